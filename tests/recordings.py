@@ -35,10 +35,11 @@ def write_recording(
     seconds: float = 120.0,
     seed: int = 0,
     biases: Mapping[str, tuple[float, float, float]] | None = None,
+    drift: float = 0.0,
 ) -> None:
     """scans.csv, truth.csv and radars.yaml: ISO times, nautical miles, compass bearings, the boat's own places.
 
-    biases: of a radar in range, m, bearing, deg clockwise, and clock, s.
+    biases: of a radar in range, m, bearing, deg clockwise, and clock, s. drift: of the boat's ranges, m/s.
     """
     rng, rows = np.random.default_rng(seed), list[list[Any]]()
     for name, (place, period) in RADARS.items():
@@ -47,6 +48,7 @@ def write_recording(
             own = np.array(place) + (np.array([-4.0, 2.0]) * time if name == "boat" else 0.0)
             seen = SHIPS[rng.random(len(SHIPS)) < 0.95]
             offsets = seen[:, :2] + seen[:, 2:] * time - own
+            far_now = far + (drift * time if name == "boat" else 0.0)
             ranges = np.hypot(*offsets.T) + rng.normal(0.0, 20.0, len(seen))
             bearings = np.arctan2(*offsets.T) + rng.normal(0.0, math.radians(0.7), len(seen))
             clutter = rng.uniform(-6000.0, 6000.0, (rng.poisson(2.0), 2)) - own
@@ -55,7 +57,7 @@ def write_recording(
             lon, lat = ORIGIN.to_degrees([own])[0].tolist()
             told = (lon, lat)
             found = [
-                [f"{max(r + far, 0.0) / 1852.0:.6f}", f"{(math.degrees(b) + turned) % 360.0:.4f}"]
+                [f"{max(r + far_now, 0.0) / 1852.0:.6f}", f"{(math.degrees(b) + turned) % 360.0:.4f}"]
                 for r, b in zip(ranges, bearings, strict=True)
             ]
             rows += [[_iso(time + ahead), name, *one, *told] for one in found or [["", ""]]]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -230,6 +231,65 @@ def test_places_are_asked_of_the_others_alone(tmp_path: Path) -> None:
     )
     assert plain == [(0, "bearing_deg"), (0, "range"), (1, "bearing_deg"), (1, "range"), (1, "clock")]
     assert asked == [(0, "range"), (1, "bearing_deg"), (1, "range"), (1, "clock"), (1, "x"), (1, "y")]
+
+
+def two_radars(folder: Path, targets: Sequence[tuple[float, ...]], names: str = "ab") -> Problem:
+    """Of targets (x, y, vx, vy); b is at (3000, 0), and said to be at (3080, -60); places are asked for."""
+    rng, rows = np.random.default_rng(3), list[list[object]]()
+    for name, at, period in (("a", 0.0, 4.0), ("b", 3000.0, 5.0))[: len(names)]:
+        for time in np.arange(0.3, 120.0, period).tolist():
+            for x, y, vx, vy in targets:
+                dx, dy = x + vx * time - at, y + vy * time
+                bearing = math.degrees(math.atan2(dy, dx) + rng.normal(0.0, 0.012))
+                rows.append([time, name, math.hypot(dx, dy) + rng.normal(0.0, 20.0), bearing])
+    with (folder / "scans.csv").open("w", newline="") as file:
+        csv.writer(file).writerows([["time", "sensor", "range", "bearing_deg"], *rows])
+    sensors = ["  - {name: a, position: [0, 0]}\n", "  - {name: b, position: [3080, -60]}\n"][: len(names)]
+    (folder / "radars.yaml").write_text(
+        "recording: {bearings: east}\n"
+        "sensor_defaults:\n"
+        "  noise: {kind: constant, std: [0.012, 20.0]}\n"
+        "  detection: {kind: constant, probability: 0.9}\n"
+        "  clutter: {kind: region, rate: 1.0}\n"
+        f"sensors:\n{''.join(sensors)}" + MOTION,
+        "utf-8",
+    )
+    scenario = scenario_of_recording(folder / "radars.yaml", folder / "scans.csv").scenario
+    return problem_of(scenario, position=True)
+
+
+def biases_of(problem: Problem) -> Calibration:
+    return calibrate(problem, only=[each for each in problem.parameters if each.kind == "bias"])
+
+
+def test_where_a_radar_really_is_is_found_by_targets_all_around(tmp_path: Path) -> None:
+    targets = [(2000.0, 3000.0, 5.0, 3.0), (-3000.0, 1000.0, -4.0, 4.0), (1000.0, -3000.0, 3.0, -6.0)]
+    calibration = biases_of(two_radars(tmp_path, targets))
+    found = {(each.parameter.sensor, each.parameter.name): each for each in calibration.found}
+    assert (calibration.rank, len(found)) == (5, 6)
+    assert found[1, "clock"].why == "what it sees with others hardly moves in so short a time"
+    for name, truth in (("x", 80.0), ("y", -60.0), ("range", 0.0), ("bearing_deg", 0.0)):
+        one = found[1, name]
+        assert abs(one.value - truth) < 3.0 * one.std, name
+    assert found[1, "x"].std < 20.0
+
+
+def test_of_far_targets_in_one_direction_a_place_is_like_a_range(tmp_path: Path) -> None:
+    """Ranges that are too long, or a place too far north."""
+    targets = [(1600.0, 9000.0, 5.0, 3.0), (1400.0, 9600.0, -4.0, 4.0), (1500.0, 8400.0, 3.0, -6.0)]
+    calibration = biases_of(two_radars(tmp_path, targets))
+    why = {(each.parameter.sensor, each.parameter.name): each.why for each in calibration.found}
+    assert why[1, "range"].startswith("it cannot be told apart from y of b")
+    assert why[1, "y"].startswith("it cannot be told apart from range of b")
+    assert (why[1, "bearing_deg"], why[1, "x"]) == ("", "")
+    assert calibration.rank == 5
+
+
+def test_of_a_radar_alone_no_place_is_found(tmp_path: Path) -> None:
+    calibration = biases_of(two_radars(tmp_path, [(2000.0, 3000.0, 5.0, 3.0), (-3000.0, 1000.0, -4.0, 4.0)], "a"))
+    assert [each.parameter.name for each in calibration.found] == ["range"]
+    assert "there is no other sensor" in calibration.found[0].why
+    assert calibration.rank == 0
 
 
 def test_values_and_scales_are_each_others_inverse(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ from typer.testing import CliRunner, Result
 from recordings import write_recording
 from vedette.calibration import Problem
 from vedette.cli import app
+from vedette.scenarios.yaml_reader import read_yaml
 
 
 @pytest.fixture
@@ -36,6 +38,19 @@ def test_what_is_found_is_printed_and_its_file_is_tracked_with(place: Path) -> N
         assert tracked.exit_code == 0, tracked.output
         scores.append(float(tracked.stdout.split("mean OSPA ")[1].split(" ")[0]))
     assert scores[1] < scores[0]
+
+
+def test_windows_are_printed_side_by_side_and_the_last_is_written(place: Path) -> None:
+    words = ("calibrate", "scans.csv", "--sensors", "radars.yaml", "--window", "30", "--out", "found.yaml")
+    result = call(*words)
+    assert result.exit_code == 0, result.output
+    assert "from, s" in result.stdout
+    assert result.stdout.count("boat") > 2 * 8
+    told = json.loads(call(*words, "--overwrite", "--json").stdout)
+    assert [round(each["begin_s"]) for each in told["windows"]] == [0, 28]
+    last = {(row["sensor"], row["parameter"]): row["found"] for row in told["windows"][1]["found"]}
+    written = read_yaml((place / "found.yaml").read_text("utf-8"), "found.yaml").data
+    assert written["sensors"][1]["bias"]["range"] == pytest.approx(last["boat", "range"], rel=1e-6)
 
 
 def test_what_is_there_is_not_overwritten_unasked(place: Path) -> None:

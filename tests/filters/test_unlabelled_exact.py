@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,6 +21,14 @@ every_scene = pytest.mark.parametrize("name", SCENES)
 
 def make(kind, scene: Scene, limits: Limits | None = None):
     return kind(scene.targets, scene.sensor, limits or Limits.none())
+
+
+def steps_of(scene: Scene) -> Iterator[tuple[int, float, Any]]:
+    """Number, seconds and scan of each step; between the first two is one of no time."""
+    yield 1, DT, scene.scans[0]
+    yield 1, 0.0, scene.scans[1]
+    for step, scan in enumerate(scene.scans[1:], 2):
+        yield step, DT, scan
 
 
 def mixture_of(density: Poisson | IidCluster, total: float = 1.0) -> Mixture:
@@ -51,10 +61,12 @@ def test_phd_is_the_intensity_of_the_exact_posterior_of_a_poisson_prior(name: st
     scene = SCENES[name]()
     tracker, rng = make(PhdFilter, scene), np.random.default_rng(0)
     belief = tracker.initial()
-    for step, scan in enumerate(scene.scans, 1):
-        posterior, info = tracker.step(belief, scan, scene.pose, DT, step, rng=rng)
+    for step, dt, scan in steps_of(scene):
+        posterior, info = tracker.step(belief, scan, scene.pose, dt, step, rng=rng)
         posterior.validate()
-        predicted = unlabelled.predict_intensity(mixture_of(belief), births_of(scene, step), scene.plain)
+        predicted = mixture_of(belief)
+        if dt > 0.0:
+            predicted = unlabelled.predict_intensity(predicted, births_of(scene, step), scene.plain)
         mean = sum(w for w, _, _ in predicted)
         density = [(w / mean, m, c) for w, m, c in predicted]
         numbers = unlabelled.poisson_distribution(mean, 22)
@@ -70,13 +82,13 @@ def test_cphd_is_cardinality_and_intensity_of_the_exact_posterior_of_an_iid_clus
     scene = SCENES[name]()
     tracker, rng = make(CphdFilter, scene), np.random.default_rng(0)
     belief = tracker.initial()
-    for step, scan in enumerate(scene.scans, 1):
-        posterior, info = tracker.step(belief, scan, scene.pose, DT, step, rng=rng)
+    for step, dt, scan in steps_of(scene):
+        posterior, info = tracker.step(belief, scan, scene.pose, dt, step, rng=rng)
         posterior.validate()
-        births = births_of(scene, step)
-        predicted, intensity = unlabelled.predict_cluster(
-            np.exp(belief.log_cardinality), mixture_of(belief), births, scene.plain
-        )
+        predicted, intensity = np.exp(belief.log_cardinality), mixture_of(belief, belief.expected_number)
+        if dt > 0.0:
+            before, births = mixture_of(belief), births_of(scene, step)
+            predicted, intensity = unlabelled.predict_cluster(predicted, before, births, scene.plain)
         mean = unlabelled.expected_number(predicted)
         assert sum(w for w, _, _ in intensity) == pytest.approx(mean, rel=1e-12)
         density = [(w / mean, m, c) for w, m, c in intensity]
@@ -94,10 +106,12 @@ def test_cb_member_is_what_the_formulas_say(name: str) -> None:
     scene = SCENES[name]()
     tracker, rng = make(CbMemberFilter, scene), np.random.default_rng(0)
     belief = tracker.initial()
-    for step, scan in enumerate(scene.scans, 1):
-        posterior, info = tracker.step(belief, scan, scene.pose, DT, step, rng=rng)
+    for step, dt, scan in steps_of(scene):
+        posterior, info = tracker.step(belief, scan, scene.pose, dt, step, rng=rng)
         posterior.validate()
-        predicted = unlabelled.predict_bernoullis(bernoullis_of(belief), births_of(scene, step), scene.plain)
+        predicted = bernoullis_of(belief)
+        if dt > 0.0:
+            predicted = unlabelled.predict_bernoullis(predicted, births_of(scene, step), scene.plain)
         expected = unlabelled.correct_cb_member(predicted, list(scan), scene.plain)
         got = bernoullis_of(posterior)
         assert [r for r, _ in got] == pytest.approx([r for r, _ in expected], abs=1e-11)

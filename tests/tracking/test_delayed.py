@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tracking.scenes import rngs
-from tracking.test_late_scans import TRACKERS, assert_equal_bits, tracker_of
+from tracking.test_late_scans import DRAW, TRACKERS, assert_equal_bits, tracker_of
 from vedette.errors import InputError, ScenarioError
 from vedette.evaluation.runs import run_scenario
 from vedette.kernels.base.types import Floats
@@ -47,7 +47,7 @@ class Loop:
         return found
 
 
-@pytest.mark.parametrize("name", [name for name in TRACKERS if name != "gibbs"])
+@pytest.mark.parametrize("name", [name for name in TRACKERS if name not in DRAW])
 def test_without_delay_it_is_the_tracker(name: str) -> None:
     tracker, experiment = tracker_of(TRACKERS[name])
     loop = Loop(experiment)

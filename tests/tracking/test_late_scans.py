@@ -23,18 +23,25 @@ MEASURED = {
     "birth.sites": [],
     "birth.from_measurements": {"expected": 0.5, "max_existence": 0.03, "std": [30.0, 30.0, 9.0, 9.0]},
 }
+LMBS: dict[str, Any] = {"fusion": {"kind": "sequential"}, "filter": {"kind": "lmb"}}
+RADIO = {"network": {"delay": 1, "loss": 0.2}}
 # Of each family of trackers, filters and fusions one, and all that draw or remember.
 TRACKERS: dict[str, dict[str, Any]] = {
     "paper-e": {},
-    "sequential": {"fusion": {"kind": "sequential"}, "filter": {"kind": "lmb"}},
+    "sequential": LMBS,
     "central": {"fusion": {"kind": "central"}, "filter": {"kind": "lmb"}},
     "clmb": {"fusion": {"kind": "clmb"}, "filter": {"kind": "lmb"}},
     "cm_delta_glmb": {"fusion": {"kind": "cm_delta_glmb"}, "filter": {"kind": "delta_glmb"}},
     "parallel": {"fusion": {"kind": "parallel"}, "filter": {"kind": "factored_glmb"}},
     "gibbs": {"filter": {"kind": "delta_glmb", "assignment": {"kind": "gibbs"}}, "fusion": {"kind": "cm_delta_glmb"}},
-    "measured": {**MEASURED, "fusion": {"kind": "sequential"}, "filter": {"kind": "lmb"}},
+    "measured": {**MEASURED, **LMBS},
     "matched": {**MEASURED, "fusion": {"kind": "clmb", "matching": "assignment"}, "filter": {"kind": "lmb"}},
+    "radio": {**RADIO, **MEASURED, **LMBS},
+    "reach": {**MEASURED, **LMBS, "network": {"hops": 1, "loss": 0.3}},
+    "radio beliefs": {**RADIO, "fusion": {"kind": "clmb", "feedback": True}, "filter": {"kind": "lmb"}},
+    "consensus": {"fusion": {"kind": "parallel"}, "network": {"consensus_rounds": 2}, "filter": {"kind": "lmb"}},
 }
+DRAW = ("gibbs", "radio", "reach", "radio beliefs")
 WINDOW = 6.0
 
 
@@ -200,8 +207,10 @@ def test_arrays_that_a_caller_goes_on_to_change_do_not_change_what_is_worked_aga
         (scan(sensor=2), "scan.sensor: expected a whole number from 0 to 1; got 2"),
         (scan(sensor=-1), "scan.sensor: expected a whole number of at least 0; got -1"),
         (scan(time=float("nan")), "scan.time: expected a finite number; got nan"),
-        (scan(measurements=[[1.0, 2.0, 3.0]]), "scan of sensor 0 at 1 s: scan: expected an array of shape"),
+        (scan(time=3.0, measurements=[[1.0, 2.0, 3.0]]), "scan of sensor 0 at 3 s: scan: expected an array of shape"),
         (scan(measurements=None), "scan of sensor 0 at 1 s: scan: expected"),
+        (scan(measurements=[[1.0], [2.0, 3.0]]), "scan of sensor 0 at 1 s: scan: expected numbers in an array"),
+        (scan(time=3.0, measurements=[[1.0, np.nan]]), "scan of sensor 0 at 3 s: scan: expected finite numbers"),
         (scan(pose=(0.0, 0.0)), "scan of sensor 0 at 1 s, pose: expected an array of shape"),
         (scan(pose=np.zeros(4)), "scan of sensor 0 at 1 s, pose: expected at most 3 numbers"),
         ("scan", "scan: expected a SensorScan; got str"),

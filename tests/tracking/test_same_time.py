@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from tracking.scenes import filters, rngs, scans_of, sensor, targets
+from tracking.scenes import assert_same_lmb, filters, rngs, scans_of, sensor, targets
 from vedette import models
 from vedette.densities import LMB, as_lmb
 from vedette.errors import InputError
@@ -19,11 +20,10 @@ from vedette.filters import (
     LmbFilter,
     MultiSensorGlmbFilter,
     MultiSensorLmbFilter,
-    PhdFilter,
     SequentialLmbFilter,
 )
-from vedette.fusion import Clmb
-from vedette.tracking import Central, Distributed, Network, ScanNetwork, Tracker
+from vedette.fusion import Clmb, Matched, ParallelUpdate
+from vedette.tracking import BeliefNetwork, Central, Distributed, Network, ScanNetwork, State, Tracker
 
 TRUTH = np.array([[2.0, 1.0, 1.0, 0.0], [98.0, 3.0, 0.0, 1.0]])
 POSES = np.zeros((2, 3))
@@ -97,17 +97,83 @@ def test_who_was_measured_at_one_time_by_scans_that_came_apart_is_born_once() ->
     assert state.fused.tracks.num_tracks == 2
 
 
-def test_time_does_not_run_back_and_networks_and_filters_without_labels_wait_for_it() -> None:
+NEAR = np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 0.0], [200.0, 0.0, 0.0]])  # within 120 m of the next: two hops
+THREE = (*SENSORS, sensor(4.0, 0.7, 0.5))
+BORN = models.MeasurementBirth(expected=0.5, max_existence=0.1, std=np.array([20.0, 20.0, 5.0, 5.0]))
+EQUAL = (1 / 3, 1 / 3, 1 / 3)
+
+
+def both_ways(tracker: Tracker, num_steps: int = 5) -> Iterator[tuple[State, State]]:
+    """The state after scans of three sensors that come together, and after the same that come one by one."""
+    rng = np.random.default_rng(1)
+    together = apart = tracker.initial()
+    for step in range(1, num_steps + 1):
+        truth = TRUTH.copy()
+        truth[:, :2] += step * truth[:, 2:]
+        scans = scans_of(truth, THREE, NEAR, rng)
+        together, _ = tracker.step(together, scans, NEAR, float(step), rngs=rngs(3))
+        for s in range(3):
+            alone = [scan if i == s else None for i, scan in enumerate(scans)]
+            apart, _ = tracker.step(apart, alone, NEAR, float(step), rngs=rngs(3))
+        yield together, apart
+
+
+@pytest.mark.parametrize("network", [Network(), Network(120.0), Network(120.0, delay=1), Network(60.0)])
+def test_scans_that_come_apart_over_a_network_are_those_that_come_together(network: Network) -> None:
+    tracker = ScanNetwork(SequentialLmbFilter(targets(), THREE, OPEN), network, Clmb(EQUAL))
+    for together, apart in both_ways(tracker):
+        for one, other in zip(together.local, apart.local, strict=True):
+            assert_same_lmb(one, other, 1e-9)
+
+
+@pytest.mark.parametrize("network", [Network(), Network(120.0), Network(60.0)])
+def test_beliefs_that_come_apart_over_a_network_say_what_each_scan_said_once(network: Network) -> None:
+    """Whoever divides by the common prediction adds what each scan has said, in one round or in three."""
+    tracker = BeliefNetwork(filters(targets(), THREE), ParallelUpdate(), network, Clmb(EQUAL))
+    for together, apart in both_ways(tracker):
+        for one, other in zip(together.local, apart.local, strict=True):
+            np.testing.assert_array_equal(one.tracks.labels, other.tracks.labels)
+            np.testing.assert_allclose(one.existence, other.existence, atol=0.02)
+
+
+@pytest.mark.parametrize("network", [Network(), Network(120.0, hops=1), Network(loss=0.3)])
+@pytest.mark.parametrize("beliefs", [False, True])
+def test_nobody_moves_dies_or_is_born_of_no_time_in_a_network(network: Network, beliefs: bool) -> None:
+    world = targets((0.5, 0.3))
+    world = replace(world, birth=replace(world.birth, steps=None))  # at every step
+    tracker: Tracker = ScanNetwork(SequentialLmbFilter(world, THREE), network, Clmb(EQUAL))
+    if beliefs:
+        tracker = BeliefNetwork(filters(world, THREE), Clmb(EQUAL), network, Clmb(EQUAL))
+    state, nobody = tracker.initial(), [None] * 3
+    for time in (1.0, 2.0, 3.0):  # nothing was measured: all believe the same, whatever they hear
+        state, _ = tracker.step(state, nobody, NEAR, time, rngs=rngs(3))
+    again, _ = tracker.step(state, nobody, NEAR, 3.0, rngs=rngs(3))
+    for before, after in zip(state.local, again.local, strict=True):
+        assert_same_lmb(after, before, 1e-12)
+
+
+@pytest.mark.parametrize("delay", [0, 1])
+def test_who_was_measured_by_scans_that_came_apart_is_born_once_in_a_network(delay: int) -> None:
+    world, near = targets((), BORN), [np.array([[10.0, 0.0]]), np.array([[12.0, 1.0], [300.0, 0.0]])]
+    trackers = (
+        ScanNetwork(SequentialLmbFilter(world, SENSORS), Network(delay=delay), Clmb((0.5, 0.5))),
+        BeliefNetwork(filters(world, SENSORS), Matched(Clmb((0.5, 0.5))), Network(), Clmb((0.5, 0.5))),
+    )
+    for tracker in trackers:
+        state, _ = tracker.step(tracker.initial(), [near[0], None], POSES, 1.0, rngs=rngs(2))
+        state, _ = tracker.step(state, [None, near[1]], POSES, 1.0, rngs=rngs(2))
+        state, _ = tracker.step(state, [None, None], POSES, 2.0, rngs=rngs(2))
+        own = [sorted(belief.tracks.means[:, 0].round().tolist()) for belief in state.local]
+        assert own[0] == own[1] == [10.0, 300.0]  # late or not, all know of all scans of 1 s at 2 s
+
+
+def test_time_does_not_run_back_and_does_not_stand_still_where_beliefs_are_late() -> None:
     tracker = central(SequentialLmbFilter)
     nothing = [np.zeros((0, 2))] * 2
     state, _ = tracker.step(tracker.initial(), nothing, POSES, 1.0, rngs=rngs(2))
     with pytest.raises(InputError, match=r"time: expected one from that of the last scan on, 1 s; got 0.5"):
         tracker.step(state, nothing, POSES, 0.5, rngs=rngs(2))
-    radio = ScanNetwork(SequentialLmbFilter(targets(), SENSORS), Network(), Clmb((0.5, 0.5)))
-    state, _ = radio.step(radio.initial(), nothing, POSES, 1.0, rngs=rngs(2))
-    with pytest.raises(InputError, match=r"time: expected one after that of the last scan, 1 s; got 1"):
-        radio.step(state, nothing, POSES, 1.0, rngs=rngs(2))
-    alone = Distributed((PhdFilter(targets(), SENSORS[0]),))
-    state, _ = alone.step(alone.initial(), nothing[:1], POSES[:1], 1.0, rngs=rngs(1))
-    with pytest.raises(InputError, match=r"dt: expected a number above 0; got 0"):
-        alone.step(state, nothing[:1], POSES[:1], 1.0, rngs=rngs(1))
+    late = BeliefNetwork(filters(targets(), SENSORS), Clmb((0.5, 0.5)), Network(delay=1), Clmb((0.5, 0.5)))
+    state, _ = late.step(late.initial(), nothing, POSES, 1.0, rngs=rngs(2))
+    with pytest.raises(InputError, match=r"time: expected one after that of the last scan, 1 s, as beliefs that"):
+        late.step(state, nothing, POSES, 1.0, rngs=rngs(2))

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from vedette.calibration.maximum import Maximum, covariance, maximise
+from vedette.calibration.maximum import covariance, maximise
 from vedette.calibration.parameters import Parameter, Problem
 from vedette.calibration.registration import BIASES, Pairs, linked, matched, register
 from vedette.kernels.base.types import Floats
@@ -33,43 +34,60 @@ class Found(NamedTuple):
     high: float
     why: str
 
+    @property
+    def std(self) -> float:
+        """Standard deviation of a parameter whose scale is plain; NaN where it was not found."""
+        return (self.high - self.low) / (2.0 * _QUANTILE)
+
 
 class Calibration(NamedTuple):
     """What was found of all parameters.
 
     log_likelihood, before: of the recording, as found and as it was said. converged: whether the search came to an end.
+    rank: of the information, the number of directions of the parameters that the recording says something of.
     """
 
     found: tuple[Found, ...]
     log_likelihood: float
     before: float
     converged: bool
+    rank: int
 
 
-def calibrate(problem: Problem, watch: Callable[[], None] = lambda: None) -> Calibration:
+def calibrate(
+    problem: Problem, watch: Callable[[], None] = lambda: None, only: Sequence[Parameter] | None = None
+) -> Calibration:
     """The maximum of the likelihood of a recording over what its sensors may be like.
 
     Args:
         problem: the recording and the parameters.
         watch: called whenever the recording was tracked once more.
+        only: the parameters that are found, while others are as they start; None: all.
 
     Raises:
         VedetteError: a filter that cannot take the recording.
     """
 
+    said = problem.free([each.start for each in problem.parameters])
+    own = [i for i, each in enumerate(problem.parameters) if only is None or each in only]
+    asked = replace(problem, parameters=tuple(problem.parameters[i] for i in own))
+
     def terms(free: Floats) -> Floats:
         watch()
-        return problem.log_likelihoods(free)
+        whole = said.copy()
+        whole[own] = free
+        return problem.log_likelihoods(whole)
 
-    said = problem.free([each.start for each in problem.parameters])
-    unknown = np.array([each.unknown for each in problem.parameters])
-    before = float(terms(said).sum())
-    start, pairs = _guess(problem, said, watch)
-    if not float(terms(start).sum()) > before:
-        start = said
-    maximum = maximise(terms, start, unknown, _blocks(problem.parameters))
-    apart = np.flatnonzero(~linked(pairs, len(problem.sites))).tolist()
-    return Calibration(_judged(problem, maximum, unknown, apart), maximum.log_likelihood, before, maximum.converged)
+    unknown = np.array([each.unknown for each in asked.parameters])
+    before = float(terms(said[own]).sum())
+    guessed, pairs = _guess(problem, said, own, watch)
+    start = guessed[own] if float(terms(guessed[own]).sum()) > before else said[own]
+    maximum = maximise(terms, start, unknown, _blocks(asked.parameters))
+    together = linked(pairs, len(problem.sites))
+    apart = np.flatnonzero(~together | (together.sum() == 1)).tolist()  # with nobody else, the first one is, too
+    cov, lost = covariance(maximum.information, unknown)
+    found, rank = _judged(asked, maximum.at, cov, lost, apart), len(own) - round(float(np.trace(lost)))
+    return Calibration(found, maximum.log_likelihood, before, maximum.converged, rank)
 
 
 def _blocks(parameters: tuple[Parameter, ...]) -> list[list[int]]:
@@ -83,8 +101,8 @@ def _blocks(parameters: tuple[Parameter, ...]) -> list[list[int]]:
     return blocks
 
 
-def _guess(problem: Problem, said: Floats, watch: Callable[[], None]) -> tuple[Floats, Pairs]:
-    """A first guess, and what it was made from.
+def _guess(problem: Problem, said: Floats, own: Sequence[int], watch: Callable[[], None]) -> tuple[Floats, Pairs]:
+    """A first guess, of `own` among the biases, and what it was made from.
 
     Tracks by noise as wide as biases may be, then by narrower noise, and what fits them.
     """
@@ -93,7 +111,7 @@ def _guess(problem: Problem, said: Floats, watch: Callable[[], None]) -> tuple[F
     asked, unknown = np.zeros((len(sites), len(BIASES)), bool), np.ones((len(sites), len(BIASES)))
     places = {}
     for i, each in enumerate(problem.parameters):
-        if each.kind == "bias":
+        if each.kind == "bias" and i in own:
             at = each.sensor, BIASES.index(each.component)
             places[i], asked[at], unknown[at] = at, True, each.unknown / abs(each.per_si)
     stds = far
@@ -138,15 +156,17 @@ def _with_counts(problem: Problem, values: Floats, pairs: Pairs) -> Floats:
     return values
 
 
-def _judged(problem: Problem, maximum: Maximum, unknown: Floats, apart: Sequence[int]) -> tuple[Found, ...]:
-    """Each parameter with its interval, or why it cannot be found; apart: sensors without targets that others see."""
-    cov, lost = covariance(maximum.information, unknown)
+def _judged(problem: Problem, at: Floats, cov: Floats, lost: Floats, apart: Sequence[int]) -> tuple[Found, ...]:
+    """Each parameter with its interval, or why it cannot be found.
+
+    cov, lost: as of `covariance`. apart: sensors without targets that others see.
+    """
     found = []
-    for i, (each, free) in enumerate(zip(problem.parameters, maximum.at.tolist(), strict=True)):
+    for i, (each, free) in enumerate(zip(problem.parameters, at.tolist(), strict=True)):
         partners = [j for j in np.flatnonzero(np.abs(lost[i]) > _PART).tolist() if j != i]
         compared = each.sensor in apart and each.component in _COMPARED
         if compared or lost[i, i] > _PART:
-            why = _why(problem, i, [] if compared else partners)
+            why = _why(problem, i, [] if compared else partners, each.sensor in apart)
             found.append(Found(each, each.start, math.nan, math.nan, why))
             continue
         reach = _QUANTILE * math.sqrt(cov[i, i])
@@ -155,17 +175,19 @@ def _judged(problem: Problem, maximum: Maximum, unknown: Floats, apart: Sequence
     return tuple(found)
 
 
-def _why(problem: Problem, i: int, partners: list[int]) -> str:
+def _why(problem: Problem, i: int, partners: list[int], is_apart: bool) -> str:
     """Why a parameter cannot be found, by those that cannot be told from it."""
     own = problem.parameters[i]
     names = [f"{problem.parameters[j].name} of {problem.sites[problem.parameters[j].sensor].name}" for j in partners]
-    others = {problem.parameters[j].sensor for j in partners} - {own.sensor}
     if own.kind != "bias":
         return "the recording says next to nothing of it"
-    if not others:
-        alone = len(problem.sites) == 1
+    if len(problem.sites) == 1 or is_apart:
         what = {"bearing": "a rotation", "clock": "a shift in time"}.get(own.component, "a shift")
+        alone = len(problem.sites) == 1
         told = "there is no other sensor" if alone else "no other sensor sees enough of the same targets"
         beside = f" (with {', '.join(names)})" if names else ""
         return f"{told} to tell it{beside} from {what} of all that this one sees"
-    return f"it cannot be told apart from {', '.join(names)}: together they move all that is seen"
+    if names:
+        return f"it cannot be told apart from {', '.join(names)}: together they move all that is seen"
+    still = own.component == "clock"
+    return f"what it sees with others {'hardly moves in so short a time' if still else 'says next to nothing of it'}"

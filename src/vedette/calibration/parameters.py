@@ -85,13 +85,17 @@ class Problem:
 
     def without_biases(self, values: Floats) -> RecordedScans:
         """The recording as sensors without such biases would have made it."""
+        return without_biases(self.recording, self.with_biases(values))
+
+    def with_biases(self, values: Floats) -> list[Site]:
+        """The sensors with the biases among these values of the parameters."""
         sites = list(self.sites)
         for each, value in zip(self.parameters, values.tolist(), strict=True):
             if each.kind == "bias":
                 # The bearing of a `Bias` has the rows' direction, as its parameter has.
                 own, change = sites[each.sensor], {each.component: value / abs(each.per_si)}
                 sites[each.sensor] = replace(own, bias=replace(own.bias, **change))
-        return without_biases(self.recording, sites)
+        return sites
 
     def log_likelihoods(self, free: Floats) -> Floats:
         """(num_scans,) what each scan of each sensor adds to the log likelihood, whatever order they are in.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,7 +18,7 @@ from vedette.cli.tracking import read_recording
 from vedette.errors import InputError
 
 if TYPE_CHECKING:
-    from vedette.calibration import Calibration
+    from vedette.calibration import Calibration, Window
 
 
 def calibrate(
@@ -31,12 +32,16 @@ def calibrate(
     position: Annotated[
         bool, typer.Option("--position", help="Find biases of the sensors' own places, too (x, y).")
     ] = False,
+    window: Annotated[
+        float | None,
+        typer.Option("--window", metavar="S", min=0.001, help="Find them anew for every S seconds, where they drift."),
+    ] = None,
     speed: Speed = 10.0,
     bad_rows: BadRows = "refuse",
     trust: Trust = False,
 ) -> None:
     """Find from recorded scans alone what each sensor is like: biases, noise, detection, clutter, with intervals."""
-    from vedette.calibration.calibrating import calibrate as found_by
+    from vedette.calibration.drifting import calibrate_windows
     from vedette.files import write_whole
     from vedette.scenarios.calibrated import calibrated_text, problem_of
 
@@ -47,21 +52,35 @@ def calibrate(
         compile_if_cold(scenario)
         problem = problem_of(scenario, position=position)
         with compiling(), _counting() as watch:
-            calibration = found_by(problem, watch)
+            windows = list(calibrate_windows(problem, window or math.inf, watch))
         if out is not None:
-            text = calibrated_text(scenario, sensors, calibration, out.parent)
+            text = calibrated_text(scenario, sensors, windows[-1].calibration, out.parent)
             try:
                 out.parent.mkdir(parents=True, exist_ok=True)
                 write_whole(out, lambda file: file.write(text.encode("utf-8")))
             except OSError as error:
                 raise InputError(f"{out}: expected a place to write; got {error.strerror}") from None
-    rows = _rows(calibration, scenario.model.sensor_names)
-    _print(rows, calibration, position)
+    names = scenario.model.sensor_names
+    _print(windows, names, position)
     if out is not None:
         say(f"wrote {out}")
+    documents = [_document(each.calibration, names) for each in windows]
+    told = {"assumed": assumed, "skipped": recording.skipped, "written": [] if out is None else [out]}
+    if window is None:
+        publish({**documents[0], **told})
+    else:
+        spans = [{"begin_s": each.begin, "end_s": each.end} for each in windows]
+        publish({"windows": [span | own for span, own in zip(spans, documents, strict=True)], **told})
+
+
+def _document(calibration: Calibration, names: tuple[str, ...]) -> dict[str, Any]:
     likelihoods = {"log_likelihood": calibration.log_likelihood, "log_likelihood_before": calibration.before}
-    told = {"converged": calibration.converged, "assumed": assumed, "skipped": recording.skipped}
-    publish({"found": rows, **likelihoods, **told, "written": [] if out is None else [out]})
+    return {
+        "found": _rows(calibration, names),
+        **likelihoods,
+        "converged": calibration.converged,
+        "rank": calibration.rank,
+    }
 
 
 @contextmanager
@@ -93,27 +112,39 @@ def _rows(calibration: Calibration, names: tuple[str, ...]) -> list[dict[str, An
     ]
 
 
-def _print(rows: list[dict[str, Any]], calibration: Calibration, position: bool) -> None:
+def _print(windows: list[Window], names: tuple[str, ...], position: bool) -> None:
+    """Each parameter, through the windows."""
     from rich.table import Table
 
-    table = Table("sensor", "parameter", "said", "found", "95 times of 100 in", box=None, pad_edge=False)
-    for row in rows:
-        unit = f" {row['unit']}" if row["unit"] else ""
-        told = [row["sensor"], row["parameter"], f"{row['said']:.4g}{unit}"]
-        if row["why_not"]:
-            table.add_row(*told, "not found", "")
-        else:
-            table.add_row(*told, f"{row['found']:.4g}{unit}", f"{row['low']:.4g} to {row['high']:.4g}")
+    all_rows = [_rows(each.calibration, names) for each in windows]
+    rows, several = all_rows[0], len(windows) > 1
+    table = Table("sensor", "parameter", *["from, s"] * several, "said", "found", "95 times of 100 in", box=None)
+    for i in range(len(rows)):
+        for window, own in zip(windows, all_rows, strict=True):
+            row, since = own[i], [f"{window.begin:.0f}"] * several
+            unit = f" {row['unit']}" if row["unit"] else ""
+            told = [row["sensor"], row["parameter"], *since, f"{row['said']:.4g}{unit}"]
+            if row["why_not"]:
+                table.add_row(*told, "not found", "")
+            else:
+                table.add_row(*told, f"{row['found']:.4g}{unit}", f"{row['low']:.4g} to {row['high']:.4g}")
+    table.pad_edge = False
     console().print(table)
-    for row in rows:
-        if row["why_not"]:
-            say(f"{row['parameter']} of {row['sensor']}: {row['why_not']}")
+    told_of = [
+        f"{row['parameter']} of {row['sensor']}: {row['why_not']}" for own in all_rows for row in own if row["why_not"]
+    ]
+    for text in dict.fromkeys(told_of):
+        say(text)
     others = {row["parameter"] for row in rows if row["sensor"] != rows[0]["sensor"]}
     if "clock" in others:
         say("clocks are against that of the first sensor, as a shift of all times changes nothing")
-    if "x" in others - {row["parameter"] for row in rows if row["sensor"] == rows[0]["sensor"]}:
-        what = "places and bearings" if position else "positions"
-        say(f"{what} are against those of the first sensor, as a shift or turn of all changes nothing")
-    if not calibration.converged:
-        note("the search did not come to an end: what was found may not be the maximum")
-    say(f"log likelihood {calibration.before:.1f} as said, {calibration.log_likelihood:.1f} as found")
+    if position or "x" in others - {row["parameter"] for row in rows if row["sensor"] == rows[0]["sensor"]}:
+        what, alone = "places and bearings" if position else "positions", "" if others else ", and there is no other"
+        say(f"{what} are against those of the first sensor, as a shift or turn of all changes nothing{alone}")
+    for window in windows:
+        calibration, part = window.calibration, f"from {window.begin:.0f} s on: " if several else ""
+        if not calibration.converged:
+            note(f"{part}the search did not come to an end: what was found may not be the maximum")
+        if any(each.why for each in calibration.found):
+            say(f"{part}the recording says something of {calibration.rank} of {len(calibration.found)} directions")
+        say(f"{part}log likelihood {calibration.before:.1f} as said, {calibration.log_likelihood:.1f} as found")

@@ -147,6 +147,21 @@ def check_covariances(field: str, covs: Floats, error: type[VedetteError] = Nume
         raise error(message) from None
 
 
+def check_components(
+    field: str, log_weights: Any, means: Any, covs: Any, error: type[VedetteError] = NumericalError
+) -> None:
+    """Raise unless these are weights, means and covariances of Gaussians; arguments and errors as `check_mixtures`."""
+    check_array(f"{field}means", means, np.float64, (None, None))
+    num_components, dim = means.shape
+    if dim == 0:
+        raise InputError(f"{field}means: expected a state of at least 1 dimension; got 0")
+    check_array(f"{field}log_weights", log_weights, np.float64, (num_components,))
+    check_array(f"{field}covs", covs, np.float64, (num_components, dim, dim))
+    check_log_weights(f"{field}log_weights", log_weights, error)
+    check_finite(f"{field}means", means, error)
+    check_covariances(f"{field}covs", covs, error)
+
+
 def check_mixtures(
     field: str,
     offsets: Any,
@@ -160,17 +175,9 @@ def check_mixtures(
 
     field: what goes before the names of the arrays. `InputError` for faults of form, `error` for faults of value.
     """
-    check_array(f"{field}means", means, np.float64, (None, None))
-    num_components, dim = means.shape
-    if dim == 0:
-        raise InputError(f"{field}means: expected a state of at least 1 dimension; got 0")
-    check_array(f"{field}log_weights", log_weights, np.float64, (num_components,))
-    check_array(f"{field}covs", covs, np.float64, (num_components, dim, dim))
-    check_offsets(f"{field}offsets", offsets, count, num_components, empty_allowed=False)
-    check_log_weights(f"{field}log_weights", log_weights, error)
+    check_components(field, log_weights, means, covs, error)
+    check_offsets(f"{field}offsets", offsets, count, len(log_weights), empty_allowed=False)
     check_normalised(f"{field}log_weights", log_weights, offsets, error)
-    check_finite(f"{field}means", means, error)
-    check_covariances(f"{field}covs", covs, error)
 
 
 def label_step_up(labels: Ints) -> Bools:

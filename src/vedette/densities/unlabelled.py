@@ -114,15 +114,7 @@ class Poisson(Unlabelled):
         `InputError` for faults of form; `error` for values that are not finite or covariances that are not symmetric
         positive definite.
         """
-        checks.check_array("means", self.means, np.float64, (None, None))
-        num_components, dim = self.means.shape
-        if dim == 0:
-            raise InputError("means: expected a state of at least 1 dimension; got 0")
-        checks.check_array("log_weights", self.log_weights, np.float64, (num_components,))
-        checks.check_array("covs", self.covs, np.float64, (num_components, dim, dim))
-        checks.check_log_weights("log_weights", self.log_weights, error)
-        checks.check_finite("means", self.means, error)
-        checks.check_covariances("covs", self.covs, error)
+        checks.check_components("", self.log_weights, self.means, self.covs, error)
 
 
 @dataclass(frozen=True, slots=True)

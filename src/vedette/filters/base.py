@@ -99,6 +99,14 @@ class SingleSensorFilter:
         motion = kernel_motion(targets.motion, targets.survival)
         return given, motion, sensor.to_kernel(), self.limits.truncation(sensor.meas_dim)
 
+    def _inputs_after(
+        self, dt: Any, scan: Floats, pose: Any, step: Any, prior: Labelled | None = None, births: LMB | None = None
+    ) -> StepInputs:
+        """As `_inputs`; at the prior's own time those of an update."""
+        if no_time(dt):
+            return self._update_inputs(scan, pose)
+        return self._inputs(scan, pose, dt, step, prior, births)
+
     def _update_inputs(self, scan: Floats, pose: Any) -> tuple[ScanInput, None, Sensor, Truncation]:
         """As `_inputs`, of a scan of the prior's own time."""
         given = ScanInput(nobody(self.targets.state_dim), scan, pose_vector("pose", pose), 0.0)
@@ -191,14 +199,6 @@ class LabelledFilter(SingleSensorFilter, OfKind[BeliefT]):
         prior = check_belief(belief, self.kind, self.targets.state_dim)
         inputs = self._update_inputs(measurements, pose)
         return self._taken(prior, inputs, rng, num_duplicates, "")
-
-    def _inputs_after(
-        self, dt: Any, scan: Floats, pose: Any, step: Any, prior: BeliefT, births: LMB | None
-    ) -> StepInputs:
-        """As `_inputs`; at the prior's own time those of an update."""
-        if no_time(dt):
-            return self._update_inputs(scan, pose)
-        return self._inputs(scan, pose, dt, step, prior, births)
 
     def _taken(
         self,

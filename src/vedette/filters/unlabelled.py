@@ -11,18 +11,15 @@ import numpy as np
 
 from vedette.densities import IidCluster, MultiBernoulli, Poisson
 from vedette.errors import NumericalError
-from vedette.filters.base import SingleSensorFilter
+from vedette.filters.base import SingleSensorFilter, StepInputs
 from vedette.filters.inputs import check_belief, check_scan, model_errors
 from vedette.filters.protocols import FilterInfo
-from vedette.kernels.association.truncation import Truncation
-from vedette.kernels.base.types import Motion, ScanInput, Sensor
 from vedette.kernels.steps.cbmember import step_cb_member
 from vedette.kernels.steps.cphd import step_cphd
 from vedette.kernels.steps.phd import step_phd
 from vedette.models.arguments import generator
 
 _Density = TypeVar("_Density", Poisson, IidCluster, MultiBernoulli)
-_Inputs = tuple[ScanInput, Motion, Sensor, Truncation]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,13 +46,13 @@ class UnlabelledFilter(SingleSensorFilter, ABC, Generic[_Density]):
         generator(rng)
         measurements, num_duplicates = check_scan(scan, self.sensor)
         prior = check_belief(belief, self.kind, self.targets.state_dim)
-        inputs = self._inputs(measurements, pose, dt, step)
+        inputs = self._inputs_after(dt, measurements, pose, step)
         with model_errors():
             posterior, info = self._updated(prior, inputs, f"step {step}: ")
         return posterior, replace(info, num_duplicates=num_duplicates)
 
     @abstractmethod
-    def _updated(self, prior: _Density, inputs: _Inputs, place: str) -> tuple[_Density, FilterInfo]:
+    def _updated(self, prior: _Density, inputs: StepInputs, place: str) -> tuple[_Density, FilterInfo]:
         """The posterior and a report without `num_duplicates`. place: of errors."""
 
     def _info(self, report: Any, num_tracks: int, most: int, log_likelihood: float, discarded: float) -> FilterInfo:
@@ -86,7 +83,7 @@ class PhdFilter(UnlabelledFilter[Poisson]):
 
     kind: ClassVar[type[Poisson]] = Poisson
 
-    def _updated(self, prior: Poisson, inputs: _Inputs, place: str) -> tuple[Poisson, FilterInfo]:
+    def _updated(self, prior: Poisson, inputs: StepInputs, place: str) -> tuple[Poisson, FilterInfo]:
         posterior, report = step_phd(prior.to_kernel(), *inputs, self.limits.intensity_caps())
         log_likelihood = report.log_total + report.log_clutter - self.sensor.clutter.rate
         num, most = len(posterior.log_weights), self.limits.max_intensity_components
@@ -106,7 +103,7 @@ class CphdFilter(UnlabelledFilter[IidCluster]):
 
     kind: ClassVar[type[IidCluster]] = IidCluster
 
-    def _updated(self, prior: IidCluster, inputs: _Inputs, place: str) -> tuple[IidCluster, FilterInfo]:
+    def _updated(self, prior: IidCluster, inputs: StepInputs, place: str) -> tuple[IidCluster, FilterInfo]:
         log_cardinality, mixture = prior.to_kernel()
         cardinality, posterior, report = step_cphd(log_cardinality, mixture, *inputs, self.limits.intensity_caps())
         if report.log_total == -math.inf:
@@ -131,7 +128,7 @@ class CbMemberFilter(UnlabelledFilter[MultiBernoulli]):
 
     kind: ClassVar[type[MultiBernoulli]] = MultiBernoulli
 
-    def _updated(self, prior: MultiBernoulli, inputs: _Inputs, place: str) -> tuple[MultiBernoulli, FilterInfo]:
+    def _updated(self, prior: MultiBernoulli, inputs: StepInputs, place: str) -> tuple[MultiBernoulli, FilterInfo]:
         limits = self.limits
         posterior, report = step_cb_member(prior.to_kernel(), *inputs, limits.reduction(), limits.max_existence_logit)
         info = self._info(report, len(posterior.existence_logit), limits.max_labels, math.nan, math.nan)

@@ -102,6 +102,19 @@ class RecordedScans:
     skipped: tuple[str, ...]
     bearings: tuple[Bearings | None, ...]
 
+    def between(self, begin: float, end: float) -> RecordedScans:
+        """The instants from `begin` to before `end`, s of `times`; they start anew where there are any."""
+        low, high = np.searchsorted(self.times, [begin, end]).tolist()
+        first = float(self.times[low]) if low < high else 0.0
+        parts = (
+            self.times[low:high] - first,
+            self.start + first,
+            self.is_utc,
+            self.scans[low:high],
+            self.poses[low:high],
+        )
+        return RecordedScans(*parts, self.skipped, self.bearings)
+
     def arrivals(self) -> Iterator[SensorScan]:
         """Every scan by itself, in order of time, as `LateScans` takes them; times as of `times`."""
         for time, scans, poses in zip(self.times.tolist(), self.scans, self.poses, strict=True):
@@ -163,12 +176,14 @@ def without_biases(recording: RecordedScans, sites: Sequence[Site]) -> RecordedS
         for s, scan in enumerate(scans):
             if scan is not None:
                 look = Look(time, s, scan, poses[s])
-                looks.append(_without_bias(look, sites[s].kind, sites[s].bias, recording.bearings[s]))
+                looks.append(without_bias(look, sites[s], recording.bearings[s]))
     told = recording.start, recording.is_utc, recording.skipped, recording.bearings
     return in_order(looks, recording.poses[0], *told)
 
 
-def _without_bias(look: Look, kind: str, bias: Bias, bearings: Bearings | None) -> Look:
+def without_bias(look: Look, site: Site, bearings: Bearings | None) -> Look:
+    """A scan as its sensor would have made it without its bias."""
+    kind, bias = site.kind, site.bias
     if bias == NO_BIAS:
         return look
     turn = -bias.bearing if bearings == "north" else bias.bearing

@@ -15,7 +15,8 @@ from vedette.kernels.base.types import Floats
 from vedette.models import Bias, Region, SensorModel, TargetModel
 from vedette.plausible import told_elsewhere
 from vedette.reading import read_text
-from vedette.recorded.instants import COMPONENTS
+from vedette.recorded import RecordedScans
+from vedette.recorded.instants import COMPONENTS, Bearings
 from vedette.scenarios.build import build_sensors
 from vedette.scenarios.dumping import dump_data
 from vedette.scenarios.loading import Scenario
@@ -33,7 +34,7 @@ _WIDER = 3.0  # times the region, along each axis: what is turned or shifted sta
 _LEAST_RATE, _SUREST = 0.01, 0.98  # to start from
 
 
-def problem_of(scenario: Scenario, *, position: bool = False) -> Problem:
+def problem_of(scenario: Scenario, *, position: bool = False, bearings: Bearings | None = None) -> Problem:
     """The sensors of a recording as parameters to be found.
 
     Biases of range, bearing and clock, noise, probability of detection and rate of clutter: what each sensor has of
@@ -42,16 +43,18 @@ def problem_of(scenario: Scenario, *, position: bool = False) -> Problem:
     LMB filter that takes the scans in turn, with the motion, survival and births of the scenario.
 
     Args:
-        scenario: as of `vedette.scenarios.of_recording`.
+        scenario: as of `vedette.scenarios.of_recording`; of sensors alone, as for scans that are to come, it has none.
         position: whether biases of the other sensors' own places are asked for, too.
+        bearings: in which direction the biases of bearings count, where there is no recording.
     """
     model, folder = scenario.model, scenario.folder
-    assert model.recording is not None
-    recording = model.recording.build(model, folder, as_told=True)
     sites = tuple(sites_of(model))
+    recording = RecordedScans(np.empty(0), 0.0, False, (), np.empty((0, len(sites), 3)), (), (bearings,) * len(sites))
+    if model.recording is not None:
+        recording = model.recording.build(model, folder, as_told=True)
     parameters, only_positions = list[Parameter](), all(site.kind == "position" for site in sites)
     for s, sensor in enumerate(model.sensors):
-        if any(scans[s] is not None for scans in recording.scans):
+        if not recording.scans or any(scans[s] is not None for scans in recording.scans):
             clockwise = recording.bearings[s] == "north"
             parameters += _biases(s, sensor, sites[s].bias, clockwise, position, only_positions)
             parameters += _of_models(s, sensor)

@@ -90,7 +90,7 @@ class Tracker(Protocol):
                 has found nothing; None of a sensor that did not scan at `time`.
             poses: (num_sensors, 3 or more) [px, py, heading_rad, ...] of each sensor at `time`.
             time: s, after `state.time`; or the same, for scans of that time that come apart: nobody then moves, dies
-                or is born in between. Networks, whose messages take scans, and filters without labels take none.
+                or is born in between. Networks exchange messages at each such step; their delays count times.
             rngs: one a sensor, for filters that draw.
 
         Returns:
@@ -105,26 +105,15 @@ class Tracker(Protocol):
 
 
 def check_step(
-    state: State,
-    scans: Sequence[Any],
-    poses: Any,
-    time: float,
-    rngs: Sequence[Any],
-    num_sensors: int,
-    *,
-    same_time: bool = True,
+    state: State, scans: Sequence[Any], poses: Any, time: float, rngs: Sequence[Any], num_sensors: int
 ) -> tuple[Floats, float]:
-    """The poses as an array, and the seconds since the last scan; `InputError` as `Tracker.step` says.
-
-    same_time: whether the time may be that of the last scan again.
-    """
+    """The poses as an array, and the seconds since the last scan; `InputError` as `Tracker.step` says."""
     if not isinstance(state, State):
         raise InputError(f"state: expected a State; got {type(state).__name__}")
     one_a_sensor(num_sensors, scans=scans, poses=poses, rngs=rngs)
     now = real("time", time)
-    if state.time is not None and (now < state.time or (now == state.time and not same_time)):
-        wanted = f"one {'from' if same_time else 'after'} that of the last scan{' on' if same_time else ''}"
-        raise InputError(f"time: expected {wanted}, {state.time:g} s; got {now:g}")
+    if state.time is not None and now < state.time:
+        raise InputError(f"time: expected one from that of the last scan on, {state.time:g} s; got {now:g}")
     at = float_array("poses", poses, (num_sensors, None))
     return at, FIRST_PERIOD if state.time is None else now - state.time
 

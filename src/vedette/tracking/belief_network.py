@@ -17,7 +17,7 @@ from vedette.fusion.rebasing import rebased, with_labels_of
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import reject
 from vedette.tracking.base import Stages, State, TrackerInfo, check_step
-from vedette.tracking.births import births_due, births_heard
+from vedette.tracking.births import births_due, births_heard, births_waiting
 from vedette.tracking.distributed import check_labels_of_births
 from vedette.tracking.local import LocalFilters
 from vedette.tracking.merging import merged, views_of, with_weights
@@ -29,7 +29,8 @@ class _Sent(NamedTuple):
 
     step: int
     time: float
-    views: Views  # from where, and by whom it was scanned
+    poses: Floats  # from where, and by whom it was scanned
+    scanned: tuple[bool, ...]
     predictions: tuple[Any, ...]  # what each belief was updated from, where the fusion divides by it; else None
     beliefs: tuple[Any, ...]
     arrives: Ints  # (num_sensors, num_sensors) as of `Network.arrivals`
@@ -90,19 +91,23 @@ class BeliefNetwork(LocalFilters):
         self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[State, TrackerInfo]:
         """Filter each sensor's scan, send, and fuse what has arrived; see `Tracker.step`."""
-        at, dt = check_step(state, scans, poses, time, rngs, len(self.filters), same_time=False)
+        at, dt = check_step(state, scans, poses, time, rngs, len(self.filters))
+        if dt == 0.0 and self.network.delay > 0:
+            expected = f"one after that of the last scan, {time:g} s, as beliefs that are late would count again"
+            raise reject("time", expected, time)
         step, stages, num = state.step + 1, Stages(), len(self.filters)
         hops = hop_counts(self.network.links(at, rngs[0]))
         with stages.timing("filter"):
             predictions, local, infos = self._filtered(state, scans, at, dt, rngs)
-        views = Views(self.sensors, at, tuple(scan is not None for scan in scans))
-        sent = _Sent(step, float(time), views, predictions, local, self.network.arrivals(hops, step))
+        scanned, arrives = tuple(scan is not None for scan in scans), self.network.arrivals(hops, step)
+        sent = _Sent(step, float(time), at, scanned, predictions, local, arrives)
         waiting = (*state.memory.sent, sent)
         with stages.timing("fusion"):
             fused, reports = self._fused(waiting, hops)
-            whole, report = merged(self.merging, self._for_fusion(fused), range(num), views)
+            whole, report = merged(self.merging, self._for_fusion(fused), range(num), self._views(sent))
         with stages.timing("births"):
-            births = self._births(fused, scans, at, sent)
+            before = state.memory.births if dt == 0.0 else (None,) * num
+            births = self._births(before, fused, scans, at, sent)
         longest = self.network.longest_delay(num)
         memory = _Memory(births, tuple(own for own in waiting if own.step + longest > step))
         messages: list[tuple[Any, ...]] = [(belief,) for belief in local]
@@ -161,7 +166,7 @@ class BeliefNetwork(LocalFilters):
 
     def _fuse(self, messages: Sequence[_Sent], heard: Sequence[int], weights: Floats) -> tuple[Any, FusionInfo | None]:
         """What these sensors' messages are together; `weights` are of a mean, or of a sum where predictions divide."""
-        seen = views_of([sent.views for sent in messages], heard)
+        seen = views_of([self._views(sent) for sent in messages], heard)
         if not shares_prediction(self.fusion):
             now = max(messages, key=lambda sent: sent.step)
             current = [self._current(sent, now, j) for sent, j in zip(messages, heard, strict=True)]
@@ -185,6 +190,9 @@ class BeliefNetwork(LocalFilters):
         fused, report = with_weights(self.fusion, weights.tolist()).fuse(posteriors, replace(seen, prediction=base))
         return self._kept(fused), report
 
+    def _views(self, sent: _Sent) -> Views:
+        return Views(self.sensors, sent.poses, sent.scanned)
+
     def _current(self, sent: _Sent, now: _Sent, sensor: int) -> Any:
         """A sensor's belief at the time of the step `now`; nobody is born on the way."""
         if sent is now:
@@ -201,8 +209,13 @@ class BeliefNetwork(LocalFilters):
         shares = groups / sizes if rounds is None else np.linalg.matrix_power(metropolis_weights(hops == 1), rounds)
         return np.asarray(shares * sizes if shares_prediction(self.fusion) else shares)
 
-    def _births(self, fused: Sequence[Any], scans: Sequence[Any], poses: Floats, sent: _Sent) -> tuple[LMB | None, ...]:
-        """For each sensor, who may be born at the next step: the same for those who have heard and believe the same."""
+    def _births(
+        self, before: Sequence[LMB | None], fused: Sequence[Any], scans: Sequence[Any], poses: Floats, sent: _Sent
+    ) -> tuple[LMB | None, ...]:
+        """For each sensor, who may be born at the next step: the same for those who have heard and believe the same.
+
+        before: who may by earlier scans of the same time.
+        """
         birth, num = self.targets.birth, len(fused)
         if birth.from_measurements is None:
             return (None,) * num
@@ -210,8 +223,9 @@ class BeliefNetwork(LocalFilters):
         births = []
         for i, belief in enumerate(fused):
             heard = heard_by(i, sent.arrives, sent.step)
-            key = id(belief), heard
+            key = id(belief), id(before[i]), heard
             if key not in found:
-                found[key] = births_heard(birth, belief, self.sensors, scans, poses, sent.step + 1, heard)
+                own = births_heard(birth, belief, self.sensors, scans, poses, sent.step + 1, heard)
+                found[key] = births_waiting(birth, before[i], own)
             births.append(found[key])
         return tuple(births)

@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.filters.inputs import check_scan
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import count, dimension, instance, pose_vector, positive, real, reject
+from vedette.models.arguments import as_array, count, dimension, instance, pose_vector, positive, real, reject
 from vedette.tracking.base import State, Tracker, TrackerInfo
 
 _TIME = attrgetter("time")
@@ -173,7 +172,10 @@ class LateScans:
         first, newest, dropped = math.inf, timeline.newest, list[SensorScan]()
         taken = late = repeated = 0
         for given in scans:
-            scan = self._checked(given)
+            scan = own_scan(given, len(self.tracker.sensors))
+            if len(scan.pose) > self._start.shape[1]:
+                expected = f"at most {self._start.shape[1]} numbers, as of poses"
+                raise reject(f"{name_of(scan)}, pose", expected, len(scan.pose))
             if newest is not None and (scan.time < newest - self.window or _is_settled(timeline, scan.time)):
                 dropped.append(scan)
                 continue
@@ -217,22 +219,6 @@ class LateScans:
         nothing = [None] * len(self._start)
         return self.tracker.step(state, nothing, timeline.poses, now, rngs=self._streams(state.step + 1))
 
-    def _checked(self, scan: SensorScan) -> SensorScan:
-        """The scan with arrays of its own, so that what is worked again is what came."""
-        instance("scan", scan, SensorScan)
-        num, sensors = len(self.tracker.sensors), self.tracker.sensors
-        if count("scan.sensor", scan.sensor) >= num:
-            raise reject("scan.sensor", f"a whole number from 0 to {num - 1}", scan.sensor)
-        name = f"scan of sensor {scan.sensor} at {real('scan.time', scan.time):g} s"
-        pose = pose_vector(f"{name}, pose", scan.pose)
-        if len(pose) > self._start.shape[1]:
-            raise reject(f"{name}, pose", f"at most {self._start.shape[1]} numbers, as of poses", len(pose))
-        try:
-            check_scan(scan.measurements, sensors[scan.sensor])
-        except InputError as error:
-            raise InputError(f"{name}: {error}") from None
-        return SensorScan(int(scan.sensor), float(scan.time), np.array(scan.measurements, float), pose.copy())
-
     def _worked(
         self, timeline: Timeline, num_kept: int, came: dict[float, dict[int, SensorScan]]
     ) -> tuple[Instant, ...]:
@@ -249,7 +235,10 @@ class LateScans:
             for s, scan in due[time].items():
                 poses[s, : len(scan.pose)] = scan.pose
             measured = [due[time][s].measurements if s in due[time] else None for s in range(len(poses))]
-            state, info = self.tracker.step(state, measured, poses, time, rngs=self._streams(state.step + 1))
+            try:
+                state, info = self.tracker.step(state, measured, poses, time, rngs=self._streams(state.step + 1))
+            except InputError as error:
+                raise (_named(error, came[time]) if time in came else error) from None
             made.append(Instant(time, due[time], poses, state, info))
         return tuple(made)
 
@@ -269,6 +258,31 @@ class LateScans:
             return timeline
         last = timeline.instants[past - 1]
         return replace(timeline, settled=last.state, settled_poses=last.poses, instants=timeline.instants[past:])
+
+
+def own_scan(scan: SensorScan, num_sensors: int) -> SensorScan:
+    """The scan with arrays of its own, so that what is worked again is what came; measurements: of whatever shape.
+
+    What a scan of the sensor may hold is for the tracker to check, which does so whenever it takes it. Raises
+    `InputError` for a sensor that there is not, a time that is no finite number, a pose or measurements that are none.
+    """
+    instance("scan", scan, SensorScan)
+    if count("scan.sensor", scan.sensor) >= num_sensors:
+        raise reject("scan.sensor", f"a whole number from 0 to {num_sensors - 1}", scan.sensor)
+    real("scan.time", scan.time)
+    pose = pose_vector(f"{name_of(scan)}, pose", scan.pose)
+    measured = as_array(f"{name_of(scan)}: scan", scan.measurements, "fiu", "numbers in an array")
+    return SensorScan(int(scan.sensor), float(scan.time), np.array(measured, float), pose.copy())
+
+
+def name_of(scan: SensorScan) -> str:
+    """As errors call it."""
+    return f"scan of sensor {scan.sensor} at {scan.time:g} s"
+
+
+def _named(error: InputError, came: dict[int, SensorScan]) -> InputError:
+    """What a tracker refused, with the scans that had just come."""
+    return InputError(f"{', '.join(map(name_of, came.values()))}: {error}")
 
 
 def _place(timeline: Timeline, time: float) -> int:

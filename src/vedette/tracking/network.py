@@ -70,6 +70,7 @@ class Network:
         """(num_sensors, num_sensors) step at which sensor i has the message that sensor j sends now, or `NEVER`.
 
         hops: `hop_counts` of the links of the step; messages travel over those of the step at which they are sent.
+        step: its number, where steps of one time count once.
         """
         return np.where(self.reaches(hops), step + self.delay * np.minimum(hops, len(hops)), NEVER)
 

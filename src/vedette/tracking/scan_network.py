@@ -14,7 +14,7 @@ from vedette.fusion import Fusion, Views
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import reject
 from vedette.tracking.base import Stages, State, TrackerInfo, bytes_of_scan, check_step
-from vedette.tracking.births import births_heard
+from vedette.tracking.births import births_heard, births_waiting
 from vedette.tracking.central import OfAllScans
 from vedette.tracking.merging import merged
 from vedette.tracking.network import Network, bytes_of_messages, heard_by, hop_counts
@@ -32,6 +32,7 @@ class _Frame(NamedTuple):
     """The scans of one step, and when each sensor has them."""
 
     step: int
+    instant: int  # number of its time, by which messages are late
     dt: float
     scans: tuple[Any, ...]
     poses: Floats
@@ -43,7 +44,8 @@ class _Memory(NamedTuple):
 
     known: tuple[_Known, ...]
     frames: tuple[_Frame, ...]
-    last: _Frame | None  # the last step of all
+    last: tuple[_Frame, ...]  # all steps of the last time
+    instant: int  # times so far
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,16 +78,17 @@ class ScanNetwork(OfAllScans):
         """No target."""
         belief = self.filter.initial()
         known = (_Known(belief, None, None),) * len(self.sensors)
-        return State((belief,) * len(self.sensors), belief, memory=_Memory(known, (), None))
+        return State((belief,) * len(self.sensors), belief, memory=_Memory(known, (), (), 0))
 
     def step(
         self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[State, TrackerInfo]:
         """Send the scans and filter what has arrived; see `Tracker.step`. Only the first of `rngs` is drawn from."""
-        at, dt = check_step(state, scans, poses, time, rngs, len(self.sensors), same_time=False)
+        at, dt = check_step(state, scans, poses, time, rngs, len(self.sensors))
         stages, step, num = Stages(), state.step + 1, len(self.sensors)
+        instant = state.memory.instant + (dt > 0.0)
         hops = hop_counts(self.network.links(at, rngs[0]))
-        frame = _Frame(step, dt, tuple(scans), at, self.network.arrivals(hops, step))
+        frame = _Frame(step, instant, dt, tuple(scans), at, self.network.arrivals(hops, instant))
         views = Views(self.sensors, at, tuple(scan is not None for scan in scans))
         sent = np.array(self.network.bytes_sent(hops, [bytes_of_scan(*own) for own in zip(scans, at, strict=True)]))
         known = state.memory.known
@@ -95,16 +98,17 @@ class ScanNetwork(OfAllScans):
                 known = self._merge(state.memory, frame, views)
         frames, runs = (*state.memory.frames, frame), _Runs(self, rngs[0])
         with stages.timing("filter"):
-            now = tuple(runs.through(known[i], frames, i, step) for i in range(num))
-            while frames and step - frames[0].step >= self.network.longest_delay(num):
-                known = tuple(runs.through(known[i], frames[:1], i, step) for i in range(num))
+            now = tuple(runs.through(known[i], frames, i, instant) for i in range(num))
+            while frames and instant - frames[0].instant >= self.network.longest_delay(num):
+                known = tuple(runs.through(known[i], frames[:1], i, instant) for i in range(num))
                 frames = frames[1:]
         with stages.timing("fusion"):
             fused, report = merged(self.merging, [own.belief for own in now], range(num), views)
         infos = tuple(own.info for own in now if own.info is not None)
         info = TrackerInfo(infos, report, stages.seconds, tuple(sent.tolist()))
         local = tuple(own.belief for own in now)
-        return State(local, fused, step, float(time), _Memory(known, frames, frame)), info
+        last = (frame,) if dt > 0.0 else (*state.memory.last, frame)
+        return State(local, fused, step, float(time), _Memory(known, frames, last, instant)), info
 
     def _merge(self, memory: _Memory, frame: _Frame, views: Views) -> tuple[_Known, ...]:
         """Each sensor's belief and those of all that it hears as one; the same for those who hear the same.
@@ -112,7 +116,7 @@ class ScanNetwork(OfAllScans):
         Who scans at this step is not asked, as the beliefs are those of before.
         """
         found: dict[tuple[int, ...], _Known] = {}
-        everyone = [heard_by(i, frame.arrives, frame.step) for i in range(len(self.sensors))]
+        everyone = [heard_by(i, frame.arrives, frame.instant) for i in range(len(self.sensors))]
         for heard in everyone:
             if heard not in found:
                 beliefs = [memory.known[j].belief for j in heard]
@@ -120,20 +124,24 @@ class ScanNetwork(OfAllScans):
                 if report is None:
                     found[heard] = memory.known[heard[0]]
                 else:
-                    assert memory.last is not None  # beliefs differ after a step alone
-                    found[heard] = _Known(belief, self._measured(belief, memory.last, heard), None)
+                    measured = None
+                    for own in memory.last:
+                        measured = self._measured(measured, belief, own, heard)
+                    found[heard] = _Known(belief, measured, None)
         return tuple(found[heard] for heard in everyone)
 
-    def _measured(self, belief: Any, frame: _Frame, heard: tuple[int, ...]) -> LMB | None:
-        """Who may be born after a step of which these sensors' scans are known."""
+    def _measured(self, before: LMB | None, belief: Any, frame: _Frame, heard: tuple[int, ...]) -> LMB | None:
+        """Who may be born after a step of which these sensors' scans are known. before: after those of its time."""
         birth, after = self.targets.birth, frame.step + 1
-        return births_heard(birth, belief, self.sensors, frame.scans, frame.poses, after, heard)
+        found = births_heard(birth, belief, self.sensors, frame.scans, frame.poses, after, heard)
+        return births_waiting(birth, before, found)
 
     def filtered(self, known: _Known, frame: _Frame, heard: tuple[int, ...], rng: np.random.Generator) -> _Known:
         """What a sensor knows after a step of which it has heard these sensors' scans."""
         scans = [scan if s in heard else None for s, scan in enumerate(frame.scans)]
         belief, info = self._filtered(known.belief, known.births, scans, frame.poses, frame.dt, frame.step, rng)
-        return _Known(belief, self._measured(belief, frame, heard), info)
+        before = known.births if frame.dt == 0.0 else None
+        return _Known(belief, self._measured(before, belief, frame, heard), info)
 
 
 class _Runs:

@@ -27,7 +27,7 @@ FORMAT_NAME = "vedette-snapshot"
 FORMAT_VERSION = 1
 
 # The rooms whose data classes may stand in a file; they hold arrays and open nothing.
-_ROOMS = ("densities", "filters", "fusion", "tracking", "models", "control", "kernels.base")
+_ROOMS = ("densities", "filters", "fusion", "tracking", "models", "control", "calibration", "kernels.base")
 _BITS = {kind.__name__: kind for kind in (np.random.PCG64, np.random.PCG64DXSM, np.random.SFC64, np.random.Philox)}
 _PLAIN = (bool, int, str, type(None))
 

@@ -154,7 +154,7 @@ def _bounded(existence_logit: Floats, most: float) -> tuple[Floats, float]:
 def step_cb_member(
     prior: Lmb,
     scan: ScanInput,
-    motion: Motion,
+    motion: Motion | None,
     sensor: Sensor,
     truncation: Truncation,
     reduction: Reduction,

@@ -202,7 +202,7 @@ def step_cphd(
     log_cardinality: Floats,
     prior: Mixture,
     scan: ScanInput,
-    motion: Motion,
+    motion: Motion | None,
     sensor: Sensor,
     truncation: Truncation,
     caps: MixtureCaps,

@@ -32,7 +32,7 @@ class IntensityReport(NamedTuple):
 
 
 @kernel
-def predict_intensity(prior: Mixture, scan: ScanInput, motion: Motion, sensor: Sensor) -> tuple[Rows, float]:
+def predict_intensity(prior: Mixture, scan: ScanInput, motion: Motion | None, sensor: Sensor) -> tuple[Rows, float]:
     """The predicted intensity as one row, survivors before births, and the log of the weight that died.
 
     The births carry the intensity of the multi-Bernoulli birth: the sum of existence times density over the sites.
@@ -79,7 +79,7 @@ def corrected_intensity(rows: Rows, options: Options, log_factors: Floats, caps:
 
 @kernel
 def step_phd(
-    prior: Mixture, scan: ScanInput, motion: Motion, sensor: Sensor, truncation: Truncation, caps: MixtureCaps
+    prior: Mixture, scan: ScanInput, motion: Motion | None, sensor: Sensor, truncation: Truncation, caps: MixtureCaps
 ) -> tuple[Mixture, IntensityReport]:
     """One scan (Vo and Ma 2006, Propositions 1 and 2): a measurement shares one unit between targets and clutter."""
     rows, _ = predict_intensity(prior, scan, motion, sensor)
