@@ -74,6 +74,19 @@ def told(page: Page, words: str, part: str) -> None:
     wait_until(page, f"document.querySelector('[data-part={part}]')?.textContent.includes({json.dumps(words)})")
 
 
+def test_dates_are_its_clock(browser: Browser, folder: Path) -> None:
+    loop = Loop(folder)
+    try:
+        page = browser.open(loop.page)
+        told(page, "no scan yet: 0 estimates", "summary")
+        loop.send([line(1, "2016-01-12T13:02:24Z", [[1.0, 2.0]]), line(2, "2016-01-12T13:02:25.5Z", [[1.0, 2.0]])])
+        told(page, "2016-01-12 13:02:25.5 UTC: ", "summary")
+        assert not text(page, "summary").startswith("t = ")
+        assert page.complaints() == []
+    finally:
+        loop.kill()
+
+
 def test_it_draws_what_comes_and_outlives_a_kill(browser: Browser, folder: Path) -> None:
     loop, lines = Loop(folder), walk(12)
     try:
