@@ -41,13 +41,14 @@ def test_what_is_found_is_printed_and_its_file_is_tracked_with(place: Path) -> N
 
 
 def test_windows_are_printed_side_by_side_and_the_last_is_written(place: Path) -> None:
-    words = ("calibrate", "scans.csv", "--sensors", "radars.yaml", "--window", "30", "--out", "found.yaml")
+    words = ("calibrate", "scans.csv", "--sensors", "radars.yaml", "--window", "60", "--out", "found.yaml")
     result = call(*words)
     assert result.exit_code == 0, result.output
     assert "from, s" in result.stdout
     assert result.stdout.count("boat") > 2 * 8
     told = json.loads(call(*words, "--overwrite", "--json").stdout)
-    assert [round(each["begin_s"]) for each in told["windows"]] == [0, 28]
+    assert [each["begin_s"] for each in told["windows"]] == [0.0, told["windows"][0]["end_s"]]
+    assert told["windows"][1]["end_s"] == pytest.approx(2.0 * told["windows"][0]["end_s"])
     last = {(row["sensor"], row["parameter"]): row["found"] for row in told["windows"][1]["found"]}
     written = read_yaml((place / "found.yaml").read_text("utf-8"), "found.yaml").data
     assert written["sensors"][1]["bias"]["range"] == pytest.approx(last["boat", "range"], rel=1e-6)
