@@ -167,11 +167,15 @@ class Page:
         self.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
 
     def middle(self, selector: str) -> tuple[float, float]:
-        """Middle of an element in the window, after scrolling to it."""
+        """Middle of an element in the window, after scrolling to it.
+
+        Two frames later: where a click hits is found in the frame that is shown, which may be the one before.
+        """
         name = json.dumps(selector)
         x, y = self.evaluate(
-            f"(() => {{ const element = document.querySelector({name}); element.scrollIntoView({{block: 'center', "
-            "behavior: 'instant'}); const box = element.getBoundingClientRect(); "
+            f"(async () => {{ const element = document.querySelector({name}); element.scrollIntoView({{block: 'center', "
+            "behavior: 'instant'}); const frame = () => new Promise((done) => { requestAnimationFrame(done); "
+            "setTimeout(done, 200); }); await frame(); await frame(); const box = element.getBoundingClientRect(); "
             "return [box.x + box.width / 2, box.y + box.height / 2]; })()"
         )
         return float(x), float(y)
