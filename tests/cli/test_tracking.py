@@ -82,6 +82,23 @@ def test_tracks_are_written_in_the_formats_that_are_asked_for(place: Path) -> No
     assert call(*words[:3], "--format", "csv").exit_code == 2
 
 
+def test_numbers_that_an_option_cannot_have_are_told_as_they_came(place: Path) -> None:
+    words = ("scans.csv", "--sensors", "radars.yaml", "--speed")
+    low, none = call(*words, "-3"), call(*words, "fast")
+    assert (low.exit_code, none.exit_code) == (2, 2)
+    assert "'--speed': expected greater than or equal to 0.001; got '-3'" in " ".join(low.stderr.split())
+    assert "'--speed': expected a valid number" in " ".join(none.stderr.split())
+    assert "got 'fast'" in none.stderr
+
+
+def test_a_sensor_that_never_scanned_is_told(place: Path) -> None:
+    rows = (place / "scans.csv").read_text("utf-8").splitlines()
+    (place / "scans.csv").write_text("\n".join(row for row in rows if ",boat," not in row), "utf-8")
+    result = call("scans.csv", "--sensors", "radars.yaml")
+    assert result.exit_code == 0, result.output
+    assert "clutter of boat: 1 a scan, as it has no scan in the recording" in result.stderr
+
+
 def test_without_truth_no_error_is_told(place: Path) -> None:
     result = call("scans.csv", "--sensors", "radars.yaml")
     assert result.exit_code == 0, result.output
