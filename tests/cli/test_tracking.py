@@ -82,6 +82,19 @@ def test_tracks_are_written_in_the_formats_that_are_asked_for(place: Path) -> No
     assert call(*words[:3], "--format", "csv").exit_code == 2
 
 
+def test_a_format_of_places_on_the_earth_without_an_origin_leaves_no_folder(place: Path) -> None:
+    (place / "plane.csv").write_text("time,sensor,x,y\n0,pier,100,200\n1,pier,105,200\n2,pier,110,201\n", "utf-8")
+    (place / "plane.yaml").write_text(
+        "sensor_defaults: {measurement: {kind: position}, noise: {kind: constant, std: [9.0, 9.0]}}\n"
+        "sensors: [{name: pier, position: [0.0, 0.0]}]\n",
+        "utf-8",
+    )
+    result = call("plane.csv", "--sensors", "plane.yaml", "--out", "out", "--format", "csv", "--format", "czml")
+    assert result.exit_code == 2, result.output
+    assert "expected an origin in plane.yaml, as czml has degrees; got none" in " ".join(result.stderr.split())
+    assert not (place / "out").exists()
+
+
 def test_numbers_that_an_option_cannot_have_are_told_as_they_came(place: Path) -> None:
     words = ("scans.csv", "--sensors", "radars.yaml", "--speed")
     low, none = call(*words, "-3"), call(*words, "fast")
