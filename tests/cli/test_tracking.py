@@ -147,3 +147,17 @@ def test_files_that_are_not_there_are_told(place: Path, words: tuple[str, ...], 
     assert result.exit_code == 1
     assert message in result.stderr
     assert {path.name for path in place.iterdir()} == {"scans.csv", "truth.csv", "radars.yaml"}
+
+
+def test_times_that_are_no_dates_are_told_where_a_format_has_dates(place: Path) -> None:
+    rows = "".join(f"{600_000_000_000 + k},pier,{100 + k},200\n" for k in range(4))
+    (place / "far.csv").write_text("time,sensor,x,y\n" + rows, "utf-8")
+    (place / "plane.yaml").write_text(
+        "origin: {lon: 1.0, lat: 50.0}\n"
+        "sensor_defaults: {measurement: {kind: position}, noise: {kind: constant, std: [9.0, 9.0]}}\n"
+        "sensors: [{name: pier, position: [0.0, 0.0]}]\n",
+        "utf-8",
+    )
+    result = call("far.csv", "--sensors", "plane.yaml", "--out", "out", "--format", "czml")
+    assert result.exit_code == 1, result.output
+    assert "time: expected seconds since 1970 of a date before the year 10000; got 6e+11" in result.stderr
