@@ -82,6 +82,36 @@ def test_tracks_are_written_in_the_formats_that_are_asked_for(place: Path) -> No
     assert call(*words[:3], "--format", "csv").exit_code == 2
 
 
+def test_a_format_of_places_on_the_earth_without_an_origin_leaves_no_folder(place: Path) -> None:
+    (place / "plane.csv").write_text("time,sensor,x,y\n0,pier,100,200\n1,pier,105,200\n2,pier,110,201\n", "utf-8")
+    (place / "plane.yaml").write_text(
+        "sensor_defaults: {measurement: {kind: position}, noise: {kind: constant, std: [9.0, 9.0]}}\n"
+        "sensors: [{name: pier, position: [0.0, 0.0]}]\n",
+        "utf-8",
+    )
+    result = call("plane.csv", "--sensors", "plane.yaml", "--out", "out", "--format", "csv", "--format", "czml")
+    assert result.exit_code == 2, result.output
+    assert "expected an origin in plane.yaml, as czml has degrees; got none" in " ".join(result.stderr.split())
+    assert not (place / "out").exists()
+
+
+def test_numbers_that_an_option_cannot_have_are_told_as_they_came(place: Path) -> None:
+    words = ("scans.csv", "--sensors", "radars.yaml", "--speed")
+    low, none = call(*words, "-3"), call(*words, "fast")
+    assert (low.exit_code, none.exit_code) == (2, 2)
+    assert "'--speed': expected greater than or equal to 0.001; got '-3'" in " ".join(low.stderr.split())
+    assert "'--speed': expected a valid number" in " ".join(none.stderr.split())
+    assert "got 'fast'" in none.stderr
+
+
+def test_a_sensor_that_never_scanned_is_told(place: Path) -> None:
+    rows = (place / "scans.csv").read_text("utf-8").splitlines()
+    (place / "scans.csv").write_text("\n".join(row for row in rows if ",boat," not in row), "utf-8")
+    result = call("scans.csv", "--sensors", "radars.yaml")
+    assert result.exit_code == 0, result.output
+    assert "clutter of boat: 1 a scan, as it has no scan in the recording" in result.stderr
+
+
 def test_without_truth_no_error_is_told(place: Path) -> None:
     result = call("scans.csv", "--sensors", "radars.yaml")
     assert result.exit_code == 0, result.output
@@ -117,3 +147,17 @@ def test_files_that_are_not_there_are_told(place: Path, words: tuple[str, ...], 
     assert result.exit_code == 1
     assert message in result.stderr
     assert {path.name for path in place.iterdir()} == {"scans.csv", "truth.csv", "radars.yaml"}
+
+
+def test_times_that_are_no_dates_are_told_where_a_format_has_dates(place: Path) -> None:
+    rows = "".join(f"{600_000_000_000 + k},pier,{100 + k},200\n" for k in range(4))
+    (place / "far.csv").write_text("time,sensor,x,y\n" + rows, "utf-8")
+    (place / "plane.yaml").write_text(
+        "origin: {lon: 1.0, lat: 50.0}\n"
+        "sensor_defaults: {measurement: {kind: position}, noise: {kind: constant, std: [9.0, 9.0]}}\n"
+        "sensors: [{name: pier, position: [0.0, 0.0]}]\n",
+        "utf-8",
+    )
+    result = call("far.csv", "--sensors", "plane.yaml", "--out", "out", "--format", "czml")
+    assert result.exit_code == 1, result.output
+    assert "time: expected seconds since 1970 of a date before the year 10000; got 6e+11" in result.stderr

@@ -128,7 +128,7 @@ def test_an_mp4_is_one(runs: Path, tmp_path: Path) -> None:
         (("run.avi",), 1, "--out: expected a file that ends with .mp4 or .gif; got run.avi"),
         (("a.gif", "--seconds", 500), 1, "--seconds: expected at most 1000 frames of a .gif file; got 5000"),
         (("a.gif", "--seconds", 5, "--speed", 2), 2, "expected one of --speed and --seconds; got both"),
-        (("a.gif", "--size", 20), 2, "for '--size': Input should be greater"),
+        (("a.gif", "--size", 20), 2, "for '--size': expected greater than or equal to 200; got '20'"),
     ],
 )
 def test_what_cannot_be_is_said(runs: Path, words: tuple[object, ...], status: int, message: str) -> None:

@@ -21,6 +21,7 @@ from vedette.errors import ScenarioError
 from vedette.evaluation.figures import scene_of, tracks_figure
 from vedette.evaluation.runs import run_scenario
 from vedette.scenarios import Scenario, load_scenario
+from vedette.scenarios.cautions import cautions
 from vedette.scenarios.dumping import dump_scenario
 from vedette.scenarios.views import COAST, zones
 
@@ -115,6 +116,16 @@ def test_what_is_no_coast_is_told_at_the_field(tmp_path: Path, coast: Any, messa
     (fault,) = error.value.faults
     assert "coastline: expected a GeoJSON file of lines or polygons, got" in fault
     assert message in fault
+
+
+def test_a_coast_of_which_nothing_is_drawn_is_warned_of(tmp_path: Path) -> None:
+    def told(places: Any) -> list[str]:
+        scenario = load_scenario(scene(tmp_path, world(feature("LineString", places))))
+        return [text for text in cautions(scenario) if "coastline" in text]
+
+    assert told(degrees(EDGE)) == []
+    (text,) = told([[lat, lon] for lon, lat in degrees(EDGE)])
+    assert "coastline: nothing of it is near region and sensors, and none is drawn (are longitudes" in text
 
 
 def test_a_file_and_an_origin_must_be_there(tmp_path: Path) -> None:

@@ -129,10 +129,24 @@ def test_places_in_degrees_may_stand_wherever_metres_may(tmp_path: Path) -> None
         (
             "origin: {lon: -1.1171, lat: 50.7865}",
             "",
-            r"sensors\[0\].position: expected a list, got a mapping \(places in degrees need an `origin",
+            r"sensors\[0\].position: expected a list, got {lon: -1.13, lat: 50.77} \(.* need such an `origin",
         ),
         ("lat_min: 50.76", "lat_min: 50.9", "a box of degrees needs an `origin.*and its four ends in order"),
-        ("{lon: -1.12, lat: 50.79}", "{lon: -1.12, lat: 99}", r"state\[0\]: expected a number, got a mapping \(places"),
+        (
+            "{lon: -1.12, lat: 50.79}",
+            "{lon: -1.12, lat: 99}",
+            r"state\[0\]: expected a number, got {lon: -1.12, lat: 99} \(places",
+        ),
+        (
+            "position: {lon: -1.13, lat: 50.77}",
+            "position: {lon: 50.77, lat: -1.13}",
+            r"sensors\[0\].position: expected places within 1000 km of the origin, got x 5\d+ km, .*exchanged",
+        ),
+        (
+            "origin: {lon: -1.1171, lat: 50.7865}",
+            "origin: {lon: 50.7865, lat: -1.1171}",
+            r"region: expected places within 1000 km of the origin, .*here or in `origin`",
+        ),
         ("{lon: -1.1171, lat: 50.7865}", "{lon: -1.1171, lat: 95}", "origin.lat: expected a number of at most 90"),
     ],
 )

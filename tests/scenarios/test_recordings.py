@@ -141,6 +141,20 @@ def test_places_in_degrees_are_measured_and_sensors_carry_their_own() -> None:
     assert (plane.scans[0][0].tolist(), plane.poses[0, 0, :2].tolist()) == ([[5.0, 7.5]], [1.0, 2.0])
 
 
+@pytest.mark.parametrize("swapped", [{"lon": 50.79, "lat": -1.12}, {"own_lon": 50.78, "own_lat": -1.13}])
+def test_longitude_and_latitude_that_are_exchanged_are_told(swapped: dict[str, float]) -> None:
+    sites = [Site("drone", "position", (0.0, 0.0, 0.0))]
+    row = {"time": 0, "sensor": "drone", "lon": -1.12, "lat": 50.79, "own_lon": -1.13, "own_lat": 50.78}
+    lon, lat = swapped
+    wanted = f"expected with latitude {swapped[lat]:g} a longitude within 1000 km of the origin .are they exchanged"
+    with pytest.raises(InputError, match=f"row 2, column '{lon}': {wanted}.*; got {swapped[lon]:g}"):
+        parsed([{**row, **swapped}], sites, ORIGIN)
+    with pytest.raises(InputError, match="column 'lon': expected with latitude -50"):  # where no plane is
+        parsed([{**row, "lon": 178.0, "lat": -50.0}], sites, ORIGIN)
+    found = parsed([row, {**row, **swapped}], sites, ORIGIN, bad_rows="skip")
+    assert (found.num_measurements, len(found.skipped)) == (1, 1)
+
+
 def test_rows_of_one_turn_of_the_antenna_are_gathered() -> None:
     rows = [{**ROWS[0], "time": time, "range": 1000 + i} for i, time in enumerate((0.0, 1.0, 2.0, 5.0, 5.5))]
     found = parsed(rows, gather=2.5)

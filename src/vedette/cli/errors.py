@@ -15,6 +15,7 @@ from typer.core import TyperGroup
 
 from vedette.cli.output import accept_any_letter, drop_output, trouble_of_system
 from vedette.errors import InputError, VedetteError
+from vedette.text import shown
 
 INTERRUPTED = 130
 
@@ -33,6 +34,9 @@ class Commands(TyperGroup):
             result = super().invoke(ctx)
             sys.stdout.flush()  # here, where a fault can still be told in words
             return result
+        except typer.BadParameter as error:
+            error.message = _with_value(error)
+            raise
         except VedetteError as error:
             typer.echo(str(error), err=True)
             raise typer.Exit(1) from None
@@ -45,6 +49,15 @@ class Commands(TyperGroup):
         except KeyboardInterrupt:  # where a command has nothing to say of what it leaves
             typer.echo("\ninterrupted", err=True)
             raise typer.Exit(INTERRUPTED) from None
+
+
+def _with_value(error: typer.BadParameter) -> str:
+    """The message; where it is one of pydantic's, which leaves the value out, with what came."""
+    said = getattr(error.__cause__, "errors", None)
+    if said is None:
+        return error.message
+    first = said()[0]
+    return f"{first['msg'].replace('Input should be', 'expected', 1)}; got {shown(first['input'])}"
 
 
 def usage_error(message: str, option: str) -> typer.BadParameter:

@@ -15,7 +15,7 @@ import typer
 from vedette.cli.compiling import compiling
 from vedette.cli.completing import strategies
 from vedette.cli.errors import usage_error
-from vedette.cli.options import Seed, Trust
+from vedette.cli.options import Seed, Speed, Trust
 from vedette.cli.output import note, publish, say
 from vedette.cli.running import Approval, check_planner, compile_if_cold, interruptible
 from vedette.cli.scenario_files import warn
@@ -36,10 +36,7 @@ def live(
         float,
         typer.Option("--ahead", min=0.001, help="s that a scan may be ahead of all others, unless several agree."),
     ] = 60.0,
-    speed: Annotated[
-        float,
-        typer.Option("--speed", min=0.001, help="m/s that targets hardly exceed, where motion or births are not said."),
-    ] = 10.0,
+    speed: Speed = 10.0,
     planner: Annotated[
         str,
         typer.Option("--planner", help="Who decides, see `vedette run`; still: nobody.", autocompletion=strategies),

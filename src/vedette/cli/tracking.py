@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from vedette.simulation.records import RunRecord
 
 FORMATS = ("csv", "geojson", "parquet", "czml", "mcap")
+ON_EARTH = ("geojson", "czml", "mcap")
 _SHOWN_ROWS = 5
 _LASTING = 10  # estimates of a track that is more than a moment's
 
@@ -70,6 +71,9 @@ def track(
         with named_options({"directory": "--out"}):
             check_free(out, overwrite)
     scenario, recording, assumed = read_recording(sensors, scans, truth, speed=speed, bad_rows=bad_rows, trust=trust)
+    on_earth = [name for name in formats or () if name in ON_EARTH]
+    if on_earth and scenario.model.origin is None:  # before there is a folder with a part of what was asked for
+        raise usage_error(f"expected an origin in {sensors}, as {on_earth[0]} has degrees; got none", "--format")
     with interruptible("nothing was written"):
         compile_if_cold(scenario)
         try:

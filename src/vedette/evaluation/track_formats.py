@@ -126,8 +126,12 @@ def _tracks(kind: str, table: Table) -> dict[str, list[int]]:
 
 
 def utc_text(time: float) -> str:
-    """Seconds since 1970 as ISO 8601, to the millisecond."""
-    return (_EPOCH + timedelta(seconds=time)).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+    """Seconds since 1970 as ISO 8601, to the millisecond. Raises `InputError` for what is in no year of four digits."""
+    try:
+        moment = _EPOCH + timedelta(seconds=time)
+    except OverflowError:
+        raise InputError(f"time: expected seconds since 1970 of a date before the year 10000; got {time:g}") from None
+    return moment.isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
 def _most_common(names: Sequence[str | None]) -> str | None:

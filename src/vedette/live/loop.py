@@ -131,7 +131,8 @@ class Live:
             time = told - start
             state = replace(state, start=start, is_utc=message.is_utc, due=self._due_after(time, time))
         elif message.is_utc != state.is_utc:
-            raise reject(f"{place}, time", "dates, as before" if state.is_utc else "seconds, as before", f"{told:g}")
+            came = utc_text(told) if message.is_utc else f"{told:g}"
+            raise reject(f"{place}, time", "dates, as before" if state.is_utc else "seconds, as before", came)
         assert state.start is not None
         time, newest = told - state.start, state.timeline.newest
         if newest is None or time <= newest + self.ahead:

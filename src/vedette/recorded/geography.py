@@ -11,6 +11,7 @@ from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import float_array, real, reject
 
+PLANE_REACH = 1e6  # m along each axis; sensors and zones beyond are in no plane with the origin, but were mistyped
 _LONGEST, _HIGHEST = 360.0, 90.0  # deg
 _NEAR_ENOUGH = 1e-7  # m above the ellipsoid, of a point that is to lie on it; it is known to some 1e-8
 _MOST_STEPS = 60
@@ -61,6 +62,14 @@ class Origin:
                 f"longitude, latitude: expected points on the origin's side of the globe; got {place} degrees"
             )
         return np.stack([east, north], axis=-1)
+
+    def nearby(self, longitude_deg: float, latitude_deg: float) -> tuple[float, float] | None:
+        """As `to_plane`, of a place in degrees; None of one that is beyond `PLANE_REACH`."""
+        try:
+            x, y = self.to_plane([longitude_deg], [latitude_deg])[0].tolist()
+        except InputError:  # on the other side of the globe
+            return None
+        return (x, y) if max(abs(x), abs(y)) <= PLANE_REACH else None
 
     def to_degrees(self, positions: ArrayLike) -> Floats:
         """(n, 2) longitudes and latitudes in degrees of points of the plane, (n, 2) m east and north of the origin.

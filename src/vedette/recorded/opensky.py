@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from vedette.recorded.tables import FARTHEST, Table
+from vedette.recorded.tables import FARTHEST, Table, is_empty
 
 _POSITION = ("icao24", "lat", "lon")
 _VELOCITY = ("velocity", "heading")
-_EMPTY = ("", "null", "none", "nan", r"\n")
+_NOTHING = ("null", "none", "nan", r"\n")
 
 
 def is_opensky(columns: Iterable[str]) -> bool:
@@ -51,7 +51,7 @@ def _are_there(table: Table, names: Iterable[str], rows: list[int]) -> bool:
 
 def _is_there(table: Table, name: str, row: int) -> bool:
     cell: Any = table.columns[name][row]
-    return cell is not None and cell == cell and str(cell).strip().lower() not in _EMPTY
+    return not is_empty(cell) and str(cell).strip().lower() not in _NOTHING
 
 
 __all__ = ["is_opensky", "of_opensky"]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from vedette.kernels.base.types import Floats
 from vedette.models.arguments import reject
 from vedette.models.bias import NO_BIAS
 from vedette.recorded.conventions import ANGLES, MOST, OTHER_NAMES, QUANTITIES, Conventions
-from vedette.recorded.geography import Origin
+from vedette.recorded.geography import PLANE_REACH, Origin
 from vedette.recorded.instants import (
     COMPONENTS,
     Bearings,
@@ -25,7 +24,7 @@ from vedette.recorded.instants import (
     turned,
     without_biases,
 )
-from vedette.recorded.tables import FARTHEST, LATEST, Table, column_names, is_number, number, seconds
+from vedette.recorded.tables import FARTHEST, LATEST, Table, column_names, is_empty, is_number, number, seconds
 from vedette.text import shown
 
 
@@ -192,27 +191,31 @@ class _Rows:
         if site.kind == "position" and "lon" in self._columns:
             quantities = ("lon", "lat")
         cells = [self.table.columns[self._columns[quantity][0]][i] for quantity in quantities]
-        if all(map(_is_empty, cells)):
+        if all(map(is_empty, cells)):
             return None
-        values = [self._value(i, quantity, self.bearings[s]) for quantity in quantities]
-        return self._plane(values) if quantities[0] == "lon" else tuple(values)
+        if quantities[0] == "lon":
+            return self._plane(i, *quantities)
+        return tuple(self._value(i, quantity, self.bearings[s]) for quantity in quantities)
 
     def _pose(self, i: int, s: int) -> tuple[float, ...]:
         """Where the sensor was, as far as the row says."""
         site = self.sites[s]
         place: tuple[float, ...] = site.pose[:2]
         if {"own_lon", "own_lat"} <= set(self._columns):
-            place = self._plane([self._value(i, "own_lon"), self._value(i, "own_lat")])
+            place = self._plane(i, "own_lon", "own_lat")
         elif {"own_x", "own_y"} <= set(self._columns):
             place = self._value(i, "own_x"), self._value(i, "own_y")
         has_heading = "own_heading" in self._columns
         heading = self._value(i, "own_heading", self.bearings[s]) if has_heading else site.pose[2]
         return (*place, heading, *site.pose[3:])
 
-    def _plane(self, degrees: Sequence[float]) -> tuple[float, ...]:
+    def _plane(self, i: int, lon: str, lat: str) -> tuple[float, ...]:
         assert self.origin is not None  # as was checked
-        x, y = self.origin.to_plane([degrees[0]], [degrees[1]])[0].tolist()
-        return x, y
+        degrees = self._value(i, lon), self._value(i, lat)
+        if (place := self.origin.nearby(*degrees)) is None:
+            wanted = f"with latitude {degrees[1]:g} a longitude within {PLANE_REACH / 1000.0:g} km of the origin"
+            raise self.table.fault(i, self._columns[lon][0], f"{wanted} (are they exchanged?)")
+        return place
 
 
 def _at_instants(rows: list[_Row], how: _Rows, skipped: tuple[str, ...]) -> RecordedScans:
@@ -227,11 +230,6 @@ def _at_instants(rows: list[_Row], how: _Rows, skipped: tuple[str, ...]) -> Reco
     for s, site in enumerate(sites):
         first[s, : len(site.pose)] = site.pose
     return in_order(looks, first, 0.0, how.is_utc, skipped, how.bearings)
-
-
-def _is_empty(cell: Any) -> bool:
-    """Whether nothing stands there: None, an empty text, or what data frames have in its place."""
-    return cell is None or cell != cell or str(cell).strip() == ""
 
 
 def _groups(rows: list[_Row], gather: float) -> list[list[_Row]]:

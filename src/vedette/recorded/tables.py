@@ -125,6 +125,11 @@ def number(cell: Any) -> float:
     return float(cell)
 
 
+def is_empty(cell: Any) -> bool:
+    """Whether nothing stands there: None, an empty text, or what data frames have in its place."""
+    return cell is None or cell != cell or str(cell).strip() == ""
+
+
 def is_number(cell: Any) -> bool:
     """Whether `number` takes it."""
     try:

@@ -13,7 +13,7 @@ import numpy as np
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Floats
 from vedette.recorded import Origin
-from vedette.scenarios.faults import Finding, describe
+from vedette.scenarios.faults import Finding, Path, describe
 from vedette.scenarios.geojson import geometries, listed
 from vedette.scenarios.sections import ScenarioModel
 
@@ -128,4 +128,11 @@ def coastline_findings(model: ScenarioModel, folder: FilePath) -> Iterator[Findi
         yield ("coastline",), "a GeoJSON file of lines or polygons", str(error)
 
 
-__all__ = ["coastline", "coastline_findings"]
+def coastline_cautions(model: ScenarioModel, folder: FilePath) -> Iterator[tuple[Path, str]]:
+    """That a file says nothing of where the region is, which may not be meant."""
+    if model.coastline is not None and not coastline(model, folder):
+        meant = "are longitudes and latitudes exchanged?"
+        yield ("coastline",), f"coastline: nothing of it is near region and sensors, and none is drawn ({meant})"
+
+
+__all__ = ["coastline", "coastline_cautions", "coastline_findings"]

@@ -197,8 +197,9 @@ def _translate(error: ErrorDetails, annotation: Any, path: Path) -> Told:
                 suggestion(error["input"], _literals(inner)),
             )
     if isinstance(error["input"], Mapping) and {"lon", "lat"} & set(error["input"]):
-        hint = "places in degrees need an `origin: {lon: , lat: }` of the scenario, both numbers of degrees"
-        return Told(path, _expected(error, inner), describe(error["input"]), hint)
+        hint = "places in degrees are `{lon: , lat: }`, both numbers, and need such an `origin` of the scenario"
+        came = ", ".join(f"{key}: {describe(value)}" for key, value in error["input"].items())
+        return Told(path, _expected(error, inner), f"{{{came}}}", hint)
     return Told(path, _expected(error, inner), describe(error["input"]))
 
 

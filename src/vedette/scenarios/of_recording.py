@@ -271,7 +271,8 @@ def _assumed_clutter(
         counts = [len(scan) for scans in recording.scans if (scan := scans[s]) is not None]
         rate = max(0.1, round(0.5 * float(np.mean(counts)), 2)) if counts else 1.0
         sensors.append({**sensor, "clutter": {"kind": "region", "rate": rate}})
-        words.append(f"clutter of {model.sensor_names[s]}: {rate:g} a scan, half of what it measures")
+        why = "half of what it measures" if counts else "as it has no scan in the recording"
+        words.append(f"clutter of {model.sensor_names[s]}: {rate:g} a scan, {why}")
     return {"sensors": sensors}
 
 

@@ -15,7 +15,7 @@ from vedette.errors import InputError
 from vedette.filters import FilterInfo
 from vedette.kernels.base.types import Floats
 from vedette.models import SensorModel, TargetModel
-from vedette.models.arguments import float_array, one_a_sensor, real
+from vedette.models.arguments import float_array, one_a_sensor, real, reject
 
 # s. The belief before the first scan holds no target, so that the time before it changes nothing.
 FIRST_PERIOD = 1.0
@@ -102,6 +102,34 @@ class Tracker(Protocol):
                 stage it was raised (`vedette.tracking.stage_of`).
         """
         ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AroundTracker:
+    """What the trackers share that are another one, and something more.
+
+    Attributes:
+        tracker: any.
+
+    Raises:
+        InputError: something else than a tracker.
+    """
+
+    tracker: Tracker
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.tracker, Tracker):
+            raise reject("tracker", "a Tracker, with targets, sensors, initial() and step()", self.tracker)
+
+    @property
+    def targets(self) -> TargetModel:
+        """The targets as all sensors know them."""
+        return self.tracker.targets
+
+    @property
+    def sensors(self) -> tuple[SensorModel, ...]:
+        """What each sensor sees."""
+        return self.tracker.sensors
 
 
 def check_step(

@@ -10,9 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vedette.kernels.base.types import Floats
-from vedette.models import SensorModel, TargetModel
 from vedette.models.arguments import count, instance, positive, probability, real, reject
-from vedette.tracking.base import State, Tracker, TrackerInfo, check_step
+from vedette.tracking.base import AroundTracker, State, TrackerInfo, check_step
 from vedette.tracking.late import LateScans, SensorScan, Timeline
 
 
@@ -66,7 +65,7 @@ class _Memory(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Delayed:
+class Delayed(AroundTracker):
     """Another tracker, which hears of some scans late and puts them in their places (`LateScans`).
 
     Its state is what is believed of now by what has arrived, predicted to now where the latest scan is older. Births
@@ -80,28 +79,17 @@ class Delayed:
         InputError: something else than a tracker, a sensor that there is not, no delay.
     """
 
-    tracker: Tracker
     delays: Mapping[int, Delay]
     _window: float = field(init=False, repr=False)  # s, in which nothing that is not lost is too late
 
     def __post_init__(self) -> None:
-        instance("tracker", self.tracker, Tracker)
+        AroundTracker.__post_init__(self)
         for s, delay in self.delays.items():
             if count("delays", s) >= len(self.sensors):
                 raise reject("delays", f"sensors from 0 to {len(self.sensors) - 1}", s)
             instance(f"delays[{s}]", delay, Delay)
         longest = (min(delay.up_to, delay.window) for delay in self.delays.values())
         object.__setattr__(self, "_window", max(longest, default=0.0) + 1.0)
-
-    @property
-    def targets(self) -> TargetModel:
-        """The targets as all sensors know them."""
-        return self.tracker.targets
-
-    @property
-    def sensors(self) -> tuple[SensorModel, ...]:
-        """What each sensor sees."""
-        return self.tracker.sensors
 
     def initial(self) -> State:
         """As the tracker's."""

@@ -12,15 +12,15 @@ from vedette.densities import UndetectedIntensity
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.kernels.steps.undetected import survival_probabilities, take_out_detected
-from vedette.models import SensorModel, TargetModel, UndetectedModel, kernel_motion
+from vedette.models import SensorModel, UndetectedModel, kernel_motion
 from vedette.models.arguments import float_array, reject
-from vedette.tracking.base import Stages, State, Tracker, TrackerInfo
+from vedette.tracking.base import AroundTracker, Stages, State, TrackerInfo
 from vedette.tracking.births import unexplained
 from vedette.tracking.losing import expected_in_cells, expected_of_lost, lost_labels
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Searching:
+class Searching(AroundTracker):
     """Another tracker, whose states also say how many undetected targets are expected where (`State.undetected`).
 
     The beliefs are the other tracker's, to the last bit. A scan takes out of every cell the share that it would have
@@ -38,28 +38,16 @@ class Searching:
         InputError: something else than a tracker or a model.
     """
 
-    tracker: Tracker
     model: UndetectedModel
     _nodes: Floats = field(init=False, repr=False)  # (num_cells, num_nodes, state_dim)
     _node_weights: Floats = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.tracker, Tracker):
-            raise reject("tracker", "a Tracker, with targets, sensors, initial() and step()", self.tracker)
+        AroundTracker.__post_init__(self)
         if not isinstance(self.model, UndetectedModel):
             raise reject("model", "an UndetectedModel", self.model)
         object.__setattr__(self, "_nodes", self.model.grid.states(self.targets.state_dim))
         object.__setattr__(self, "_node_weights", self.model.grid.node_weights())
-
-    @property
-    def targets(self) -> TargetModel:
-        """The targets as all sensors know them."""
-        return self.tracker.targets
-
-    @property
-    def sensors(self) -> tuple[SensorModel, ...]:
-        """What each sensor sees."""
-        return self.tracker.sensors
 
     def initial(self) -> State:
         """As the tracker's, with those that the model expects to be there at first."""

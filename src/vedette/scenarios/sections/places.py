@@ -109,15 +109,28 @@ def _region(box: Mapping[str, Any], origin: Origin) -> Any:
     return {"x_min": x_min, "x_max": x_max, "y_min": y_min, "y_max": y_max}
 
 
-def bare_degrees(model: ScenarioModel) -> Iterator[Finding]:
-    """Places in metres that can only be degrees: within two degrees of what the origin's are."""
+def misplaced(model: ScenarioModel) -> Iterator[Finding]:
+    """Places in metres that can only be degrees, near to what the origin's are; and places in no plane with it."""
     origin = model.origin
-    if origin is None or max(abs(origin.lon), abs(origin.lat)) <= 2.0 * _NEAR_DEG:
+    if origin is None:
         return
+    from vedette.recorded.geography import PLANE_REACH
+
+    told = max(abs(origin.lon), abs(origin.lat)) > 2.0 * _NEAR_DEG
     wanted = "metres from the origin, or a place {lon: , lat: } in degrees"
+    near = f"places within {PLANE_REACH / 1000.0:g} km of the origin"
     for path, section in sections_in(model):
         for inside, points in _points_of(section):
-            if points and all(abs(x - origin.lon) < _NEAR_DEG and abs(y - origin.lat) < _NEAR_DEG for x, y in points):
+            far = [(x, y) for x, y in points if max(abs(x), abs(y)) > PLANE_REACH]
+            if far:
+                x, y = far[0]
+                got = f"x {x / 1000.0:.0f} km, y {y / 1000.0:.0f} km (are lon and lat exchanged, here or in `origin`?)"
+                yield (*path, *inside), near, got
+            elif (
+                told
+                and points
+                and all(abs(x - origin.lon) < _NEAR_DEG and abs(y - origin.lat) < _NEAR_DEG for x, y in points)
+            ):
                 yield (*path, *inside), wanted, f"{describe(points[0][0])}, {describe(points[0][1])}"
 
 
@@ -137,4 +150,4 @@ def _points_of(section: Section) -> Iterator[tuple[Path, Sequence[tuple[float, f
         yield ("state",), [section.state[:2]]  # type: ignore[list-item]
 
 
-__all__ = ["OriginSection", "bare_degrees", "in_metres", "is_place"]
+__all__ = ["OriginSection", "in_metres", "is_place", "misplaced"]

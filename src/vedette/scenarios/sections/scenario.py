@@ -18,7 +18,7 @@ from vedette.scenarios.sections.control import Control
 from vedette.scenarios.sections.derived import of_kind
 from vedette.scenarios.sections.fusion import AnyFusion, Fusion
 from vedette.scenarios.sections.network import NetworkSection
-from vedette.scenarios.sections.places import OriginSection, bare_degrees, in_metres
+from vedette.scenarios.sections.places import OriginSection, in_metres, misplaced
 from vedette.scenarios.sections.planners import STRATEGIES, AnyPlanner
 from vedette.scenarios.sections.recording import RecordingSection
 from vedette.scenarios.sections.scoring import AnyEstimator, AnyMetric, Ospa
@@ -140,7 +140,7 @@ class ScenarioModel(Section):
 
     @check
     def _across_sections(self) -> Iterator[Finding]:
-        for across in (*CHECKS, bare_degrees):
+        for across in (*CHECKS, misplaced):
             yield from attempt(across(self))
 
     @property
