@@ -19,7 +19,7 @@ from campaigns.examples import small_campaign
 from campaigns.filled import fill, make_campaign
 from campaigns.stubs import stub_campaign, stub_perform
 from vedette.campaigns import Campaign, Shard, engine, merge, open_results, parse_shard, run_campaign
-from vedette.campaigns.shards import ranges, slurm_script
+from vedette.campaigns.shards import owner, ranges, slurm_script
 from vedette.errors import InputError
 
 
@@ -58,6 +58,9 @@ def test_shares_are_disjoint_hold_every_run_and_are_balanced(num_cells: int, cou
         for number in range(1, count + 1)
     ]
     assert sorted(itertools.chain(*found)) == [(cell, run) for cell in range(num_cells) for run in range(num_runs)]
+    assert all(
+        owner(run, cell, num_cells, count) == number for number, runs in enumerate(found, start=1) for cell, run in runs
+    )
     sizes = [len(runs) for runs in found]
     assert max(sizes) - min(sizes) <= 1
     for cell in range(num_cells):

@@ -68,13 +68,16 @@ def merge(folders: Sequence[Path | str], out: Path | str | None = None, *, table
     num_taken = _fill(target, whole, shares)
     results = open_results(target)
     count = max(share.shard.count for share in shares)
-    lacking = [(place, results.missing(cell.name)) for place, cell in enumerate(results.campaign.cells)]
-    num_cells = len(lacking)
-    missing = {owner(run, place, num_cells, count) for place, runs in lacking for run in runs}
-    if tables and not missing:
+    cells, done = results.campaign.cells, set(journal.Reader(target).finished())
+    lacking = [
+        owner(run, place, len(cells), count)
+        for place, cell in enumerate(cells)
+        for run in results.campaign.runs(place)
+        if (cell.name, run) not in done
+    ]
+    if tables and not lacking:
         export_tables(results, target / TABLES)
-    num_missing = sum(len(runs) for _, runs in lacking)
-    return Merged(results, num_taken, count, tuple(sorted(missing)), num_missing, places[0].parent)
+    return Merged(results, num_taken, count, tuple(sorted(set(lacking))), len(lacking), places[0].parent)
 
 
 def _places(folders: Sequence[Path | str]) -> list[Path]:

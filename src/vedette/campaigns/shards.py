@@ -6,16 +6,11 @@ import math
 import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
-
-import numpy as np
-from numpy.typing import NDArray
 
 from vedette.errors import InputError
 from vedette.text import shown
 
 _MOST_SHARDS = 1_000_000
-Number = TypeVar("Number", int, NDArray[np.int64])
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,15 +47,21 @@ class Shard:
         """Numbers of its runs of the cell at that place, increasing."""
         if self.count == 1:
             return range(num_runs)
-        of_all = owner(np.arange(num_runs), cell, num_cells, self.count)
-        found: list[int] = np.flatnonzero(of_all == self.number).tolist()
-        return found
+        # As `owner`, solved for the run: at most one a round, in every so many rounds one.
+        shared = math.gcd(num_cells, self.count)
+        length = self.count // shared  # of a round, in runs
+        inverse = pow(num_cells // shared, -1, length)
+        found = []
+        for number in range((self.number - 1 - cell) % shared, -(-num_runs // length), shared):
+            turn = (self.number - 1 - number) % self.count
+            found.append(number * length + (turn - cell) // shared * inverse % length)
+        return found if not found or found[-1] < num_runs else found[:-1]
 
 
 WHOLE = Shard()
 
 
-def owner(run: Number, cell: int, num_cells: int, count: int) -> Number:
+def owner(run: int, cell: int, num_cells: int, count: int) -> int:
     """Number of the share that has a run of the cell at that place.
 
     Runs are dealt out one after the other, all cells of a run number together. Where that would come back to the same

@@ -67,6 +67,8 @@ def campaign(
     need("vedette campaign", "pyarrow")
     if (slurm is None) != (time is None):
         raise usage_error("expected both or neither", "--slurm and --time")
+    if slurm is not None and shard is not None:
+        raise usage_error("expected without --slurm, which gives each task its shard", "--shard")
     if scheduler is None and not dry_run and slurm is None:
         load_workers(workers)
     from vedette.campaigns import load_spec, parse_shard, resolve
