@@ -68,6 +68,7 @@ HEAVY = {
         "live,report",
     ),
     ("campaign", "spec.toml"): ("pyarrow", "campaigns"),
+    ("merge", "there"): ("pyarrow", "campaigns"),
     ("results", "there"): ("pyarrow", "campaigns"),
     ("upgrade", "there"): ("pyarrow", "campaigns"),
     ("report", "there"): ("jinja2 and matplotlib and pyarrow", "report"),

@@ -79,10 +79,12 @@ def add_until_full(folder: Path, make_room: str) -> None:
     print(f"went on with run {run}", flush=True)
 
 
-def started(function: str, *arguments: str, before: str = "", prefix: tuple[str, ...] = ()) -> subprocess.Popen[str]:
-    """One of these functions in a process of its own."""
+def started(
+    function: str, *arguments: str, before: str = "", prefix: tuple[str, ...] = (), module: str = "adding"
+) -> subprocess.Popen[str]:
+    """One of these functions, or those of another module here, in a process of its own."""
     tests = str(Path(__file__).parents[1])
-    call = f"import sys; sys.path.insert(0, {tests!r}); {before}\nfrom campaigns.adding import *\n"
+    call = f"import sys; sys.path.insert(0, {tests!r}); {before}\nfrom campaigns.{module} import *\n"
     call += f"{function}(Path(sys.argv[1]), *sys.argv[2:])"
     return subprocess.Popen(
         [*prefix, sys.executable, "-c", call, *arguments],

@@ -64,6 +64,10 @@ CALLS: list[tuple[tuple[str, ...], set[str]]] = [
     (("video", "run", "--out", "run.gif", "--fps", "2", "--size", "200"), {"video", "frames", "seconds"}),
     (("campaign", "spec.toml", "--dry-run"), {"cells", "compared", "warnings"}),
     (("campaign", "spec.toml", "--workers", "1"), {"folder", "finished", "failed"}),
+    (("campaign", "spec.toml", "--slurm", "1000", "--time", "4h"), {"script"}),
+    (("campaign", "spec.toml", "--workers", "1", "--shard", "1/2"), {"folder", "finished", "failed"}),
+    (("campaign", "spec.toml", "--workers", "1", "--shard", "2/2"), {"folder", "finished", "failed"}),
+    (("merge", "trial-shards", "--out", "merged"), {"folder", "runs", "finished", "missing_shards", "commands"}),
     (("results", "trial-results", "--export", "tables"), {"comparisons", "missing", "written"}),
     (("upgrade", "trial-results"), {"folder", "format_was", "format"}),
     (("report", "trial-results"), {"page", "figures"}),
@@ -214,3 +218,25 @@ def test_a_shell_is_given_names(place: Path, words: tuple[str, ...], expected: l
     )
     assert done.stderr == ""
     assert done.stdout.split() == expected
+
+
+def test_missing_shards_are_named_with_the_commands_that_run_them(place: Path) -> None:
+    assert call("campaign", "spec.toml", "--workers", "1", "--shard", "2/3").exit_code == 0
+    result = call("merge", "trial-shards", "--out", "merged")
+    assert result.exit_code == 1
+    commands = [line.strip() for line in result.stderr.splitlines() if line.startswith("  vedette campaign SPEC")]
+    assert [command.split()[-1] for command in commands] == ["1/3", "3/3"]
+    for command in commands:
+        words = command.replace("SPEC", "spec.toml").split()[1:]
+        assert call(*words, "--workers", "1").exit_code == 0
+    result = call("merge", "trial-shards", "--out", "merged")
+    assert (result.exit_code, "4 of 4 runs" in result.stdout) == (0, True)
+    assert call("results", "merged").exit_code == 0
+
+
+def test_a_job_array_needs_a_time_and_has_no_shard_of_its_own(place: Path) -> None:
+    assert call("campaign", "spec.toml", "--slurm", "3").exit_code == 2
+    assert call("campaign", "spec.toml", "--slurm", "3", "--time", "4h", "--shard", "1/3").exit_code == 2
+    script = call("campaign", "spec.toml", "--runs", "5", "--slurm", "3", "--time", "4h").stdout
+    assert script.startswith("#!/bin/bash\n")
+    assert "vedette campaign spec.toml --out trial-shards --runs=5 --workers=1 --shard" in script

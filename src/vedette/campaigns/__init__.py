@@ -5,8 +5,10 @@ from vedette.extras import need
 need("a campaign", "pyarrow")
 
 from vedette.campaigns.cells import Campaign, Cell, resolve
+from vedette.campaigns.merging import Merged, merge
 from vedette.campaigns.results import CampaignResults, open_results
 from vedette.campaigns.running import Outcome, Watch, run_campaign
+from vedette.campaigns.shards import Shard, parse_shard
 from vedette.campaigns.spec import CampaignSpec, Variant, load_spec, parse_spec
 from vedette.campaigns.tasks import Failed, Landed
 
@@ -17,11 +19,15 @@ __all__ = [
     "Cell",
     "Failed",
     "Landed",
+    "Merged",
     "Outcome",
+    "Shard",
     "Variant",
     "Watch",
     "load_spec",
+    "merge",
     "open_results",
+    "parse_shard",
     "parse_spec",
     "resolve",
     "run_campaign",

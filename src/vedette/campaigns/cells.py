@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from vedette.campaigns.shards import WHOLE, Shard
 from vedette.campaigns.spec import CampaignSpec, spec_from_data
 from vedette.errors import InputError, ScenarioError
 from vedette.scenarios import Scenario, list_builtin, load_scenario
@@ -50,6 +51,7 @@ class Campaign:
         axes: each axis and its values.
         compare: the axis whose values are compared; the first value is the reference.
         spec: the specification as plain data, every default written out.
+        shard: the share of its runs that are to be done; by default all.
     """
 
     name: str
@@ -59,16 +61,26 @@ class Campaign:
     axes: dict[str, tuple[Any, ...]]
     compare: str
     spec: dict[str, Any]
+    shard: Shard = WHOLE
 
     @property
     def total(self) -> int:
-        """Number of runs of all cells together."""
-        return self.num_runs * len(self.cells)
+        """Number of runs to be done, of all cells together."""
+        return sum(len(self.runs(place)) for place in range(len(self.cells)))
+
+    def runs(self, place: int) -> Sequence[int]:
+        """Numbers of the runs to be done of the cell at that place, increasing."""
+        return self.shard.runs(place, len(self.cells), self.num_runs)
 
     @property
     def default_folder(self) -> str:
         """Where its results go unless another place is named."""
-        return f"{safe_name(self.name)}-results"
+        return results_folder(self.name)
+
+    @property
+    def default_shards(self) -> str:
+        """Where the folders of its shards go unless another place is named."""
+        return f"{safe_name(self.name)}-shards"
 
     @property
     def tasks(self) -> tuple[tuple[Cell, int], ...]:
@@ -197,6 +209,11 @@ def _name(settings: Mapping[str, Any], axes: Mapping[str, tuple[Any, ...]]) -> s
     if len(text) <= _LONGEST_NAME:
         return text
     return f"{text[: _LONGEST_NAME - 9]}-{hashlib.sha256(text.encode()).hexdigest()[:8]}"
+
+
+def results_folder(name: str) -> str:
+    """Where the results of a campaign of that name go unless another place is named."""
+    return f"{safe_name(name)}-results"
 
 
 def safe_name(text: str) -> str:

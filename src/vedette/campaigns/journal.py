@@ -10,7 +10,7 @@ import hashlib
 import itertools
 import sqlite3
 import zlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,6 +34,7 @@ _TABLES = (
 )
 _ALTERED = "expected the run as it was written; it is cut short or altered"
 _COLUMNS = "cell, run, session, payload, payload_sha256, metrics, metrics_sha256, timings, timings_sha256"
+_INSERT = f"INSERT INTO runs ({_COLUMNS}) VALUES ({', '.join('?' * (_COLUMNS.count(',') + 1))})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +110,7 @@ class Writer:
             with _explained(self._path, _place(entry.cell, entry.run)):
                 self._database.execute("BEGIN IMMEDIATE")
                 with self._database:  # both or neither
-                    self._database.execute(f"INSERT INTO runs ({_COLUMNS}) VALUES ({', '.join('?' * len(row))})", row)
+                    self._database.execute(_INSERT, row)
                     self._database.execute("DELETE FROM failures WHERE cell = ? AND run = ?", (entry.cell, entry.run))
         except sqlite3.IntegrityError:
             raise InputError(
@@ -146,6 +147,37 @@ class Writer:
         """Keep other measures of a run that is there."""
         where = "UPDATE runs SET metrics = ?, metrics_sha256 = ? WHERE cell = ? AND run = ?"
         self._change(cell, run, where, *_packed(cell, run, metrics))
+
+    def take_in(self, others: Iterable[tuple[Reader, Callable[[int], int]]]) -> int:
+        """Copy the runs of other folders that are not here yet, all in one transaction; returns their number.
+
+        Args:
+            others: each with the session that stands here for one of its own.
+
+        Raises `InputError`, and changes nothing, for a run that is not as it was written, or has other bytes here.
+        """
+        with _explained(self._path):
+            self._database.execute("BEGIN IMMEDIATE")
+            with self._database:
+                num_taken = 0
+                for reader, session in others:
+                    for row in reader.rows():
+                        num_taken += self._take_in(reader, (*row[:2], session(row[2]), *row[3:]))
+                    for each in reader.failures():
+                        failure = (each.cell, each.run, session(each.session), each.message)
+                        self._database.execute("INSERT OR REPLACE INTO failures VALUES (?, ?, ?, ?)", failure)
+                self._database.execute("DELETE FROM failures WHERE (cell, run) IN (SELECT cell, run FROM runs)")
+            return num_taken
+
+    def _take_in(self, reader: Reader, row: tuple[Any, ...]) -> bool:
+        """Whether a run was new."""
+        if self._database.execute(_INSERT.replace("INSERT", "INSERT OR IGNORE", 1), row).rowcount:
+            return True
+        kept = "SELECT payload_sha256 FROM runs WHERE cell = ? AND run = ?"
+        if self._database.execute(kept, row[:2]).fetchone() != (row[4],):
+            place = _place(*row[:2])
+            raise InputError(f"{reader}: {place}expected the bytes that another folder has of it; got others")
+        return False
 
     def rewrite(self, payload: Callable[[Entry], bytes]) -> None:
         """Give every run another payload, all in one transaction.
@@ -203,6 +235,9 @@ class Reader:
     def __init__(self, folder: Path) -> None:
         self._path = folder / DATABASE
 
+    def __str__(self) -> str:
+        return str(self._path)
+
     def check(self, contents: str) -> None:
         """`InputError` unless the file is whole so far and of the campaign whose manifest has that checksum."""
         _check_contents(self._path, self._ask("SELECT contents FROM campaign"), contents)
@@ -219,6 +254,14 @@ class Reader:
             if not isinstance(session, int) or not isinstance(message, str):
                 raise InputError(f"{self._path}: expected why a run failed; got {shown(message)}")
         return [Failure(*row) for row in rows]
+
+    def rows(self) -> Iterator[tuple[Any, ...]]:
+        """Every run as it is kept, by cell and number. `InputError` at the first one that is damaged."""
+        with _explained(self._path), closing(_opened(self._path)) as database:
+            for row in database.execute(f"SELECT {_COLUMNS} FROM runs ORDER BY cell, run"):
+                if _verified(row) is None:
+                    raise InputError(f"{self._path}: {_place(*map(printable, map(str, row[:2])))}{_ALTERED}")
+                yield row
 
     def entry(self, cell: str, run: int) -> Entry:
         """A finished run, its checksums verified. `InputError` where there is none, or its row is damaged."""
@@ -257,10 +300,13 @@ def _verified(row: tuple[Any, ...]) -> Entry | None:
 
 
 def _answer(path: Path, question: str, values: Sequence[Any], mode: str = "ro") -> list[Any]:
-    address = f"{path.resolve().as_uri()}?mode={mode}"
-    with closing(sqlite3.connect(address, timeout=_WAIT, uri=True)) as database:
+    with closing(_opened(path, mode)) as database:
         _check_tables(path, database)
         return database.execute(question, values).fetchall()
+
+
+def _opened(path: Path, mode: str = "ro") -> sqlite3.Connection:
+    return sqlite3.connect(f"{path.resolve().as_uri()}?mode={mode}", timeout=_WAIT, uri=True)
 
 
 def _check_tables(path: Path, database: sqlite3.Connection) -> None:
@@ -301,7 +347,7 @@ def _check_contents(path: Path, found: Sequence[tuple[str]], contents: str) -> N
         )
 
 
-def _place(cell: str, run: int) -> str:
+def _place(cell: str, run: int | str) -> str:
     return f"cell {cell}, run {run}: "
 
 

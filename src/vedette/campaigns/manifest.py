@@ -14,6 +14,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, JsonValue, ValidationError
 
 from vedette.campaigns.cells import Campaign, Cell, safe_name
+from vedette.campaigns.shards import WHOLE, parse_shard
 from vedette.campaigns.spec import CampaignSpec, spec_from_data
 from vedette.errors import InputError
 from vedette.files import write_whole
@@ -65,6 +66,7 @@ class _Manifest(BaseModel):
     cells: list[_CellEntry]
     created: str
     sessions: list[_Session]
+    shard: str | None = None
 
 
 def new_manifest(campaign: Campaign) -> dict[str, Any]:
@@ -91,6 +93,7 @@ def new_manifest(campaign: Campaign) -> dict[str, Any]:
         ],
         "created": _now(),
         "sessions": [],
+        **({"shard": str(campaign.shard)} if campaign.shard.count > 1 else {}),
     }
     plain: dict[str, Any] = json.loads(json.dumps(manifest))
     return plain
@@ -148,9 +151,9 @@ def contents_checksum(manifest: Mapping[str, Any]) -> str:
 
 
 def check_same(folder: Path, there: Mapping[str, Any], here: Mapping[str, Any]) -> None:
-    """`InputError`, naming the first field that differs, unless both manifests are of the same campaign."""
-    for field in _FIXED:
-        difference = _difference(field, there[field], here[field])
+    """`InputError`, naming the first field that differs, unless both manifests are of the same share of a campaign."""
+    for field in (*_FIXED, "shard"):
+        difference = _difference(field, there.get(field), here.get(field))
         if difference and field == "digest":
             difference = "the files that its scenarios name have other contents now"
         if difference:
@@ -178,6 +181,7 @@ def campaign_of(folder: Path, manifest: Mapping[str, Any]) -> Campaign:
             axes=axes,
             compare=manifest["compare"],
             spec=spec,
+            shard=parse_shard(shard) if (shard := manifest.get("shard")) else WHOLE,
         )
     except (InputError, ValidationError) as error:
         raise InputError(

@@ -70,7 +70,8 @@ class CampaignResults:
     def missing(self, cell: str) -> tuple[int, ...]:
         """Numbers of the runs of a cell that are still to be done."""
         done = set(self.finished(cell))
-        return tuple(run for run in range(self.campaign.num_runs) if run not in done)
+        place = [each.name for each in self.campaign.cells].index(cell)
+        return tuple(run for run in self.campaign.runs(place) if run not in done)
 
     def failures(self) -> tuple[Failure, ...]:
         """The runs that were tried and could not be finished, each with where and why it stopped; by cell and run.

@@ -125,8 +125,9 @@ def run_campaign(
                 store.add(result.cell, result.run, result.payload, result.timings, result.metrics)
                 num_landed += 1
                 watch.landed(result)
-    # Each time: what was left of them by another end of this call, or altered since, is put right.
-    export_tables(open_results(folder, campaign=campaign), Path(folder) / TABLES)
+    if campaign.shard.count == 1:  # of shares they are written when these are one
+        # Each time: what was left of them by another end of this call, or altered since, is put right.
+        export_tables(open_results(folder, campaign=campaign), Path(folder) / TABLES)
     return Outcome(num_landed, num_found, tuple(failed))
 
 

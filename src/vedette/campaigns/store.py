@@ -52,7 +52,7 @@ class Store(journal.Writer):
         target = Path(folder)
         fresh = new_manifest(campaign)
         try:
-            _check_place(target)
+            check_place(target)
             target.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise InputError(f"{target}: expected a place for a results folder; {error}") from error
@@ -124,7 +124,7 @@ class Store(journal.Writer):
         self.close()
 
 
-def _check_place(folder: Path) -> None:
+def check_place(folder: Path) -> None:
     """`InputError` unless the folder is new, empty but for what a killed start leaves, or has a manifest."""
     if not folder.exists() or (folder / MANIFEST).exists():
         return

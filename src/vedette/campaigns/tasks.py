@@ -125,8 +125,8 @@ class TaskQueue:
         self._fastest: dict[str, float] = {}
         self._compiled: dict[tuple[object, ...], bool] = {}  # False: by a task that is under way
         self._todo = {
-            cell.name: [run for run in range(campaign.num_runs) if (cell.name, run) not in finished]
-            for cell in campaign.cells
+            cell.name: [run for run in campaign.runs(place) if (cell.name, run) not in finished]
+            for place, cell in enumerate(campaign.cells)
         }
 
     def __len__(self) -> int:

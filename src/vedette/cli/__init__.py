@@ -11,6 +11,7 @@ from vedette.cli.calibrating import calibrate
 from vedette.cli.campaign import campaign
 from vedette.cli.errors import Commands
 from vedette.cli.live import live
+from vedette.cli.merging import merge
 from vedette.cli.output import speaking
 from vedette.cli.reproducing import reproduce
 from vedette.cli.results import report, results, upgrade
@@ -58,6 +59,7 @@ app.command()(speaking(live))
 app.command()(speaking(calibrate))
 app.command()(speaking(reproduce))
 app.command()(speaking(campaign))
+app.command()(speaking(merge))
 app.command()(speaking(results))
 app.command()(speaking(report))
 app.command()(speaking(video))

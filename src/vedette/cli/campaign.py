@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import shlex
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from vedette.cli import completing
+from vedette.cli.errors import named_options, usage_error
 from vedette.cli.options import Trust, Workers
 from vedette.cli.output import complain, note, publish, say
 from vedette.cli.progress import CampaignProgress
@@ -48,26 +49,51 @@ def campaign(
         bool, typer.Option("--redo-damaged", help="Run again what was altered since it was kept, in its place.")
     ] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be run, and stop.")] = False,
+    shard: Annotated[
+        str | None,
+        typer.Option(
+            "--shard", metavar="NUMBER/COUNT", help="Run one share, such as 17/1000, in a folder of its own in DIR."
+        ),
+    ] = None,
+    slurm: Annotated[
+        int | None, typer.Option("--slurm", metavar="COUNT", min=1, help="Print a job array of so many shards; stop.")
+    ] = None,
+    time: Annotated[
+        str | None, typer.Option("--time", metavar="TIME", help="That a task of --slurm may take: 4h, 90m, 1d12h.")
+    ] = None,
     trust: Trust = False,
 ) -> None:
     """Run a campaign, or go on with one: every run that its folder does not hold yet."""
     need("vedette campaign", "pyarrow")
-    if scheduler is None and not dry_run:
+    if (slurm is None) != (time is None):
+        raise usage_error("expected both or neither", "--slurm and --time")
+    if slurm is not None and shard is not None:
+        raise usage_error("expected without --slurm, which gives each task its shard", "--shard")
+    if scheduler is None and not dry_run and slurm is None:
         load_workers(workers)
-    from vedette.campaigns import load_spec, resolve
+    from vedette.campaigns import load_spec, parse_shard, resolve
 
     resolved = resolve(load_spec(spec), spec.parent, approve=Approval(trust, spec))
     if runs is not None:
         resolved = resolved.with_runs(runs)
+    if shard is not None:
+        with named_options({"shard": "--shard"}):
+            resolved = replace(resolved, shard=parse_shard(shard))
     if dry_run:
         _describe(resolved)
         return
-    folder = out or Path(resolved.default_folder)
+    folder = out or Path(resolved.default_folder if (shard or slurm) is None else resolved.default_shards)
+    if slurm is not None and time is not None:
+        options = [*([f"--runs={runs}"] if runs else []), *(["--trust"] if trust else [])]
+        _print_job(resolved, slurm, time, ["vedette", "campaign", str(spec), "--out", str(folder), *options])
+        return
+    if shard is not None:
+        folder = folder / resolved.shard.folder
     outcome = carry_out(resolved, folder, workers, scheduler, redo_damaged)
     finished = outcome.num_landed + outcome.num_found
     say(f"{folder}: {finished} of {resolved.total} runs")
-    place = shlex.quote(str(folder))
-    say(f"next: vedette results {place}; vedette report {place}")
+    place = shlex.quote(str(folder if shard is None else folder.parent))
+    say(f"next: vedette {f'results {place}; vedette report' if shard is None else 'merge'} {place}")
     publish(
         {
             "campaign": resolved.name,
@@ -78,6 +104,17 @@ def campaign(
         }
     )
     report_failures(outcome.failed)
+
+
+def _print_job(campaign: Campaign, count: int, time: str, command: list[str]) -> None:
+    from vedette.campaigns.cells import safe_name
+    from vedette.campaigns.shards import slurm_script
+
+    merge = shlex.join(["vedette", "merge", command[4], "--out", campaign.default_folder])
+    with named_options({"time": "--time", "shard": "--slurm"}):
+        script = slurm_script(safe_name(campaign.name), count, time, shlex.join([*command, "--workers=1"]), merge)
+    say(script.rstrip("\n"))
+    publish({"script": script})
 
 
 def load_workers(workers: int) -> None:
@@ -117,8 +154,9 @@ def report_failures(failed: tuple[Failed, ...]) -> None:
 def _describe(campaign: Campaign) -> None:
     from vedette.scenarios.cautions import cautions
 
+    share = f", shard {campaign.shard}" if campaign.shard.count > 1 else ""
     say(
-        f"{campaign.name}: {campaign.total} runs, {campaign.num_runs} of each of {len(campaign.cells)} cells, "
+        f"{campaign.name}{share}: {campaign.total} runs, {campaign.num_runs} of each of {len(campaign.cells)} cells, "
         f"seed {campaign.seed}"
     )
     for field, value in campaign.spec["set"].items():

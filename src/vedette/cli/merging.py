@@ -1,0 +1,73 @@
+"""The command that makes one results folder of those of shards, merge."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from vedette.cli.output import complain, publish, say
+from vedette.cli.running import interruptible
+from vedette.extras import need
+from vedette.text import counted
+
+if TYPE_CHECKING:
+    from vedette.campaigns import Merged
+
+_SHOWN_COMMANDS = 3
+
+
+def merge(
+    folders: Annotated[
+        list[Path], typer.Argument(metavar="DIR...", help="Results folders of shards, or folders that they are in.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results; else named after the campaign.")
+    ] = None,
+    tables: Annotated[
+        bool, typer.Option("--tables/--no-tables", help="Write the tables for other tools when no run is missing.")
+    ] = True,
+) -> None:
+    """Make one results folder of those of shards, and name the shards that are missing."""
+    need("vedette merge", "pyarrow")
+    from vedette.campaigns import merging
+    from vedette.campaigns.shards import ranges
+
+    with interruptible("nothing of this call was kept; the shards are as they were"):
+        merged = merging.merge(folders, out, tables=tables)
+    results = merged.results
+    campaign = results.campaign
+    finished = campaign.total - merged.num_missing
+    say(f"{results.folder}: {finished} of {campaign.total} runs, {merged.num_taken} of them new")
+    commands = _commands(merged)
+    publish(
+        {
+            "campaign": campaign.name,
+            "folder": results.folder,
+            "runs": campaign.total,
+            "finished": finished,
+            "missing_shards": merged.missing,
+            "commands": commands,
+        }
+    )
+    if not commands:
+        place = shlex.quote(str(results.folder))
+        say(f"next: vedette results {place}; vedette report {place}")
+        return
+    complain(f"missing: {counted(merged.num_missing, 'run')}, which these run (SPEC: the campaign's file):")
+    for command in commands[:_SHOWN_COMMANDS]:
+        complain(f"  {command}")
+    if len(commands) > _SHOWN_COMMANDS:
+        complain(f"  and so on, {len(commands)} shards; as a job array: sbatch --array={ranges(merged.missing)} SCRIPT")
+    raise typer.Exit(1)
+
+
+def _commands(merged: Merged) -> list[str]:
+    """What runs each share that is missing; one command where the campaign was not cut."""
+    words = ["vedette", "campaign", "SPEC", f"--runs={merged.results.campaign.num_runs}", "--out"]
+    if merged.count == 1:
+        return [shlex.join([*words, str(merged.results.folder)]) for _ in merged.missing]
+    words.append(str(merged.shards))
+    return [shlex.join([*words, "--shard", f"{number}/{merged.count}"]) for number in merged.missing]
