@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from vedette.text import ELLIPSIS, counted, elided, plain
+from vedette.text import ELLIPSIS, elided, plain
 
 _MOST_FIELDS, _MOST_NUMBERS, _MOST_ROWS = 8, 4, 20
 _WIDEST = 160
@@ -75,7 +75,9 @@ def _brief(value: Any) -> str:
     if value is None or isinstance(value, bool | int):
         return str(value)
     if isinstance(value, tuple | list | dict):
-        return f"({counted(len(value), 'entry') if len(value) == 1 else f'{len(value)} entries'})"
+        if len(value) <= _MOST_NUMBERS and all(isinstance(entry, int | float | str) for entry in value):
+            return elided(plain(value))
+        return "(1 entry)" if len(value) == 1 else f"({len(value)} entries)"
     return type(value).__name__
 
 
