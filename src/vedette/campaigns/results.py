@@ -19,7 +19,8 @@ from vedette.evaluation.comparison import Comparison, scored
 from vedette.evaluation.metrics import Metric, RunMetrics, decode_metrics
 from vedette.evaluation.runs import measure_run
 from vedette.simulation.records import RunRecord
-from vedette.text import shown
+from vedette.speaking import Speaking
+from vedette.text import counted, elided, shown
 
 if TYPE_CHECKING:
     import pyarrow
@@ -43,8 +44,8 @@ class GroupComparison:
     comparison: Comparison
 
 
-@dataclass(frozen=True, slots=True)
-class CampaignResults:
+@dataclass(frozen=True, slots=True, repr=False)
+class CampaignResults(Speaking):
     """What is finished of a campaign. Runs are read when they are asked for, and their checksums verified each time.
 
     Every method that reads runs raises `InputError`, naming file, cell and run, for one that is damaged.
@@ -61,6 +62,14 @@ class CampaignResults:
     manifest: dict[str, Any]
     _reader: Reader = field(repr=False)
     _own: tuple[Metric, ...] = field(default=(), repr=False)
+
+    def _summary(self) -> str:
+        campaign = self.campaign
+        done = f"{len(self._finished())} of {counted(campaign.total, 'run')} finished"
+        return f"of {elided(campaign.name)}: {done}, {counted(len(campaign.cells), 'cell')}"
+
+    def _detail(self) -> str:
+        return str(self.folder)
 
     def finished(self, cell: str) -> tuple[int, ...]:
         """Numbers of the finished runs of a cell, increasing. Raises `InputError` for a name of no cell."""

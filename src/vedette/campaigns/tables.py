@@ -19,11 +19,10 @@ import pyarrow as pa
 from vedette.campaigns.cells import Campaign, Cell
 from vedette.evaluation.metrics import RunMetrics
 from vedette.simulation.arrow import Columns, Kind, Layout, stacked, to_arrow
-from vedette.simulation.records import RunRecord
+from vedette.simulation.records import OSPA_COLUMNS, RunRecord
 from vedette.simulation.tables import (
     LAYOUTS,
     OPTIONAL,
-    OSPA_COLUMNS,
     TIMINGS,
     tables_of,
     timing_table,

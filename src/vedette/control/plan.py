@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -12,10 +12,14 @@ from vedette.control.explanation import Bound, Explanation
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
 from vedette.platforms import Actions
+from vedette.speaking import Speaking, Tabled
+from vedette.text import counted, elided
+
+_MOST_TOLD = 4
 
 
-@dataclass(frozen=True, slots=True)
-class RewardTable:
+@dataclass(frozen=True, slots=True, repr=False)
+class RewardTable(Speaking):
     """Expected reward of each action, or of each joint action, of some sensors (paper eq. 15 and 17).
 
     Attributes:
@@ -83,8 +87,8 @@ class SearchCurve(NamedTuple):
     best: Floats  # (num_steps,) the best mean reward found by then
 
 
-@dataclass(frozen=True, slots=True)
-class Plan:
+@dataclass(frozen=True, slots=True, repr=False)
+class Plan(Tabled):
     """One decision: the chosen action of each sensor, and what was evaluated to choose it.
 
     Attributes:
@@ -153,6 +157,30 @@ class Plan:
     def num_sensors(self) -> int:
         """Number of sensors that the plan steers."""
         return len(self.actions)
+
+    def to_table(self) -> dict[str, list[Any]]:
+        """A row a sensor, by columns: `sensor` (from 0), `action`, of `num_actions`, and its numbers by their names.
+
+        A number that a sensor's actions do not have is None.
+        """
+        chosen = [dict(zip(own.columns, row, strict=True)) for own, row in zip(self.actions, self._rows(), strict=True)]
+        table: dict[str, list[Any]] = {"sensor": list(range(self.num_sensors)), "action": list(self.chosen)}
+        table["num_actions"] = [len(own) for own in self.actions]
+        return table | {name: [row.get(name) for row in chosen] for name in dict.fromkeys(n for r in chosen for n in r)}
+
+    def _rows(self) -> list[list[float]]:
+        return [row.tolist() for row in self.chosen_actions]
+
+    def _summary(self) -> str:
+        rewards = self.expected_rewards
+        worth = f", expected reward {rewards[0][0]:.4g} ± {rewards[0][1]:.2g}" if len(rewards) == 1 else ""
+        return f"of {elided(self.planner)} for {counted(self.num_sensors, 'sensor')}{worth}"
+
+    def _detail(self) -> str:
+        texts = [own.text(index) for own, index in zip(self.actions, self.chosen, strict=True)][:_MOST_TOLD]
+        more = self.num_sensors - len(texts)
+        told = [f"sensor {number}: {text}" for number, text in enumerate(texts, start=1)]
+        return "; ".join(told + ([f"{more} more"] if more else []))
 
     @property
     def chosen_actions(self) -> tuple[Floats, ...]:

@@ -31,6 +31,7 @@ from vedette.densities.samples import (
     sample_poisson,
 )
 from vedette.densities.statistics import cardinality_distribution, existence_probabilities
+from vedette.densities.telling import Hypothesis, Target
 from vedette.densities.tracks import TrackTable, mixture_moments, track_moments
 from vedette.densities.undetected import UndetectedIntensity
 from vedette.densities.unlabelled import IidCluster, Poisson
@@ -41,11 +42,13 @@ __all__ = [
     "Estimate",
     "Estimator",
     "FactoredGLMB",
+    "Hypothesis",
     "IidCluster",
     "Labelled",
     "MultiBernoulli",
     "MultiTargetSamples",
     "Poisson",
+    "Target",
     "TrackHistory",
     "TrackTable",
     "UndetectedIntensity",

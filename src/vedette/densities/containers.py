@@ -9,17 +9,19 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable
 from operator import attrgetter
-from typing import Any, Self, TypeVar
+from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vedette.densities.telling import Targets
 from vedette.kernels.base.types import Floats
+from vedette.speaking import Speaking, Tabled
 
 _Container = TypeVar("_Container", bound="Container")
 
 
-class Container:
+class Container(Speaking):
     """A frozen dataclass of arrays and other containers.
 
     The arrays of its fields are read-only views of arrays that nobody else holds. Those are what kernels take (see
@@ -45,10 +47,27 @@ class Container:
         return type(self), tuple(getattr(self, name) for name in self.__match_args__)  # type: ignore[attr-defined]
 
 
-class MultiTarget(Container):
+class MultiTarget(Container, Tabled):
     """A density of a set of targets."""
 
     __slots__ = ()
+    _weight: ClassVar[str] = "existence"  # what the weights of `_targets` are called
+
+    @abstractmethod
+    def _targets(self) -> Targets:
+        """Its labels, or else its Bernoullis or components, with what each is worth and its mean and covariance."""
+
+    def to_table(self) -> dict[str, list[Any]]:
+        """A row a label, or else a Bernoulli or a component, by columns, as `pandas.DataFrame` takes them.
+
+        `label` (`birth step.index`) where there are labels, `existence` (of an intensity's components
+        `expected_number`), mean and standard deviations as in the table of a run's tracks: `x_m`, `y_m`, `vx_mps`,
+        `vy_mps`, `std_x_m` and so on, those of the marginal density.
+        """
+        return self._targets().columns(self._weight)
+
+    def _detail(self) -> str:
+        return self._targets().in_words()
 
     @property
     @abstractmethod

@@ -180,11 +180,8 @@ def as_glmb(density: Labelled, *, max_hypotheses: int) -> tuple[GLMB, float]:
     weights are normalised over what is kept, which comes by descending weight. Products of weight zero are not listed.
     Raises `InputError` for a `max_hypotheses` below 1.
     """
-    if max_hypotheses < 1:
-        raise InputError(f"max_hypotheses: expected at least 1; got {max_hypotheses}")
-    labels, label_of = distinct_labels(density.tracks.labels)
-    glmb, discarded_weight = kernels.factored_to_glmb(density.to_factors(), label_of, len(labels), int(max_hypotheses))
-    return GLMB.from_kernel(glmb), float(discarded_weight)
+    glmb, discarded_weight = density.heaviest_sets(max_hypotheses)
+    return GLMB.from_kernel(glmb), discarded_weight
 
 
 def lmb_on_label_sets(lmb: LMB, sets: Sequence[Sequence[tuple[int, ...]]]) -> GLMB:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -17,19 +17,22 @@ from vedette.densities.glmb import GLMB
 from vedette.densities.labelled import LMB, Labelled
 from vedette.densities.multi_bernoulli import MultiBernoulli
 from vedette.densities.statistics import cardinality_distribution, heaviest_tracks, labelled
+from vedette.densities.telling import Target, Targets
 from vedette.densities.tracks import TrackTable, gaussian_tracks, heaviest_components
 from vedette.densities.unlabelled import IidCluster, Poisson
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import no_gaussians
+from vedette.speaking import Tabled
+from vedette.text import counted
 
 _MARGINAL_COMPONENTS = 10
 # A component of weight 1.5 to 2 is more often one target that two measurements fit than two: docs/filters.md.
 _RANK_OF_HALF_LEFT = 0.2
 
 
-@dataclass(frozen=True, slots=True)
-class Estimate:
+@dataclass(frozen=True, slots=True, repr=False)
+class Estimate(Tabled):
     """Estimated targets at one moment, in increasing label order.
 
     Attributes:
@@ -48,6 +51,27 @@ class Estimate:
     def num_targets(self) -> int:
         """Number of estimated targets."""
         return len(self.labels)
+
+    def __len__(self) -> int:
+        """Number of estimated targets."""
+        return len(self.labels)
+
+    def targets(self) -> Iterator[Target]:
+        """Label, probability of existence, mean and covariance of each, in increasing label order."""
+        return self._targets().each()
+
+    def to_table(self) -> dict[str, list[Any]]:
+        """A row a target, by columns: those of the table of a density."""
+        return self._targets().columns("existence")
+
+    def _targets(self) -> Targets:
+        return Targets(self.labels, self.existence, self.means, self.covs)
+
+    def _summary(self) -> str:
+        return f"of {counted(self.num_targets, 'target')}"
+
+    def _detail(self) -> str:
+        return self._targets().in_words()
 
     @classmethod
     def empty(cls, state_dim: int) -> Estimate:
@@ -179,8 +203,8 @@ def _by_units(weights: Floats, number: int) -> tuple[Ints, Floats]:
     return np.array(chosen, np.int64), np.array(had)
 
 
-@dataclass(frozen=True, slots=True)
-class TrackHistory:
+@dataclass(frozen=True, slots=True, repr=False)
+class TrackHistory(Tabled):
     """All estimates of one label, in order of time; scans at which it was not estimated are left out.
 
     Attributes:
@@ -198,6 +222,11 @@ class TrackHistory:
     means: Floats
     covs: Floats
     existence: Floats
+
+    def to_table(self) -> dict[str, list[Any]]:
+        """A row a scan, by columns: `step`, `time_s`, and those of the table of a density."""
+        scans: dict[str, list[Any]] = {"step": self.steps.tolist(), "time_s": self.times.tolist()}
+        return scans | Targets(None, self.existence, self.means, self.covs).columns("existence")
 
 
 def track_histories(estimates: Sequence[Estimate], times: Floats) -> tuple[TrackHistory, ...]:

@@ -19,11 +19,12 @@ from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.labelled.cardinality import convolved
 from vedette.kernels.labelled.labels import group_by_label_set
 from vedette.kernels.labelled.stacking import join_offsets, stack_glmbs
+from vedette.text import counted
 
 _FACTORS = kernel_arrays("track_offsets", "hyp_offsets", "hyp_tracks", "hyp_log_weights", "factor_offsets")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class FactoredGLMB(Hypotheses):
     """Product of independent GLMBs (factors), no two of which share a label.
 
@@ -57,6 +58,9 @@ class FactoredGLMB(Hypotheses):
     def num_factors(self) -> int:
         """Number of factors."""
         return len(self.factor_offsets) - 1
+
+    def _parts(self) -> str:
+        return f"{Hypotheses._parts(self)}, {counted(self.num_factors, 'factor')}"
 
     @property
     def is_bernoulli(self) -> Bools:

@@ -16,6 +16,7 @@ from vedette.errors import InputError, VedetteError
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.labelled.labels import group_by_label_set
+from vedette.text import counted
 
 _HYPOTHESES = kernel_arrays("hyp_offsets", "hyp_tracks", "hyp_log_weights")
 
@@ -36,6 +37,10 @@ class Hypotheses(Labelled):
     def num_hyps(self) -> int:
         """Number of hypotheses, of all factors together."""
         return len(self.hyp_log_weights)
+
+    def _parts(self) -> str:
+        hyps = "1 hypothesis" if self.num_hyps == 1 else f"{self.num_hyps} hypotheses"
+        return f", {counted(self.tracks.num_tracks, 'track')}, {hyps}"
 
     @property
     def track_existence(self) -> Floats:
@@ -58,7 +63,7 @@ class Hypotheses(Labelled):
         return self.with_fields(tracks=self.tracks.with_fields(labels=labels), hyp_tracks=self.hyp_tracks[order])
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class GLMB(Hypotheses):
     """delta-GLMB density (paper eq. 4); marginalised delta-GLMB (eq. 10) where every label set occurs once.
 

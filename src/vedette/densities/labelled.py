@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, Self
 
@@ -10,12 +11,15 @@ import numpy as np
 
 from vedette.densities import checks
 from vedette.densities.containers import MultiTarget, for_kernel, unchecked
-from vedette.densities.tracks import TrackTable, take_tracks
+from vedette.densities.telling import Hypothesis, Target, Targets
+from vedette.densities.tracks import TrackTable, run_moments, take_tracks, track_moments
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.labelled.cardinality import convolved
+from vedette.kernels.labelled.conversions import factored_to_glmb
 from vedette.probabilities import expit
+from vedette.text import counted
 
 LABELLED = "a GLMB, an LMB or a FactoredGLMB"  # how messages call one
 
@@ -62,6 +66,62 @@ class Labelled(MultiTarget):
     def label_existence(self) -> tuple[Ints, Floats]:
         """See `vedette.densities.existence_probabilities`."""
 
+    def __len__(self) -> int:
+        """Number of labels, whether their targets are likely or not."""
+        return len(self.label_existence()[0])
+
+    def targets(self) -> Iterator[Target]:
+        """Label, probability of existence, mean and covariance of each target, in increasing label order.
+
+        Mean and covariance are those of the label's marginal density, over all hypotheses and components; of an
+        estimate that keeps rivals apart see `vedette.densities.map_estimate`.
+        """
+        return self._targets().each()
+
+    def hypotheses(self, max_hypotheses: int = 1000) -> Iterator[Hypothesis]:
+        """The likeliest hypotheses, by descending weight: `weight`, `labels`, and `tracks`, their rows of the table.
+
+        Of a product, and an LMB is one, these are products of one hypothesis of each factor. The weights are
+        probabilities: where there are more than `max_hypotheses`, they sum to less than one.
+        Raises `InputError` for a `max_hypotheses` below 1.
+        """
+        listed, left_out = self.heaviest_sets(max_hypotheses)
+        weights, ends = np.exp(listed.hyp_log_weights) * (1.0 - left_out), listed.hyp_offsets.tolist()
+        for weight, first, last in zip(weights.tolist(), ends[:-1], ends[1:], strict=True):
+            tracks = listed.hyp_tracks[first:last]
+            labels = tuple((step, index) for step, index in self.tracks.labels[tracks].tolist())
+            yield Hypothesis(weight, labels, tracks)
+
+    def heaviest_sets(self, max_hypotheses: int) -> tuple[kt.Glmb, float]:
+        """See `vedette.densities.as_glmb`."""
+        if max_hypotheses < 1:
+            raise InputError(f"max_hypotheses: expected at least 1; got {max_hypotheses}")
+        labels, label_of = checks.distinct_labels(self.tracks.labels)
+        glmb, left_out = factored_to_glmb(self.to_factors(), label_of, len(labels), int(max_hypotheses))
+        return glmb, float(left_out)
+
+    def _targets(self) -> Targets:
+        labels, existence = self.label_existence()
+        table, place = checks.distinct_labels(self.tracks.labels)
+        means, covs = track_moments(self.tracks)
+        if len(labels) == 0:
+            return Targets(labels, existence, means[:0], covs[:0])
+        weights, counts = self.track_existence, np.bincount(place)
+        totals = np.bincount(place, weights)[place]
+        shares = np.where(totals > 0.0, weights / np.where(totals > 0.0, totals, 1.0), 1.0 / counts[place])
+        order = np.argsort(place, kind="stable")
+        moments = run_moments(shares[order], means[order], covs[order], checks.offsets_of(counts))
+        _, row = checks.distinct_labels(np.concatenate([table, labels]))  # a table may have more
+        return Targets(labels, existence, *(part[row[len(table) :]] for part in moments))
+
+    def _parts(self) -> str:
+        """What it is made of beside labels."""
+        return ""
+
+    def _summary(self) -> str:
+        labels, existence = self.label_existence()
+        return f"of {counted(len(labels), 'label')}{self._parts()}, {existence.sum():.4g} targets expected"
+
     @abstractmethod
     def to_kernel(self) -> Any:
         """The same arrays as the bundle that kernels take."""
@@ -93,7 +153,7 @@ class Labelled(MultiTarget):
         """Raise where what is not in the track table is not as it should be."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class LMB(Labelled):
     """Labelled multi-Bernoulli density: independent tracks, each with a probability of existence.
 

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from vedette.densities import checks
 from vedette.densities.containers import kernel_arrays, unchecked
 from vedette.densities.labelled import poisson_binomial
+from vedette.densities.telling import Target, Targets
+from vedette.densities.tracks import run_moments
 from vedette.densities.unlabelled import Unlabelled
 from vedette.errors import NumericalError, VedetteError
 from vedette.kernels.base import types as kt
@@ -20,7 +23,7 @@ from vedette.probabilities import expit
 _ARRAYS = kernel_arrays("existence_logit", "offsets", "log_weights", "means", "covs")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class MultiBernoulli(Unlabelled):
     """Independent Bernoullis: each is a target with its probability of existence, or nothing. An LMB without labels.
 
@@ -42,6 +45,17 @@ class MultiBernoulli(Unlabelled):
     log_weights: Floats
     means: Floats
     covs: Floats
+    _weight: ClassVar[str] = "existence"
+
+    def targets(self) -> Iterator[Target]:
+        """Probability of existence, mean and covariance of each Bernoulli; their labels are None."""
+        return self._targets().each()
+
+    def _targets(self) -> Targets:
+        if self.num_bernoullis == 0:
+            return Targets(None, self.existence, self.means, self.covs)
+        moments = run_moments(np.exp(self.log_weights), self.means, self.covs, self.offsets)
+        return Targets(None, self.existence, *moments)
 
     @property
     def num_bernoullis(self) -> int:

@@ -16,12 +16,13 @@ from vedette.densities.unlabelled import IidCluster, Poisson
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base.types import Floats, Ints, Lmb, Tracks
 from vedette.models.arguments import generator
+from vedette.speaking import Speaking
 
 _MOST_TARGETS = 1e9
 
 
-@dataclass(frozen=True, slots=True)
-class MultiTargetSamples:
+@dataclass(frozen=True, slots=True, repr=False)
+class MultiTargetSamples(Speaking):
     """Samples of a multi-target state.
 
     Attributes:

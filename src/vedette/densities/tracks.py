@@ -18,11 +18,12 @@ from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.mixtures import MixtureCaps
 from vedette.kernels.gaussian.pooling import pooled_tracks
 from vedette.models.arguments import no_gaussians
+from vedette.text import counted
 
 _ARRAYS = kernel_arrays("labels", "offsets", "log_weights", "means", "covs")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class TrackTable(Container):
     """Gaussian-mixture densities of labelled tracks.
 
@@ -53,6 +54,10 @@ class TrackTable(Container):
     def num_tracks(self) -> int:
         """Number of tracks."""
         return len(self.labels)
+
+    def _summary(self) -> str:
+        components = counted(len(self.log_weights), "component")
+        return f"of {counted(self.num_tracks, 'track')} in {components}, of {self.state_dim} state components"
 
     @property
     def state_dim(self) -> int:
@@ -186,7 +191,7 @@ def mixture_moments(log_weights: Floats, means: Floats, covs: Floats) -> tuple[F
     log_total = checks.run_log_sums(log_weights, offsets)[0] if len(log_weights) else -math.inf
     if log_total == -math.inf:
         raise InputError("log_weights: expected a mixture of positive weight; got none")
-    mean, cov = _run_moments(np.exp(log_weights - log_total), means, covs, offsets)
+    mean, cov = run_moments(np.exp(log_weights - log_total), means, covs, offsets)
     return mean[0], cov[0]
 
 
@@ -194,10 +199,10 @@ def track_moments(tracks: TrackTable) -> tuple[Floats, Floats]:
     """Mean (num_tracks, state_dim) and covariance (num_tracks, state_dim, state_dim) of every track."""
     if len(tracks.log_weights) == tracks.num_tracks:
         return tracks.means.copy(), tracks.covs.copy()
-    return _run_moments(np.exp(tracks.log_weights), tracks.means, tracks.covs, tracks.offsets)
+    return run_moments(np.exp(tracks.log_weights), tracks.means, tracks.covs, tracks.offsets)
 
 
-def _run_moments(weights: Floats, means: Floats, covs: Floats, offsets: Ints) -> tuple[Floats, Floats]:
+def run_moments(weights: Floats, means: Floats, covs: Floats, offsets: Ints) -> tuple[Floats, Floats]:
     """Moments of consecutive mixtures of linear weights that sum to one, none of them empty."""
     starts, lengths = offsets[:-1], np.diff(offsets)
     run_means = np.add.reduceat(weights[:, None] * means, starts)

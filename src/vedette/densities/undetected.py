@@ -11,10 +11,11 @@ from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.models import CellGrid, Region
 from vedette.models.arguments import non_negative, reject
+from vedette.speaking import Speaking
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class UndetectedIntensity:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class UndetectedIntensity(Speaking):
     """Poisson density of undetected targets: any number in each cell, independent of the others, and anywhere in it.
 
     Attributes:
@@ -38,6 +39,9 @@ class UndetectedIntensity:
             place = int(np.flatnonzero(expected < 0.0)[0])
             raise reject(f"{field}[{place}]", "a number of at least 0", expected[place])
         object.__setattr__(self, "expected", expected)
+
+    def _summary(self) -> str:
+        return f"of {self.num_cells} cells, {self.total:.4g} targets expected"
 
     @classmethod
     def uniform(cls, grid: CellGrid, total: float) -> UndetectedIntensity:

@@ -5,17 +5,19 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from vedette.densities import checks
 from vedette.densities.containers import MultiTarget, kernel_arrays, unchecked
+from vedette.densities.telling import Targets
 from vedette.densities.tracks import log_weights as logs_of
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import no_gaussians
+from vedette.text import counted
 
 _POISSON = kernel_arrays("log_weights", "means", "covs")
 _CLUSTER = kernel_arrays("log_cardinality", "log_weights", "means", "covs")
@@ -28,10 +30,19 @@ class Unlabelled(MultiTarget):
     log_weights: Floats
     means: Floats
     covs: Floats
+    _weight: ClassVar[str] = "expected_number"
 
     def __post_init__(self) -> None:
         self._own_arrays()
         self.validate(error=InputError)
+
+    def __len__(self) -> int:
+        """Number of components, or of a multi-Bernoulli of Bernoullis."""
+        return len(self._targets().weights)
+
+    def _summary(self) -> str:
+        what = "component" if self._weight == "expected_number" else "Bernoulli"
+        return f"of {counted(len(self), what)}, {self.expected_number:.4g} targets expected"
 
     @property
     def state_dim(self) -> int:
@@ -48,7 +59,7 @@ class Unlabelled(MultiTarget):
         """Raise unless the arrays fit each other and are a density."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Poisson(Unlabelled):
     """Poisson density of intensity sum over i of exp(log_weights[i]) N(.; means[i], covs[i]).
 
@@ -72,6 +83,10 @@ class Poisson(Unlabelled):
         """Mean number of targets."""
         with np.errstate(over="ignore"):  # more than any number
             return float(np.exp(self.log_weights).sum())
+
+    def _targets(self) -> Targets:
+        with np.errstate(over="ignore"):
+            return Targets(None, np.exp(self.log_weights), self.means, self.covs)
 
     def cardinality(self) -> Floats:
         """Probabilities of 0, 1, ... targets, up to a number beyond which less than 1e-20 remains."""
@@ -117,7 +132,7 @@ class Poisson(Unlabelled):
         checks.check_components("", self.log_weights, self.means, self.covs, error)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class IidCluster(Unlabelled):
     """A number of targets from a cardinality distribution, each drawn from one density by itself.
 
@@ -145,6 +160,9 @@ class IidCluster(Unlabelled):
     def expected_number(self) -> float:
         """Mean number of targets."""
         return float(np.exp(self.log_cardinality) @ np.arange(len(self.log_cardinality)))
+
+    def _targets(self) -> Targets:
+        return Targets(None, self.expected_number * np.exp(self.log_weights), self.means, self.covs)
 
     def cardinality(self) -> Floats:
         """Probabilities of 0, 1, ..., most targets."""

@@ -17,14 +17,17 @@ from vedette.evaluation.statistics import PairedDifference, Summary, paired_diff
 from vedette.kernels.base.types import Bools, Floats
 from vedette.scenarios import Scenario
 from vedette.simulation.records import RunRecord
+from vedette.speaking import Speaking
+from vedette.text import counted, elided
 
+_MOST_TOLD = 4
 PARTS = ("total", "localisation", "cardinality")
 # What was chosen at one decision, one row a sensor.
 Choice: TypeAlias = tuple[Row, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Comparison:
+@dataclass(frozen=True, slots=True, repr=False)
+class Comparison(Speaking):
     """OSPA and other measures of several strategies on one scenario, paired run by run.
 
     A `part` is "total", "localisation" or "cardinality", of OSPA, or the name of a measure.
@@ -51,6 +54,14 @@ class Comparison:
     choices: tuple[tuple[tuple[Choice, ...], ...], ...]
     measures: Mapping[str, Floats] = field(default_factory=dict)
     unit: str = "m"
+
+    def _summary(self) -> str:
+        return f"of {counted(self.num_runs, 'run')} on {elided(self.scenario)}"
+
+    def _detail(self) -> str:
+        means = [f"{elided(name)} {float(self.summary(name).mean):.4g}" for name in self.strategies[:_MOST_TOLD]]
+        more = len(self.strategies) - len(means)
+        return "mean OSPA: " + "; ".join(means + ([f"{more} more"] if more else []))
 
     @property
     def num_runs(self) -> int:

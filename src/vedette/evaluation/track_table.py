@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from vedette.densities.telling import state_columns
 from vedette.errors import InputError
 from vedette.evaluation.metrics.matching import match_run
 from vedette.evaluation.told import told_by
@@ -48,7 +49,7 @@ def track_table(
         )
     )
     rows = [
-        (scan, tuple(label), mean, np.sqrt(np.diagonal(cov)), existence)
+        (scan, tuple(label), mean, cov, existence)
         for scan, estimate in enumerate(record.estimates)
         for label, mean, cov, existence in zip(
             estimate.labels.tolist(), estimate.means, estimate.covs, estimate.existence.tolist(), strict=True
@@ -59,12 +60,9 @@ def track_table(
     if is_utc:
         table["utc"] = [utc_text(time) for time in times]
     table["label"] = [f"{label[0]}.{label[1]}" for _, label, *_ in rows]
-    columns = ("x_m", "y_m", "vx_mps", "vy_mps")
-    dim = len(rows[0][2]) if rows else len(columns)
-    for j, column in enumerate(columns[: 4 if dim >= 4 else 2]):
-        table[column] = [float(row[2][j]) for row in rows]
-    for j, column in enumerate(columns[: 4 if dim >= 4 else 2]):
-        table[f"std_{column}"] = [float(row[3][j]) for row in rows]
+    dim = len(rows[0][2]) if rows else 4
+    means, covs = (np.array([row[part] for row in rows]) for part in (2, 3))
+    table |= state_columns(means.reshape(-1, dim), covs.reshape(-1, dim, dim))
     if origin is not None:
         places = origin.to_degrees(np.array([row[2][:2] for row in rows]).reshape(-1, 2))
         table["lon_deg"], table["lat_deg"] = places[:, 0].tolist(), places[:, 1].tolist()

@@ -14,6 +14,8 @@ import numpy as np
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models.arguments import as_array, float_array, reject, sequence
+from vedette.speaking import Speaking
+from vedette.text import counted
 
 # Poses nearer than this, relative to their size, are one: rounding of degrees to radians and back stays below.
 _SAME_POSE = 1e-9
@@ -62,8 +64,8 @@ def _same(courses: Floats) -> Bools:
     return equal
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Actions:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Actions(Speaking):
     """What one sensor may do, one action a row.
 
     Attributes:
@@ -92,6 +94,9 @@ class Actions:
 
     def __len__(self) -> int:
         return len(self.values)
+
+    def _summary(self) -> str:
+        return f"of {counted(len(self), 'choice')}: {', '.join(self.columns)}"
 
     def text(self, index: int) -> str:
         """One action in words: `heading_deg 30, speed 5`."""

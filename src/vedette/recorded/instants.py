@@ -14,6 +14,8 @@ from vedette.kernels.base.types import Floats
 from vedette.models import Bias
 from vedette.models.arguments import float_array
 from vedette.models.bias import LEAST_RANGE, NO_BIAS
+from vedette.speaking import Speaking
+from vedette.text import counted
 from vedette.tracking import SensorScan
 
 Bearings = Literal["east", "north"]
@@ -78,8 +80,8 @@ class Site:
         return found
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class RecordedScans:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class RecordedScans(Speaking):
     """Scans at the instants at which any sensor scanned.
 
     Attributes:
@@ -101,6 +103,12 @@ class RecordedScans:
     poses: Floats
     skipped: tuple[str, ...]
     bearings: tuple[Bearings | None, ...]
+
+    def _summary(self) -> str:
+        sizes = f"{counted(len(self.times), 'instant')}, {counted(self.poses.shape[1], 'sensor')}"
+        return (
+            f"of {sizes}, {counted(self.num_measurements, 'measurement')}, {counted(len(self.skipped), 'row')} skipped"
+        )
 
     def between(self, begin: float, end: float) -> RecordedScans:
         """The instants from `begin` to before `end`, s of `times`; they start anew where there are any."""

@@ -15,6 +15,7 @@ from vedette.models.arguments import pose_vector, reject
 from vedette.platforms import Fleet, Platform
 from vedette.simulation.true_sensors import TrueSensor, scanning, true_sensors_of
 from vedette.simulation.truth import TargetSource
+from vedette.speaking import Speaking
 from vedette.tracking import Tracker
 
 
@@ -32,8 +33,8 @@ class Recording(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Experiment:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Experiment(Speaking):
     """The parts of a run.
 
     Attributes:

@@ -11,12 +11,17 @@ from vedette.control.plan import Plan
 from vedette.densities.estimates import Estimate
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
-from vedette.simulation.health import Health
+from vedette.simulation.arrow import Columns
+from vedette.simulation.health import FUSION_COLUMNS, Health
 from vedette.simulation.truth import Truth
+from vedette.speaking import Speaking, Tabled
+from vedette.text import counted, elided
+
+OSPA_COLUMNS = ("ospa_m", "localisation_m", "cardinality_m")
 
 
-@dataclass(frozen=True, slots=True)
-class Decision:
+@dataclass(frozen=True, slots=True, repr=False)
+class Decision(Speaking):
     """A plan and the moment it was made.
 
     Attributes:
@@ -30,6 +35,12 @@ class Decision:
     time: float
     poses: Floats
     plan: Plan
+
+    def _summary(self) -> str:
+        return f"after scan {self.step}, at {self.time:g} s: {self.plan.in_short()}"
+
+    def _detail(self) -> str:
+        return self.plan._detail()
 
     def check(self, times: Floats, poses: Floats) -> None:
         """Raise `InputError` unless the plan is valid, and time and poses are those of its scan of the run."""
@@ -46,8 +57,8 @@ class Decision:
         self.plan.validate()
 
 
-@dataclass(frozen=True, slots=True)
-class RunRecord:
+@dataclass(frozen=True, slots=True, repr=False)
+class RunRecord(Tabled):
     """One run of one strategy on one scenario.
 
     Attributes:
@@ -90,6 +101,31 @@ class RunRecord:
     def num_sensors(self) -> int:
         """Number of sensors."""
         return int(self.poses.shape[1])
+
+    def scan_columns(self) -> Columns:
+        """A row a scan, as the table `scans` of a run that is kept has them; see docs/results.md."""
+        return {
+            "step": np.arange(1, self.num_scans + 1),
+            "time_s": self.times,
+            "num_targets": np.diff(self.truth.offsets),
+            "num_estimates": np.array([estimate.num_targets for estimate in self.estimates], np.int64),
+            **dict(zip(OSPA_COLUMNS, self.ospa.T, strict=True)),
+            **{name: getattr(self.health, name) for name in FUSION_COLUMNS},
+        }
+
+    def to_table(self) -> dict[str, list[Any]]:
+        """The same as lists."""
+        return {name: np.asarray(column).tolist() for name, column in self.scan_columns().items()}
+
+    def _summary(self) -> str:
+        known = self.ospa[:, 0][~np.isnan(self.ospa[:, 0])]
+        error = f", mean OSPA {known.mean():.4g}" if len(known) else ""
+        whose = f"of {elided(self.scenario)} by {elided(self.planner)}, seed {self.seed}, run {self.run}"
+        sizes = f"{counted(self.num_scans, 'scan')}, {counted(self.num_sensors, 'sensor')}"
+        return f"{whose}: {sizes}, {counted(len(self.decisions), 'decision')}{error}"
+
+    def _detail(self) -> str:
+        return "" if self.stopped is None else f"stopped: {self.stopped}"
 
 
 class Measure(Protocol):

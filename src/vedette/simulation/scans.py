@@ -16,13 +16,14 @@ from vedette.models.arguments import float_array, generator, pose_vector, reject
 from vedette.models.bias import LEAST_RANGE
 from vedette.models.measurement import wrap_angular
 from vedette.simulation.true_sensors import TrueSensor
+from vedette.speaking import Speaking
 from vedette.tracking import Stages
 
 CLUTTER = -1
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Scan:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Scan(Speaking):
     """One scan, in random order.
 
     Attributes:

@@ -21,12 +21,11 @@ from vedette.simulation.arrow import Columns, Kind, Layout
 from vedette.simulation.explained import EXPLAINED, explained_tables, with_explanations
 from vedette.simulation.health import FUSION_COLUMNS, SENSOR_COLUMNS, Health
 from vedette.simulation.planned import OWN_REWARDS, PLANNED, decisions_of, planned_tables
-from vedette.simulation.records import Decision, RunRecord
+from vedette.simulation.records import OSPA_COLUMNS, Decision, RunRecord
 from vedette.simulation.truth import Truth
 
 Tables: TypeAlias = dict[str, Columns]
 
-OSPA_COLUMNS = ("ospa_m", "localisation_m", "cardinality_m")
 POSE_COLUMNS = ("x_m", "y_m", "heading_rad")
 
 _TIME = {"step": Kind.INTEGER, "time_s": Kind.NUMBER}
@@ -72,7 +71,7 @@ def check_record(record: RunRecord) -> None:
 def tables_of(record: RunRecord) -> Tables:
     """The tables of `LAYOUTS`, and those of `OPTIONAL` that the run has."""
     of_scans = {
-        "scans": _scans(record),
+        "scans": record.scan_columns(),
         "truth": _truth(record),
         "tracks": _tracks(record),
         "sensors": _sensors(record),
@@ -142,17 +141,6 @@ def _decisions_of(tables: Mapping[str, Mapping[str, Any]], poses: Floats) -> tup
     if not any(name in tables for name in EXPLAINED):
         return decisions
     return with_explanations(decisions, tables)
-
-
-def _scans(record: RunRecord) -> Columns:
-    return {
-        "step": np.arange(1, record.num_scans + 1),
-        "time_s": record.times,
-        "num_targets": np.diff(record.truth.offsets),
-        "num_estimates": _counts(record),
-        **dict(zip(OSPA_COLUMNS, record.ospa.T, strict=True)),
-        **{name: getattr(record.health, name) for name in FUSION_COLUMNS},
-    }
 
 
 def _truth(record: RunRecord) -> Columns:

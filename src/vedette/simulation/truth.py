@@ -13,6 +13,7 @@ from vedette.errors import InputError, ModelError
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models import MotionModel
 from vedette.models.arguments import float_array, generator, reject
+from vedette.speaking import Speaking
 
 # Start times and scan times come from different sums; they count as equal within this share of a second.
 TIME_TOLERANCE = 1e-9
@@ -20,8 +21,8 @@ TIME_TOLERANCE = 1e-9
 _PIVOT_TOLERANCE = 1e-12
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Truth:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Truth(Speaking):
     """The targets alive at each scan, scan after scan.
 
     Attributes:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from html import escape
 from time import perf_counter
 from typing import Any, Protocol, runtime_checkable
 
@@ -16,6 +17,8 @@ from vedette.filters import FilterInfo
 from vedette.kernels.base.types import Floats
 from vedette.models import SensorModel, TargetModel
 from vedette.models.arguments import float_array, one_a_sensor, real, reject
+from vedette.speaking import Speaking, in_short
+from vedette.text import counted
 
 # s. The belief before the first scan holds no target, so that the time before it changes nothing.
 FIRST_PERIOD = 1.0
@@ -23,8 +26,8 @@ NUMBER = 8  # bytes; each symmetric matrix is sent as its triangle, nothing is c
 _NOTE = "stage: "
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class State:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class State(Speaking):
     """What is believed after a scan.
 
     Attributes:
@@ -43,9 +46,21 @@ class State:
     memory: Any = None
     undetected: UndetectedIntensity | None = None
 
+    def _summary(self) -> str:
+        when = "before the first scan" if self.time is None else f"after scan {self.step}, at {self.time:g} s"
+        unfound = "" if self.undetected is None else f", {self.undetected.total:.3g} not yet found"
+        return f"{when}, of {counted(len(self.local), 'sensor')}{unfound}"
 
-@dataclass(frozen=True, slots=True, eq=False)
-class TrackerInfo:
+    def _detail(self) -> str:
+        return f"fused: {in_short(self.fused)}"
+
+    def _repr_html_(self) -> str:
+        said: str = self.fused._repr_html_() if isinstance(self.fused, Speaking) else ""
+        return f"<p><b>{escape(self.in_short())}</b></p>{said}"
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class TrackerInfo(Speaking):
     """Report of one step of a tracker.
 
     Attributes:

@@ -14,13 +14,15 @@ import numpy as np
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import as_array, count, dimension, instance, pose_vector, positive, real, reject
+from vedette.speaking import Speaking, Tabled
+from vedette.text import counted
 from vedette.tracking.base import State, Tracker, TrackerInfo
 
 _TIME = attrgetter("time")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class SensorScan:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class SensorScan(Speaking):
     """One scan of one sensor, as it arrives.
 
     Attributes:
@@ -36,8 +38,8 @@ class SensorScan:
     pose: Any
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Instant:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Instant(Speaking):
     """A time at which sensors scanned, and what was believed after it.
 
     Attributes:
@@ -54,9 +56,15 @@ class Instant:
     state: State
     info: TrackerInfo
 
+    def _summary(self) -> str:
+        return f"at {self.time:g} s, {counted(len(self.scans), 'scan')}"
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Timeline:
+    def _detail(self) -> str:
+        return self.state.in_short()
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Timeline(Tabled):
     """The instants that a late scan may still come before, and what was believed at the one before them.
 
     Attributes:
@@ -89,9 +97,22 @@ class Timeline:
         """(num_sensors, 3 or more) where each sensor was last, at the latest instant."""
         return self.instants[-1].poses if self.instants else self.settled_poses
 
+    def to_table(self) -> dict[str, list[Any]]:
+        """A row an instant, by columns: `time_s`, `num_scans` and `num_measurements`, of all sensors."""
+        found = [sum(len(scan.measurements) for scan in instant.scans.values()) for instant in self.instants]
+        scans = [len(instant.scans) for instant in self.instants]
+        return {"time_s": [i.time for i in self.instants], "num_scans": scans, "num_measurements": found}
 
-@dataclass(frozen=True, slots=True, eq=False)
-class LateInfo:
+    def _summary(self) -> str:
+        told = f"{self.num_late} late, {self.num_dropped} dropped, {self.num_repeated} repeated"
+        return f"of {counted(len(self.instants), 'instant')}, {counted(self.num_taken, 'scan')} taken, {told}"
+
+    def _detail(self) -> str:
+        return self.state.in_short()
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class LateInfo(Speaking):
     """What was done with scans that arrived.
 
     Attributes:

@@ -19,6 +19,7 @@ from vedette.models.arguments import as_array, reject
 from vedette.simulation.arrow import RUN_COLUMNS
 from vedette.simulation.records import Measure, RunRecord
 from vedette.simulation.tables import LAYOUTS
+from vedette.speaking import Speaking
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,8 +65,8 @@ class Metric:
         return values
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class RunMetrics:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class RunMetrics(Speaking):
     """Measures of a run at each scan; every array is (num_scans,). OSPA is in the run's record.
 
     With c the cutoff and p the order that they were computed with, the three GOSPA costs add up to `gospa_m ** p`: for

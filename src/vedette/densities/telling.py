@@ -1,0 +1,91 @@
+"""Targets one by one, in words and by columns: what densities and estimates say of those that they hold."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vedette.kernels.base.types import Floats, Ints
+
+_MOST_TOLD = 3
+_LARGE = 1e7  # m, from which on a place is told in powers of ten
+_COLUMNS = ("x_m", "y_m", "vx_mps", "vy_mps")
+
+
+class Target(NamedTuple):
+    """One target that there may be."""
+
+    label: tuple[int, int] | None  # birth step and birth index; None in a density without labels
+    existence: float  # probability that it is there
+    mean: Floats  # (state_dim,) of its state, if it is
+    cov: Floats  # (state_dim, state_dim)
+
+
+class Hypothesis(NamedTuple):
+    """One set of targets that there may be, each with its density.
+
+    Which measurements were taken for whose is not here: filters leave it behind, as more than one association may lead
+    to the same tracks.
+    """
+
+    weight: float  # its probability
+    labels: tuple[tuple[int, int], ...]  # in increasing order
+    tracks: Ints  # (num_targets,) for each label, the row of the density's track table
+
+
+class Targets(NamedTuple):
+    """Targets, or of an intensity its components, row by row."""
+
+    labels: Ints | None  # (num, 2)
+    weights: Floats  # (num,) probability of existence, or expected number
+    means: Floats  # (num, state_dim)
+    covs: Floats  # (num, state_dim, state_dim)
+
+    def each(self) -> Iterator[Target]:
+        """One by one."""
+        labels = [None] * len(self.weights) if self.labels is None else map(tuple, self.labels.tolist())
+        return map(Target, labels, self.weights.tolist(), self.means, self.covs)
+
+    def in_words(self) -> str:
+        """The likeliest few: label, probability (or expected number), place and its standard deviation."""
+        first = np.argsort(-self.weights, kind="stable")[:_MOST_TOLD]
+        told = []
+        for target in self._at(first).each():
+            with np.errstate(invalid="ignore"):
+                stds = np.sqrt(np.diagonal(target.cov))
+            name = "" if target.label is None else f"{target.label[0]}.{target.label[1]}: "
+            told.append(f"{name}{target.existence:.3g} at {_place(target.mean)} ± {_place(stds)} m")
+        more = len(self.weights) - len(first)
+        return "; ".join(told + ([f"{more} more"] if more else []))
+
+    def columns(self, weight: str) -> dict[str, list[Any]]:
+        """By columns: `label` (`birth step.index`, where there are labels), `weight` and those of `state_columns`."""
+        names = {} if self.labels is None else {"label": [f"{step}.{index}" for step, index in self.labels.tolist()]}
+        return {**names, weight: self.weights.tolist(), **state_columns(self.means, self.covs)}
+
+    def _at(self, places: Ints) -> Targets:
+        labels = None if self.labels is None else self.labels[places]
+        return Targets(labels, self.weights[places], self.means[places], self.covs[places])
+
+
+def state_columns(means: Floats, covs: Floats) -> dict[str, list[float]]:
+    """`x_m`, `y_m`, `vx_mps`, `vy_mps` of states (num, state_dim), and `std_...`, their standard deviations.
+
+    Velocities only where the state goes on with them: four components or more.
+    """
+    names = _COLUMNS[: 4 if means.shape[1] >= 4 else min(2, means.shape[1])]
+    with np.errstate(invalid="ignore"):
+        stds = np.sqrt(np.diagonal(covs, axis1=1, axis2=2))
+    return {name: means[:, j].tolist() for j, name in enumerate(names)} | {
+        f"std_{name}": stds[:, j].tolist() for j, name in enumerate(names)
+    }
+
+
+def _place(state: Floats) -> str:
+    told = [f"{x:.1f}" if abs(x) < _LARGE else f"{x:.3g}" for x in state[:2].tolist()]
+    return f"({', '.join(told)})"
+
+
+__all__ = ["Hypothesis", "Target", "Targets", "state_columns"]
