@@ -220,9 +220,7 @@ def peer_table(folder: Path, python: str, runs: int) -> Iterator[str]:
     for number in results.finished(cell.name)[:runs]:
         record = results.record(cell.name, number)
         spent = sum(record.timings[stage].sum() for stage in ("filter", "fusion"))
-        scores.setdefault("Vedette, with what is late", []).append(
-            (counted(record, record.estimates, scenario), spent)
-        )
+        scores.setdefault("Vedette, with what is late", []).append((counted(record, record.estimates, scenario), spent))
         write_peer_scans(folder / "peer-scans.npz", record, scans_of(record, experiment), experiment)
         subprocess.run([python, str(PEER), "peer-scans.npz", "peer-found.npz"], cwd=folder, check=True)
         with np.load(folder / "peer-found.npz") as found:

@@ -173,8 +173,8 @@ class Page:
         """
         name = json.dumps(selector)
         x, y = self.evaluate(
-            f"(async () => {{ const element = document.querySelector({name}); element.scrollIntoView({{block: 'center', "
-            "behavior: 'instant'}); const frame = () => new Promise((done) => { requestAnimationFrame(done); "
+            f"(async () => {{ const element = document.querySelector({name}); "
+            "element.scrollIntoView({block: 'center', behavior: 'instant'}); const frame = () => new Promise((done) => { requestAnimationFrame(done); "
             "setTimeout(done, 200); }); await frame(); await frame(); const box = element.getBoundingClientRect(); "
             "return [box.x + box.width / 2, box.y + box.height / 2]; })()"
         )
