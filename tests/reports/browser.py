@@ -174,8 +174,9 @@ class Page:
         name = json.dumps(selector)
         x, y = self.evaluate(
             f"(async () => {{ const element = document.querySelector({name}); "
-            "element.scrollIntoView({block: 'center', behavior: 'instant'}); const frame = () => new Promise((done) => { requestAnimationFrame(done); "
-            "setTimeout(done, 200); }); await frame(); await frame(); const box = element.getBoundingClientRect(); "
+            "element.scrollIntoView({block: 'center', behavior: 'instant'}); "
+            "const frame = () => new Promise((done) => { requestAnimationFrame(done); setTimeout(done, 200); }); "
+            "await frame(); await frame(); const box = element.getBoundingClientRect(); "
             "return [box.x + box.width / 2, box.y + box.height / 2]; })()"
         )
         return float(x), float(y)
