@@ -77,6 +77,11 @@ def test_noise_that_no_bearing_has_is_a_fault(old: str, new: str, wanted: str) -
             "sensors[0].noise.sigma_bearing_deg: 57 degrees leave little of a bearing",
         ),
         (
+            ((NOISE, f"{NOISE}\n  bias: {{clock: 5000.0}}"),),
+            "16:17",
+            "sensors[0].bias.clock: expected at most 3600 either way; got 5000",
+        ),
+        (
             (zone("polygon: [[-1.10, 50.78], [-1.08, 50.78], [-1.08, 50.80]]"),),
             "22:75",
             "control.constraints[0].polygon: expected metres from the origin; got an area of 0.02 by 0.02 m (are these "

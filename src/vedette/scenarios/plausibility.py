@@ -19,6 +19,8 @@ from vedette.scenarios.sections.world import RegionSection, grouped_order
 
 # Standard deviations from every birth site at which a target begins that filters never find.
 _FAR_FROM_SITES = 8.0
+# Biases beyond which a radar is no radar, by field; degrees, s.
+_MOST_BIAS = {"bearing_deg": 90.0, "clock": 3600.0}
 # Scans in a period of the horizon; the paper's scenarios have 2.
 _MANY_SCANS = 3.0
 
@@ -26,6 +28,7 @@ _MANY_SCANS = 3.0
 def implausible(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     """Where in a scenario, and what was expected, came and was probably meant."""
     yield from _bearings(model)
+    yield from _biases(model)
     yield from _areas(model)
     yield from _beyond_sites(model)
     yield from _per_scan(model)
@@ -41,6 +44,17 @@ def _bearings(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
             if noise is not None and noise not in told:
                 told.append(noise)
                 yield from _bearing_noise(("sensors", s, *where), sensor.measurement, noise)
+
+
+def _biases(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
+    """Biases that can hardly be meant."""
+    for s, sensor in enumerate(model.sensors):
+        true = None if sensor.truth is None else sensor.truth.bias
+        for where, bias in ((("bias",), sensor.bias), (("truth", "bias"), true)):
+            for name, most in _MOST_BIAS.items():
+                if bias is not None and abs(value := getattr(bias, name)) > most:
+                    at = ("sensors", s, *where, name)
+                    yield at, f"{format_path(at)}: expected at most {most:g} either way; got {value:g}"
 
 
 def _bearing_noise(path: Path, measurement: Measurement, noise: Noise) -> Iterator[tuple[Path, str]]:

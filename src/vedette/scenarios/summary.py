@@ -70,7 +70,7 @@ def facts(model: ScenarioModel) -> list[tuple[str, str]]:
         ("scans", f"{time.num_steps}, every {time.step_period:g} s from {time.start:g} to {end:g} s"),
         *(() if model.origin is None else (("origin", settings(model.origin)),)),
         ("region", _bounds(region)),
-        ("motion", settings(model.motion)),
+        ("motion", _motion(model.motion)),
         ("survival", settings(model.survival)),
         ("births", _births(model.birth)),
         ("filter", _filter(model.filter)),
@@ -88,6 +88,12 @@ def facts(model: ScenarioModel) -> list[tuple[str, str]]:
         *((f"planner {name}", settings(section)) for name, section in model.planners.items()),
         *((f"metric {name}", settings(section)) for name, section in model.metrics.items()),
     ]
+
+
+def _motion(section: Section) -> str:
+    """Its settings; the root of a spectral density has another unit than an acceleration."""
+    continuous = getattr(section, "acceleration", "") == "continuous"
+    return settings(section).replace("m/s^2", "m/s^1.5") if continuous else settings(section)
 
 
 def _samples(control: Control) -> str:
