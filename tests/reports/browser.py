@@ -175,7 +175,8 @@ class Page:
         x, y = self.evaluate(
             f"(async () => {{ const element = document.querySelector({name}); "
             "element.scrollIntoView({block: 'center', behavior: 'instant'}); "
-            "const frame = () => new Promise((done) => { requestAnimationFrame(done); setTimeout(done, 200); }); "
+            "const next = /native/.test(requestAnimationFrame) ? requestAnimationFrame : queueMicrotask; "
+            "const frame = () => new Promise((done) => { next(done); setTimeout(done, 200); }); "
             "await frame(); await frame(); const box = element.getBoundingClientRect(); "
             "return [box.x + box.width / 2, box.y + box.height / 2]; })()"
         )
