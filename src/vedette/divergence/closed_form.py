@@ -27,7 +27,9 @@ _ROUNDING = 1e-11
 
 
 def cauchy_schwarz(a: Density, b: Density, *, unit_volume: float = 1.0, support: Support = "full") -> float:
-    """Cauchy-Schwarz divergence of two densities (paper eqs. 5, 8 and 9), at least 0, 0 for equal ones, symmetric.
+    """Cauchy-Schwarz divergence of two densities (paper eqs. 5, 8 and 9), at least 0, symmetric.
+
+    It is 0 for equal ones, to rounding, and exactly for a density and itself.
 
     GLMB (Beard et al. 2017, "Void probabilities and Cauchy-Schwarz divergence for generalized labeled multi-Bernoulli
     models"): all pairs of hypotheses that share a label set. LMB: the sum over labels of the Bernoulli divergences.
@@ -61,6 +63,8 @@ def cauchy_schwarz(a: Density, b: Density, *, unit_volume: float = 1.0, support:
         raise InputError("support: 'common' is for densities that share a label set; got two that share none")
     if cross == -math.inf:
         return math.inf
+    if a is b:
+        cross = own_a  # the same terms, which the sums add up in different orders
     return at_least_zero(0.5 * (own_a + own_b) - cross, max(abs(own_a), abs(own_b)))
 
 
