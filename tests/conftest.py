@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import matplotlib
 import pytest
 from hypothesis import HealthCheck, settings
+
+from reports.browser import Browser, chromium
 
 matplotlib.use("Agg")
 
@@ -13,6 +17,15 @@ settings.register_profile(
     "vedette", derandomize=True, deadline=None, max_examples=50, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile("vedette")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """A browser, for tests that are left out where there is none."""
+    program = chromium()
+    assert program is not None
+    with Browser(program) as running:
+        yield running
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

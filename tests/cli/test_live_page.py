@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import subprocess
-from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any
 
@@ -19,13 +18,6 @@ from reports.test_browser import ink, state, text, wait_until
 CHROMIUM = chromium()
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium or chrome on PATH to open the page in")
 OPTIONS = ("--decide-every", "4", "--planner", "idm")
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    assert CHROMIUM is not None
-    with Browser(CHROMIUM) as running:
-        yield running
 
 
 class Loop:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
 from importlib import resources
 from pathlib import Path
 
@@ -20,13 +19,6 @@ from vedette.recorded import Origin
 from vedette.reports import write_report, write_run_report
 
 pytestmark = pytest.mark.skipif(PROGRAM is None, reason="no chromium or chrome on PATH to open the page in")
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    assert PROGRAM is not None
-    with Browser(PROGRAM) as running:
-        yield running
 
 
 @pytest.fixture(scope="module")
