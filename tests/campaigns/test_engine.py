@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import struct
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -100,6 +101,28 @@ def test_a_task_that_was_done_when_its_worker_died_is_not_done_again(
         assert workers._killers == set()
     landed = [result for _, outcome in ended if not isinstance(outcome, WorkerDied) for result in outcome]
     assert payloads(landed).items() <= alone.items()
+
+
+def test_a_worker_that_is_killed_in_the_middle_of_a_message_is_waited_for_by_nobody(
+    alone: dict[tuple[str, int], bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Results of a hundred kilobytes go through a pipe in pieces, and Ctrl-C comes in between."""
+    monkeypatch.setattr(local, "perform", partial(half_said, tmp_path / "once"))
+    assert payloads(on_local_workers()) == alone
+    assert (tmp_path / "once").exists()
+
+
+def half_said(once: Path, task: Task) -> Any:
+    """As `perform`, but the first worker that is asked for a certain run ends while it says so."""
+    if task.cell.name == "still" and 7 in task.runs and not once.exists():
+        once.touch()
+        frame = sys._getframe()
+        while "result_queue" not in frame.f_locals:
+            assert frame.f_back is not None
+            frame = frame.f_back
+        os.write(frame.f_locals["result_queue"]._writer.fileno(), struct.pack("!i", 100_000) + b"half of it")
+        os.kill(os.getpid(), signal.SIGKILL)
+    return perform(task)
 
 
 def test_workers_that_end_while_they_start_are_told_of(monkeypatch: pytest.MonkeyPatch) -> None:

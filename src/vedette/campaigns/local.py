@@ -83,6 +83,9 @@ class _Worker:
             raise VedetteError(
                 f"workers: expected that another process can be started; {said(error)} (--workers 1 needs none)"
             ) from error
+        # The process has its own by now. While this one is open, too, half a message of a worker that was killed is
+        # waited upon for ever.
+        pool._result_queue._writer.close()  # type: ignore[attr-defined]
         return cls(pool, begun, set(active_children()) - others)
 
     def has_begun(self) -> bool:
