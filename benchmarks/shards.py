@@ -25,6 +25,7 @@ from pathlib import Path
 
 from vedette.campaigns import Campaign, Shard, engine, merge, resolve, run_campaign
 from vedette.campaigns.codec import encode
+from vedette.campaigns.rows import row_of
 from vedette.campaigns.spec import spec_from_data
 from vedette.campaigns.tasks import Landed, Outcome, Task
 from vedette.evaluation.metrics import encode_metrics
@@ -57,7 +58,7 @@ def stub_of(campaign: Campaign) -> Callable[[Task], Outcome]:
 
     def perform(task: Task) -> Outcome:
         return tuple(
-            Landed(task.cell.name, run, payload + b"%d" % run, metrics, timings, 1.0, 0.2) for run in task.runs
+            Landed(row_of(task.cell.name, run, payload + b"%d" % run, timings, metrics), 1.0, 0.2) for run in task.runs
         )
 
     return perform

@@ -32,6 +32,7 @@ from vedette.campaigns.cells import resolve
 from vedette.campaigns.codec import decode, encode
 from vedette.campaigns.export import export_tables
 from vedette.campaigns.results import open_results
+from vedette.campaigns.rows import row_of
 from vedette.campaigns.spec import spec_from_data
 from vedette.campaigns.store import Store
 from vedette.evaluation.metrics import RunMetrics, decode_metrics, encode_metrics, measure
@@ -146,7 +147,8 @@ def prepared(what: str) -> Once:
     def land() -> float:
         with tempfile.TemporaryDirectory() as place, Store.open(Path(place) / "results", campaign) as store:
             seconds = [
-                cpu_seconds(lambda run=run: store.add("jdm", run, payload, timings, measures)) for run in range(10)
+                cpu_seconds(lambda run=run: store.add(row_of("jdm", run, payload, timings, measures)))
+                for run in range(10)
             ]
         return 1e3 * sum(seconds) / 10
 
@@ -182,7 +184,7 @@ def whole_folder(folder: Path, record: RunRecord, metrics: RunMetrics, num_runs:
     with Store.open(folder / "results", campaign) as store:
         for cell, run in campaign.tasks:
             mine = replace(record, run=run)
-            store.add(cell.name, run, encode(mine), encode_timings(mine), encode_metrics(metrics))
+            store.add(row_of(cell.name, run, encode(mine), encode_timings(mine), encode_metrics(metrics)))
     start = time.perf_counter()
     results = open_results(folder / "results")
     results.comparisons()

@@ -10,7 +10,8 @@ import sys
 import time
 from pathlib import Path
 
-from vedette.campaigns.journal import DATABASE, Entry, Writer
+from vedette.campaigns.journal import DATABASE, Writer
+from vedette.campaigns.rows import Entry, row_of
 from vedette.errors import InputError
 
 CELL, CONTENTS = "jdm", "checksum of a manifest"
@@ -24,6 +25,12 @@ def entry_of(run: int) -> Entry:
     return Entry(CELL, run, 1, payload, b"", payload[:1000])
 
 
+def put(writer: Writer, run: int) -> None:
+    """Add it."""
+    entry = entry_of(run)
+    writer.put([row_of(entry.cell, entry.run, entry.payload, entry.timings, entry.metrics)], entry.session)
+
+
 def add_for_ever(folder: Path, pause: str = "0.0") -> None:
     """Print the number of every run once it is added; rest for so many seconds after each."""
     writer = Writer(folder)
@@ -32,7 +39,7 @@ def add_for_ever(folder: Path, pause: str = "0.0") -> None:
     run = 0
     while True:
         if (CELL, run) not in done:
-            writer.put(entry_of(run))
+            put(writer, run)
             print(f"{run}\n", end="", flush=True)
             time.sleep(float(pause))
         run += 1
@@ -69,12 +76,12 @@ def add_until_full(folder: Path, make_room: str) -> None:
     run = 0
     try:
         while run < 1000:
-            writer.put(entry_of(run))
+            put(writer, run)
             run += 1
     except InputError as error:
         print(f"run {run}: {error}")
     exec(make_room)
-    writer.put(entry_of(run))
+    put(writer, run)
     writer.close()
     print(f"went on with run {run}", flush=True)
 

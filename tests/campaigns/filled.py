@@ -8,6 +8,7 @@ from pathlib import Path
 from evaluation.synthetic import make_record
 from vedette.campaigns.cells import Campaign, resolve
 from vedette.campaigns.codec import encode
+from vedette.campaigns.rows import row_of
 from vedette.campaigns.spec import spec_from_data
 from vedette.campaigns.store import Store
 from vedette.evaluation.metrics import RunMetrics, encode_metrics, measure
@@ -39,7 +40,7 @@ def add(store: Store, cell: str, run: int) -> bytes:
     """Add a run of the planner that the cell's name begins with; returns its payload."""
     record, metrics = make_run(cell.split("-")[0], run)
     payload = encode(record)
-    store.add(cell, run, payload, encode_timings(record), encode_metrics(metrics))
+    store.add(row_of(cell, run, payload, encode_timings(record), encode_metrics(metrics)))
     return payload
 
 

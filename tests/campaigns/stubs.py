@@ -11,6 +11,7 @@ from pathlib import Path
 from campaigns.filled import make_campaign, make_run
 from vedette.campaigns import Campaign, Shard, engine, run_campaign
 from vedette.campaigns.codec import encode
+from vedette.campaigns.rows import row_of
 from vedette.campaigns.running import Unwatched
 from vedette.campaigns.tasks import Landed, Outcome, Task
 from vedette.evaluation.metrics import RunMetrics, encode_metrics
@@ -32,7 +33,7 @@ def stub_perform(task: Task) -> Outcome:
     """In place of `vedette.campaigns.tasks.perform`: the same numbers every time, under the run's own number."""
     record, metrics = _first(task.cell.planner)
     return tuple(
-        Landed(task.cell.name, run, encode(mine), encode_metrics(metrics), encode_timings(mine), 1.0, 0.2)
+        Landed(row_of(task.cell.name, run, encode(mine), encode_timings(mine), encode_metrics(metrics)), 1.0, 0.2)
         for run in task.runs
         for mine in [replace(record, run=run)]
     )
@@ -55,6 +56,7 @@ class _Killed(Unwatched):
 def run_killed(folder: Path, runs: str, count: str, every: str = "10") -> None:
     """Run all shares, each in children that are killed after so many rows; print the rows there after each kill."""
     engine.perform = stub_perform
+    engine._MOST_TOGETHER = 5  # in a transaction: a kill may come after each
     whole = stub_campaign(int(runs))
     for number in range(1, int(count) + 1):
         campaign = replace(whole, shard=Shard(number, int(count)))

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import struct
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from functools import partial
+from itertools import chain
 from multiprocessing import active_children
 from pathlib import Path
 from typing import Any
@@ -17,11 +20,12 @@ from typing import Any
 import pytest
 
 from campaigns.examples import small_campaign
-from vedette.campaigns import local
+from vedette.campaigns import engine, local
 from vedette.campaigns.cluster import remote_workers
 from vedette.campaigns.engine import in_process, on_workers
 from vedette.campaigns.local import local_workers
-from vedette.campaigns.tasks import Failed, Landed, Task, TaskQueue, WorkerDied, perform
+from vedette.campaigns.rows import Row, pack
+from vedette.campaigns.tasks import Failed, Landed, Outcome, Task, TaskQueue, WorkerDied, perform
 from vedette.errors import InputError, VedetteError
 from waiting import wait_for_port, wait_until
 
@@ -29,36 +33,39 @@ pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::Depr
 RUNS = 30
 
 
-def payloads(results: Any) -> dict[tuple[str, int], bytes]:
-    landed = list(results)
-    assert all(isinstance(result, Landed) for result in landed), [r for r in landed if isinstance(r, Failed)]
+def payloads(results: Iterable[Landed | Failed]) -> dict[tuple[str, int], Row]:
+    done = list(results)
+    landed = [result for result in done if isinstance(result, Landed)]
+    assert len(landed) == len(done), [r for r in done if isinstance(r, Failed)]
     assert len({(result.cell, result.run) for result in landed}) == len(landed)
-    return {(result.cell, result.run): result.payload + result.metrics for result in landed}
+    # The timings are of the clock.
+    return {(each.cell, each.run): replace(each.row, timings=pack("", 0, b"")) for each in landed}
 
 
 @pytest.fixture(scope="module")
-def alone() -> dict[tuple[str, int], bytes]:
-    return payloads(in_process(TaskQueue(small_campaign(runs=RUNS), ())))
+def alone() -> dict[tuple[str, int], Row]:
+    return payloads(chain.from_iterable(in_process(TaskQueue(small_campaign(runs=RUNS), ()))))
 
 
-def on_local_workers(num_workers: int = 2) -> Iterator[Landed | Failed]:
-    with local_workers(num_workers) as workers:
-        yield from on_workers(workers, TaskQueue(small_campaign(runs=RUNS), ()))
+def on_local_workers(num_workers: int = 2, tell: Callable[[str], None] = print) -> Iterator[Landed | Failed]:
+    with local_workers(num_workers, tell) as workers:
+        yield from chain.from_iterable(on_workers(workers, TaskQueue(small_campaign(runs=RUNS), ())))
 
 
-def test_workers_change_no_byte_even_when_one_is_killed(alone: dict[tuple[str, int], bytes]) -> None:
+def test_workers_change_no_byte_even_when_one_is_killed(alone: dict[tuple[str, int], Row]) -> None:
     before = set(active_children())
-    results = []
-    for result in on_local_workers():
+    results, told = [], list[str]()
+    for result in on_local_workers(tell=told.append):
         results.append(result)
         if len(results) == 10:
             (set(active_children()) - before).pop().kill()
     assert payloads(results) == alone
     assert set(active_children()) <= before
+    assert told == ["a worker has died (signal 9, out of memory?): another takes its place, and what it had not done"]
 
 
 def test_a_task_that_kills_its_workers_is_told_and_the_others_are_done(
-    alone: dict[tuple[str, int], bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    alone: dict[tuple[str, int], Row], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its own runs alone, one after the other, with those that can be done."""
     monkeypatch.setattr(local, "perform", partial(deadly, tmp_path / "deaths"))
@@ -80,14 +87,14 @@ def deadly(deaths: Path, task: Task) -> Any:
 
 
 def test_a_task_that_was_done_when_its_worker_died_is_not_done_again(
-    alone: dict[tuple[str, int], bytes], monkeypatch: pytest.MonkeyPatch
+    alone: dict[tuple[str, int], Row], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Nor taken for what it died of: nobody looks before the next task is handed out."""
     queue = TaskQueue(small_campaign(runs=RUNS), ())
     first, second = queue.take(), queue.take()
     assert first is not None
     assert second is not None
-    with local_workers(1) as workers:
+    with local_workers(1, print) as workers:
         workers.submit(first)
         (worker,) = workers._workers
         (done,) = worker.tasks
@@ -96,7 +103,9 @@ def test_a_task_that_was_done_when_its_worker_died_is_not_done_again(
             process.kill()
         wait_until(lambda: not active_children(), "the end of the worker")
         workers.submit(second)
-        ended = [workers.next(), workers.next()]
+        ended = workers.next()
+        while len(ended) < 2:
+            ended += workers.next()
         assert [task for task, _ in ended] == [first, second]
         assert workers._killers == set()
     landed = [result for _, outcome in ended if not isinstance(outcome, WorkerDied) for result in outcome]
@@ -104,7 +113,7 @@ def test_a_task_that_was_done_when_its_worker_died_is_not_done_again(
 
 
 def test_a_worker_that_is_killed_in_the_middle_of_a_message_is_waited_for_by_nobody(
-    alone: dict[tuple[str, int], bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    alone: dict[tuple[str, int], Row], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Results of a hundred kilobytes go through a pipe in pieces, and Ctrl-C comes in between."""
     monkeypatch.setattr(local, "perform", partial(half_said, tmp_path / "once"))
@@ -131,6 +140,21 @@ def test_workers_that_end_while_they_start_are_told_of(monkeypatch: pytest.Monke
         list(on_local_workers())
 
 
+def test_what_is_finished_when_ctrl_c_comes_is_given_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Though it waits for others, to be kept together."""
+
+    def until(task: Task) -> Outcome:
+        if task.runs[0] == 2:
+            raise KeyboardInterrupt
+        return (Failed(task.cell.name, task.runs[0], "made up"),)
+
+    monkeypatch.setattr(engine, "perform", until)
+    results = in_process(TaskQueue(small_campaign(runs=3), ()))
+    assert [(each.cell, each.run) for each in next(results)] == [("idm", 0), ("still", 0), ("idm", 1), ("still", 1)]
+    with pytest.raises(KeyboardInterrupt):
+        next(results)
+
+
 @contextmanager
 def dask(*arguments: str) -> Iterator[subprocess.Popen[bytes]]:
     process = subprocess.Popen(
@@ -147,14 +171,56 @@ def dask(*arguments: str) -> Iterator[subprocess.Popen[bytes]]:
         process.wait()
 
 
-def test_a_cluster_of_its_own_does_the_same(alone: dict[tuple[str, int], bytes], free_port: int) -> None:
+def test_a_cluster_of_its_own_does_the_same(alone: dict[tuple[str, int], Row], free_port: int) -> None:
     address = f"tcp://127.0.0.1:{free_port}"
     with (
         dask("scheduler", "--host", "127.0.0.1", "--port", str(free_port)),
         dask("worker", address, "--nthreads", "1", "--nworkers", "2"),
         remote_workers(address, print) as workers,
     ):
-        assert payloads(on_workers(workers, TaskQueue(small_campaign(runs=RUNS), ()))) == alone
+        results = on_workers(workers, TaskQueue(small_campaign(runs=RUNS), ()))
+        assert payloads(chain.from_iterable(results)) == alone
+
+
+def test_workers_are_waited_for_and_missed(
+    alone: dict[tuple[str, int], Row], free_port: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By the file that the scheduler writes; they are looked at often here."""
+    monkeypatch.setattr("vedette.campaigns.cluster._REFRESH_SECONDS", 0.2)
+    file, told, results = tmp_path / "scheduler.json", list[str](), list[Landed | Failed]()
+    known = ("--scheduler-file", str(file))
+    with (
+        dask("scheduler", "--host", "127.0.0.1", *known, "--port", str(free_port)),
+        dask("worker", *known, "--nthreads", "1"),
+        ExitStack() as second,
+    ):
+
+        def tell(text: str) -> None:
+            told.append(text)
+            if text.startswith("waiting: "):
+                second.enter_context(dask("worker", *known, "--nthreads", "1", "--no-nanny"))
+
+        with remote_workers(str(file), tell, 2) as workers:
+            for result in chain.from_iterable(on_workers(workers, TaskQueue(small_campaign(runs=RUNS), ()))):
+                results.append(result)
+                if len(results) == 5:
+                    second.close()
+    assert payloads(results) == alone
+    assert any(re.fullmatch("waiting: [01] of 2 workers there", text) for text in told)
+    assert "1 worker gone, whose work is done again; 1 worker left" in told
+
+
+@pytest.mark.parametrize(("text", "told"), [(None, "it is not there"), ("{", "Expecting"), ("{}", "address")])
+def test_a_file_that_no_scheduler_wrote(
+    text: str | None, told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("vedette.campaigns.cluster._CONNECT_SECONDS", 0.1)
+    file = tmp_path / "scheduler.json"
+    if text is not None:
+        file.write_text(text)
+    expected = pytest.raises(InputError, match=rf"scheduler: expected a file that .*scheduler\.json: .*{told}")
+    with expected, remote_workers(str(file), print):
+        pass
 
 
 def test_a_scheduler_that_is_killed_is_said_to_be_gone(free_port: int) -> None:
@@ -163,7 +229,7 @@ def test_a_scheduler_that_is_killed_is_said_to_be_gone(free_port: int) -> None:
 
     def run_until_it_dies() -> None:
         with remote_workers(address, print) as workers:
-            for result in on_workers(workers, TaskQueue(small_campaign(runs=RUNS), ())):
+            for result in chain.from_iterable(on_workers(workers, TaskQueue(small_campaign(runs=RUNS), ()))):
                 landed.append(result)
                 if len(landed) == 5:
                     scheduler.kill()

@@ -19,6 +19,7 @@ from simulation.test_storage import assert_same
 from vedette.campaigns.codec import encode
 from vedette.campaigns.manifest import contents_checksum
 from vedette.campaigns.results import open_results
+from vedette.campaigns.rows import row_of
 from vedette.campaigns.store import Store
 from vedette.cli import app
 from vedette.errors import InputError
@@ -164,8 +165,8 @@ def test_a_payload_of_another_run_or_of_none_is_named(folder, campaign):
     record, _ = make_run("random", 0)
     timings = encode_timings(record)
     with Store.open(folder, campaign) as store:
-        store.add("random-rate-5.0", 2, encode(record), timings)
-        store.add("random-rate-10.0", 2, b"no run", timings)
+        store.add(row_of("random-rate-5.0", 2, encode(record), timings))
+        store.add(row_of("random-rate-10.0", 2, b"no run", timings))
     results = open_results(folder)
     for cell, message in (("random-rate-5.0", "expected the number 2; got 0"), ("random-rate-10.0", "got others")):
         with pytest.raises(InputError, match=rf"campaign\.sqlite: cell {cell}, run 2: run: .*{message}"):

@@ -15,6 +15,7 @@ from vedette.campaigns import manifest as manifests
 from vedette.campaigns import store as stores
 from vedette.campaigns.cells import resolve
 from vedette.campaigns.results import open_results
+from vedette.campaigns.rows import row_of
 from vedette.campaigns.spec import spec_from_data
 from vedette.campaigns.store import Store
 from vedette.errors import InputError
@@ -81,7 +82,7 @@ def test_a_finished_run_is_not_added_again(filled, campaign):
 )
 def test_runs_of_no_cell_are_refused(filled, campaign, cell, run, message):
     with Store.open(filled, campaign) as store, pytest.raises(InputError, match=message):
-        store.add(cell, run, b"", b"")
+        store.add(row_of(cell, run, b"", b""))
 
 
 @pytest.mark.parametrize(

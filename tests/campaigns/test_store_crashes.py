@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from campaigns.adding import CELL, CONTENTS, entry_of, started
+from campaigns.adding import CELL, CONTENTS, entry_of, put, started
 from vedette.campaigns.journal import DATABASE, Reader, Writer
 from vedette.errors import InputError
 
@@ -80,7 +80,7 @@ def test_whatever_was_added_survives_a_kill_at_any_moment(folder):
 def test_a_transaction_killed_half_way_is_taken_back_by_the_first_reader(folder):
     writer = Writer(folder)
     writer.open_runs(CONTENTS)
-    writer.put(entry_of(0))
+    put(writer, 0)
     writer.close()
     before = (folder / DATABASE).stat().st_size
     with started("add_half", str(folder)) as process:

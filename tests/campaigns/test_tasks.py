@@ -11,6 +11,7 @@ from campaigns.examples import small_campaign
 from vedette.campaigns import tasks
 from vedette.campaigns.cells import Campaign
 from vedette.campaigns.codec import decode
+from vedette.campaigns.rows import row_of
 from vedette.campaigns.tasks import MIN_TASK_SECONDS, Failed, Landed, Task, TaskQueue, perform
 from vedette.errors import ModelError, VedetteError
 from vedette.evaluation.metrics import decode_metrics, measure
@@ -18,7 +19,7 @@ from vedette.evaluation.runs import run_scenario
 
 
 def landed(cell: str, seconds: float) -> Landed:
-    return Landed(cell, 0, b"", b"", b"", 1.0, seconds)
+    return Landed(row_of(cell, 0, b"", b""), 1.0, seconds)
 
 
 def drain(queue: TaskQueue) -> list[tuple[str, tuple[int, ...]]]:
@@ -66,6 +67,18 @@ def test_a_task_holds_a_least_time_of_work_once_that_is_known() -> None:
     assert drain(queue)[:3] == [("still", (1,)), ("idm", tuple(range(2, 12))), ("still", (2,))]
 
 
+def test_the_more_workers_the_longer_are_tasks_until_little_is_left() -> None:
+    queue = TaskQueue(small_campaign(planners=["still"], runs=1000), ())
+    learnt(queue, landed("still", 0.1), landed("still", 0.1))
+    sizes = []
+    while (task := queue.take(200)) is not None:
+        sizes.append(len(task.runs))
+    assert sum(sizes) == 998
+    assert sizes == sorted(sizes, reverse=True)
+    assert sizes[0] == 5  # of 998 runs that 200 tasks share; 200 times .005 s would be 10 runs
+    assert sizes[-1] == 1
+
+
 def test_the_first_run_of_each_set_of_kernels_goes_before_the_others() -> None:
     campaign = small_campaign(planners=["jdm", "idm", "random", "still"], fusions=["cm_delta_glmb", "clmb"], runs=2)
     queue = TaskQueue(campaign, {("jdm-clmb", run) for run in range(2)})
@@ -89,8 +102,8 @@ def test_a_task_gives_back_the_runs_it_was_given() -> None:
     assert isinstance(first, Landed)
     assert isinstance(second, Landed)
     assert (first.cell, first.run, second.run) == ("idm", 0, 2)
-    record = decode(second.payload)
-    metrics, own = decode_metrics(second.metrics, record.num_scans)
+    record = decode(second.row.payload.unpacked())
+    metrics, own = decode_metrics(second.row.metrics.unpacked(), record.num_scans)
     assert metrics is not None
     assert own == {}
     again = run_scenario(task.cell.scenario, "idm", seed=0, run=2)

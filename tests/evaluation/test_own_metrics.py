@@ -18,6 +18,7 @@ from simulation.test_storage import assert_same
 from vedette.campaigns.cells import resolve
 from vedette.campaigns.codec import encode
 from vedette.campaigns.results import open_results
+from vedette.campaigns.rows import row_of
 from vedette.campaigns.running import run_campaign
 from vedette.campaigns.spec import spec_from_data
 from vedette.campaigns.store import Store
@@ -88,7 +89,7 @@ def test_a_new_measure_is_computed_for_an_old_folder(tmp_path: Path, monkeypatch
         fill(tmp_path / "results", campaign, leave_out=2)
     with Store.open(tmp_path / "results", campaign) as store:
         other = make_run("jdm", 1)[0]
-        store.add("jdm", 1, encode(other), encode_timings(other))
+        store.add(row_of("jdm", 1, encode(other), encode_timings(other)))
     results = open_results(tmp_path / "results")
     assert_same(replace(results.metrics("jdm", 0), own={}), metrics)
     assert_same(results.metrics("jdm", 1), make_run("jdm", 1)[1])

@@ -26,6 +26,7 @@ from fuzz.mutations import spoil_bytes
 from vedette.campaigns.cells import Campaign
 from vedette.campaigns.codec import encode
 from vedette.campaigns.results import CampaignResults, open_results
+from vedette.campaigns.rows import row_of
 from vedette.campaigns.store import Store
 from vedette.cli import app
 from vedette.densities.files import load_density, save_density
@@ -68,7 +69,7 @@ def originals(tmp_path_factory: pytest.TempPathFactory) -> Originals:
         for cell, run in campaign.tasks:
             record = replace(make_record(cell.planner, run, num_scans=SCANS), scenario="paper-a")
             metrics = encode_metrics(measure(record, cutoff=100.0, order=1.0, window=10))
-            store.add(cell.name, run, encode(record), encode_timings(record), metrics)
+            store.add(row_of(cell.name, run, encode(record), encode_timings(record), metrics))
     save_run(make_record(num_scans=SCANS), place / "run", scenario_text="name: synthetic\n")
     rng = np.random.default_rng(0)
     save_density(place / "glmb.npz", random_glmb(rng, 3, 5, 2))

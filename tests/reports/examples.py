@@ -26,7 +26,7 @@ def results_of(folder: Path, campaign: Campaign, *, skipped: Collection[tuple[st
             if (cell.name, run) not in skipped:
                 (result,) = perform(Task(cell, campaign.seed, (run,), {}))
                 assert isinstance(result, Landed), result
-                store.add(result.cell, result.run, result.payload, result.timings, result.metrics)
+                store.add(result.row)
     return open_results(folder)
 
 

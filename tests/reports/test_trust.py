@@ -14,6 +14,7 @@ from evaluation.synthetic import make_record
 from fuzz.store_edits import sign_manifest
 from vedette.campaigns.cells import Campaign, resolve
 from vedette.campaigns.codec import encode
+from vedette.campaigns.rows import row_of
 from vedette.campaigns.spec import spec_from_data
 from vedette.campaigns.store import Store
 from vedette.cli import app
@@ -54,7 +55,7 @@ def results(scenario: Path, tmp_path: Path) -> Path:
     )
     with Store.open(tmp_path / "results", campaign) as store:
         record = replace(make_record("jdm"), scenario="paper-a")
-        store.add("jdm", 0, encode(record), encode_timings(record))
+        store.add(row_of("jdm", 0, encode(record), encode_timings(record)))
     scenario.with_name("mark").unlink()
     return tmp_path / "results"
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import logging
 import math
 import re
@@ -12,11 +13,13 @@ from asyncio import CancelledError as AsyncCancelledError
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vedette.campaigns.tasks import Outcome, Task, WorkerDied, perform
 from vedette.errors import InputError, VedetteError
 from vedette.reading import said
+from vedette.text import counted, shown
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -29,17 +32,20 @@ _ADDRESS = re.compile(r"(tcp|tls)://[^\s/]+:[0-9]+")
 
 
 @contextmanager
-def remote_workers(address: str, tell: Callable[[str], None]) -> Iterator[RemoteWorkers]:
+def remote_workers(address: str, tell: Callable[[str], None], quorum: int = 1) -> Iterator[RemoteWorkers]:
     """The workers of a scheduler that runs already.
 
     Args:
-        address: of the scheduler.
-        tell: is told, in words, when there is no worker to do the work.
+        address: of the scheduler, or the file that it writes.
+        tell: is told, in words, when workers come and go.
+        quorum: workers that are waited for, once.
 
     Raises:
         InputError: the address is none, or nothing answers there.
     """
     expected = "scheduler: expected the address of a running dask scheduler, such as tcp://host:8786"
+    if address.endswith(".json"):
+        address = _address_in(Path(address))
     if not _ADDRESS.fullmatch(address):
         raise InputError(f"{expected}; got {address!r}")
     from distributed import Client
@@ -52,7 +58,9 @@ def remote_workers(address: str, tell: Callable[[str], None]) -> Iterator[Remote
     except (OSError, ValueError) as error:
         raise InputError(f"{expected}; nothing answers at {address}: {error}") from None
     with client:
-        yield RemoteWorkers(client, tell)
+        workers = RemoteWorkers(client, tell)
+        workers.wait_for(quorum)
+        yield workers
 
 
 class RemoteWorkers:
@@ -64,7 +72,7 @@ class RemoteWorkers:
         self._client = client
         self._tell = tell
         self._looked_at = -math.inf
-        self._waiting = False
+        self._there: frozenset[str] = frozenset()
         self._num_threads = 1
         self._tasks: dict[Future, Task] = {}
         self._done = as_completed(loop=client.loop)
@@ -80,13 +88,22 @@ class RemoteWorkers:
         self._tasks[future] = task
         self._done.add(future)
 
-    def next(self) -> tuple[Task, Outcome | WorkerDied]:
+    def wait_for(self, quorum: int) -> None:
+        """Return when so many workers are there."""
+        self._look()
+        if len(self._there) < quorum:
+            self._tell(f"waiting: {len(self._there)} of {counted(quorum, 'worker')} there")
+        while len(self._there) < quorum:
+            time.sleep(_POLL_SECONDS)
+            self._look()
+
+    def next(self) -> list[tuple[Task, Outcome | WorkerDied]]:
         """See `Workers`."""
         while not self._done.has_ready():
             self._look()
             time.sleep(_POLL_SECONDS)
-        future = next(self._done)
-        return self._tasks.pop(future), self._outcome(future)
+        futures = self._done.next_batch(block=False)
+        return [(self._tasks.pop(future), self._outcome(future)) for future in futures]
 
     def _outcome(self, future: Future) -> Outcome | WorkerDied:
         from distributed import KilledWorker
@@ -104,7 +121,7 @@ class RemoteWorkers:
                 return outcome
 
     def _look(self) -> None:
-        """Count the workers, now and then."""
+        """Count the workers, now and then, and tell of those that have come or gone."""
         now = time.monotonic()
         if now - self._looked_at < _REFRESH_SECONDS or self._client.status != "running":
             return
@@ -114,9 +131,29 @@ class RemoteWorkers:
         except OSError:  # the connection is lost: the tasks under way say so
             return
         self._num_threads = max(1, sum(threads.values()))
-        if bool(threads) == self._waiting:
-            self._waiting = not threads
-            self._tell("waiting: there is no worker" if self._waiting else f"going on: workers: {len(threads)}")
+        before, self._there = self._there, frozenset(threads)
+        if gone := len(before - self._there):
+            left = f"{counted(len(threads), 'worker')} left" if threads else "waiting: there is no worker"
+            self._tell(f"{counted(gone, 'worker')} gone, whose work is done again; {left}")
+        elif len(threads) != len(before):
+            self._tell(f"{counted(len(threads), 'worker')}")
+
+
+def _address_in(file: Path) -> str:
+    """What a scheduler wrote of itself; `InputError` where it does not within the time that one may take."""
+    problem = "it is not there"
+    for _ in range(round(_CONNECT_SECONDS / _POLL_SECONDS)):
+        try:
+            address = json.loads(file.read_text("utf-8"))["address"]
+            if isinstance(address, str):
+                return address
+            problem = f"its address is {shown(address)}"
+        except FileNotFoundError:
+            pass
+        except (OSError, ValueError, LookupError, TypeError) as error:  # or it is being written
+            problem = said(error)
+        time.sleep(_POLL_SECONDS)
+    raise InputError(f"scheduler: expected a file that a dask scheduler writes (--scheduler-file); {file}: {problem}")
 
 
 def _check_scheduler(address: str, refusal: str) -> None:

@@ -14,8 +14,6 @@ from vedette.extras import need
 if TYPE_CHECKING:
     import xarray
 
-_EMPTY = pa.table({"cell": pa.array([], pa.string()), **{name: np.empty(0) for name in ("run", "step", "time_s")}})
-
 
 def dataset_of_scans(campaign: Campaign, scans: pa.Table | None) -> xarray.Dataset:
     """Every column of the table `scans` (None: no run is finished) as a float64 variable of (cell, run, step).
@@ -29,7 +27,9 @@ def dataset_of_scans(campaign: Campaign, scans: pa.Table | None) -> xarray.Datas
     need("a dataset", "xarray")
     import xarray
 
-    table = _EMPTY if scans is None else scans
+    table = scans
+    if table is None:
+        table = pa.table({"cell": pa.array([], pa.string()), **dict.fromkeys(("run", "step", "time_s"), np.empty(0))})
     cells = [cell.name for cell in campaign.cells]
     of_cells = np.array([cells.index(name) for name in table["cell"].to_pylist()], np.int64)
     of_runs, steps = (table[name].to_numpy().astype(np.int64) for name in ("run", "step"))

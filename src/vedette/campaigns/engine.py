@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from typing import Protocol
 
-from vedette.campaigns.tasks import Failed, Landed, Outcome, Task, TaskQueue, WorkerDied, perform
+from vedette.campaigns.tasks import Failed, Outcome, Task, TaskQueue, WorkerDied, perform
 from vedette.errors import VedetteError
 
 _TRIES_ALONE = 2
+_MOST_TOGETHER, _SECONDS_TOGETHER = 20, 1.0  # that a transaction is of: what a kill may lose of one process
 
 
 class Workers(Protocol):
@@ -22,8 +24,8 @@ class Workers(Protocol):
         """Hand out a task."""
         ...
 
-    def next(self) -> tuple[Task, Outcome | WorkerDied]:
-        """A task that has ended with what it gave back, once there is one.
+    def next(self) -> list[tuple[Task, Outcome | WorkerDied]]:
+        """The tasks that have ended by now with what they gave back, once there is one.
 
         `WorkerDied` where a worker died of it, and so did the next that it was given to; or may have died of it.
 
@@ -32,33 +34,53 @@ class Workers(Protocol):
         ...
 
 
-def in_process(queue: TaskQueue) -> Iterator[Landed | Failed]:
-    """Every run, one after the other, by this process."""
-    while (task := queue.take()) is not None:
-        yield from queue.learn(task, perform(task))
+def in_process(queue: TaskQueue) -> Iterator[Outcome]:
+    """Every run, one after the other, by this process; those of a second come together.
+
+    Raises `KeyboardInterrupt`, once those that are finished have been given back.
+    """
+    batch: Outcome = ()
+    since = time.monotonic()
+    try:
+        while (task := queue.take()) is not None:
+            batch += queue.learn(task, perform(task))
+            if len(batch) >= _MOST_TOGETHER or time.monotonic() - since > _SECONDS_TOGETHER:
+                yield batch
+                batch, since = (), time.monotonic()
+    except KeyboardInterrupt:
+        yield batch
+        raise
+    if batch:
+        yield batch
 
 
-def on_workers(workers: Workers, queue: TaskQueue) -> Iterator[Landed | Failed]:
-    """Every run, in the order of finishing. The runs of a worker that died are done again by another.
+def on_workers(workers: Workers, queue: TaskQueue) -> Iterator[Outcome]:
+    """Every run, in the order of finishing; those that have finished by the same time come together.
+
+    The runs of a worker that died are done again by another.
 
     Raises as `Workers.next`.
     """
     suspects: list[Task] = []
+    batch: Outcome = ()
     under_way = 0
     while True:
-        while under_way < workers.room() and (task := queue.take()) is not None:
+        while under_way < workers.room() and (task := queue.take(workers.room())) is not None:
             workers.submit(task)
             under_way += 1
+        if batch:  # while the next are being done
+            yield batch
         if not under_way:
             break
-        ended, outcome = _next(workers)
-        under_way -= 1
-        if isinstance(outcome, WorkerDied):
-            suspects += ended.alone()
-            outcome = ()
-        yield from queue.learn(ended, outcome)
+        batch = ()
+        for ended, outcome in _next(workers):
+            under_way -= 1
+            if isinstance(outcome, WorkerDied):
+                suspects += ended.alone()
+                outcome = ()
+            batch += queue.learn(ended, outcome)
     for task in suspects:
-        yield from queue.learn(task, _alone(workers, task))
+        yield queue.learn(task, _alone(workers, task))
 
 
 def _alone(workers: Workers, task: Task) -> Outcome:
@@ -68,13 +90,13 @@ def _alone(workers: Workers, task: Task) -> Outcome:
     """
     for _ in range(_TRIES_ALONE):
         workers.submit(task)
-        _, outcome = _next(workers)
+        ((_, outcome),) = _next(workers)
         if not isinstance(outcome, WorkerDied):
             return outcome
     return (Failed(task.cell.name, task.runs[0], "every worker that took it died (out of memory?)"),)
 
 
-def _next(workers: Workers) -> tuple[Task, Outcome | WorkerDied]:
+def _next(workers: Workers) -> list[tuple[Task, Outcome | WorkerDied]]:
     try:
         return workers.next()
     except VedetteError:

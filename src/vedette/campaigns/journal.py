@@ -1,21 +1,18 @@
 """The runs of a campaign in one SQLite file: a row a run, each landing whole or not at all.
 
-A rollback journal, not a write-ahead log: see docs/decisions/0004-results-store.md. Every row carries checksums, over
-its cell and run number too, that are verified whenever it is read.
+A rollback journal, not a write-ahead log: see docs/decisions/0004-results-store.md.
 """
 
 from __future__ import annotations
 
-import hashlib
-import itertools
 import sqlite3
-import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from vedette.campaigns.rows import Entry, Row, pack, verified
 from vedette.errors import InputError
 from vedette.reading import inflate, said
 from vedette.text import printable, shown
@@ -23,7 +20,6 @@ from vedette.text import printable, shown
 DATABASE, LOCK = "campaign.sqlite", "campaign.lock"
 
 _WAIT = 60.0  # s, for a reader or writer of the same file; each holds it for milliseconds
-_LEVEL = 1  # of zlib: half the size in under a millisecond, and higher levels gain little
 _TABLES = (
     "CREATE TABLE campaign (contents TEXT NOT NULL)",
     "CREATE TABLE runs (cell TEXT NOT NULL, run INTEGER NOT NULL, session INTEGER NOT NULL, "
@@ -35,30 +31,6 @@ _TABLES = (
 _ALTERED = "expected the run as it was written; it is cut short or altered"
 _COLUMNS = "cell, run, session, payload, payload_sha256, metrics, metrics_sha256, timings, timings_sha256"
 _INSERT = f"INSERT INTO runs ({_COLUMNS}) VALUES ({', '.join('?' * (_COLUMNS.count(',') + 1))})"
-
-
-@dataclass(frozen=True, slots=True)
-class Entry:
-    """One finished run as it was handed in.
-
-    Attributes:
-        cell, run: which.
-        session: that it was handed in by, counted from 1.
-        payload, timings: the run, and what the clock said of it.
-        metrics: what was measured of it; no bytes where nothing was, as it can be measured again.
-    """
-
-    cell: str
-    run: int
-    session: int
-    payload: bytes
-    metrics: bytes
-    timings: bytes
-
-    @property
-    def checksum(self) -> str:
-        """SHA-256 of the run's cell, number and payload: equal for equal results, whenever they were computed."""
-        return _checksum(self.cell, self.run, self.payload)
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,21 +73,24 @@ class Writer:
             database.execute("COMMIT")
         _check_contents(self._path, found, contents)
 
-    def put(self, entry: Entry) -> None:
-        """Put the run on the disk; when this returns it stays, whatever happens to this process or its machine."""
-        parts = (entry.payload, entry.metrics, entry.timings)
-        packed = itertools.chain.from_iterable(_packed(entry.cell, entry.run, part) for part in parts)
-        row = (entry.cell, entry.run, entry.session, *packed)
-        try:
-            with _explained(self._path, _place(entry.cell, entry.run)):
-                self._database.execute("BEGIN IMMEDIATE")
-                with self._database:  # both or neither
-                    self._database.execute(_INSERT, row)
-                    self._database.execute("DELETE FROM failures WHERE cell = ? AND run = ?", (entry.cell, entry.run))
-        except sqlite3.IntegrityError:
-            raise InputError(
-                f"{self._path}: {_place(entry.cell, entry.run)}expected another run; it is there"
-            ) from None
+    def put(self, rows: Sequence[Row], session: int) -> None:
+        """Put runs on the disk, all or none; when this returns they stay, whatever happens to this process or machine.
+
+        Args:
+            session: that they are handed in by, counted from 1.
+
+        Raises `InputError`, and keeps none, where a run is there already, and where the disk is full or fails.
+        """
+        places = [_place(row.cell, row.run) for row in rows]
+        with _explained(self._path, places[0] if len(places) == 1 else ""):
+            self._database.execute("BEGIN IMMEDIATE")
+            with self._database:
+                for row, place in zip(rows, places, strict=True):
+                    try:
+                        self._database.execute(_INSERT, row.values(session))
+                    except sqlite3.IntegrityError:
+                        raise InputError(f"{self._path}: {place}expected another run; it is there") from None
+                    self._database.execute("DELETE FROM failures WHERE cell = ? AND run = ?", (row.cell, row.run))
 
     def put_failure(self, failure: Failure) -> None:
         """Keep why a run could not be finished, in place of an earlier reason, until it is."""
@@ -135,7 +110,7 @@ class Writer:
         """Cell and number of every run whose row is not as it was written."""
         with _explained(self._path):
             rows = self._database.execute(f"SELECT {_COLUMNS} FROM runs ORDER BY cell, run")
-            return tuple((row[0], row[1]) for row in rows if _verified(row) is None)
+            return tuple((row[0], row[1]) for row in rows if verified(row) is None)
 
     def metrics(self) -> Iterator[tuple[str, int, bytes]]:
         """Cell and number of every run, with its measures."""
@@ -146,7 +121,7 @@ class Writer:
     def put_metrics(self, cell: str, run: int, metrics: bytes) -> None:
         """Keep other measures of a run that is there."""
         where = "UPDATE runs SET metrics = ?, metrics_sha256 = ? WHERE cell = ? AND run = ?"
-        self._change(cell, run, where, *_packed(cell, run, metrics))
+        self._change(cell, run, where, *pack(cell, run, metrics))
 
     def take_in(self, others: Iterable[tuple[Reader, Callable[[int], int]]]) -> int:
         """Copy the runs of other folders that are not here yet, all in one transaction; returns their number.
@@ -194,11 +169,11 @@ class Writer:
     def _rewrite(self, cell: str, run: int, payload: Callable[[Entry], bytes]) -> None:
         where = f"{self._path}: {_place(cell, run)}"
         rows = self._database.execute(f"SELECT {_COLUMNS} FROM runs WHERE cell = ? AND run = ?", (cell, run))
-        entry = _verified(rows.fetchone())
+        entry = verified(rows.fetchone())
         if entry is None:
             raise InputError(f"{where}{_ALTERED}")
         try:
-            packed = _packed(cell, run, payload(entry))
+            packed = pack(cell, run, payload(entry))
         except InputError as error:
             raise InputError(f"{where}{error}") from error
         change = "UPDATE runs SET payload = ?, payload_sha256 = ? WHERE cell = ? AND run = ?"
@@ -259,7 +234,7 @@ class Reader:
         """Every run as it is kept, by cell and number. `InputError` at the first one that is damaged."""
         with _explained(self._path), closing(_opened(self._path)) as database:
             for row in database.execute(f"SELECT {_COLUMNS} FROM runs ORDER BY cell, run"):
-                if _verified(row) is None:
+                if verified(row) is None:
                     raise InputError(f"{self._path}: {_place(*map(printable, map(str, row[:2])))}{_ALTERED}")
                 yield row
 
@@ -269,7 +244,7 @@ class Reader:
         rows = self._ask(f"SELECT {_COLUMNS} FROM runs WHERE cell = ? AND run = ?", (cell, run), where)
         if not rows:
             raise InputError(f"{self._path}: {where}expected a finished run; it is not there yet")
-        entry = _verified(rows[0])
+        entry = verified(rows[0])
         if entry is None:
             raise InputError(f"{self._path}: {where}{_ALTERED}")
         return entry
@@ -284,19 +259,6 @@ class Reader:
             # A writer was killed in the middle of a run: what it left half done is first taken back.
             _answer(self._path, question, values, mode="rw")
             return _answer(self._path, question, values)
-
-
-def _verified(row: tuple[Any, ...]) -> Entry | None:
-    """The run in a row; None where it is not as it was written."""
-    cell, run, session, *packed = row
-    if not isinstance(cell, str) or not isinstance(run, int) or not isinstance(session, int):
-        return None
-    try:
-        parts = [inflate(part) for part in packed[::2]]
-    except (ValueError, TypeError):
-        return None
-    intact = [_checksum(cell, run, part) for part in parts] == packed[1::2]
-    return Entry(cell, run, session, *parts) if intact else None
 
 
 def _answer(path: Path, question: str, values: Sequence[Any], mode: str = "ro") -> list[Any]:
@@ -351,21 +313,11 @@ def _place(cell: str, run: int | str) -> str:
     return f"cell {cell}, run {run}: "
 
 
-def _packed(cell: str, run: int, content: bytes) -> tuple[bytes, str]:
-    return zlib.compress(content, _LEVEL), _checksum(cell, run, content)
-
-
-def _checksum(cell: str, run: int, content: bytes) -> str:
-    return hashlib.sha256(f"{cell}\n{run}\n".encode() + content).hexdigest()
-
-
 @contextmanager
 def _explained(path: Path, where: str = "") -> Iterator[None]:
-    """What SQLite raises, as errors of this library that name the file; a key that is there already is passed on."""
+    """What SQLite raises, as errors of this library that name the file."""
     try:
         yield
-    except sqlite3.IntegrityError:
-        raise
     except (sqlite3.DatabaseError, UnicodeDecodeError) as error:  # the latter of words of the file in a message
         raise InputError(f"{path}: {where}{_advice(path, error)} ({printable(said(error))})") from error
 

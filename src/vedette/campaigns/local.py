@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -26,14 +26,14 @@ _FILES, _FILES_A_WORKER = 40, 10  # open at once, with room to spare: 16 were wi
 
 
 @contextmanager
-def local_workers(num_workers: int) -> Iterator[LocalWorkers]:
-    """As many worker processes on this machine; one that dies is replaced.
+def local_workers(num_workers: int, tell: Callable[[str], None]) -> Iterator[LocalWorkers]:
+    """As many worker processes on this machine; one that dies is replaced, and `tell` told.
 
     Raises:
         VedetteError: they cannot be started.
     """
     _make_room_for_files(num_workers)
-    workers = LocalWorkers()
+    workers = LocalWorkers(tell)
     try:
         workers.start(num_workers)
         yield workers
@@ -91,6 +91,13 @@ class _Worker:
     def has_begun(self) -> bool:
         return self.begun.done() and self.begun.exception() is None
 
+    def manner(self) -> str:
+        """How it died."""
+        status = next((process.exitcode for process in self.processes), None)
+        if status is None or status >= 0:
+            return f"exit status {status}"
+        return f"signal {-status}{', out of memory?' if status == -signal.SIGKILL else ''}"
+
     def end(self) -> None:
         for process in self.processes:
             process.kill()
@@ -100,7 +107,8 @@ class _Worker:
 class LocalWorkers:
     """See `vedette.campaigns.engine.Workers`."""
 
-    def __init__(self) -> None:
+    def __init__(self, tell: Callable[[str], None]) -> None:
+        self._tell = tell
         self._since = time.monotonic()
         self._failed_starts = 0
         self._killers: set[Task] = set()
@@ -126,7 +134,7 @@ class LocalWorkers:
             except BrokenProcessPool:
                 self._replace(worker)
 
-    def next(self) -> tuple[Task, Outcome | WorkerDied]:
+    def next(self) -> list[tuple[Task, Outcome | WorkerDied]]:
         """See `Workers`."""
         while not self._ended:
             wait([each for worker in self._workers for each in worker.tasks], _WAIT_SECONDS, FIRST_COMPLETED)
@@ -136,7 +144,8 @@ class LocalWorkers:
                     self._replace(worker)
             if time.monotonic() - self._since > _START_SECONDS and not any(map(_Worker.has_begun, self._workers)):
                 raise _not_started()
-        return self._ended.pop(0)
+        ended, self._ended = self._ended, []
+        return ended
 
     def end(self) -> None:
         """Stop them, whatever they are doing."""
@@ -165,6 +174,7 @@ class LocalWorkers:
                 self._ended.append((left.pop(0), WorkerDied()))
             else:
                 self._killers.update(left[:1])
+            self._tell(f"a worker has died ({dead.manner()}): another takes its place, and what it had not done")
         else:
             self._failed_starts += 1
             if self._failed_starts >= _MOST_FAILED_STARTS:

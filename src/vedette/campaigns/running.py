@@ -19,6 +19,7 @@ from vedette.campaigns.manifest import MANIFEST
 from vedette.campaigns.results import open_results
 from vedette.campaigns.store import Store
 from vedette.campaigns.tasks import Failed, Landed, TaskQueue
+from vedette.campaigns.tasks import Outcome as Done
 from vedette.errors import InputError, VedetteError
 from vedette.evaluation.metrics import encode_metrics
 from vedette.evaluation.runs import own_metrics
@@ -85,8 +86,10 @@ def run_campaign(
     Args:
         campaign: see `vedette.campaigns.resolve`.
         folder: for the results; new, empty, or of the same campaign.
-        num_workers: processes on this machine; 1: this process alone.
-        scheduler: address of a dask scheduler whose workers do the work instead; each has this version installed.
+        num_workers: processes on this machine; 1: this process alone. With a scheduler: workers that are waited for
+            before the first run.
+        scheduler: address of a dask scheduler whose workers do the work instead, or the file that it writes
+            (`--scheduler-file`); each has this version installed.
         redo_damaged: run again what was altered in the folder since it was kept, instead of refusing to go on.
         watch: is told of the progress.
 
@@ -116,15 +119,16 @@ def run_campaign(
         for change in store.version_changes:
             watch.note(f"{change}; runs of both may differ in their last digits")
         with closing(_results(queue, num_workers, scheduler, watch)) as results:
-            for result in results:
-                if isinstance(result, Failed):
-                    failed.append(result)
-                    store.note_failure(result.cell, result.run, result.message)
-                    watch.failed(result)
-                    continue
-                store.add(result.cell, result.run, result.payload, result.timings, result.metrics)
-                num_landed += 1
-                watch.landed(result)
+            for batch in results:
+                store.add(*(result.row for result in batch if isinstance(result, Landed)))
+                for result in batch:
+                    if isinstance(result, Landed):
+                        num_landed += 1
+                        watch.landed(result)
+                    else:
+                        failed.append(result)
+                        store.note_failure(result.cell, result.run, result.message)
+                        watch.failed(result)
     if campaign.shard.count == 1:  # of shares they are written when these are one
         # Each time: what was left of them by another end of this call, or altered since, is put right.
         export_tables(open_results(folder, campaign=campaign), Path(folder) / TABLES)
@@ -158,12 +162,12 @@ def _measure_anew(store: Store, campaign: Campaign, watch: Watch) -> None:
         watch.note(f"measured anew: {counted(len(lacking), 'run')}")
 
 
-def _results(queue: TaskQueue, num_workers: int, scheduler: str | None, watch: Watch) -> Generator[Landed | Failed]:
+def _results(queue: TaskQueue, num_workers: int, scheduler: str | None, watch: Watch) -> Generator[Done]:
     if scheduler is not None:
-        with remote_workers(scheduler, watch.note) as workers:
+        with remote_workers(scheduler, watch.note, num_workers) as workers:
             yield from on_workers(workers, queue)
     elif num_workers > 1 and len(queue) > 1:
-        with local_workers(min(num_workers, len(queue))) as workers:
+        with local_workers(min(num_workers, len(queue)), watch.note) as workers:
             yield from on_workers(workers, queue)
     else:
         yield from in_process(queue)

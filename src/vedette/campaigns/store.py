@@ -22,6 +22,7 @@ from vedette.campaigns.manifest import (
     read_manifest,
     write_manifest,
 )
+from vedette.campaigns.rows import Row
 from vedette.errors import InputError
 from vedette.evaluation.metrics import has_metrics
 
@@ -77,19 +78,20 @@ class Store(journal.Writer):
         )
         return tuple(changes)
 
-    def add(self, cell: str, run: int, payload: bytes, timings: bytes, metrics: bytes = b"") -> None:
-        """Keep a finished run (`vedette.campaigns.codec`), and its measures if there are any yet.
+    def add(self, *runs: Row) -> None:
+        """Keep finished runs (`vedette.campaigns.codec`), packed, with their measures if there are any yet.
 
-        When this returns, the run is on the disk.
+        When this returns, the runs are on the disk.
 
         Raises `InputError` for a run that is not the campaign's or is there already, and for a disk that is full or
-        fails: then the run is not kept, the earlier ones are, and adding may be tried again.
+        fails: then none of these is kept, the earlier ones are, and adding may be tried again.
         """
-        if cell not in self._num_runs:
-            raise InputError(f"cell: expected one of {', '.join(self._num_runs)}; got {cell!r}")
-        if not 0 <= run < self._num_runs[cell]:
-            raise InputError(f"run: expected a number from 0 to {self._num_runs[cell] - 1}; got {run}")
-        self.put(journal.Entry(cell, int(run), self.session, payload, metrics, timings))
+        for row in runs:
+            if row.cell not in self._num_runs:
+                raise InputError(f"cell: expected one of {', '.join(self._num_runs)}; got {row.cell!r}")
+            if not 0 <= row.run < self._num_runs[row.cell]:
+                raise InputError(f"run: expected a number from 0 to {self._num_runs[row.cell] - 1}; got {row.run}")
+        self.put(runs, self.session)
 
     def unmeasured(self, own: Mapping[str, Collection[str]]) -> tuple[tuple[str, int], ...]:
         """Cell name and number of every finished run that lacks measures: this version's, or its cell's `own`."""

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import heapq
 import math
 import time
+from collections import defaultdict, deque
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 from vedette.campaigns.cells import Campaign, Cell
 from vedette.campaigns.codec import encode
+from vedette.campaigns.rows import Row, row_of
 from vedette.errors import VedetteError
 from vedette.evaluation.metrics import encode_metrics
 from vedette.evaluation.runs import measure_run, own_metrics, run_scenario
@@ -19,6 +22,7 @@ from vedette.simulation.storage import versions
 
 # Below this a task costs more to hand out than it is worth.
 MIN_TASK_SECONDS = 0.1
+_HANDED_OUT_SECONDS = 0.005  # that a task takes the one who hands it out, generously
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,20 +49,24 @@ class Landed:
     """A finished run.
 
     Attributes:
-        cell, run: which.
-        payload: as `vedette.campaigns.codec` encodes it.
-        metrics, timings: as Arrow files.
+        row: what is kept of it: as `vedette.campaigns.codec` encodes it, with measures and timings as Arrow files.
         ospa: mean over the scans, m.
         seconds: it took, s of wall time.
     """
 
-    cell: str
-    run: int
-    payload: bytes
-    metrics: bytes
-    timings: bytes
+    row: Row
     ospa: float
     seconds: float
+
+    @property
+    def cell(self) -> str:
+        """Which."""
+        return self.row.cell
+
+    @property
+    def run(self) -> int:
+        """Which."""
+        return self.row.run
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,17 +106,14 @@ def _one(cell: Cell, seed: int, run: int) -> Landed | Failed:
     start = time.perf_counter()
     try:
         record = run_scenario(cell.scenario, cell.planner, seed=seed, run=run, num_threads=1)
-        kept = (
-            encode(record),
-            encode_metrics(measure_run(record, cell.scenario, own_metrics(cell.scenario))),
-            encode_timings(record),
-        )
+        metrics = encode_metrics(measure_run(record, cell.scenario, own_metrics(cell.scenario)))
+        row = row_of(cell.name, run, encode(record), encode_timings(record), metrics)
     except VedetteError as error:
         return Failed(cell.name, run, str(error))
     except Exception as error:  # in what surrounds a run: one bad one must not end a night's work
         return Failed(cell.name, run, f"{type(error).__name__}: {error}")
     mean = float(record.ospa[:, 0].mean())
-    return Landed(cell.name, run, *kept, mean, time.perf_counter() - start)
+    return Landed(row, mean, time.perf_counter() - start)
 
 
 class TaskQueue:
@@ -120,42 +125,68 @@ class TaskQueue:
     """
 
     def __init__(self, campaign: Campaign, finished: Collection[tuple[str, int]]) -> None:
-        self._campaign = campaign
+        self._cells = campaign.cells
+        self._seed = campaign.seed
         self._versions = versions()
         self._fastest: dict[str, float] = {}
-        self._compiled: dict[tuple[object, ...], bool] = {}  # False: by a task that is under way
-        self._todo = {
-            cell.name: [run for run in campaign.runs(place) if (cell.name, run) not in finished]
+        self._todo = [
+            deque(run for run in campaign.runs(place) if (cell.name, run) not in finished)
             for place, cell in enumerate(campaign.cells)
-        }
+        ]
+        self._num_left = sum(map(len, self._todo))
+        # Cells that can be taken from, by their next run; those that wait for others to have compiled their kernels.
+        self._ready = [(runs[0], place) for place, runs in enumerate(self._todo) if runs]
+        heapq.heapify(self._ready)
+        self._kernels = {cell.name: _kernels(cell) for cell in campaign.cells}
+        self._compiled: dict[tuple[object, ...], bool] = {}  # False: by a task that is under way
+        self._waiting: defaultdict[tuple[object, ...], list[int]] = defaultdict(list)
 
     def __len__(self) -> int:
         """Runs not yet handed out."""
-        return sum(len(runs) for runs in self._todo.values())
+        return self._num_left
 
     def learn(self, task: Task, outcome: Outcome) -> Outcome:
         """Note that a task has ended, and how long its runs took; returns its outcome."""
-        self._compiled[_kernels(task.cell)] = True
+        kernels = self._kernels[task.cell.name]
+        self._compiled[kernels] = True
+        for place in self._waiting.pop(kernels, ()):
+            self._put_back(place)
         for result in outcome:
             if isinstance(result, Landed):
                 self._fastest[result.cell] = min(self._fastest.get(result.cell, math.inf), result.seconds)
         return outcome
 
-    def take(self) -> Task | None:
-        """The next task; None when all runs are handed out, or wait for a first one to compile their kernels."""
-        waiting = [cell for cell in self._campaign.cells if self._todo[cell.name] and self._is_ready(cell)]
-        if not waiting:
-            return None
-        cell = min(waiting, key=lambda cell: self._todo[cell.name][0])
-        self._compiled.setdefault(_kernels(cell), False)
-        seconds = self._fastest.get(cell.name, MIN_TASK_SECONDS)
-        count = max(1, math.ceil(MIN_TASK_SECONDS / seconds))
-        runs = self._todo[cell.name]
-        taken, self._todo[cell.name] = runs[:count], runs[count:]
-        return Task(cell, self._campaign.seed, tuple(taken), self._versions)
+    def take(self, room: int = 1) -> Task | None:
+        """The next task; None when all runs are handed out, or wait for a first one to compile their kernels.
 
-    def _is_ready(self, cell: Cell) -> bool:
-        return self._compiled.get(_kernels(cell), True)
+        Args:
+            room: tasks that may be under way. The more, the longer each is, so that handing them out keeps up; and
+                none is so long that others would have nothing left.
+        """
+        while self._ready:
+            _, place = heapq.heappop(self._ready)
+            kernels = self._kernels[self._cells[place].name]
+            if self._compiled.get(kernels, True):
+                self._compiled.setdefault(kernels, False)
+                return self._taken(place, room)
+            self._waiting[kernels].append(place)
+        return None
+
+    def _taken(self, place: int, room: int) -> Task:
+        """A task of some runs of the cell at that place."""
+        cell, runs = self._cells[place], self._todo[place]
+        seconds = self._fastest.get(cell.name, MIN_TASK_SECONDS)
+        wanted = math.ceil(max(MIN_TASK_SECONDS, room * _HANDED_OUT_SECONDS) / seconds)
+        share = -(-self._num_left // room)
+        taken = tuple(runs.popleft() for _ in range(min(max(1, min(wanted, share)), len(runs))))
+        self._num_left -= len(taken)
+        self._put_back(place)
+        return Task(cell, self._seed, taken, self._versions)
+
+    def _put_back(self, place: int) -> None:
+        """Have runs of the cell at that place taken in their turn, while there are any."""
+        if self._todo[place]:
+            heapq.heappush(self._ready, (self._todo[place][0], place))
 
 
 def _kernels(cell: Cell) -> tuple[object, ...]:

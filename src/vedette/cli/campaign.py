@@ -39,7 +39,9 @@ def campaign(
     scheduler: Annotated[
         str | None,
         typer.Option(
-            "--scheduler", metavar="ADDRESS", help="Dask scheduler, tcp://host:port, with workers of its own."
+            "--scheduler",
+            metavar="ADDRESS",
+            help="Dask scheduler, tcp://host:port, or the .json that it writes; --workers: that are waited for.",
         ),
     ] = None,
     runs: Annotated[
@@ -135,7 +137,7 @@ def carry_out(
             return run_campaign(
                 campaign,
                 folder,
-                num_workers=workers or processors(),
+                num_workers=workers or (1 if scheduler else processors()),
                 scheduler=scheduler,
                 redo_damaged=redo_damaged,
                 watch=progress,
