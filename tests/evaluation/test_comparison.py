@@ -9,8 +9,8 @@ import pytest
 
 from evaluation.synthetic import make_record
 from vedette.errors import InputError
-from vedette.evaluation import Comparison, compare, decision_rows, strategy_csv, strategy_markdown, strategy_rows
-from vedette.evaluation.tables import header
+from vedette.evaluation import Comparison, compare, decision_rows, holm, strategy_csv, strategy_markdown, strategy_rows
+from vedette.evaluation.tables import header, strategy_latex, told_apart
 from vedette.simulation.records import RunRecord
 
 NUM_RUNS = 6
@@ -52,6 +52,33 @@ def test_differences_are_to_the_first_strategy_unless_named(comparison: Comparis
     )
     assert float(comparison.difference("random", "random").summary.mean) == 0.0
     assert comparison.difference("random").share_won == 1.0
+
+
+def test_what_is_told_apart_allows_for_the_number_of_strategies(comparison: Comparison) -> None:
+    alone = [comparison.difference(name).p_value for name in STRATEGIES[1:]]
+    np.testing.assert_array_equal(comparison.p_values(), [np.nan, *holm(np.array(alone))])
+    assert told_apart(comparison) == (
+        "From jdm, at 5 % among all 3 (Holm), told apart: random, fixed; not told apart: idm."
+    )
+    alike = replace(comparison, ospa=comparison.ospa[[0, 2, 3, 0]])
+    assert told_apart(alike) == "From jdm, at 5 % among all 3 (Holm), told apart: idm, random; not told apart: fixed."
+    all_apart = replace(comparison, ospa=comparison.ospa[[0, 2, 3, 3]])
+    assert told_apart(all_apart).endswith("(Holm), told apart: idm, random, fixed.")
+    two = replace(comparison, strategies=("a", "b"), ospa=comparison.ospa[:2])
+    assert told_apart(two) == ""
+
+
+def test_latex_has_the_table_with_its_letters_escaped(comparison: Comparison) -> None:
+    names = ("a_b & 50%", "x^2", r"\input{y}", "$#~")
+    lines = strategy_latex(replace(comparison, strategies=names)).splitlines()
+    rows = [line for line in lines if line.endswith(r"\\")]
+    assert rows[1].startswith(r"a\_b \& 50\% & ")
+    assert rows[2].startswith(r"x\textasciicircum{}2 & ")
+    assert rows[3].startswith(r"\textbackslash{}input\{y\} & ")
+    assert rows[4].startswith(r"\$\#\textasciitilde{} & ")
+    assert {row.replace(r"\&", "").count("&") for row in rows} == {6}
+    assert r"$\pm$" in rows[1]
+    assert (lines[0], lines[-1]) == (r"\begin{table}", r"\end{table}")
 
 
 def test_decision_shares_add_up(comparison: Comparison) -> None:

@@ -7,8 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import matplotlib
+import matplotlib.style
 import numpy as np
 import pytest
+import scipy.stats
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
@@ -20,6 +22,7 @@ from vedette.evaluation import Comparison, compare
 from vedette.evaluation.figures import (
     Scene,
     cost_figure,
+    differences_figure,
     distributions_figure,
     ospa_figure,
     overview_figure,
@@ -29,6 +32,7 @@ from vedette.evaluation.figures import (
     svg_text,
     tracks_figure,
 )
+from vedette.evaluation.figures.style import COLOURS
 from vedette.platforms import Actions
 
 
@@ -166,6 +170,34 @@ def test_ospa_has_a_curve_and_a_band_a_strategy_and_marks_decisions(comparison: 
     assert axes.get_ylim()[0] == 0.0
 
 
+def test_differences_are_drawn_from_the_first_decision_on_with_their_intervals(
+    comparison: Comparison,
+) -> None:
+    above, below = differences_figure(comparison).axes
+    assert below.get_xlabel() == "Time (s)"
+    assert (above.get_ylabel(), below.get_ylabel()) == ("OSPA (m)", "minus JDM (m)")
+    assert below.get_xlim()[0] == comparison.decision_times[0]
+    idm = np.asarray(below.lines[1].get_ydata())
+    shown = comparison.times >= comparison.decision_times[0]
+    apart = comparison.values("idm")[:, shown] - comparison.values("jdm")[:, shown]
+    np.testing.assert_allclose(idm, apart.mean(axis=0))
+    (band, *_) = below.collections
+    low, high = (np.asarray(each) for each in scipy.stats.ttest_1samp(apart, 0.0).confidence_interval(0.95))
+    corners = np.asarray(band.get_paths()[0].vertices)[:, 1]
+    assert (corners.min(), corners.max()) == pytest.approx((low.min(), high.max()))
+    spread = [comparison.curve(name) for name in comparison.strategies]
+    assert above.get_ylim()[1] >= max((curve.mean + curve.standard_error)[shown].max() for curve in spread)
+    with pytest.raises(InputError, match="comparison: expected two strategies and runs or more; got 3 and 1"):
+        differences_figure(replace(comparison, ospa=comparison.ospa[:, :1]))
+
+
+def test_the_style_is_there_for_figures_of_ones_own() -> None:
+    with matplotlib.style.context("vedette.paper"):
+        assert matplotlib.rcParams["font.size"] == 8.0
+        colours = matplotlib.rcParams["axes.prop_cycle"].by_key()["color"]
+    assert [f"#{each.lstrip('#')}" for each in colours] == list(COLOURS)
+
+
 def test_overview_shows_a_run_beside_the_errors(comparison: Comparison) -> None:
     left, right = overview_figure(make_record(), comparison).axes
     assert left.get_title() == "JDM, run 0"
@@ -203,7 +235,7 @@ def test_global_settings_are_left_alone() -> None:
     assert dict(matplotlib.rcParams) == before
 
 
-@pytest.mark.parametrize("kind", [ospa_figure, distributions_figure, roses_figure])
+@pytest.mark.parametrize("kind", [ospa_figure, differences_figure, distributions_figure, roses_figure])
 def test_any_name_can_be_drawn_without_a_warning(
     kind: Callable[[Comparison], Figure], comparison: Comparison, tmp_path: Path
 ) -> None:

@@ -12,7 +12,7 @@ from vedette.reports.claims import all_pairs, claim, claims
 
 def comparison_of(*errors: list[float]) -> Comparison:
     """Strategies a, b, ... on one scan, with the given OSPA in each run."""
-    names = tuple("abc"[: len(errors)])
+    names = tuple("abcde"[: len(errors)])
     totals = np.array(errors, np.float64)[:, :, np.newaxis, np.newaxis]
     ospa = np.concatenate([totals, totals, np.zeros_like(totals)], axis=3)
     return Comparison("synthetic", names, np.array([1.0]), np.empty(0), ospa, 0.0, 2.0, ((),) * len(names))
@@ -74,6 +74,18 @@ def test_the_first_is_compared_with_each_and_every_pair_is_listed() -> None:
     comparison = comparison_of([1.0, 2.0], [2.0, 3.0], [3.0, 5.0])
     assert [(each.first, each.second) for each in claims(comparison)] == [("a", "b"), ("a", "c")]
     assert [(each.first, each.second) for each in all_pairs(comparison)] == [("a", "b"), ("a", "c"), ("b", "c")]
+
+
+def test_claims_that_stand_together_allow_for_their_number() -> None:
+    errors = [[1.0, 2.0, 3.0, 4.0], [1.1, 3.0, 4.2, 4.8], [2.0, 3.1, 3.9, 5.0]]
+    alone = claim(comparison_of(*errors), "a", "b")
+    together = claims(comparison_of(*errors))
+    assert (alone.verdict, [each.verdict for each in together]) == ("better", ["better", "better"])
+    assert together[0].sentence.endswith("of the runs (p = 0.048 among 2 comparisons).")
+    several = comparison_of(*errors, [1.2, 1.9, 3.2, 4.0], [1.0, 2.1, 2.9, 4.1])
+    among_four = claims(several)[0]
+    assert among_four.verdict == "untold"
+    assert "among so many comparisons its 95 % confidence interval, 0.01 to 1.54 m, is no proof" in among_four.sentence
 
 
 @pytest.mark.parametrize(

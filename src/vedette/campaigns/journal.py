@@ -77,6 +77,7 @@ class Writer:
         """Put runs on the disk, all or none; when this returns they stay, whatever happens to this process or machine.
 
         Args:
+            rows: of the runs.
             session: that they are handed in by, counted from 1.
 
         Raises `InputError`, and keeps none, where a run is there already, and where the disk is full or fails.

@@ -161,6 +161,9 @@ def results(
             autocompletion=one_of(*_FORMATS),
         ),
     ] = None,
+    tex: Annotated[
+        Path | None, typer.Option("--tex", metavar="FILE", help="Write the comparisons as LaTeX tables (booktabs).")
+    ] = None,
 ) -> None:
     """Print the comparison of a campaign's strategies, and what is still to be run, or a single run; export either."""
     for name in formats or ():
@@ -173,9 +176,12 @@ def results(
     from vedette.simulation.storage import holds_run, load_run
 
     opened: CampaignResults | RunRecord
+    written: list[Path] = []
     if holds_run(folder):
         opened = load_run(folder)
         scenario = _scenario_of(folder)
+        if tex is not None:
+            raise usage_error(f"expected of a campaign; {folder} holds a single run", "--tex")
         print_run(opened, scenario)
         document = run_document(opened, "" if scenario is None else scenario.model.ospa.unit)
     else:
@@ -183,15 +189,30 @@ def results(
         groups = opened.comparisons()
         print_results(opened, groups)
         document = results_document(opened, groups)
-    written: list[Path] = []
+        if tex is not None:
+            written.append(_write_tex(opened, groups, tex))
     if export is not None:
         from vedette.campaigns.export import FORMATS
 
         for name in dict.fromkeys(formats or ("parquet",)):
             written += FORMATS[name](opened, export)
-        for path in written:
-            say(f"wrote {path}")
+    for path in written:
+        say(f"wrote {path}")
     publish({**document, "written": written})
+
+
+def _write_tex(opened: CampaignResults, groups: Sequence[GroupComparison], path: Path) -> Path:
+    from vedette.evaluation.tables import strategy_latex
+    from vedette.files import write_whole
+
+    tables = [
+        f"% {opened.title(group) or opened.campaign.name}\n{strategy_latex(group.comparison)}" for group in groups
+    ]
+    try:
+        write_whole(path, lambda file: file.write("\n".join(tables).encode()))
+    except OSError as error:
+        raise usage_error(f"expected a place to write tables; got {path}: {error.strerror}", "--tex") from None
+    return path
 
 
 def _scenario_of(folder: Path) -> Scenario | None:

@@ -32,7 +32,7 @@ from vedette.evaluation.metrics import (
     seen_targets,
 )
 from vedette.evaluation.runs import measure_run, own_metrics, run_scenario
-from vedette.evaluation.statistics import PairedDifference, Summary, paired_difference, summarise
+from vedette.evaluation.statistics import PairedDifference, Summary, holm, paired_difference, summarise
 from vedette.evaluation.tables import decision_rows, strategy_csv, strategy_markdown, strategy_rows
 
 __all__ = [
@@ -58,6 +58,7 @@ __all__ = [
     "gospa",
     "gospa_distance",
     "gospa_of_run",
+    "holm",
     "match_run",
     "measure",
     "measure_run",

@@ -13,7 +13,7 @@ from vedette.control import Plan
 from vedette.errors import InputError
 from vedette.evaluation.actions import Row, rounded
 from vedette.evaluation.metrics import RunMetrics
-from vedette.evaluation.statistics import PairedDifference, Summary, paired_difference, summarise
+from vedette.evaluation.statistics import PairedDifference, Summary, holm, paired_difference, summarise
 from vedette.kernels.base.types import Bools, Floats
 from vedette.scenarios import Scenario
 from vedette.simulation.records import RunRecord
@@ -75,7 +75,7 @@ class Comparison(Speaking):
 
     def run_means(self, strategy: str, part: str = "total") -> Floats:
         """(num_runs,) mean over the counted scans of each run that have a value; NaN where none has one."""
-        values = self._values(strategy, part)[:, self.counted]
+        values = self.values(strategy, part)[:, self.counted]
         known = ~np.isnan(values)
         if known.all():
             return np.asarray(values.mean(axis=1))
@@ -88,19 +88,27 @@ class Comparison(Speaking):
 
     def curve(self, strategy: str, part: str = "total") -> Summary:
         """Mean over runs at each scan: arrays of shape (num_scans,)."""
-        return summarise(self._values(strategy, part))
+        return summarise(self.values(strategy, part))
 
     def difference(self, strategy: str, reference: str | None = None, part: str = "total") -> PairedDifference:
         """How much more a strategy has than the reference (the first strategy unless named), run by run."""
         return paired_difference(self.run_means(strategy, part), self.run_means(reference or self.strategies[0], part))
+
+    def p_values(self) -> Floats:
+        """(num_strategies,) of each strategy's `difference` from the first, by Holm's method for all together.
+
+        NaN for the first strategy, and of single runs.
+        """
+        alone = [self.difference(strategy).p_value for strategy in self.strategies[1:]]
+        return np.concatenate([[np.nan], holm(np.array(alone, np.float64))])
 
     def decision_shares(self, strategy: str, decision: int) -> dict[Choice, float]:
         """Share of the runs in which each combination of actions was chosen; the most frequent first."""
         chosen = Counter(run[decision] for run in self.choices[self._index(strategy)] if decision < len(run))
         return {choice: count / self.num_runs for choice, count in chosen.most_common()}
 
-    def _values(self, strategy: str, part: str) -> Floats:
-        """(num_runs, num_scans)."""
+    def values(self, strategy: str, part: str = "total") -> Floats:
+        """(num_runs, num_scans) of a strategy."""
         if part in PARTS:
             return np.asarray(self.ospa[self._index(strategy), :, :, PARTS.index(part)])
         if part not in self.measures:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +12,10 @@ from vedette.kernels.base.types import Floats
 from vedette.models.arguments import as_array
 
 CONFIDENCE = 0.95
+_RESAMPLES, _BLOCK = 9999, 10_000_000  # of the bootstrap; numbers drawn at once
+# Where more than this falls out of a tail of Student's interval, to first order, for the skewness of what is averaged.
+_MOST_MISPLACED = 0.01
+_FEWEST = 8  # runs, below which a sample says nothing of its skewness
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,14 +41,19 @@ class PairedDifference:
     """How much more one strategy costs than another, run by run.
 
     Attributes:
-        summary: of the differences, first minus second; positive where the second is better.
+        summary: of the differences, first minus second; positive where the second is better. Its interval is a
+            bootstrap's where `is_skewed`.
         share_won: share of the runs in which the second is better (strictly lower).
         share_tied: share of the runs in which both are equal.
+        p_value: two-sided, of a mean difference of 0, by the same method as the interval; NaN for a single run.
+        is_skewed: whether the differences are too skewed, for their number, for Student's t.
     """
 
     summary: Summary
     share_won: float
     share_tied: float
+    p_value: float
+    is_skewed: bool
 
 
 def summarise(values: ArrayLike) -> Summary:
@@ -85,5 +94,73 @@ def paired_difference(first: ArrayLike, second: ArrayLike) -> PairedDifference:
     )
     if a.ndim != 1 or a.shape != b.shape:
         raise InputError(f"first, second: expected equally many numbers, one a run; got shapes {a.shape} and {b.shape}")
-    summary = summarise(a - b)
-    return PairedDifference(summary, float((b < a).mean()), float((b == a).mean()))
+    summary, p_value, is_skewed = _tested(a - b)
+    return PairedDifference(summary, float((b < a).mean()), float((b == a).mean()), p_value, is_skewed)
+
+
+def holm(p_values: ArrayLike) -> Floats:
+    """p-values corrected for their number: those below 0.05 hold all at once with 95 % confidence (Holm, 1979).
+
+    Args:
+        p_values: (num_tests,); NaN stays, and counts as no test.
+
+    Raises `InputError` for what are no probabilities.
+    """
+    given = as_array("p_values", p_values, "fiu", "numbers, one a test").astype(np.float64)
+    known = ~np.isnan(given)
+    if given.ndim != 1 or not ((given[known] >= 0.0) & (given[known] <= 1.0)).all():
+        raise InputError(f"p_values: expected probabilities, one a test; got {p_values!r}")
+    corrected = np.full(len(given), np.nan)
+    order = np.flatnonzero(known)[np.argsort(given[known], kind="stable")]
+    corrected[order] = np.minimum(np.maximum.accumulate(given[order] * np.arange(len(order), 0, -1)), 1.0)
+    return corrected
+
+
+def _tested(differences: Floats) -> tuple[Summary, float, bool]:
+    """Mean with its interval, the p-value of a mean of 0, and whether both are a bootstrap's."""
+    from scipy.special import stdtr
+
+    summary = summarise(differences)
+    mean, error = float(summary.mean), float(summary.standard_error)
+    if summary.num_runs == 1:
+        return summary, np.nan, False
+    if error == 0.0:
+        return summary, float(mean == 0.0), False
+    if summary.num_runs >= _FEWEST and _misplaced(differences) > _MOST_MISPLACED:
+        drawn = _studentised(differences)
+        low, high = np.quantile(drawn, ((1.0 + CONFIDENCE) / 2.0, (1.0 - CONFIDENCE) / 2.0))
+        if np.isfinite(low) and np.isfinite(high):
+            tail = min((drawn >= mean / error).sum(), (drawn <= mean / error).sum())
+            skewed = replace(summary, low=np.asarray(mean - low * error), high=np.asarray(mean - high * error))
+            return skewed, min(1.0, 2.0 * (float(tail) + 1.0) / (_RESAMPLES + 1.0)), True
+    return summary, float(2.0 * stdtr(summary.num_runs - 1, -abs(mean) / error)), False
+
+
+def _misplaced(values: Floats) -> float:
+    """What a tail of Student's interval lacks for the skewness of the values: the first term of Edgeworth's expansion.
+
+    P(T <= z) = Phi(z) + (2 z^2 + 1) phi(z) skewness / (6 sqrt(n)) (P. Hall, The Bootstrap and Edgeworth Expansion,
+    1992, chapter 2).
+    """
+    centred = values - values.mean()
+    skewness = (centred**3).mean() / (centred**2).mean() ** 1.5
+    z = 1.96
+    density = np.exp(-z * z / 2.0) / np.sqrt(2.0 * np.pi)
+    return float(abs(skewness) * (2.0 * z * z + 1.0) * density / (6.0 * np.sqrt(len(values))))
+
+
+def _studentised(values: Floats) -> Floats:
+    """(resamples,) (mean* - mean) / error* of samples drawn from the values; infinite where a sample is of one value.
+
+    The same draws for the same number of values, so that a table is the same whenever it is made.
+    """
+    rng, number = np.random.default_rng(0), len(values)
+    found = np.empty(_RESAMPLES)
+    block = max(1, _BLOCK // number)
+    for start in range(0, _RESAMPLES, block):
+        sample = values[rng.integers(number, size=(min(block, _RESAMPLES - start), number))]
+        away = sample.mean(axis=1) - values.mean()
+        error = sample.std(axis=1, ddof=1) / np.sqrt(number)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            found[start : start + block] = np.where(away == 0.0, 0.0, away / error)
+    return found

@@ -5,15 +5,26 @@ from __future__ import annotations
 import csv
 import io
 import itertools
+import re
 from collections.abc import Mapping
 
 import numpy as np
 
 from vedette.evaluation.actions import choice_words
 from vedette.evaluation.comparison import PARTS, Comparison
-from vedette.evaluation.statistics import PairedDifference, Summary, summarise
+from vedette.evaluation.statistics import CONFIDENCE, PairedDifference, Summary, summarise
 from vedette.text import markdown_table, named_in, spreadsheet_text, with_error
 
+_ESCAPED = str.maketrans(
+    {
+        **{letter: f"\\{letter}" for letter in "&%$#_{}"},
+        "~": r"\textasciitilde{}",
+        "^": r"\textasciicircum{}",
+        "\\": r"\textbackslash{}",
+        "\N{MINUS SIGN}": "-",
+    }
+)
+_NUMBER = re.compile(r"(?<![\w.])[+-][0-9.]+")  # with a sign, which text would set as a hyphen
 _ERRORS = ("OSPA", "Localisation", "Cardinality", "Difference")
 
 
@@ -46,6 +57,35 @@ def strategy_markdown(comparison: Comparison) -> str:
     """The table as Markdown, with a line that says what was averaged."""
     table = markdown_table(header(comparison), strategy_rows(comparison))
     return f"{table}\n{caption(comparison)}\n"
+
+
+def strategy_latex(comparison: Comparison) -> str:
+    """The table as LaTeX (package booktabs), with its caption; an environment `table` of its own."""
+    rows = [tuple(map(_latex, row)) for row in (header(comparison), *strategy_rows(comparison))]
+    lines = [f"{' & '.join(row)} \\\\" for row in rows]
+    body = "\n".join(["\\toprule", lines[0], "\\midrule", *lines[1:], "\\bottomrule"])
+    return (
+        f"\\begin{{table}}\n\\centering\n\\caption{{{_latex(caption(comparison))}}}\n"
+        f"\\begin{{tabular}}{{l{'r' * (len(rows[0]) - 1)}}}\n{body}\n\\end{{tabular}}\n\\end{{table}}\n"
+    )
+
+
+def _latex(text: str) -> str:
+    """Text as LaTeX sets it: what is a command is escaped, signs of arithmetic are in mathematics."""
+    return _NUMBER.sub(lambda found: f"${found[0]}$", text.translate(_ESCAPED)).replace("±", "$\\pm$")
+
+
+def told_apart(comparison: Comparison) -> str:
+    """Which strategies differ from the first when all are compared with it at once; empty where there is one other."""
+    others = list(zip(comparison.strategies, comparison.p_values(), strict=True))[1:]
+    if len(others) < 2 or comparison.num_runs < 2:
+        return ""
+    verdicts = {
+        "told apart": [name for name, p_value in others if p_value <= 1.0 - CONFIDENCE],
+        "not told apart": [name for name, p_value in others if p_value > 1.0 - CONFIDENCE],
+    }
+    parts = [f"{said}: {', '.join(names)}" for said, names in verdicts.items() if names]
+    return f"From {comparison.strategies[0]}, at 5 % among all {len(others)} (Holm), {'; '.join(parts)}."
 
 
 def decisions_markdown(comparison: Comparison) -> str:
@@ -91,6 +131,9 @@ def strategy_numbers(comparison: Comparison, strategy: str) -> dict[str, str | f
         "difference_se_m": float(paired.standard_error),
         "low_m": float(paired.low),
         "high_m": float(paired.high),
+        "interval": "bootstrap" if difference.is_skewed else "t",
+        "p_value": difference.p_value,
+        "p_holm": float(comparison.p_values()[comparison.strategies.index(strategy)]),
         "share_won": difference.share_won,
         **dict(itertools.chain(*measures)),
     }

@@ -6,6 +6,14 @@ need("a report", "jinja2", "matplotlib", "pyarrow")
 
 from vedette.reports.saving import write_figures, write_run_figures, write_summary
 from vedette.reports.single import write_run_report
-from vedette.reports.writing import code_in_replays, write_report
+from vedette.reports.writing import code_in_replays, write_demo, write_report
 
-__all__ = ["code_in_replays", "write_figures", "write_report", "write_run_figures", "write_run_report", "write_summary"]
+__all__ = [
+    "code_in_replays",
+    "write_demo",
+    "write_figures",
+    "write_report",
+    "write_run_figures",
+    "write_run_report",
+    "write_summary",
+]

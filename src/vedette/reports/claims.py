@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from vedette.evaluation import Comparison, PairedDifference
+import numpy as np
+
+from vedette.evaluation import Comparison, PairedDifference, holm
 from vedette.evaluation.figures.style import strategy_label
 from vedette.evaluation.health import percent
+from vedette.evaluation.statistics import CONFIDENCE
 from vedette.text import amount, with_minus
 
 Verdict = Literal["better", "worse", "untold", "unknown"]
@@ -18,7 +22,8 @@ class Claim:
     """One strategy against another.
 
     Attributes:
-        verdict: of `first` against `second`: better, worse, not told apart, or unknown for want of runs.
+        verdict: of `first` against `second`: better, worse, not told apart, or unknown for want of runs. It allows for
+            the number of comparisons that are made together.
         first, second: names of the strategies.
         sentence: the finding with its numbers.
         difference: second minus first, with its interval: "+1.20 (+0.80 to +1.60)".
@@ -35,33 +40,52 @@ class Claim:
 
 def claims(comparison: Comparison) -> tuple[Claim, ...]:
     """The first strategy against each of the others."""
-    return tuple(claim(comparison, comparison.strategies[0], other) for other in comparison.strategies[1:])
+    return _together(comparison, [(comparison.strategies[0], other) for other in comparison.strategies[1:]])
 
 
 def all_pairs(comparison: Comparison) -> tuple[Claim, ...]:
     """Every strategy against every later one."""
     names = comparison.strategies
-    return tuple(claim(comparison, first, second) for i, first in enumerate(names) for second in names[i + 1 :])
+    return _together(comparison, [(first, second) for i, first in enumerate(names) for second in names[i + 1 :]])
 
 
 def claim(comparison: Comparison, first: str, second: str) -> Claim:
-    """One strategy against another, run by run, in mean OSPA over the counted scans."""
-    paired = comparison.difference(second, first)
-    verdict, names = _verdict(paired), (strategy_label(first), strategy_label(second))
-    sentence = _SENTENCES[verdict](*names, paired, comparison.unit)
+    """One strategy against another, run by run, in mean OSPA over the counted scans; by itself."""
+    return _together(comparison, [(first, second)])[0]
+
+
+def _together(comparison: Comparison, pairs: Sequence[tuple[str, str]]) -> tuple[Claim, ...]:
+    """What holds of all pairs at once, by Holm's method."""
+    differences = [comparison.difference(second, first) for first, second in pairs]
+    p_values = holm(np.array([paired.p_value for paired in differences]))
+    return tuple(
+        _claim(pair, paired, float(p_value), len(pairs), comparison.unit)
+        for pair, paired, p_value in zip(pairs, differences, p_values, strict=True)
+    )
+
+
+def _claim(pair: tuple[str, str], paired: PairedDifference, p_value: float, number: int, unit: str) -> Claim:
+    verdict, names = _verdict(paired, p_value), (strategy_label(pair[0]), strategy_label(pair[1]))
+    sentence = _SENTENCES[verdict](*names, paired, unit)
     sentence = sentence[0].upper() + sentence[1:]
+    if number > 1 and verdict != "unknown":
+        sentence = f"{sentence[:-1]} (p {_probability(p_value)} among {number} comparisons)."
     mean, low, high = (float(each) for each in (paired.summary.mean, paired.summary.low, paired.summary.high))
     share = "unknown" if verdict == "unknown" else percent(paired.share_won)
     interval = "" if verdict == "unknown" else f" ({low:+.2f} to {high:+.2f})"
     return Claim(verdict, *names, sentence, with_minus(f"{mean:+.2f}{interval}"), share)
 
 
-def _verdict(paired: PairedDifference) -> Verdict:
+def _verdict(paired: PairedDifference, p_value: float) -> Verdict:
     if paired.summary.num_runs < 2:
         return "unknown"
-    if float(paired.summary.low) > 0.0:
-        return "better"
-    return "worse" if float(paired.summary.high) < 0.0 else "untold"
+    if p_value > 1.0 - CONFIDENCE:
+        return "untold"
+    return "better" if float(paired.summary.mean) > 0.0 else "worse"
+
+
+def _probability(value: float) -> str:
+    return "< 0.001" if value < 0.001 else f"= {value:.2g}"
 
 
 def _better(first: str, second: str, paired: PairedDifference, unit: str) -> str:
@@ -85,9 +109,15 @@ def _untold(first: str, second: str, paired: PairedDifference, unit: str) -> str
     difference = amount(with_minus(f"{float(paired.summary.mean):.2f}"), unit)
     return (
         f"{first} and {second} are not told apart: the paired difference in mean OSPA, {second} minus {first}, is "
-        f"{difference}, but its 95 % confidence interval, {_interval(paired, unit)}, "
-        f"holds 0 ({_runs(paired)}); {first} is better in {_share(paired)}."
+        f"{difference}, but {_why_untold(paired, unit)} ({_runs(paired)}); {first} is better in {_share(paired)}."
     )
+
+
+def _why_untold(paired: PairedDifference, unit: str) -> str:
+    interval = f"its 95 % confidence interval, {_interval(paired, unit)},"
+    if float(paired.summary.low) <= 0.0 <= float(paired.summary.high):
+        return f"{interval} holds 0"
+    return f"among so many comparisons {interval} is no proof"
 
 
 def _unknown(first: str, second: str, paired: PairedDifference, unit: str) -> str:
@@ -110,7 +140,7 @@ def _range(low: float, high: float, unit: str) -> str:
 
 
 def _runs(paired: PairedDifference) -> str:
-    return f"{paired.summary.num_runs} paired runs"
+    return f"{paired.summary.num_runs} paired runs{', bootstrap, as they are skewed' if paired.is_skewed else ''}"
 
 
 def _share(paired: PairedDifference) -> str:

@@ -16,6 +16,7 @@ from vedette.evaluation.figures import (
     SweepCurve,
     consistency_figure,
     cost_figure,
+    differences_figure,
     distributions_figure,
     mean_rewards_figure,
     ospa_figure,
@@ -24,6 +25,7 @@ from vedette.evaluation.figures import (
     tracks_figure,
 )
 from vedette.evaluation.figures.cost import MIN_FOR_TAILS
+from vedette.evaluation.figures.style import strategy_label
 from vedette.kernels.base.types import Floats
 from vedette.reports.groups import Group, Strategy, axis_label, axis_unit, describe_settings
 from vedette.reports.tables import nees_over_runs, stage_seconds
@@ -93,6 +95,15 @@ def error_drawings(group: Group) -> Iterator[Drawing]:
         f"{together if len(comparison.strategies) > 1 else ''}",
         ospa_figure(comparison, parts=("total", "localisation", "cardinality")),
     )
+    if len(comparison.strategies) > 1 and comparison.num_runs > 1:
+        yield Drawing(
+            "differences",
+            "What the decisions brought",
+            "Above: mean OSPA from the first decision on, close up, with bands of one standard error. Below: each "
+            f"strategy minus {strategy_label(comparison.strategies[0])}, run by run, with the 95 % confidence interval "
+            "of the mean at each scan by itself.",
+            differences_figure(comparison),
+        )
     differences = ""
     if len(comparison.strategies) > 1 and comparison.num_runs > 1:
         differences = (

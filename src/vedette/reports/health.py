@@ -12,8 +12,11 @@ from vedette.evaluation.health import HealthSummary, health_findings, percent, s
 from vedette.fusion.base import LOST, SURE
 from vedette.kernels.base.types import Bools, Floats
 from vedette.reports.groups import Group, Strategy
-from vedette.reports.tables import Table, nees_spread
+from vedette.reports.tables import Table, nees_over_runs, nees_spread
 from vedette.scenarios.sections.fusion import ONE_BELIEF
+
+_TRIFLE = 0.01  # share of the targets without an estimate, below which it is not said
+_OFTEN = 0.2  # share of the scans at which covariances are too small, or too large, from which that is said
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,18 +129,49 @@ def health_table(group: Group) -> Table | None:
 def group_health(group: Group) -> tuple[tuple[str, str], ...]:
     """Name and findings, in a sentence, of each strategy whose filters or fusion left out more than a trifle.
 
-    So has one with an estimate that is farther off than its covariance allows.
+    So has one that lost targets, one whose covariances are too small or too large, and one with an estimate that is
+    farther off than its covariance allows.
     """
     said = (
-        (each.name, (*health_findings(each.records, each.scene.names), *_consistency_findings(each, group.counted)))
+        (each.name, (*health_findings(each.records, each.scene.names), *_findings(each, group.counted)))
         for each in group.strategies
         if each.records
     )
     return tuple((name, f"{'; '.join(findings)}.") for name, findings in said if findings)
 
 
+def _findings(strategy: Strategy, counted: Bools) -> Iterator[str]:
+    if strategy.metrics:  # the targets are known
+        yield from _lost_findings(strategy, counted)
+        yield from _consistency_findings(strategy, counted)
+
+
+def _lost_findings(strategy: Strategy, counted: Bools) -> Iterator[str]:
+    """Targets without an estimate, and the run where that is most frequent."""
+    alive = np.array([np.diff(record.truth.offsets)[counted].sum() for record in strategy.records], np.float64)
+    missed = np.array([metrics.num_missed[counted].sum() for metrics in strategy.metrics], np.float64)
+    if not alive.any() or missed.sum() < _TRIFLE * alive.sum():
+        return
+    shares = missed / np.maximum(alive, 1.0)
+    worst = int(np.argmax(shares))
+    yield (
+        f"{percent(float(missed.sum() / alive.sum()))} of the targets, over the scans, have no estimate within the "
+        f"cutoff, most in run {strategy.records[worst].run} ({percent(float(shares[worst]))})"
+    )
+
+
 def _consistency_findings(strategy: Strategy, counted: Bools) -> Iterator[str]:
-    """The estimate that is worst for its covariance, where no consistent filter has one like it."""
+    """Covariances that are wrong on average, and the estimate that is worst for its own, if not by chance."""
+    average = nees_over_runs(strategy, 2)
+    known = counted & (average.count > 0)
+    for said, outside in (("small", average.mean > average.upper), ("large", average.mean < average.lower)):
+        share = float(outside[known].mean()) if known.any() else 0.0
+        if share > _OFTEN:
+            middle = float(np.median(average.mean[known])) / average.dim
+            yield (
+                f"covariances are too {said} at {percent(share)} of the scans, where 2.5 % may be by chance: position "
+                f"NEES / 2, averaged over the runs, is {middle:.2f} in the middle, and 1 is consistent"
+            )
     spread = nees_spread(strategy, counted)
     if spread is not None and not spread.is_by_chance:
         yield (

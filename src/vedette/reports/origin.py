@@ -54,6 +54,28 @@ def _text(value: str) -> str:
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")  # a JSON string is a TOML basic string
 
 
+def made_with(manifest: Mapping[str, Any]) -> tuple[str, str]:
+    """Version of this program, and the day, of the last session that worked on a campaign."""
+    last = manifest["sessions"][-1]
+    return str(last["versions"]["vedette"]), str(last["started"])[:10]
+
+
+def citation(version: str, year: str = "") -> str:
+    """BibTeX of this program, by version and year, and of the paper whose methods it implements."""
+    dated = f"  year = {{{year}}},\n" if year else ""
+    return f"""@software{{vedette,
+  title = {{Vedette}},
+  author = {{{{The Vedette developers}}}},
+  version = {{{version}}},
+{dated}}}
+@inproceedings{{jiang2016multi,
+  title = {{Multi-Sensor Control for Multi-Target Tracking Using {{Cauchy-Schwarz}} Divergence}},
+  author = {{Jiang, Meng and Yi, Wei and Kong, Lingjiang}},
+  booktitle = {{19th International Conference on Information Fusion}},
+  year = {{2016}},
+}}"""
+
+
 def versions_table(manifest: Mapping[str, Any]) -> Table:
     """Start, versions and machine of each session that ran a part of the campaign, a column a session.
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from vedette.evaluation.scans import code_of_sensors
 from vedette.reports.groups import group_of_run
+from vedette.reports.origin import citation
 from vedette.reports.replay import replay_data
 from vedette.reports.tables import Table
 from vedette.reports.writing import make_room, render, section_of, write_page
@@ -50,6 +51,7 @@ def write_run_report(
         untrusted=() if trust else code_of_sensors(scenario),
         described=scenario.model.description,
         versions=None if manifest is None else _versions(manifest),
+        citation="" if manifest is None else citation(manifest["versions"]["vedette"]),
     )
     write_page(target, page)
 

@@ -19,6 +19,7 @@ from markupsafe import Markup
 from vedette.campaigns.results import CampaignResults
 from vedette.errors import InputError
 from vedette.evaluation.figures.labels import elided_names
+from vedette.evaluation.figures.style import strategy_label
 from vedette.evaluation.scans import code_of_sensors
 from vedette.files import write_whole
 from vedette.kernels.base.types import Floats
@@ -26,12 +27,12 @@ from vedette.reports.claims import Claim, all_pairs, claims
 from vedette.reports.drawings import Drawing, error_drawings, group_drawings, sweep_drawings, typical_records
 from vedette.reports.groups import Group, axis_label, gather
 from vedette.reports.health import group_health, health_table
-from vedette.reports.origin import spec_toml, versions_table
+from vedette.reports.origin import citation, made_with, spec_toml, versions_table
 from vedette.reports.replay import replay_data
 from vedette.reports.saving import run_errors
 from vedette.reports.svg import inline_png, inline_svg
 from vedette.reports.tables import Table, cost_table, decision_table, error_table, measure_table
-from vedette.text import named_in
+from vedette.text import amount, named_in
 
 # A page that a mail can carry: beyond these, groups show their errors alone, and typical runs are left out.
 MAX_FIGURE_BYTES, MAX_REPLAY_BYTES = 6_000_000, 4_000_000
@@ -103,6 +104,7 @@ def write_report(
     kept = _within(runs, MAX_REPLAY_BYTES) if replays is None else runs
     untrusted = () if trust else code_in_replays(results)
     campaign = results.campaign
+    made = made_with(results.manifest)
     page = render(
         "report.html",
         kept,
@@ -118,8 +120,46 @@ def write_report(
         planned=campaign.total,
         spec=spec_toml(campaign.spec),
         versions=versions_table(results.manifest),
+        digest=results.manifest["digest"],
+        made=made,
+        citation=citation(made[0], made[1][:4]),
     )
     write_page(target, page)
+
+
+def write_demo(results: CampaignResults, path: str | Path, *, trust: bool = False) -> Path:
+    """Write a page that shows the first run of the strategies of a campaign side by side; returns where it is.
+
+    It needs nothing else, and the same results give the same bytes.
+
+    Args:
+        results: of a campaign on one scenario, of which a run of each strategy is finished.
+        path: of the file; its folder is made.
+        trust: run the code that the scenario names, to draw measurements (see `write_report`).
+
+    Raises:
+        InputError: no such run, or a file that cannot be written.
+    """
+    target = Path(path)
+    make_room(target)
+    first = [(cell.name, 0) for cell in results.campaign.cells]
+    _check_replays(results, first)
+    (group,) = gather(results)
+    comparison = group.comparison
+    assert comparison is not None
+    page = render(
+        "demo.html",
+        _replays(results, group, first, trust),
+        campaign=results.campaign,
+        means=[
+            (strategy_label(name), amount(f"{comparison.run_means(name)[0]:.1f}", comparison.unit))
+            for name in comparison.strategies
+        ],
+        untrusted=() if trust else code_in_replays(results),
+        together=True,
+    )
+    write_page(target, page)
+    return target
 
 
 def code_in_replays(results: CampaignResults) -> tuple[str, ...]:
@@ -249,7 +289,7 @@ def render(
         style=Markup((_FILES / "report.css").read_text("utf-8")),
         script=Markup(script),
         script_hash=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
-        **{"left_out": 0, "sections": (), "live": False, **told},
+        **{"left_out": 0, "sections": (), "live": False, "together": False, **told},
     )
 
 

@@ -12,7 +12,7 @@ from vedette.evaluation.figures.consistency import consistency_figure
 from vedette.evaluation.figures.cost import cost_figure
 from vedette.evaluation.figures.distributions import distributions_figure
 from vedette.evaluation.figures.mean_rewards import mean_rewards_figure
-from vedette.evaluation.figures.ospa import ospa_figure
+from vedette.evaluation.figures.ospa import differences_figure, ospa_figure
 from vedette.evaluation.figures.rewards import reward_figure
 from vedette.evaluation.figures.roses import roses_figure
 from vedette.evaluation.figures.scene import Scene, scene_of
@@ -26,6 +26,7 @@ __all__ = [
     "SweepCurve",
     "consistency_figure",
     "cost_figure",
+    "differences_figure",
     "distributions_figure",
     "mean_rewards_figure",
     "ospa_figure",

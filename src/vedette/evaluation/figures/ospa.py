@@ -14,6 +14,7 @@ from vedette.evaluation.comparison import PARTS, Comparison
 from vedette.evaluation.figures.labels import short_labels
 from vedette.evaluation.figures.style import (
     GREY,
+    INK,
     colour,
     legend_columns,
     line_style,
@@ -21,7 +22,7 @@ from vedette.evaluation.figures.style import (
     span_times,
     styled,
 )
-from vedette.evaluation.statistics import Summary
+from vedette.evaluation.statistics import Summary, summarise
 from vedette.kernels.base.types import Bools, Floats
 from vedette.text import named_in
 
@@ -97,6 +98,53 @@ def ospa_figure(comparison: Comparison, *, parts: Sequence[str] = ("total",)) ->
     return figure
 
 
+@styled
+def differences_figure(comparison: Comparison) -> Figure:
+    """What the decisions brought: mean OSPA from the first one on, close up, and the paired differences against time.
+
+    Above, bands of one standard error. Below, each strategy minus the first, run by run: the mean with its 95 %
+    confidence interval at each scan by itself, above 0 where the first strategy is better.
+
+    Raises `InputError` for one strategy, or one run.
+    """
+    if len(comparison.strategies) < 2 or comparison.num_runs < 2:
+        raise InputError(
+            f"comparison: expected two strategies and runs or more; got {len(comparison.strategies)} and "
+            f"{comparison.num_runs}"
+        )
+    figure = new_figure(4.05)
+    above, below = figure.subplots(2, 1, sharex=True)
+    draw_ospa(above, comparison, "total")
+    shown = comparison.times >= (comparison.decision_times[:1].min(initial=np.inf))
+    if shown.sum() < 2:
+        shown[:] = True
+    _close_up(above, comparison, shown)
+    below.axhline(0.0, color=INK, linewidth=0.8)
+    first = comparison.values(comparison.strategies[0])
+    for index, strategy in enumerate(comparison.strategies[1:], start=1):
+        curve = summarise(comparison.values(strategy)[:, shown] - first[:, shown])
+        below.plot(comparison.times[shown], curve.mean, color=colour(index), linestyle=line_style(index))
+        _fill(below, comparison.times[shown], curve.low, curve.high, np.ones(shown.sum(), bool), colour(index))
+    _mark_decisions(below, comparison)
+    span_times(below, comparison.times[shown])
+    below.set_xlabel("Time (s)")
+    below.set_ylabel(named_in(f"minus {short_labels(comparison.strategies)[0]}", comparison.unit))
+    handles, labels = above.get_legend_handles_labels()
+    figure.legend(
+        handles, labels, loc="outside upper center", ncols=legend_columns(labels), columnspacing=1.2, handlelength=1.8
+    )
+    return figure
+
+
+def _close_up(axes: Axes, comparison: Comparison, shown: Bools) -> None:
+    """Let the height of the axes be that of the curves with their bands at these scans."""
+    curves = [comparison.curve(strategy) for strategy in comparison.strategies]
+    low = min(float((curve.mean - curve.standard_error)[shown].min()) for curve in curves)
+    high = max(float((curve.mean + curve.standard_error)[shown].max()) for curve in curves)
+    room = 0.06 * (high - low) or 1.0
+    axes.set_ylim(max(0.0, low - room), high + room)
+
+
 def draw_ospa(axes: Axes, comparison: Comparison, part: str) -> None:
     """Draw one part of the OSPA of every strategy into axes; curves that are one have dashes of all their colours."""
     times = comparison.times
@@ -116,17 +164,25 @@ def draw_ospa(axes: Axes, comparison: Comparison, part: str) -> None:
             axes.plot(times, mean, color=colour(index), linestyle=dashes, dash_capstyle="butt", label="_")
         if comparison.num_runs > 1:
             _draw_band(axes, times, curves[shared.members[0]], shared.shown, GREY)
-    for number, time in enumerate(comparison.decision_times):
-        label = "_" if number else "decision"  # named once in the legend
-        axes.axvline(time, color=GREY, linestyle=(0, (2, 2)), linewidth=0.9, zorder=1, label=label)
+    _mark_decisions(axes, comparison)
     axes.set_ylim(bottom=0.0)
     span_times(axes, comparison.times)
     axes.set_ylabel(named_in(_LABELS[part], comparison.unit))
 
 
+def _mark_decisions(axes: Axes, comparison: Comparison) -> None:
+    for number, time in enumerate(comparison.decision_times):
+        label = "_" if number else "decision"  # named once in the legend
+        axes.axvline(time, color=GREY, linestyle=(0, (2, 2)), linewidth=0.9, zorder=1, label=label)
+
+
 def _draw_band(axes: Axes, times: Floats, curve: Summary, shown: Bools, shade: str) -> None:
-    """One standard error to either side: faint, with a thin outline that tells one band from another."""
-    low, high = curve.mean - curve.standard_error, curve.mean + curve.standard_error
+    """One standard error to either side."""
+    _fill(axes, times, curve.mean - curve.standard_error, curve.mean + curve.standard_error, shown, shade)
+
+
+def _fill(axes: Axes, times: Floats, low: Floats, high: Floats, shown: Bools, shade: str) -> None:
+    """Faint, with a thin outline that tells one band from another."""
     axes.fill_between(
         times, low, high, where=shown.tolist(), facecolor=(shade, 0.12), edgecolor=(shade, 0.45), linewidth=0.35
     )

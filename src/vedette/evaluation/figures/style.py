@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import lru_cache, wraps
+from importlib import resources
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
@@ -55,29 +56,10 @@ _OTHER_FONTS = (
 # Of the drawing of names, not of the results: a letter without a font is drawn as a box, a crowded figure as it is.
 _UNTOLD = ("Glyph .* missing from", "constrained_layout not applied", "Tight layout not applied")
 
-_SETTINGS: Any = {
-    "axes.grid": True,
-    "axes.labelsize": 8,
-    "axes.linewidth": 0.6,
-    "axes.spines.right": False,
-    "axes.spines.top": False,
-    "axes.titlesize": 8,
-    "font.sans-serif": ["DejaVu Sans"],  # comes with Matplotlib, so a figure is the same everywhere
-    "font.size": 8,
-    "grid.color": "#DDDDDD",
-    "grid.linewidth": 0.4,
-    "legend.fontsize": 7,
-    "legend.framealpha": 0.9,
-    "legend.handlelength": 2.2,
-    "lines.linewidth": 1.2,
-    "pdf.fonttype": 42,  # text stays text
-    "svg.fonttype": "none",
-    "svg.hashsalt": "vedette",
-    "xtick.labelsize": 7,
-    "xtick.major.width": 0.6,
-    "ytick.labelsize": 7,
-    "ytick.major.width": 0.6,
-}
+with resources.as_file(resources.files("vedette") / "paper.mplstyle") as _file:
+    _SETTINGS: Any = dict(matplotlib.rc_params_from_file(_file, use_default_template=False))
+for _name in ("axes.prop_cycle", "figure.figsize"):  # figures here have their own
+    del _SETTINGS[_name]
 _FORMATS = ("pdf", "svg", "png")
 _DOTS_PER_INCH = 300
 _POINTS_PER_INCH = 72.0

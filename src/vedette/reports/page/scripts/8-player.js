@@ -1,4 +1,6 @@
 // The state of the replay, its controls, and the words beside the picture.
+const MOST_SECONDS = 60; // that runs take which play as the page opens
+
 function startReplay(root) {
   const part = (name) => root.querySelector(`[data-part="${name}"]`);
   const state = { run: 0, step: 0, playing: false, speed: 5, view: null, pointer: null, ghost: null, shown: null };
@@ -254,6 +256,14 @@ function startReplay(root) {
   window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
   readColours();
   choose(0);
+  if ("together" in root.dataset) {
+    part("beside").selectedIndex = part("beside").options.length - 1;
+    accompany();
+    const speeds = [...part("speed").options].map(({ value }) => Number(value));
+    state.speed = speeds.find((speed) => last() / speed <= MOST_SECONDS) ?? speeds.at(-1);
+    part("speed").value = state.speed;
+    play(!window.matchMedia("(prefers-reduced-motion: reduce)").matches);
+  }
   return { arrived, play };
 }
 
