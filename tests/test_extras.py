@@ -72,6 +72,7 @@ HEAVY = {
     ("results", "there"): ("pyarrow", "campaigns"),
     ("upgrade", "there"): ("pyarrow", "campaigns"),
     ("report", "there"): ("jinja2 and matplotlib and pyarrow", "report"),
+    ("demo",): ("jinja2 and matplotlib and pyarrow", "report"),
     ("reproduce",): ("jinja2 and matplotlib and pyarrow", "report"),
 }
 

@@ -68,9 +68,10 @@ CALLS: list[tuple[tuple[str, ...], set[str]]] = [
     (("campaign", "spec.toml", "--workers", "1", "--shard", "1/2"), {"folder", "finished", "failed"}),
     (("campaign", "spec.toml", "--workers", "1", "--shard", "2/2"), {"folder", "finished", "failed"}),
     (("merge", "trial-shards", "--out", "merged"), {"folder", "runs", "finished", "missing_shards", "commands"}),
-    (("results", "trial-results", "--export", "tables"), {"comparisons", "missing", "written"}),
+    (("results", "trial-results", "--export", "tables", "--tex", "table.tex"), {"comparisons", "missing", "written"}),
     (("upgrade", "trial-results"), {"folder", "format_was", "format"}),
     (("report", "trial-results"), {"page", "figures"}),
+    (("demo", "short.yaml", "--planners", "still,own", "--workers", "1"), {"comparisons", "page"}),
     (("reproduce", "short.yaml", "--runs", "1", "--planners", "still", "--workers", "1"), {"comparisons", "report"}),
 ]
 LISTS = [("list",), ("reproduce", "--list"), ("schema",)]

@@ -11,9 +11,10 @@ from reports.browser import Browser, Page, chromium
 from reports.test_browser import choose, state, text, wait_until
 from reports.test_single import data_of, tracked
 from vedette.campaigns.results import CampaignResults
+from vedette.errors import InputError
 from vedette.evaluation.figures import video
 from vedette.evaluation.track_table import utc_text
-from vedette.reports import write_report, write_run_report
+from vedette.reports import write_demo, write_report, write_run_report
 
 PROGRAM = chromium()
 pytestmark = pytest.mark.skipif(PROGRAM is None, reason="no chromium or chrome on PATH to open the page in")
@@ -53,6 +54,18 @@ def options(page: Page, part: str) -> list[list[str]]:
     script = f"[...document.querySelector('[data-part={part}]').options].map(({{value, text}}) => [value, text])"
     found: list[list[str]] = page.evaluate(script)
     return found
+
+
+def test_a_demo_plays_all_of_them_as_it_opens(browser: Browser, results: CampaignResults, tmp_path: Path) -> None:
+    written = write_demo(results, tmp_path / "there" / "demo.html")
+    page = browser.open(written, width=1400)
+    assert [caption.split(":")[0] for caption in captions(page)] == ["JDM", "IDM", "Random"]
+    assert text(page, "play") == "Pause"
+    wait_until(page, "Number(document.getElementById('replay').dataset.step) > 2")
+    assert page.complaints() == []
+    assert "JDM, IDM, Random send their own way" in page.evaluate("document.querySelector('.lead').textContent")
+    with pytest.raises(InputError, match="path: expected a place to write a report"):
+        write_demo(results, tmp_path / "there")
 
 
 def test_one_other_run_or_all_can_stand_beside(page: Page) -> None:

@@ -9,6 +9,7 @@ import typer
 from vedette import __version__
 from vedette.cli.calibrating import calibrate
 from vedette.cli.campaign import campaign
+from vedette.cli.demo import demo
 from vedette.cli.errors import Commands
 from vedette.cli.live import live
 from vedette.cli.merging import merge
@@ -47,6 +48,7 @@ def main(
 
 
 app.command("list")(speaking(list_))
+app.command()(speaking(demo))
 app.command()(speaking(init))
 app.command()(speaking(generate))
 app.command()(speaking(crowd))

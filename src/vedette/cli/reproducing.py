@@ -76,8 +76,8 @@ def reproduce(
         _list(known)
         return
     yardstick = known.get(name)
-    spec = _spec_of_scenario(name, planners) if yardstick is None else yardstick.spec
-    campaign = resolve(_changed(spec, planners, runs, seed), approve=Approval(trust))
+    spec = compared(name, planners, runs, seed) if yardstick is None else _changed(yardstick.spec, planners, runs, seed)
+    campaign = resolve(spec, approve=Approval(trust))
     folder = out or Path(_FOLDER if yardstick is None else campaign.default_folder)
     outcome = carry_out(campaign, folder, workers)
     opened = open_results(folder)
@@ -92,7 +92,8 @@ def reproduce(
     report_failures(outcome.failed)
 
 
-def _spec_of_scenario(scenario: str, planners: str | None) -> CampaignSpec:
+def compared(scenario: str, planners: str | None, runs: int | None, seed: int, name: str = _FOLDER) -> CampaignSpec:
+    """A campaign of strategies on one scenario, by what a command line says of it; `VedetteError` for none."""
     from vedette.campaigns import CampaignSpec
     from vedette.campaigns.yardsticks import yardsticks
     from vedette.scenarios import list_builtin, load_scenario
@@ -103,7 +104,8 @@ def _spec_of_scenario(scenario: str, planners: str | None) -> CampaignSpec:
     loaded = load_scenario(scenario)
     for strategy in _names(planners) or ():
         check_planner(loaded, strategy, "--planners")
-    return CampaignSpec(name=_FOLDER, scenarios=(scenario,), planners=_STRATEGIES, runs=_RUNS, compare="planner")
+    spec = CampaignSpec(name=name, scenarios=(scenario,), planners=_STRATEGIES, runs=_RUNS, compare="planner")
+    return _changed(spec, planners, runs, seed)
 
 
 def _changed(spec: CampaignSpec, planners: str | None, runs: int | None, seed: int) -> CampaignSpec:
