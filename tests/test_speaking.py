@@ -10,10 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import vedette
 from vedette.campaigns import open_results, parse_spec, resolve, run_campaign
 from vedette.densities import LMB, MultiTargetSamples, UndetectedIntensity, sample_lmb
+from vedette.densities.telling import Targets
+from vedette.errors import InputError
 from vedette.evaluation import compare, measure_run, run_scenario
 from vedette.models import CellGrid, Region
 from vedette.scenarios import load_scenario
@@ -174,3 +177,21 @@ def test_a_results_folder(tmp_path: Path) -> None:
     first, second = repr(open_results(tmp_path / "out")).splitlines()
     assert first == "CampaignResults of trial: 1 of 1 run finished, 1 cell"
     assert len(second) <= WIDEST
+
+
+def test_a_belief_is_drawn_into_axes_with_its_ellipses_and_labels(record: RunRecord) -> None:
+    estimate = record.estimates[-1]
+    axes = Figure().subplots()
+    estimate.plot(axes)
+    ellipses = [np.column_stack(line.get_data()) for line in axes.lines if len(np.atleast_1d(line.get_xdata())) > 1]
+    assert len(ellipses) == estimate.num_targets > 0
+    for edge, mean, cov in zip(ellipses, estimate.means, estimate.covs, strict=True):
+        away = edge - mean[:2]
+        distance = np.sqrt(np.einsum("ij,ij->i", away, np.linalg.solve(cov[:2, :2], away.T).T))
+        np.testing.assert_allclose(distance, 2.0, rtol=1e-9)
+    names = [f"{step}.{index}" for step, index in estimate.labels.tolist()]
+    assert [text.get_text() for text in axes.texts] == names
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("x (m)", "y (m)")
+    on_a_line = Targets(None, np.ones(1), np.ones((1, 1)), np.ones((1, 1, 1)))
+    with pytest.raises(InputError, match="plot: expected states that begin with x and y; got 1 number"):
+        on_a_line.draw(axes)

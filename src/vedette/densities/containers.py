@@ -66,6 +66,13 @@ class MultiTarget(Container, Tabled):
         """
         return self._targets().columns(self._weight)
 
+    def plot(self, ax: Any) -> None:
+        """Draw places (m) into axes of Matplotlib, with ellipses of two standard deviations, and labels.
+
+        What is unlikely is faint. Raises `InputError` for states of one number.
+        """
+        self._targets().draw(ax)
+
     def _detail(self) -> str:
         return self._targets().in_words()
 

@@ -64,6 +64,13 @@ class Estimate(Tabled):
         """A row a target, by columns: those of the table of a density."""
         return self._targets().columns("existence")
 
+    def plot(self, ax: Any) -> None:
+        """Draw places (m) into axes of Matplotlib, with ellipses of two standard deviations, and labels.
+
+        What is unlikely is faint. Raises `InputError` for states of one number.
+        """
+        self._targets().draw(ax)
+
     def _targets(self) -> Targets:
         return Targets(self.labels, self.existence, self.means, self.covs)
 

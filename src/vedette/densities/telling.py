@@ -7,10 +7,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
+from vedette.text import counted
 
 _MOST_TOLD = 3
 _LARGE = 1e7  # m, from which on a place is told in powers of ten
+_CORNERS, _FAINTEST = 73, 0.15
 _COLUMNS = ("x_m", "y_m", "vx_mps", "vy_mps")
 
 
@@ -64,6 +67,26 @@ class Targets(NamedTuple):
         """By columns: `label` (`birth step.index`, where there are labels), `weight` and those of `state_columns`."""
         names = {} if self.labels is None else {"label": [f"{step}.{index}" for step, index in self.labels.tolist()]}
         return {**names, weight: self.weights.tolist(), **state_columns(self.means, self.covs)}
+
+    def draw(self, axes: Any) -> None:
+        """Ellipses of two standard deviations of the places into axes of Matplotlib, the fainter the less is there."""
+        if self.means.shape[1] < 2:
+            raise InputError(
+                f"plot: expected states that begin with x and y; got {counted(self.means.shape[1], 'number')}"
+            )
+        turn = np.linspace(0.0, 2.0 * np.pi, _CORNERS)
+        circle = np.array([np.cos(turn), np.sin(turn)])
+        for target in self.each():
+            widths, directions = np.linalg.eigh(target.cov[:2, :2])
+            edge = target.mean[:2, None] + 2.0 * directions @ (np.sqrt(np.maximum(widths, 0.0))[:, None] * circle)
+            shade = min(1.0, max(_FAINTEST, target.existence))
+            (line,) = axes.plot(*edge, alpha=shade, linestyle="-")
+            axes.plot(*target.mean[:2], marker="+", color=line.get_color(), alpha=shade)
+            if target.label is not None:
+                name = f"{target.label[0]}.{target.label[1]}"
+                axes.annotate(name, target.mean[:2], (3, 3), textcoords="offset points", alpha=shade)
+        axes.set_aspect("equal", adjustable="datalim")
+        axes.set(xlabel="x (m)", ylabel="y (m)")
 
     def _at(self, places: Ints) -> Targets:
         labels = None if self.labels is None else self.labels[places]
