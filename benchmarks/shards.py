@@ -3,6 +3,7 @@
     python benchmarks/shards.py                                # 10^5 runs planned on 1,000 shards, 20 of them run
     python benchmarks/shards.py --runs 1000000 --sample 3
     python benchmarks/shards.py --sample 1000 --folder /dev/shm   # all of them, where no disk is waited for
+    python benchmarks/shards.py --runs 10000 --shards 100 --real   # runs as they are, and the same by one process
 
 A run is a stub: the bytes of one finished run of paper-a with `--scans` scans, under its own number, so that it costs
 nothing but what surrounds it: queue, rows, and the store with its fsync. Each shard is a process of its own, forked
@@ -13,6 +14,7 @@ specification, once a shard. Of the shards planned `--sample` are run, one after
 from __future__ import annotations
 
 import argparse
+import hashlib
 import os
 import resource
 import subprocess
@@ -23,7 +25,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from vedette.campaigns import Campaign, Shard, engine, merge, resolve, run_campaign
+from vedette.campaigns import Campaign, Shard, engine, journal, merge, resolve, run_campaign
 from vedette.campaigns.codec import encode
 from vedette.campaigns.rows import row_of
 from vedette.campaigns.spec import spec_from_data
@@ -64,6 +66,14 @@ def stub_of(campaign: Campaign) -> Callable[[Task], Outcome]:
     return perform
 
 
+def rows_of(folder: Path) -> str:
+    """SHA-256 over the runs of a results folder, in the order of cells and numbers."""
+    digest = hashlib.sha256()
+    for values in journal.Reader(folder).rows():
+        digest.update(f"{values[0]} {values[1]} {values[4]} {values[6]}\n".encode())  # checksums of run and measures
+    return digest.hexdigest()
+
+
 def in_child(work: Callable[[], object]) -> tuple[float, float, float]:
     """CPU seconds, seconds and the peak memory in MiB of a child that does it."""
     start = time.perf_counter()
@@ -86,13 +96,16 @@ def main() -> None:
     parser.add_argument("--shards", type=int, default=1000)
     parser.add_argument("--sample", type=int, default=20, help="shards that are run")
     parser.add_argument("--scans", type=int, default=40)
+    parser.add_argument("--real", action="store_true", help="do all runs, once in shards and once by one process")
     parser.add_argument("--folder", type=Path, default=None, help="where to write; the system's temporary folder")
     options = parser.parse_args()
     data = specification(options.runs // 2, options.scans)
     started = subprocess.run([sys.executable, "-c", START.format(data)], capture_output=True, text=True, check=True)
     campaign = resolve(spec_from_data(data))
-    engine.perform = stub_of(campaign)
-    shares = [replace(campaign, shard=Shard(number, options.shards)) for number in range(1, options.sample + 1)]
+    if not options.real:
+        engine.perform = stub_of(campaign)
+    number = options.shards if options.real else options.sample
+    shares = [replace(campaign, shard=Shard(each, options.shards)) for each in range(1, number + 1)]
     with tempfile.TemporaryDirectory(dir=options.folder) as place:
         folder = Path(place)
         spent = [in_child(lambda share=share: run_campaign(share, folder / share.shard.folder)) for share in shares]
@@ -110,6 +123,11 @@ def main() -> None:
             f"  merge: {1e3 * merging / done:.3f} ms of CPU a run, {seconds:.2f} s, {size:.0f} MiB, "
             f"peak of {memory:.0f} MiB of memory (before it: {own:.0f})"
         )
+        if options.real:
+            run_campaign(campaign, folder / "alone")
+            same = rows_of(folder / "alone") == (found := rows_of(folder / "merged"))
+            print(f"  rows {found}: {'the same' if same else 'OTHER ONES'} by one process")
+            return
         resumed, _, _ = in_child(lambda: run_campaign(shares[0], folder / shares[0].shard.folder))
         print(f"  a finished shard begun again: {resumed:.3f} s of CPU")
         print(f"all in: {cpu + process + 1e3 * merging / done:.3f} ms of CPU a run")
