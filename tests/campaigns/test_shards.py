@@ -190,6 +190,7 @@ def test_a_damaged_run_and_a_folder_of_nothing_are_refused(tmp_path: Path) -> No
         database.execute("UPDATE runs SET metrics = x'00' WHERE run = 1")
     with pytest.raises(InputError, match=r"run 1: expected the run as it was written"):
         merge([folder], tmp_path / "merged")
+    assert not (tmp_path / "merged").exists()
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs kill -9")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -58,7 +59,7 @@ def merge(folders: Sequence[Path | str], out: Path | str | None = None, *, table
 
     Raises:
         InputError: no folder of results among these; one of another campaign, of other versions, or damaged; a run
-            that two folders have with different bytes. The runs in `out` are then left as they were.
+            that two folders have with different bytes. `out` is then left as it was.
     """
     places = _places(folders)
     whole, shares = _read(places)
@@ -147,9 +148,17 @@ def _fill(target: Path, whole: dict[str, Any], shares: Sequence[_Share]) -> int:
         write_manifest(target, whole)
         if not started:
             writer.open_runs(contents_checksum(whole))
-        return writer.take_in((_reader(share), _session(share, whole)) for share in shares if _has_begun(share))
-    finally:
+        num_taken = writer.take_in((_reader(share), _session(share, whole)) for share in shares if _has_begun(share))
+    except BaseException:
         writer.close()
+        if not started:
+            for name in (MANIFEST, journal.DATABASE, journal.LOCK):
+                (target / name).unlink(missing_ok=True)
+            with suppress(OSError):  # somebody else's files
+                target.rmdir()
+        raise
+    writer.close()
+    return num_taken
 
 
 def _has_begun(share: _Share) -> bool:
