@@ -6,6 +6,7 @@ need("a campaign", "pyarrow")
 
 from vedette.campaigns.cells import Campaign, Cell, resolve
 from vedette.campaigns.merging import Merged, merge
+from vedette.campaigns.progress import Progress
 from vedette.campaigns.results import CampaignResults, open_results
 from vedette.campaigns.running import Outcome, Watch, run_campaign
 from vedette.campaigns.shards import Shard, parse_shard
@@ -21,6 +22,7 @@ __all__ = [
     "Landed",
     "Merged",
     "Outcome",
+    "Progress",
     "Shard",
     "Variant",
     "Watch",

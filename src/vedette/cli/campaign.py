@@ -12,8 +12,7 @@ import typer
 from vedette.cli import completing
 from vedette.cli.errors import named_options, usage_error
 from vedette.cli.options import Trust, Workers
-from vedette.cli.output import complain, note, publish, say
-from vedette.cli.progress import CampaignProgress
+from vedette.cli.output import complain, console, note, publish, say
 from vedette.cli.results import print_failures
 from vedette.cli.running import Approval, compile_if_cold, interruptible, processors
 from vedette.extras import need
@@ -129,11 +128,11 @@ def carry_out(
     campaign: Campaign, folder: Path, workers: int, scheduler: str | None = None, redo_damaged: bool = False
 ) -> Outcome:
     """Run a campaign with its progress shown; Ctrl-C says how to go on."""
-    from vedette.campaigns import run_campaign
+    from vedette.campaigns import Progress, run_campaign
 
     with interruptible(f"{folder} keeps every run that is finished; the same command goes on from there"):
         compile_if_cold(campaign.cells[0].scenario)
-        with CampaignProgress(campaign) as progress:
+        with Progress(campaign, console(stderr=True)) as progress:
             return run_campaign(
                 campaign,
                 folder,

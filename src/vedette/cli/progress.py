@@ -1,21 +1,11 @@
-"""How a long command shows how far it is: a moving line on a terminal, a line now and then in a log."""
+"""How a long command shows how far it is: a moving line on a terminal."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
 
 from vedette.cli.output import console
-from vedette.text import amount
-
-if TYPE_CHECKING:
-    from vedette.campaigns import Campaign, Failed, Landed
-
-_SHOWN_FAILURES = 3
-_LOG_SECONDS = 600.0
-_ROOM_FOR_BAR = 90
 
 
 @contextmanager
@@ -27,81 +17,3 @@ def bar(what: str, total: int | None = None) -> Iterator[Callable[..., None]]:
     with Progress(console=screen, disable=not screen.is_terminal, transient=True) as shown:
         task = shown.add_task(what, total=total)
         yield lambda done, of=total: shown.update(task, completed=done, total=of)
-
-
-class CampaignProgress:
-    """Runs done, their rate, the time left, and the running mean error of what is compared."""
-
-    def __init__(self, campaign: Campaign) -> None:
-        from rich.progress import BarColumn, Progress, TextColumn
-
-        self._console = console(stderr=True)
-        self._terminal = self._console.is_terminal
-        bar = (BarColumn(bar_width=20),) if self._console.width >= _ROOM_FOR_BAR else ()
-        self._bar = Progress(
-            *bar,
-            TextColumn("{task.description}", markup=False),
-            console=self._console,
-            disable=not self._terminal,
-            transient=True,
-        )
-        self._bars = self._bar.add_task("starting", total=None)
-        self._name = campaign.name
-        # Means over several settings would say nothing.
-        alone = len(campaign.groups()) == 1
-        self._label = {cell.name: str(cell.settings[campaign.compare]) for cell in campaign.cells} if alone else {}
-        self._unit = campaign.cells[0].scenario.model.ospa.unit
-        self._errors: dict[str, list[float]] = {}
-        self._found = self._landed = self._total = self._failures = 0
-        self._first_at = self._said_at = time.monotonic()
-
-    def __enter__(self) -> CampaignProgress:
-        self._bar.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._bar.stop()
-
-    def begin(self, num_found: int, num_runs: int) -> None:
-        """See `vedette.campaigns.Watch`."""
-        self._found, self._total = num_found, num_runs
-        there = f", {num_found} are there already" if num_found else ""
-        if num_found < num_runs and (num_found or not self._terminal):
-            self.note(f"{self._name}: {num_runs} runs{there}")
-        self._bar.update(self._bars, total=num_runs, completed=num_found, description=f"{num_found}/{num_runs}")
-
-    def note(self, text: str) -> None:
-        """See `vedette.campaigns.Watch`."""
-        self._console.print(text, soft_wrap=True)
-
-    def landed(self, result: Landed) -> None:
-        """See `vedette.campaigns.Watch`."""
-        now = time.monotonic()
-        if self._landed == 0:  # the rate is of runs alone: what was loaded or compiled before them is not in it
-            self._first_at = now
-        self._landed += 1
-        if result.cell in self._label:
-            self._errors.setdefault(self._label[result.cell], []).append(result.ospa)
-        text = self._description(now)
-        self._bar.update(self._bars, advance=1, description=text)
-        if not self._terminal and now - self._said_at > _LOG_SECONDS:
-            self._said_at = now
-            self.note(text)
-
-    def failed(self, result: Failed) -> None:
-        """See `vedette.campaigns.Watch`."""
-        self._failures += 1
-        if self._failures <= _SHOWN_FAILURES:
-            self.note(f"cell {result.cell}, run {result.run} failed: {result.message}")
-
-    def _description(self, now: float) -> str:
-        done = self._found + self._landed
-        parts = [f"{done}/{self._total}"]
-        rate = (self._landed - 1) / (now - self._first_at) if self._landed > 1 and now > self._first_at else 0.0
-        if rate:
-            seconds = round((self._total - done) / rate)
-            parts += [f"{rate:.1f}/s", f"{seconds // 60}:{seconds % 60:02d} left"]
-        parts += [
-            f"{name} {amount(f'{sum(values) / len(values):.1f}', self._unit)}" for name, values in self._errors.items()
-        ]
-        return "  ".join(parts)
