@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 from rich.console import Console
@@ -12,7 +14,7 @@ from campaigns.stubs import stub_campaign, stub_perform
 from vedette.campaigns import Progress, engine, progress, run_campaign
 
 
-def lines_of(place: Path, monkeypatch: pytest.MonkeyPatch, **options: bool) -> list[str]:
+def lines_of(place: Path, monkeypatch: pytest.MonkeyPatch, **options: Any) -> list[str]:
     """What a campaign writes to a console of its own."""
     monkeypatch.setattr(engine, "perform", stub_perform)
     out = io.StringIO()
@@ -40,6 +42,6 @@ def test_a_notebook_has_lines_oftener(tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.setattr(progress, "_NOTEBOOK_SECONDS", -1.0)
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     shown: list[str] = []
-    monkeypatch.setattr("rich.jupyter.display", lambda segments, text: shown.append(text))
+    monkeypatch.setattr("rich.jupyter.display", lambda segments, text: shown.append(re.sub("\x1b.*?m", "", text)))
     assert lines_of(tmp_path, monkeypatch, force_jupyter=True) == []  # what is written goes to the cell
     assert [text.split()[0] for text in shown] == ["trial:", *(f"{number}/8" for number in range(1, 9))]
