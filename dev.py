@@ -5,7 +5,7 @@ usage: python3 dev.py COMMAND [ARGUMENTS]
 
     reproduce [ARGUMENTS]   run the paper's experiment and draw its figures (`vedette reproduce`)
     check [STAGE ...]       run the whole check, or only the stages named (`check --list` names them)
-    docs [--open]           build the documentation, say where it is, and with --open show it
+    docs [PORT] [--open]    show the documentation in a browser of this machine, anew when a page changes, until Ctrl-C
     vedette [ARGUMENTS]     run any other command of the program
     release [SCENARIO ...]  make source distribution and wheels, one with compiled kernels, in dist/, and try each
     setup                   only set up the environment for all of these
@@ -19,7 +19,6 @@ import os
 import platform
 import subprocess
 import sys
-import webbrowser
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -146,17 +145,6 @@ def attend(command: list[str], folder: Path | None = None) -> int:
                 return process.wait()
 
 
-def build_docs(*, show: bool) -> int:
-    """Build the documentation as the check does; it can be read from disk."""
-    status = attend([str(PYTHON), str(ROOT / "tools" / "check.py"), "docs"], ROOT)
-    if status == 0:
-        start = ROOT / "build" / "site" / "index.html"
-        print(f"the documentation starts at {start}")
-        if show:
-            webbrowser.open(start.as_uri())
-    return status
-
-
 def main(arguments: list[str]) -> int:
     """Run one command; returns the exit status."""
     if not arguments or arguments[0] in ("-h", "--help", "help"):
@@ -166,8 +154,8 @@ def main(arguments: list[str]) -> int:
     if command not in ("reproduce", "check", "docs", "vedette", "release", "setup"):
         print(f"error: unknown command {command!r}\n\n{(__doc__ or '').strip()}", file=sys.stderr)
         return 2
-    if command == "docs" and rest not in ([], ["--open"]):
-        print(f"error: docs: expected --open or nothing; got {' '.join(rest)}", file=sys.stderr)
+    if command == "docs" and [one for one in rest if one != "--open" and not one.isdecimal()]:
+        print(f"error: docs: expected a port, --open or nothing; got {' '.join(rest)}", file=sys.stderr)
         return 2
     try:
         set_up("runtime" if command in ("reproduce", "vedette") else "check")
@@ -180,7 +168,7 @@ def main(arguments: list[str]) -> int:
     if command in ("check", "release"):
         return attend([str(PYTHON), str(ROOT / "tools" / f"{command}.py"), *rest], ROOT)
     if command == "docs":
-        return build_docs(show="--open" in rest)
+        return attend([str(PYTHON), str(ROOT / "tools" / "docs.py"), "serve", *rest], ROOT)
     program = [str(SCRIPTS / "vedette")]
     return attend([*program, *(["reproduce", *rest] if command == "reproduce" else rest)])
 

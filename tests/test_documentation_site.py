@@ -1,52 +1,116 @@
-"""The built documentation works when it is opened from disk."""
+"""The site of the documentation: whole, working from disk and on a phone, and served while pages are written."""
 
 from __future__ import annotations
 
-import warnings
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import urllib.request
 from pathlib import Path
-from typing import Any
+from types import ModuleType
 
 import pytest
+from ruamel.yaml import YAML
 
-from reports.browser import Browser, chromium
-from waiting import PATIENCE
+from reports.browser import Browser, Page, chromium
+from scripts import load
+from waiting import PATIENCE, heed_interrupts, wait_until
 
 ROOT = Path(__file__).resolve().parents[1]
-PROGRAM = chromium()
+needs_browser = pytest.mark.skipif(chromium() is None, reason="no chromium or chrome on PATH to open the pages in")
 
 
-@pytest.fixture(scope="module")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two pages, built as the documentation is."""
-    place = tmp_path_factory.mktemp("documentation")
-    pages = place / "pages"
-    (pages / "assets").mkdir(parents=True)
-    for name in ("style.css", "search-from-disk.js"):
-        (pages / "assets" / name).write_bytes((ROOT / "docs/assets" / name).read_bytes())
-    (pages / "index.md").write_text("# Welcome\n\nNothing of the kind.\n")
-    (pages / "birds.md").write_text("# Birds\n\nThe cormorant dives.\n")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of what mkdocs itself imports
-        from mkdocs.commands.build import build
-        from mkdocs.config import load_config
-
-        settings: dict[str, Any] = {"docs_dir": str(pages), "site_dir": str(place / "site"), "plugins": ["search"]}
-        build(load_config(str(ROOT / "mkdocs.yml"), nav=["index.md", "birds.md"], **settings))
-    return place / "site"
+@pytest.fixture
+def docs(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    monkeypatch.syspath_prepend(ROOT / "tools")
+    return load("tools/docs.py")
 
 
-@pytest.mark.skipif(PROGRAM is None, reason="no chromium or chrome on PATH to open the pages in")
-def test_the_search_finds_pages_from_disk(site: Path) -> None:
-    assert PROGRAM is not None
-    with Browser(PROGRAM) as browser:
-        page = browser.open(site / "search.html", query="q=cormorant")
-        page.evaluate(
-            f"new Promise((done, fail) => {{ const end = performance.now() + {1000 * PATIENCE:.0f}; const look = () => "
-            "document.querySelector('#mkdocs-search-results article, #mkdocs-search-results > p') ? done() : "
-            "performance.now() > end ? fail(new Error('it never ends')) : setTimeout(look, 10); look(); })"
-        )
-        found = page.evaluate("document.getElementById('mkdocs-search-results').textContent")
-        assert "Birds" in found
-        assert "cormorant dives" in found
-        page.click("#mkdocs-search-results a")
-        assert [text for text in page.complaints() if "exception" in str(text).lower()] == []
+def small_project(place: Path, **pages: str) -> Path:
+    """A folder with these pages, set up as the project's own."""
+    written = {"index": "# Welcome\n\nNothing of the kind.\n", "birds": "# Birds\n\nThe cormorant dives.\n", **pages}
+    shutil.copytree(ROOT / "docs" / "assets", place / "docs" / "assets")
+    for name, text in written.items():
+        (place / "docs" / f"{name}.md").write_text(text, "utf-8")
+    yaml = YAML()
+    settings = yaml.load(ROOT / "mkdocs.yml")
+    settings["nav"] = ["index.md", "birds.md"]
+    settings["plugins"] = ["search", "offline"]
+    yaml.dump(settings, place / "mkdocs.yml")
+    return place
+
+
+@needs_browser
+def test_the_search_finds_pages_from_disk(tmp_path: Path, docs: ModuleType, browser: Browser) -> None:
+    project = small_project(tmp_path)
+    assert docs.build(project) == []
+    page = browser.open(project / "build" / "site" / "index.html")
+    assert found(page, "cormorant")[0].startswith("Birds")
+    assert page.complaints() == []
+    assert {address for address in page.requests() if not address.startswith(("file:", "data:", "about:"))} == set()
+
+
+def found(page: Page, words: str) -> list[str]:
+    """What the search of a page lists, the first first."""
+    page.evaluate("document.querySelector('.md-search__button').click()")
+    results = "[...(document.activeElement.shadowRoot ?? document).querySelectorAll('ol a, li a')]"
+    wait_until(lambda: page.evaluate("document.activeElement.shadowRoot !== null"), "the search's window")
+    page.call("Input.insertText", text=words)
+    wait_until(lambda: page.evaluate(f"{results}.length > 0"), f"results for {words}")
+    texts: list[str] = page.evaluate(f"{results}.map((one) => one.textContent.trim())")
+    return texts
+
+
+def test_what_leads_nowhere_or_elsewhere_is_a_fault(tmp_path: Path, docs: ModuleType) -> None:
+    text = (
+        '# Stray\n\n<script src="https://example.org/x.js"></script> <a href="gone.html">x</a> ![](images/none.png)\n'
+    )
+    told = docs.build(small_project(tmp_path / "one", stray=text))
+    assert told == [
+        "docs/stray.md: is not in the navigation of mkdocs.yml",
+        "stray.html: leads nowhere: gone.html",
+        "stray.html: would be fetched: https://example.org/x.js",
+        "stray.html: leads nowhere: images/none.png",
+    ]
+    for number, link in enumerate(("(gone.md)", "(birds.md#nobody)")):
+        (told,) = docs.build(small_project(tmp_path / str(number), index=f"# Welcome\n\n[there]{link}\n"))
+        assert "does not exist" in told
+
+
+def test_pages_are_served_and_laid_out_again_when_they_change(tmp_path: Path) -> None:
+    project = small_project(tmp_path)
+    program = (
+        f"import sys; sys.path.insert(0, {str(ROOT / 'tools')!r}); import docs, pathlib; "
+        f"docs.serve(pathlib.Path({str(project)!r}), 0, show=False)"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, text=True, preexec_fn=heed_interrupts
+    ) as server:
+        try:
+            assert server.stdout is not None
+            address = re.findall(r"http://\S+/", server.stdout.readline())[0]
+
+            def shown() -> str:
+                with urllib.request.urlopen(address + "birds.html", timeout=PATIENCE) as answer:
+                    text: str = answer.read().decode()
+                    return text
+
+            wait_until(lambda: answers(shown) and "The cormorant dives" in shown(), "the page")
+            (project / "docs" / "birds.md").write_text("# Birds\n\nThe heron waits.\n", "utf-8")
+            wait_until(lambda: "The heron waits" in shown(), "the changed page")
+            server.send_signal(signal.SIGINT)
+            assert server.wait(PATIENCE) == 0
+            assert not answers(shown)
+        finally:
+            server.kill()
+
+
+def answers(request: object) -> bool:
+    """Whether an address answers."""
+    try:
+        request()  # type: ignore[operator]
+    except OSError:
+        return False
+    return True

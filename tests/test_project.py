@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import importlib.util
 import os
 import re
 import signal
@@ -13,13 +12,13 @@ import tarfile
 import tomllib
 import zipfile
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
 import vedette
+from scripts import load
 from vedette.kernels.base.compile import JIT_ENABLED, kernel
 from waiting import PATIENCE, heed_interrupts, wait_until
 
@@ -27,17 +26,6 @@ ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
 README = (ROOT / "README.md").read_text("utf-8")
 LOCKS = sorted((ROOT / "requirements").glob("*.txt"))
-
-
-def load(path: str) -> ModuleType:
-    """A script of the repository as a module."""
-    spec = importlib.util.spec_from_file_location(Path(path).stem, ROOT / path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # its dataclasses look their module up
-    spec.loader.exec_module(module)
-    return module
 
 
 def pins(lock: Path) -> dict[str, set[str]]:
@@ -123,7 +111,7 @@ def test_an_unsupported_python_is_told_so_before_anything_else() -> None:
         (["--help"], 0, "reproduce"),
         ([], 2, "usage"),
         (["chekc"], 2, "unknown command 'chekc'"),
-        (["docs", "--opne"], 2, "expected --open or nothing; got --opne"),
+        (["docs", "--opne"], 2, "expected a port, --open or nothing; got --opne"),
     ],
 )
 def test_the_set_up_script_explains_itself(arguments: list[str], status: int, message: str) -> None:
@@ -164,27 +152,13 @@ def test_an_environment_is_made_again_only_when_its_lock_changed(
     assert steps("check") == ["new", "check True"]
 
 
-def test_the_documentation_is_built_and_where_it_is_is_said(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_documentation_is_served(monkeypatch: pytest.MonkeyPatch) -> None:
     dev = load("dev.py")
     called: list[list[str]] = []
-    shown: list[str] = []
-    monkeypatch.setattr(dev, "ROOT", tmp_path)
     monkeypatch.setattr(dev, "set_up", lambda extent: called.append([extent]))
-
-    def attend(command: list[str], folder: Path) -> int:
-        called.append(command[-2:])
-        return 0
-
-    monkeypatch.setattr(dev, "attend", attend)
-    monkeypatch.setattr(dev.webbrowser, "open", shown.append)
-    assert dev.main(["docs"]) == 0
-    assert called == [["check"], [str(tmp_path / "tools" / "check.py"), "docs"]]
-    start = tmp_path / "build" / "site" / "index.html"
-    assert str(start) in capsys.readouterr().out
-    assert dev.main(["docs", "--open"]) == 0
-    assert shown == [start.as_uri()]
+    monkeypatch.setattr(dev, "attend", lambda command, folder: called.append(command[1:]))
+    dev.main(["docs", "8123", "--open"])
+    assert called == [["check"], [str(ROOT / "tools" / "docs.py"), "serve", "8123", "--open"]]
 
 
 def test_a_failed_step_of_the_set_up_shows_what_it_said() -> None:

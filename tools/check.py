@@ -72,9 +72,7 @@ STAGES = {
     "tests-control": tests("decisions: futures, rewards, searches, planners", *CONTROL),
     "tests-program": tests("command line, scenarios, reports, examples", *PROGRAM),
     "tests-campaigns": tests("campaigns, fuzzers, extensions, the project itself", *CAMPAIGNS),
-    "docs": Stage(
-        "the documentation, without warnings", python("mkdocs", "build", "--strict", "-q", "-d", "build/site")
-    ),
+    "docs": Stage("the site of the documentation, without warnings", [sys.executable, "tools/docs.py"]),
     "format": Stage("the layout of the source", python("ruff", "format", "--check", "--output-format=concise", ".")),
     "lint": Stage("likely mistakes", python("ruff", "check", "--output-format=concise", ".")),
     "imports": Stage(

@@ -51,7 +51,7 @@ TYPES = (
 AFTER = """
 import json, sys
 sys.path.insert(0, {tools!r})
-from docs_hooks import field_tables
+from docs_fields import field_tables
 from vedette.errors import ScenarioError
 from vedette.scenarios import json_schema, load_scenario, with_fields
 from vedette.scenarios.build import build_sensors

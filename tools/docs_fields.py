@@ -1,26 +1,18 @@
-"""What the documentation generates from the source while it is built (mkdocs calls these by name)."""
+"""Tables of the fields of scenario files, for the pages that ask for them."""
 
 from __future__ import annotations
 
 import html
 import json
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 FIELDS_MARK = "<!-- scenario fields -->"
 
 
-def on_page_markdown(markdown: str, **_: Any) -> str:
+def fill(markdown: str) -> str:
     """Put the field tables of scenario files where a page asks for them."""
     return markdown.replace(FIELDS_MARK, field_tables()) if FIELDS_MARK in markdown else markdown
-
-
-def on_post_build(config: Mapping[str, Any], **_: Any) -> None:
-    """Write the search index as a script too: a page that is opened from disk can load nothing else."""
-    folder = Path(config["site_dir"]) / "search"
-    index = (folder / "search_index.json").read_text("utf-8")
-    (folder / "index.js").write_text(f"window.searchIndex = {index};\n", "utf-8")
 
 
 def field_tables() -> str:

@@ -1,0 +1,149 @@
+"""Make the site of the documentation in build/site/, from the pages of docs/ and from tables made of the source.
+
+usage: docs.py                        make it; any fault is an error
+       docs.py serve [PORT] [--open]  show it on this machine, made again when a page changes, until Ctrl-C
+"""
+
+from __future__ import annotations
+
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, urlsplit
+
+ROOT = Path(__file__).resolve().parents[1]
+PORT = 8000
+
+
+class Page(HTMLParser):
+    """What a built page names, and what it asks for."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.names = {""}
+        self.links: list[str] = []
+        self.loads: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = {name: value or "" for name, value in attrs}
+        self.names |= {given[name] for name in ("id", "name") if name in given}
+        if tag == "a" and "href" in given:
+            self.links.append(given["href"])
+        self.loads += [given["src"]] if "src" in given else []
+        if tag == "link" and given.get("rel") in ("stylesheet", "icon", "preload", "preconnect"):
+            self.loads.append(given["href"])
+
+
+def lay_out(root: Path) -> list[str]:
+    """Put the pages of docs/ into build/pages/ with the tables for which they have marks; returns the names of pages.
+
+    A file that is the same already is left alone, so that what watches them does nothing.
+    """
+    from docs_fields import fill
+
+    target, kept = root / "build" / "pages", set()
+    for source in sorted(path for path in (root / "docs").rglob("*") if path.is_file()):
+        content = source.read_bytes()
+        if source.suffix == ".md":
+            content = fill(content.decode()).encode()
+        copy = target / source.relative_to(root / "docs")
+        kept.add(copy)
+        if not copy.is_file() or copy.read_bytes() != content:
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            copy.write_bytes(content)
+    for left in [path for path in target.rglob("*") if path.is_file() and path not in kept]:
+        left.unlink()
+    return sorted(path.relative_to(target).as_posix() for path in kept if path.suffix == ".md")
+
+
+def build(root: Path) -> list[str]:
+    """Make the site; returns its faults."""
+    pages = lay_out(root)
+    command = [sys.executable, "-m", "zensical", "build", "--strict", "--clean"]
+    made = subprocess.run(command, cwd=root, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+    if made.returncode:
+        return [made.stdout]
+    return [*unlisted(root, pages), *faults(root / "build" / "site")]
+
+
+def unlisted(root: Path, pages: list[str]) -> list[str]:
+    """Pages that the navigation leaves out."""
+    from ruamel.yaml import YAML
+
+    listed = set(_leaves(YAML(typ="safe").load(root / "mkdocs.yml")["nav"]))
+    return [f"docs/{page}: is not in the navigation of mkdocs.yml" for page in pages if page not in listed]
+
+
+def _leaves(entry: Any) -> Iterator[str]:
+    if isinstance(entry, str):
+        yield entry
+    else:
+        for inner in entry.values() if isinstance(entry, dict) else entry:
+            yield from _leaves(inner)
+
+
+def faults(site: Path) -> list[str]:
+    """What of a built site leads nowhere, or would be fetched from elsewhere."""
+    pages = {path: Page(path.read_text("utf-8")) for path in sorted(site.rglob("*.html")) if path.name != "404.html"}
+    found = []
+    for path, page in pages.items():
+        where = path.relative_to(site).as_posix()
+        for link in dict.fromkeys(page.links + page.loads):
+            parts = urlsplit(link)
+            if parts.scheme or parts.netloc:
+                if link in page.loads and parts.scheme != "data":
+                    found.append(f"{where}: would be fetched: {link}")
+                continue
+            target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
+            if not target.is_file():
+                found.append(f"{where}: leads nowhere: {link}")
+            elif target in pages and unquote(parts.fragment) not in pages[target].names:
+                found.append(f"{where}: no such place in the page: {link}")
+    return found
+
+
+def serve(root: Path, port: int, *, show: bool) -> None:
+    """Show the site at an address of this machine until Ctrl-C, and lay its pages out again when one is changed."""
+    lay_out(root)
+    address = f"127.0.0.1:{free_port(port)}"
+    command = [sys.executable, "-m", "zensical", "serve", "--dev-addr", address, *(["--open"] if show else [])]
+    with subprocess.Popen(command, cwd=root, stdout=subprocess.DEVNULL) as server:
+        print(f"the documentation is at http://{address}/ until Ctrl-C", flush=True)
+        try:
+            while server.poll() is None:
+                time.sleep(0.5)
+                lay_out(root)
+        except KeyboardInterrupt:
+            pass
+        finally:
+            server.terminate()
+
+
+def free_port(wanted: int) -> int:
+    """The port wanted, or another where something listens there already."""
+    with socket.socket() as trial:
+        taken = trial.connect_ex(("127.0.0.1", wanted)) == 0
+    with socket.socket() as trial:
+        trial.bind(("127.0.0.1", 0 if taken else wanted))
+        return int(trial.getsockname()[1])
+
+
+def main(arguments: list[str]) -> int:
+    """Make or serve the site; returns the exit status."""
+    if arguments[:1] == ["serve"]:
+        ports = [int(one) for one in arguments[1:] if one != "--open"]
+        serve(ROOT, ports[0] if ports else PORT, show="--open" in arguments)
+        return 0
+    found = build(ROOT)
+    print("\n".join(found) if found else "the documentation is in build/site/; it can be opened from disk")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
