@@ -42,6 +42,19 @@ def small_project(place: Path, **pages: str) -> Path:
     return place
 
 
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The whole site, built apart from the project's own."""
+    project = tmp_path_factory.mktemp("project")
+    shutil.copytree(ROOT / "docs", project / "docs")
+    shutil.copy(ROOT / "mkdocs.yml", project)
+    (project / "src").symlink_to(ROOT / "src")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(ROOT / "tools")
+        assert load("tools/docs.py").build(project) == []
+    return project / "build" / "site"
+
+
 @needs_browser
 def test_the_search_finds_pages_from_disk(tmp_path: Path, docs: ModuleType, browser: Browser) -> None:
     project = small_project(tmp_path)
@@ -50,6 +63,43 @@ def test_the_search_finds_pages_from_disk(tmp_path: Path, docs: ModuleType, brow
     assert found(page, "cormorant")[0].startswith("Birds")
     assert page.complaints() == []
     assert {address for address in page.requests() if not address.startswith(("file:", "data:", "about:"))} == set()
+
+
+@needs_browser
+@pytest.mark.parametrize(
+    ("words", "first"),
+    [
+        ("Lmb", "LMB"),
+        ("expected loss", "expected_loss"),
+        ("bearing_range", "bearing_range"),
+        ("late", "LateInfo"),
+        ("late scans", "Scans that come late"),
+        ("vedette live", "Scans while they come in: vedette live"),
+        ("vedette track", "Recordings of your own: vedette track"),
+        ("keep_out", "keep_out"),
+        ("own reward", "A reward of your own"),
+    ],
+)
+def test_a_thing_is_found_before_what_mentions_it(site: Path, browser: Browser, words: str, first: str) -> None:
+    assert found(browser.open(site / "index.html"), words)[0].startswith(first)
+
+
+@needs_browser
+@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+@pytest.mark.parametrize(
+    "name", ["index", "control", "extending", "fields/control", "reference/models", "reproduction"]
+)
+def test_a_page_fits_a_phone_and_has_the_systems_colours(site: Path, browser: Browser, name: str, dark: bool) -> None:
+    page = browser.open(site / f"{name}.html", width=390, height=844, dark=dark)
+    assert page.evaluate("document.documentElement.scrollWidth") == 390
+    background, text = (
+        sum(map(int, re.findall(r"\d+", page.evaluate(f"getComputedStyle(document.{of}"))[:3]))
+        for of in ("body).backgroundColor", "querySelector('article p')).color")
+    )
+    assert (background < 150 < 350 < text) if dark else (text < 400 < 700 < background)
+    colours = "new Set([...document.querySelectorAll('pre code span')].map((one) => getComputedStyle(one).color)).size"
+    assert page.evaluate(colours) != 1
+    assert page.complaints() == []
 
 
 def found(page: Page, words: str) -> list[str]:

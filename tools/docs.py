@@ -16,6 +16,8 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
+from docs_fields import FieldPages
+
 ROOT = Path(__file__).resolve().parents[1]
 PORT = 8000
 
@@ -45,13 +47,11 @@ def lay_out(root: Path) -> list[str]:
 
     A file that is the same already is left alone, so that what watches them does nothing.
     """
-    from docs_fields import fill
-
-    target, kept = root / "build" / "pages", set()
+    fields, target, kept = FieldPages(root / "docs"), root / "build" / "pages", set()
     for source in sorted(path for path in (root / "docs").rglob("*") if path.is_file()):
         content = source.read_bytes()
         if source.suffix == ".md":
-            content = fill(content.decode()).encode()
+            content = fields.fill(content.decode()).encode()
         copy = target / source.relative_to(root / "docs")
         kept.add(copy)
         if not copy.is_file() or copy.read_bytes() != content:
@@ -65,11 +65,12 @@ def lay_out(root: Path) -> list[str]:
 def build(root: Path) -> list[str]:
     """Make the site; returns its faults."""
     pages = lay_out(root)
+    missing = FieldPages(root / "docs").faults() if (root / "docs" / "fields").is_dir() else []
     command = [sys.executable, "-m", "zensical", "build", "--strict", "--clean"]
     made = subprocess.run(command, cwd=root, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
     if made.returncode:
         return [made.stdout]
-    return [*unlisted(root, pages), *faults(root / "build" / "site")]
+    return [*missing, *unlisted(root, pages), *faults(root / "build" / "site")]
 
 
 def unlisted(root: Path, pages: list[str]) -> list[str]:

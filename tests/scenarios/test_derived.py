@@ -51,7 +51,8 @@ TYPES = (
 AFTER = """
 import json, sys
 sys.path.insert(0, {tools!r})
-from docs_fields import field_tables
+from pathlib import Path
+from docs_fields import FieldPages
 from vedette.errors import ScenarioError
 from vedette.scenarios import json_schema, load_scenario, with_fields
 from vedette.scenarios.build import build_sensors
@@ -64,7 +65,7 @@ except ScenarioError as error:
     refused = str(error)
 print(json.dumps({{
     "schema": json_schema()["$defs"]["FilterLimits"]["properties"]["max_forgotten"],
-    "row": [line for line in field_tables().splitlines() if "max_forgotten" in line],
+    "row": [row for row in FieldPages(Path()).fill("<!-- fields: FilterLimits -->").split("\\n") if "forgotten" in row],
     "filters": [build_sensors(each)[0].filter.limits.max_forgotten for each in (scenario, changed)],
     "refused": refused,
 }}))
