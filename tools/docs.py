@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
+import docs_signatures
 from docs_fields import FieldPages
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -51,7 +52,7 @@ def lay_out(root: Path) -> list[str]:
     for source in sorted(path for path in (root / "docs").rglob("*") if path.is_file()):
         content = source.read_bytes()
         if source.suffix == ".md":
-            content = fields.fill(content.decode()).encode()
+            content = docs_signatures.fill(fields.fill(content.decode())).encode()
         copy = target / source.relative_to(root / "docs")
         kept.add(copy)
         if not copy.is_file() or copy.read_bytes() != content:

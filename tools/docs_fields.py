@@ -1,7 +1,8 @@
 """Tables of the fields of scenario files, for the pages of docs/fields/ that ask for them.
 
-A page has a mark such as `<!-- fields: motion survival ScanTimes -->`. It stands for the sections that may be in a field
-(`motion`, `sensors.noise`), and those of these names; `Scenario` is the file itself. `<!-- every section -->` lists all.
+A page has a mark such as `<!-- fields: motion survival ScanTimes -->`. It stands for the sections that may stand in
+these fields (`motion`, `sensors.noise`), and those of these names; `Scenario` is the file itself. In place of
+`<!-- every section -->` comes an index.
 """
 
 from __future__ import annotations

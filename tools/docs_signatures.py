@@ -1,0 +1,100 @@
+"""Signatures of what a user may write, out of the source, for the page that asks for them.
+
+`<!-- model functions -->` stands for the table of compiled functions, `<!-- protocols -->` for all public protocols.
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import re
+from types import FunctionType
+from typing import Any
+
+ROOMS = ("models", "platforms", "densities", "filters", "fusion", "tracking", "control", "simulation")
+# What takes a function of each kind, as class and attribute.
+TAKEN_BY = {
+    "transition": "models.MotionModel.transition",
+    "transition_jacobian": "models.MotionModel.transition_jacobian",
+    "process_noise_cov": "models.MotionModel.process_noise_cov",
+    "prob_survival": "models.SurvivalModel.function",
+    "measurement": "models.MeasurementModel.function",
+    "measurement_jacobian": "models.MeasurementModel.jacobian",
+    "measurement_noise_cov": "models.NoiseModel.function",
+    "prob_detection": "models.DetectionModel.function",
+    "mean_prob_detection": "models.DetectionModel.mean_function",
+    "log_clutter_intensity": "models.ClutterModel.log_intensity",
+    "association_marginals": "filters.Marginals.function",
+    "label_reward": "control.LabelReward.function",
+}
+
+
+def fill(markdown: str) -> str:
+    """A page with what its marks stand for."""
+    for mark, make in (("<!-- model functions -->", model_functions), ("<!-- protocols -->", protocols)):
+        if mark in markdown:
+            markdown = markdown.replace(mark, make())
+    return markdown
+
+
+def model_functions() -> str:
+    """A row for each kind of compiled function: what it is called with, what it gives, and what takes it."""
+    from vedette.kernels.base.compile import SIGNATURES
+    from vedette.models import functions
+
+    results = dict(re.findall(r"^\| `(\w+)` \| [^|]+ \| ([^|]+) \|$", functions.__doc__ or "", re.MULTILINE))
+    rows = ["| decorator | function of | result | stands in |", "| --- | --- | --- | --- |"]
+    for kind, place in TAKEN_BY.items():
+        room, taker, attribute = place.split(".")
+        named = inspect.getattr_static(getattr(importlib.import_module(f"vedette.{room}"), taker), attribute)
+        assert named is not None
+        link = f"[`{taker}.{attribute}`](reference/{room}.md#vedette.{room}.{taker})"
+        rows.append(f'| `@model_function("{kind}")` | `{", ".join(SIGNATURES[kind][0])}` | {results[kind]} | {link} |')
+    if set(SIGNATURES) != set(TAKEN_BY):
+        raise ValueError(f"tools/docs_signatures.py: expected the kinds {set(SIGNATURES)}; got {set(TAKEN_BY)}")
+    return "\n".join(rows)
+
+
+def protocols() -> str:
+    """Each public protocol: what it is, and its members with their types."""
+    parts = []
+    for room in ROOMS:
+        module = importlib.import_module(f"vedette.{room}")
+        found = [(name, one) for name in module.__all__ if is_protocol(one := getattr(module, name))]
+        parts += [f"### `{room}`"] if found else []
+        for name, protocol in found:
+            summary = (inspect.getdoc(protocol) or "").split("\n\n")[0].replace("\n", " ")
+            code = "\n".join(f"    {line}" for member in members(protocol) for line in member.split("\n"))
+            parts.append(f"#### [`{name}`](reference/{room}.md#vedette.{room}.{name})\n\n{summary}")
+            parts.append(f"```python\nclass {name}(Protocol):\n{code}\n```")
+    return "\n\n".join(parts)
+
+
+def is_protocol(one: Any) -> bool:
+    """Whether this is a protocol."""
+    return isinstance(one, type) and bool(getattr(one, "_is_protocol", False))
+
+
+def members(protocol: type) -> list[str]:
+    """Lines of a protocol's attributes and methods, those it inherits first."""
+    found: dict[str, str] = {}
+    for base in reversed(protocol.__mro__):
+        if not is_protocol(base):
+            continue
+        found |= {name: f"{name}: {kind}" for name, kind in vars(base).get("__annotations__", {}).items()}
+        for name, member in vars(base).items():
+            if isinstance(member, property) and member.fget is not None:
+                found[name] = f"{name}: {inspect.signature(member.fget).return_annotation}"
+            elif isinstance(member, FunctionType) and (not name.startswith("_") or name == "__call__"):
+                found[name] = _method(name, member)
+    return list(found.values())
+
+
+def _method(name: str, function: FunctionType) -> str:
+    """`def name(...) -> ...: ...`, with an argument a line where it is long."""
+    line = f"def {name}{inspect.signature(function)}: ...".replace("'", "")
+    if len(line) <= 88:
+        return line
+    head, _, result = line.removeprefix(f"def {name}(").rpartition(") -> ")
+    arguments = re.split(r", (?![^\[]*\])", head)
+    return "\n".join([f"def {name}(", *(f"    {argument}," for argument in arguments), f") -> {result}"])
