@@ -58,6 +58,7 @@ SHOWN = {
         "runner-up: less by",
         "sensor 1 with heading_deg 60",
     ],
+    "docs/faq.md": ["the same"],
     "docs/filters.md": ["target at", "LMB of 4 labels", "4 labels\n(1, 0) 1.0", "((1, 0), (10, 0))"],
     "docs/fusion.md": ["ParallelUpdate ", "Clmb by views "],
     "docs/live.md": ['"line": 12, "time": 5.0, "tracks": [{"label":'],
