@@ -48,9 +48,9 @@ class FieldPages:
         section, rows = sections()[name], []
         for field, details in section["properties"].items():
             default = "required" if field in section.get("required", []) else _default(details)
-            rows.append(f"| `{field}` | {self._kind(details)} | {default} | {_cell(details.get('description', ''))} |")
+            rows.append(f"| `{field}` | {_cell(details.get('description', ''))} | {self._kind(details)} | {default} |")
         text = _cell(section.get("description", ""))
-        head = ["| field | type | default | meaning |", "| --- | --- | --- | --- |"]
+        head = ["| field | meaning | type | default |", "| --- | --- | --- | --- |"]
         return "\n".join([f"## {title(name)} {{#{name.lower()}}}", "", text, "", *head, *rows])
 
     def _index(self) -> str:

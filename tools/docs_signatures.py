@@ -43,13 +43,13 @@ def model_functions() -> str:
     from vedette.models import functions
 
     results = dict(re.findall(r"^\| `(\w+)` \| [^|]+ \| ([^|]+) \|$", functions.__doc__ or "", re.MULTILINE))
-    rows = ["| decorator | function of | result | stands in |", "| --- | --- | --- | --- |"]
+    rows = ["| kind | function of | result | stands in |", "| --- | --- | --- | --- |"]
     for kind, place in TAKEN_BY.items():
         room, taker, attribute = place.split(".")
         named = inspect.getattr_static(getattr(importlib.import_module(f"vedette.{room}"), taker), attribute)
         assert named is not None
         link = f"[`{taker}.{attribute}`](reference/{room}.md#vedette.{room}.{taker})"
-        rows.append(f'| `@model_function("{kind}")` | `{", ".join(SIGNATURES[kind][0])}` | {results[kind]} | {link} |')
+        rows.append(f"| `{kind}` | `{', '.join(SIGNATURES[kind][0])}` | {results[kind]} | {link} |")
     if set(SIGNATURES) != set(TAKEN_BY):
         raise ValueError(f"tools/docs_signatures.py: expected the kinds {set(SIGNATURES)}; got {set(TAKEN_BY)}")
     return "\n".join(rows)

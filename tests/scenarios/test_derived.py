@@ -90,7 +90,7 @@ def test_a_filter_parameter_is_written_once(tmp_path: Path) -> None:
     found: dict[str, Any] = json.loads(ran.stdout)
     assert found["schema"]["default"] == 7
     assert found["schema"]["description"] == "Labels forgotten [-]."
-    assert found["row"] == ["| `max_forgotten` | integer | `7` | Labels forgotten [-]. |"]
+    assert found["row"] == ["| `max_forgotten` | Labels forgotten [-]. | integer | `7` |"]
     assert found["filters"] == [7, 9]
     assert "filter.limits.max_forgotten: expected a number of at least 1, got 0" in found["refused"]
 
