@@ -42,11 +42,12 @@ class Journal:
         """Of the scan at hand, s."""
         return float(self.experiment.times[self.step - 1])
 
-    def begin(self, step: int) -> None:
-        """Turn to a scan."""
+    def begin(self, step: int) -> Stages:
+        """Turn to a scan; its stopwatch."""
         self.step = step
         if step > 1:
             self._clocks.append(Stages())
+        return self._clocks[-1]
 
     def timing(self, stage: str) -> AbstractContextManager[None]:
         """Take the time of a stage of the scan at hand."""
