@@ -53,7 +53,7 @@ def test_another_world_is_the_run_once_more() -> None:
     first, again, other = (World(experiment, seed=1, run=run) for run in (0, 0, 1))
     for _ in range(3):
         one, two, three = first.step(), again.step(), other.step()
-        mine, same, others = (moment.measurements[0] for moment in (one, two, three))
+        mine, same, others = (np.asarray(moment.measurements[0]) for moment in (one, two, three))
         np.testing.assert_array_equal(mine, same)
         assert not np.array_equal(mine, others)
 

@@ -69,7 +69,7 @@ class RunInterrupted(KeyboardInterrupt):
 
 
 # Streams of one run: strategies meet the same truth and the same luck in the scans, whatever else they draw.
-TRUTH, SCANS, FILTER, PLANNER, RANDOM_CONTROL, DROP_OUTS = range(6)
+TRUTH, SCANS, FILTER, PLANNER, RANDOM_CONTROL, DROP_OUTS, SCENES = range(7)
 
 
 def run_stream(seed: int, run: int, *stream: int) -> np.random.Generator:
@@ -196,6 +196,23 @@ def truth_of_run(experiment: Experiment, seed: int, run: int) -> Truth:
     return experiment.targets.truth(experiment.times, rng=run_stream(seed, run, TRUTH))
 
 
+def advance(world: World, journal: Journal, watch: Callable[[int], None] | None = None) -> list[Moment]:
+    """The scans up to the next decision, or else to the end, each written down in the journal of the run.
+
+    watch: told the number of every scan that is done. Raises as `World.step`.
+    """
+    first, steps = 1 if world.moment is None else world.moment.step + 1, world.experiment.decision_steps
+    moments: list[Moment] = []
+    for step in range(first, len(world.experiment.times) + 1):
+        moments.append(world.step(stages=journal.begin(step)))
+        journal.note(moments[-1].poses, moments[-1].info, moments[-1].estimate)
+        if watch is not None:
+            watch(step)
+        if step in steps:
+            break
+    return moments
+
+
 def simulate(
     experiment: Experiment,
     planner: Planner | None,
@@ -250,12 +267,9 @@ def _go(experiment: Experiment, planner: Planner | None, journal: Journal, watch
     stream = RANDOM_CONTROL if isinstance(planner, RandomPlanner) else PLANNER
     planner_rng = run_stream(journal.seed, journal.run, stream)
     world = World(experiment, seed=journal.seed, run=journal.run, moving=planner is not None, truth=journal.truth)
-    for step in range(1, len(experiment.times) + 1):
-        moment = world.step(stages=journal.begin(step))
-        journal.note(moment.poses, moment.info, moment.estimate)
-        if watch is not None:
-            watch(step)
-        if planner is not None and step in experiment.decision_steps:
+    while not world.is_over:
+        moment = advance(world, journal, watch)[-1]
+        if planner is not None and moment.step in experiment.decision_steps:
             with journal.timing("planning"):
                 plan = planner.plan(moment.state, moment.poses, rng=planner_rng)
             journal.decide(plan)
