@@ -14,6 +14,7 @@ _ROOMS = (
     "evaluation",
     "filters",
     "fusion",
+    "gym",
     "live",
     "models",
     "platforms",

@@ -22,6 +22,8 @@ EXTRA_OF = {
     "rosbags": "readers",
     "mcap": "formats",
     "websockets": "live",
+    "gymnasium": "gym",
+    "pettingzoo": "gym",
 }
 
 

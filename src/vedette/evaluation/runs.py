@@ -42,12 +42,16 @@ def run_scenario(
     Raises:
         VedetteError: the scenario's models, filters or planner cannot do what is asked.
     """
-    ospa = scenario.model.ospa
-    score: Score = partial(ospa_of_run, cutoff=ospa.cutoff, order=ospa.order, components=ospa.components)
-    if scenario.model.targets.kind == "unknown":
-        score = _unscored
     decides = build_planner(scenario, planner, num_threads)
-    return simulate(build_experiment(scenario), decides, seed=seed, run=run, score=score, watch=watch)
+    return simulate(build_experiment(scenario), decides, seed=seed, run=run, score=score_of(scenario), watch=watch)
+
+
+def score_of(scenario: Scenario) -> Score:
+    """What gives the OSPA of estimates at each scan, under the cutoff, order and components of a scenario."""
+    ospa = scenario.model.ospa
+    if scenario.model.targets.kind == "unknown":
+        return _unscored
+    return partial(ospa_of_run, cutoff=ospa.cutoff, order=ospa.order, components=ospa.components)
 
 
 def _unscored(truth: Truth, estimates: Sequence[Estimate]) -> Floats:

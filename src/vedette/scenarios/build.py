@@ -246,8 +246,24 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
     if strategy.needs_labels and not labels_targets(sensors[0].filter):
         kinds = "delta_glmb, m_delta_glmb, lmb or factored_glmb"
         raise InputError(f"filter.kind: expected {kinds}, as planner {name} needs labels; got {model.filter.kind}")
+    parts = build_parts(scenario, sensors, strategy, num_threads)
+    if name in model.planners:
+        return Named(name, model.planners[name].planner(parts, folder))
+    try:
+        return strategy.planner(parts, folder)
+    except InputError as error:
+        raise InputError(f"planner {name}: {error}") from error
+
+
+def build_parts(
+    scenario: Scenario, sensors: tuple[MobileSensor, ...], strategy: Strategy, num_threads: int = 0
+) -> Parts:
+    """What the planner of a strategy is made of, the sensors as of `build_sensors`. Raises `InputError` as
+    `build_planner`.
+    """
+    model, folder = scenario.model, scenario.folder
     control, fusion = model.control, _fusion_of_decisions(scenario, sensors[0].filter)
-    parts = Parts(
+    return Parts(
         sensors,
         fusion,
         replace(control.build(model.horizon, num_threads), end=float(model.time.build()[-1])),
@@ -260,12 +276,6 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
         model.estimator.build(folder),
         {"timetable": _timetable(scenario), "cutoff": model.ospa.cutoff},
     )
-    if name in model.planners:
-        return Named(name, model.planners[name].planner(parts, folder))
-    try:
-        return strategy.planner(parts, folder)
-    except InputError as error:
-        raise InputError(f"planner {name}: {error}") from error
 
 
 def _timetable(scenario: Scenario) -> Timetable:

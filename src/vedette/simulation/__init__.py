@@ -4,7 +4,7 @@ from vedette.control import KnowsTruth
 from vedette.simulation.born_targets import PoissonTargets
 from vedette.simulation.crowds import CrowdTargets
 from vedette.simulation.experiment import Experiment
-from vedette.simulation.loop import simulate
+from vedette.simulation.loop import Moment, World, simulate
 from vedette.simulation.oracle import OraclePlanner, Timetable
 from vedette.simulation.records import Decision, RunRecord
 from vedette.simulation.scans import CLUTTER, Scan, simulate_scan, simulate_scans
@@ -18,6 +18,7 @@ __all__ = [
     "Decision",
     "Experiment",
     "KnowsTruth",
+    "Moment",
     "OraclePlanner",
     "PoissonTargets",
     "RunRecord",
@@ -27,6 +28,7 @@ __all__ = [
     "Timetable",
     "TrueSensor",
     "Truth",
+    "World",
     "load_run",
     "save_run",
     "simulate",

@@ -33,7 +33,7 @@ class Journal:
         self.estimates: list[Estimate] = []
         self._poses: list[Floats] = []
         self._decisions: list[Decision] = []
-        self._health = Health.unreported(len(experiment.times), experiment.num_sensors)
+        self.health = Health.unreported(len(experiment.times), experiment.num_sensors)
         self._clocks: list[Stages] = [Stages()]
         self._fusion: list[float] = []
 
@@ -42,11 +42,12 @@ class Journal:
         """Of the scan at hand, s."""
         return float(self.experiment.times[self.step - 1])
 
-    def begin(self, step: int) -> None:
-        """Turn to a scan."""
+    def begin(self, step: int) -> Stages:
+        """Turn to a scan; its stopwatch."""
         self.step = step
         if step > 1:
             self._clocks.append(Stages())
+        return self._clocks[-1]
 
     def timing(self, stage: str) -> AbstractContextManager[None]:
         """Take the time of a stage of the scan at hand."""
@@ -55,9 +56,9 @@ class Journal:
     def note(self, poses: Floats, info: TrackerInfo, estimate: Estimate) -> None:
         """Write down the scan at hand."""
         with self.timing("report of the tracker"):
-            self._health.note_filters(self.step - 1, info.filters)
-            self._health.note_fusion(self.step - 1, info.fusion)
-            self._health.note_sent(self.step - 1, info.bytes_sent)
+            self.health.note_filters(self.step - 1, info.filters)
+            self.health.note_fusion(self.step - 1, info.fusion)
+            self.health.note_sent(self.step - 1, info.bytes_sent)
         self._fusion.append(float(info.seconds.get("fusion", 0.0)))
         self._poses.append(poses)
         self.estimates.append(estimate)
@@ -92,7 +93,7 @@ class Journal:
             estimates=tuple(self.estimates),
             decisions=tuple(self._decisions),
             ospa=ospa,
-            health=self._health.first(num),
+            health=self.health.first(num),
             timings=self._timings(num),
             stopped=stopped,
         )

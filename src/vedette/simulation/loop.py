@@ -7,19 +7,21 @@ import traceback
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from vedette.control import KnowsTruth, Planner, RandomPlanner
-from vedette.errors import VedetteError
-from vedette.kernels.base.types import Bools
+from vedette.densities import Estimate
+from vedette.errors import InputError, VedetteError
+from vedette.kernels.base.types import Bools, Floats
 from vedette.plausible import told_elsewhere
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.journal import Journal, Score
 from vedette.simulation.records import RunRecord
-from vedette.simulation.scans import simulate_scans
+from vedette.simulation.scans import Scan, simulate_scans
 from vedette.simulation.truth import Truth
+from vedette.tracking import Stages, State, TrackerInfo
 
 _LIBRARIES = (str(Path(__file__).parents[1]), *(sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")))
 
@@ -67,7 +69,7 @@ class RunInterrupted(KeyboardInterrupt):
 
 
 # Streams of one run: strategies meet the same truth and the same luck in the scans, whatever else they draw.
-TRUTH, SCANS, FILTER, PLANNER, RANDOM_CONTROL, DROP_OUTS = range(6)
+TRUTH, SCANS, FILTER, PLANNER, RANDOM_CONTROL, DROP_OUTS, SCENES = range(7)
 
 
 def run_stream(seed: int, run: int, *stream: int) -> np.random.Generator:
@@ -95,6 +97,122 @@ def scans_of_run(
     return there if scans_at is None else there & scans_at[:, :num_scans]
 
 
+class Moment(NamedTuple):
+    """What one scan of all sensors has brought."""
+
+    step: int  # number of the scan, from 1
+    time: float  # s
+    poses: Floats  # (num_sensors, 3 or more) where the sensors scanned
+    measurements: tuple[Floats | None, ...]  # of each sensor (num, meas_dim); None of one that did not scan
+    scans: tuple[Scan | None, ...]  # the same with the targets behind them, for evaluation; () where they were recorded
+    state: State  # what the tracker believes now
+    info: TrackerInfo  # what it reports
+    estimate: Estimate  # read off the fused belief
+
+
+class World:
+    """A run of an experiment, a scan at a time; who steps it sends the sensors where they please.
+
+    Attributes:
+        experiment: the parts of the run.
+        seed, run: fix every random number: the targets and scans are those of that run of a campaign.
+        truth: the targets at all scans, which are for scoring.
+        fleet: the sensors on their ways.
+        moment: what the last scan has brought; None before the first.
+    """
+
+    def __init__(
+        self, experiment: Experiment, *, seed: int, run: int = 0, moving: bool = True, truth: Truth | None = None
+    ) -> None:
+        """Before the first scan; a run once more is another world.
+
+        Args:
+            experiment, seed, run: as above.
+            moving: whether the sensors are under way at all.
+            truth: the targets, where they are had already (`truth_of_run`); None: they are drawn.
+
+        Raises `VedetteError` where the true targets cannot be had.
+        """
+        self.experiment, self.seed, self.run = experiment, seed, run
+        self.truth = truth_of_run(experiment, seed, run) if truth is None else truth
+        num = experiment.num_sensors
+        self._scan_rngs, self._filter_rngs = (sensor_streams(seed, run, stream, num) for stream in (SCANS, FILTER))
+        self._scans_at = scans_of_run(experiment.scans_at, experiment.drop_out, len(experiment.times), seed, run)
+        self.fleet, self._state = experiment.fleet(moving=moving), experiment.tracker.initial()
+        self.moment: Moment | None = None
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the last scan is done."""
+        return self.moment is not None and self.moment.step == len(self.experiment.times)
+
+    def follow(self, actions: Sequence[Floats | None]) -> None:
+        """Send the sensors on their ways from where they are, one row of `Platform.actions` each; None: lie still.
+
+        Raises `InputError` for actions that are none, or before the first scan.
+        """
+        if self.moment is None:
+            raise InputError("world: expected a scan before the sensors are sent anywhere; got none yet")
+        self.fleet = self.fleet.follow(actions, self.moment.time)
+
+    def step(self, actions: Sequence[Floats | None] | None = None, *, stages: Stages | None = None) -> Moment:
+        """One scan of every sensor, the tracker's step on it, and the estimate.
+
+        Args:
+            actions: the sensors are sent there first, see `follow`; None: all go on as they are.
+            stages: a stopwatch for "scans", "filter" and "estimate".
+
+        Raises:
+            InputError: the last scan is done, or as of `follow`.
+            VedetteError: as the models, the tracker and the estimator.
+        """
+        if self.is_over:
+            raise InputError(f"world: expected one of {len(self.experiment.times)} scans to come; all are done")
+        if actions is not None:
+            self.follow(actions)
+        experiment, clock = self.experiment, Stages() if stages is None else stages
+        step = 1 if self.moment is None else self.moment.step + 1
+        time, recording = float(experiment.times[step - 1]), experiment.recording
+        poses = self.fleet.poses(time) if recording is None else recording.poses[step - 1]
+        scans: tuple[Scan | None, ...] = ()
+        with clock.timing("scans"):
+            if recording is None:
+                ids, states = self.truth.at(step - 1)
+                sensors = experiment.sensors_at(step, self._scans_at)
+                scans = simulate_scans(states, poses, sensors, ids=ids, rngs=self._scan_rngs)
+                measurements = tuple(None if scan is None else scan.measurements for scan in scans)
+            else:
+                measurements = tuple(recording.scans[step - 1])
+        with clock.timing("filter"):
+            state, info = experiment.tracker.step(self._state, measurements, poses, time, rngs=self._filter_rngs)
+        with clock.timing("estimate"):
+            estimate = experiment.estimate(state.fused, step)
+        self._state, self.moment = state, Moment(step, time, poses, measurements, scans, state, info, estimate)
+        return self.moment
+
+
+def truth_of_run(experiment: Experiment, seed: int, run: int) -> Truth:
+    """The targets of a run at all scans. Raises `VedetteError` where they cannot be had."""
+    return experiment.targets.truth(experiment.times, rng=run_stream(seed, run, TRUTH))
+
+
+def advance(world: World, journal: Journal, watch: Callable[[int], None] | None = None) -> list[Moment]:
+    """The scans up to the next decision, or else to the end, each written down in the journal of the run.
+
+    watch: told the number of every scan that is done. Raises as `World.step`.
+    """
+    first, steps = 1 if world.moment is None else world.moment.step + 1, world.experiment.decision_steps
+    moments: list[Moment] = []
+    for step in range(first, len(world.experiment.times) + 1):
+        moments.append(world.step(stages=journal.begin(step)))
+        journal.note(moments[-1].poses, moments[-1].info, moments[-1].estimate)
+        if watch is not None:
+            watch(step)
+        if step in steps:
+            break
+    return moments
+
+
 def simulate(
     experiment: Experiment,
     planner: Planner | None,
@@ -119,7 +237,7 @@ def simulate(
             and carries the record of the scans before.
         RunInterrupted: a `KeyboardInterrupt`, likewise with the record of the scans before.
     """
-    truth = experiment.targets.truth(experiment.times, rng=run_stream(seed, run, TRUTH))
+    truth = truth_of_run(experiment, seed, run)
     alone = "still" if experiment.recording is None else "recorded"
     journal = Journal(experiment, planner.name if planner is not None else alone, seed, run, truth)
     try:
@@ -145,32 +263,14 @@ def _told(planner: Any, truth: Truth) -> Planner | None:
 
 def _go(experiment: Experiment, planner: Planner | None, journal: Journal, watch: Callable[[int], None] | None) -> None:
     """Every scan of a run, one after the other, written down in the journal."""
-    seed, run, num = journal.seed, journal.run, experiment.num_sensors
-    scan_rngs, filter_rngs = (sensor_streams(seed, run, stream, num) for stream in (SCANS, FILTER))
     planner = _told(planner, journal.truth)
-    planner_rng = run_stream(seed, run, RANDOM_CONTROL if isinstance(planner, RandomPlanner) else PLANNER)
-    tracker, recording = experiment.tracker, experiment.recording
-    scans_at = scans_of_run(experiment.scans_at, experiment.drop_out, len(experiment.times), seed, run)
-    state, fleet = tracker.initial(), experiment.fleet(moving=planner is not None)
-    for step, time in enumerate(experiment.times.tolist(), start=1):
-        journal.begin(step)
-        poses = fleet.poses(time) if recording is None else recording.poses[step - 1]
-        with journal.timing("scans"):
-            if recording is None:
-                states = journal.truth.at(step - 1)[1]
-                scans = simulate_scans(states, poses, experiment.sensors_at(step, scans_at), rngs=scan_rngs)
-                measurements = [None if scan is None else scan.measurements for scan in scans]
-            else:
-                measurements = list(recording.scans[step - 1])
-        with journal.timing("filter"):
-            state, info = tracker.step(state, measurements, poses, time, rngs=filter_rngs)
-        with journal.timing("estimate"):
-            estimate = experiment.estimate(state.fused, step)
-        journal.note(poses, info, estimate)
-        if watch is not None:
-            watch(step)
-        if planner is not None and step in experiment.decision_steps:
+    stream = RANDOM_CONTROL if isinstance(planner, RandomPlanner) else PLANNER
+    planner_rng = run_stream(journal.seed, journal.run, stream)
+    world = World(experiment, seed=journal.seed, run=journal.run, moving=planner is not None, truth=journal.truth)
+    while not world.is_over:
+        moment = advance(world, journal, watch)[-1]
+        if planner is not None and moment.step in experiment.decision_steps:
             with journal.timing("planning"):
-                plan = planner.plan(state, poses, rng=planner_rng)
+                plan = planner.plan(moment.state, moment.poses, rng=planner_rng)
             journal.decide(plan)
-            fleet = fleet.follow(plan.chosen_actions, time)
+            world.follow(plan.chosen_actions)

@@ -51,8 +51,13 @@ class Truth(Speaking):
 
     def first(self, num_scans: int) -> Truth:
         """The first scans alone."""
-        last = self.offsets[num_scans]
-        return Truth(self.times[:num_scans], self.offsets[: num_scans + 1], self.ids[:last], self.states[:last])
+        return self.between(0, num_scans)
+
+    def between(self, first: int, end: int) -> Truth:
+        """The scans from `first`, counted from 0, to the one before `end`."""
+        rows = slice(self.offsets[first], self.offsets[end])
+        offsets = self.offsets[first : end + 1] - self.offsets[first]
+        return Truth(self.times[first:end], offsets, self.ids[rows], self.states[rows])
 
     def validate(self) -> None:
         """Raise `InputError` unless the arrays fit together as described above."""

@@ -19,7 +19,7 @@ from vedette.evaluation.figures.scene import Scene, scene_of
 from vedette.evaluation.figures.style import png_bytes, save_figure, svg_text
 from vedette.evaluation.figures.sweep import SweepCurve, sweep_figure
 from vedette.evaluation.figures.tracks import overview_figure, tracks_figure
-from vedette.evaluation.figures.video import write_video
+from vedette.evaluation.figures.video import scan_image, write_video
 
 __all__ = [
     "Scene",
@@ -35,6 +35,7 @@ __all__ = [
     "reward_figure",
     "roses_figure",
     "save_figure",
+    "scan_image",
     "scene_of",
     "svg_text",
     "sweep_figure",

@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.patches import Circle, Ellipse
+from numpy.typing import NDArray
 
 from vedette.errors import InputError, VedetteError
 from vedette.evaluation.figures.labels import drawn_text, short_label
@@ -104,6 +106,17 @@ def write_video(
         except OSError as error:
             raise InputError(f"path: expected a place to write a video; got {path}: {error.strerror}") from error
     return number
+
+
+@styled
+def scan_image(record: RunRecord, scenario: Scenario, *, size: int = 800) -> NDArray[np.uint8]:
+    """(height, size, 3) a picture of the last scan of a run, as a frame of `write_video` shows it; red, green, blue."""
+    drawing = _Drawing(record, scenario, trust=False)
+    drawing.show(record.num_scans - 1)
+    drawing.figure.set_dpi(size / drawing.figure.get_figwidth())
+    canvas = FigureCanvasAgg(drawing.figure)
+    canvas.draw()  # type: ignore[no-untyped-call]
+    return np.ascontiguousarray(np.asarray(canvas.buffer_rgba())[:, :, :3])  # type: ignore[no-untyped-call]
 
 
 def _writer(ending: str, path: Path, fps: float) -> AbstractMovieWriter:

@@ -1,0 +1,29 @@
+"""Scenarios as environments for reinforcement learning, and policies as planners.
+
+Importing this registers the environment `vedette/Scenario-v0` with Gymnasium, whose argument is a `scenario`.
+"""
+
+from vedette.extras import need
+
+need("an environment", "gymnasium", "pettingzoo")
+
+import gymnasium
+
+from vedette.gym.episodes import expected_loss
+from vedette.gym.observing import Observation, Observer
+from vedette.gym.parallel import ScenarioParallelEnv
+from vedette.gym.policies import PolicyPlanner, planner_of
+from vedette.gym.single import ScenarioEnv
+
+if "vedette/Scenario-v0" not in gymnasium.registry:  # which a module that is loaded again would tell of
+    gymnasium.register("vedette/Scenario-v0", "vedette.gym.single:ScenarioEnv")
+
+__all__ = [
+    "Observation",
+    "Observer",
+    "PolicyPlanner",
+    "ScenarioEnv",
+    "ScenarioParallelEnv",
+    "expected_loss",
+    "planner_of",
+]

@@ -1,0 +1,220 @@
+"""Runs of scenarios from decision to decision, which is what all environments are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, Literal, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vedette.control import Plan
+from vedette.densities import Labelled
+from vedette.errors import InputError
+from vedette.evaluation.runs import score_of
+from vedette.extras import need
+from vedette.gym.observing import Observer, Outlook, deciding_of
+from vedette.gym.windows import Window
+from vedette.models.arguments import count, reject
+from vedette.plausible import told_elsewhere
+from vedette.scenarios import Scenario, load_scenario
+from vedette.scenarios.build import build_experiment, build_parts, build_sensors
+from vedette.scenarios.sections.planners import Strategy
+from vedette.simulation import Experiment, Moment, RunRecord, Truth, World
+from vedette.simulation.health import Health
+from vedette.simulation.journal import Journal
+from vedette.simulation.loop import SCENES, advance, run_stream, truth_of_run
+
+AnyScenario: TypeAlias = str | Path | Scenario
+Scenarios: TypeAlias = AnyScenario | Sequence[AnyScenario] | Callable[[np.random.Generator], AnyScenario]
+Reward: TypeAlias = Callable[[Sequence[Moment], Truth], float]
+AnyReward: TypeAlias = Literal["ospa", "expected_loss"] | Reward
+RENDER_MODES = ["rgb_array", "human"]
+# These grow with every scan, or are -inf where nothing fits: of a stretch of time their mean says little.
+_NOT_TOLD = ("log_likelihood", "fusion_log_normaliser")
+
+
+class Built:
+    """A scenario with what its episodes share."""
+
+    def __init__(self, scenario: AnyScenario, num_labels: int) -> None:
+        self.scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
+        self.experiment: Experiment = build_experiment(self.scenario)
+        if not self.experiment.decision_steps:
+            raise InputError(
+                f"{self.scenario.name}: expected decisions, as of control.decision_steps; got a scenario without any"
+            )
+        parts = build_parts(self.scenario, build_sensors(self.scenario), Strategy())
+        self.observer = Observer.of(parts._asdict(), num_labels)
+        self.score = score_of(self.scenario)
+
+    @property
+    def layout(self) -> Layout:
+        """Of its observations and actions."""
+        return Layout.of(self.observer.outlook(self.experiment.tracker.initial(), self.experiment.poses))
+
+
+class Layout(NamedTuple):
+    """The shapes of an observation by name, and the number of actions of each sensor that decides."""
+
+    shapes: dict[str, tuple[int, ...]]
+    num_actions: tuple[int, ...]
+    deciding: tuple[int, ...]  # places of these sensors
+
+    @classmethod
+    def of(cls, outlook: Outlook) -> Layout:
+        """Of a decision."""
+        options, shown = outlook.options, outlook.observation
+        deciding = deciding_of(options)
+        sizes = tuple(len(options[s].actions) for s in deciding)
+        return cls({name: array.shape for name, array in shown.items()}, sizes, deciding)
+
+
+class Episodes:
+    """Runs of one or several scenarios, one after the other, each from decision to decision.
+
+    Attributes:
+        built: the scenario of the present run.
+        layout: of all observations and actions.
+        render_mode: how pictures are shown.
+        world, outlook: the present run, and the decision at hand.
+        num_moved: actions of the last decision that constraints have moved.
+    """
+
+    def __init__(self, scenario: Scenarios, reward: AnyReward, num_labels: int, render_mode: str | None) -> None:
+        if render_mode not in (None, *RENDER_MODES):
+            raise reject("render_mode", f"{' or '.join(RENDER_MODES)} or None", render_mode)
+        if not callable(reward) and reward not in ("ospa", "expected_loss"):
+            raise reject("reward", "ospa, expected_loss or a function of moments and truth", reward)
+        self._num_labels, self._reward, self.render_mode = num_labels, reward, render_mode
+        self._window: Window | None = None
+        self._draw = scenario if callable(scenario) else _one_of(scenario, num_labels)
+        self._seed: int | None = None
+        self._run, self.num_moved = 0, 0
+        self.built = self._drawn(0, 0)
+        self.layout = self.built.layout
+
+    def start(self, seed: int | None, run: int | None) -> None:
+        """Turn to a run: that of a seed and number; by default run 0 of a seed, and the next of the seed before.
+
+        Where none was ever given a seed is drawn.
+        """
+        first = seed is not None or self._seed is None
+        if seed is None:
+            seed = int(np.random.default_rng().integers(2**31)) if self._seed is None else self._seed
+        number = (0 if first else self._run + 1) if run is None else count("run", run)
+        self._seed, self._run = count("seed", seed), number
+        self.built = self._drawn(self._seed, number)
+        experiment = self.built.experiment
+        truth = truth_of_run(experiment, self._seed, number)
+        self.world = World(experiment, seed=self._seed, run=number, truth=truth)
+        self._journal = Journal(experiment, "policy", self._seed, number, truth)
+        self.num_moved = 0
+        self._advance()
+
+    def decide(self, actions: ArrayLike) -> None:
+        """Send the sensors where a policy says, and go on to the next decision, or to the end."""
+        if self.is_over:
+            raise InputError("step: expected a reset first, as the run is over")
+        chosen, self.num_moved = self.built.observer.chosen(self.outlook, actions)
+        with told_elsewhere():
+            plan = plan_of("policy", self.outlook, chosen)
+            self._journal.decide(plan)
+            self.world.follow(plan.chosen_actions)
+            self._advance()
+
+    def _advance(self) -> None:
+        with told_elsewhere():
+            self._moments = advance(self.world, self._journal)
+            last = self._moments[-1]
+            self.outlook: Outlook = self.built.observer.outlook(last.state, last.poses)
+        if self.render_mode == "human":
+            self.render()
+        found = Layout.of(self.outlook)
+        if found != self.layout:
+            expected = f"{self.built.scenario.name}: expected arrays and actions of one layout at every decision"
+            raise InputError(f"{expected}, {self.layout}; got {found}")
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the last scan is done."""
+        return self.world.is_over
+
+    def reward(self) -> float:
+        """Of the scans since the last decision."""
+        moments, cutoff = self._moments, self.built.scenario.model.ospa.cutoff
+        truth = self.world.truth.between(moments[0].step - 1, moments[-1].step)
+        if callable(self._reward):
+            return float(self._reward(moments, truth))
+        if self._reward == "ospa":
+            return -float(self.built.score(truth, [moment.estimate for moment in moments])[:, 0].mean())
+        return -float(np.mean([expected_loss(moment.state.fused, cutoff) for moment in moments]))
+
+    def info(self) -> dict[str, Any]:
+        """What is known without the truth: where the run is, and the health of its filters since the last decision."""
+        first, last = self._moments[0].step - 1, self._moments[-1].step
+        told: dict[str, Any] = {"seed": self._seed, "run": self._run, "step": last, "time": self._moments[-1].time}
+        told |= {"num_moved": self.num_moved}
+        kept = {name: getattr(self._journal.health, name)[first:last] for name in Health.__match_args__}
+        means = {name: own.mean(axis=0) for name, own in kept.items() if name not in _NOT_TOLD}
+        told["health"] = {name: np.asarray(own) for name, own in means.items() if np.isfinite(own).all()}
+        return told
+
+    def record(self) -> RunRecord:
+        """What the run has brought so far, as `vedette.evaluation.run_scenario` gives it of a planner."""
+        num = len(self._journal.estimates)
+        return self._journal.record(self.built.score(self.world.truth.first(num), self._journal.estimates))
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """(height, width, 3) picture of the last scan, as a frame of `vedette video`; or in a window, and None."""
+        if self.render_mode is None:
+            return None
+        need("a picture of an environment", "matplotlib")
+        from vedette.evaluation.figures import scan_image
+
+        image = scan_image(self.record(), self.built.scenario)
+        if self.render_mode == "rgb_array":
+            return image
+        self._window = self._window or Window()
+        self._window.show(image)
+        return None
+
+    def close(self) -> None:
+        """Close the window."""
+        if self._window is not None:
+            self._window.close()
+            self._window = None
+
+    def _drawn(self, seed: int, run: int) -> Built:
+        """The scenario of a run, built."""
+        found = self._draw(run_stream(seed, run, SCENES))
+        return found if isinstance(found, Built) else Built(found, self._num_labels)
+
+
+def _one_of(scenario: AnyScenario | Sequence[AnyScenario], num_labels: int) -> Callable[[np.random.Generator], Built]:
+    """What draws one of several scenarios, each built once."""
+    given = [scenario] if isinstance(scenario, str | Path | Scenario) else list(scenario)
+    if not given:
+        raise reject("scenario", "at least one scenario", "none")
+    built = [Built(own, num_labels) for own in given]
+    return lambda rng: built[int(rng.integers(len(built)))]
+
+
+def plan_of(name: str, outlook: Outlook, chosen: tuple[int, ...]) -> Plan:
+    """The plan of a policy."""
+    notes = outlook.mask.notes if outlook.mask is not None else ()
+    return Plan(name, tuple(own.actions for own in outlook.options), chosen, (), {}, notes)
+
+
+def expected_loss(belief: Any, cutoff: float) -> float:
+    """Error to be expected of the targets that a belief holds: sum over labels of r min(sqrt(tr P), c), m.
+
+    r is the existence of a label, P the covariance of its position, c the cutoff. It knows nothing of targets that the
+    belief does not hold. Raises `InputError` for a belief without labels.
+    """
+    if not isinstance(belief, Labelled):
+        raise reject("reward", "ospa or a function, as the belief has no labels", "expected_loss")
+    return sum(
+        target.existence * min(float(np.sqrt(np.trace(target.cov[:2, :2]))), cutoff) for target in belief.targets()
+    )

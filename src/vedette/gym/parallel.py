@@ -1,0 +1,118 @@
+"""An environment in which every sensor is an agent."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+from pettingzoo import ParallelEnv
+
+from vedette.gym.episodes import RENDER_MODES, AnyReward, Episodes, Scenarios
+from vedette.gym.observing import Observation, belief_arrays
+from vedette.gym.spaces import space_of
+from vedette.models.arguments import one_of, reject
+from vedette.simulation import RunRecord, World
+
+_BELIEF = ("existence", "means", "sqrt_covs", "mask")
+
+
+class ScenarioParallelEnv(ParallelEnv):  # type: ignore[misc]  # which has no types
+    """A scenario from decision to decision; each sensor that has a choice is an agent, and all get one reward.
+
+    Steps, rewards and the end are those of `ScenarioEnv`. An agent is called `sensor_2`, by its place in the scenario,
+    from 1. Its observation has its own row of `ends` and `action_mask`, and of `poses` its own first.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": RENDER_MODES, "render_fps": 2, "name": "vedette_scenario_v0"}
+
+    def __init__(
+        self,
+        scenario: Scenarios = "paper-a",
+        *,
+        reward: AnyReward = "ospa",
+        num_labels: int = 10,
+        belief: Literal["fused", "own"] = "fused",
+        render_mode: str | None = None,
+    ) -> None:
+        """As `ScenarioEnv`; belief: whether agents are shown what is believed by all together, or by their sensor."""
+        self.episodes, self.render_mode = Episodes(scenario, reward, num_labels, render_mode), render_mode
+        self._own, self._num_labels = one_of("belief", belief, ("fused", "own")) == "own", num_labels
+        layout = self.episodes.layout
+        self._sensors = {f"sensor_{s + 1}": (row, s) for row, s in enumerate(layout.deciding)}
+        self.possible_agents = list(self._sensors)
+        self.agents: list[str] = []
+        self._action_spaces = {
+            agent: spaces.Discrete(num) for agent, num in zip(self._sensors, layout.num_actions, strict=True)
+        }
+        self._observation_spaces = {}
+        for agent, num in zip(self._sensors, layout.num_actions, strict=True):
+            own = {"ends": (num, *layout.shapes["ends"][2:]), "action_mask": (num,)}
+            self._observation_spaces[agent] = space_of(layout.shapes | own)
+
+    def observation_space(self, agent: str) -> spaces.Dict:
+        """Of an agent."""
+        return self._observation_spaces[agent]
+
+    def action_space(self, agent: str) -> spaces.Discrete:
+        """Of an agent: the indices of its sensor's actions."""
+        return self._action_spaces[agent]
+
+    @property
+    def world(self) -> World:
+        """The present run, with its truth."""
+        return self.episodes.world
+
+    def record(self) -> RunRecord:
+        """The present run so far, as one of a campaign."""
+        return self.episodes.record()
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
+        """The first decision of a run; arguments as of `ScenarioEnv.reset`."""
+        self.episodes.start(seed, (options or {}).get("run"))
+        self.agents = self.possible_agents[:]
+        return self._observations(), self._all(self.episodes.info)
+
+    def step(
+        self, actions: dict[str, Any]
+    ) -> tuple[dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
+        """Send the sensors, each where its agent says, and go on to the next decision or the end.
+
+        Raises `InputError` for an agent without an action, or after the end.
+        """
+        missing = [agent for agent in self._sensors if agent not in actions]
+        if missing and self.agents:
+            raise reject("actions", f"one of each of {', '.join(self._sensors)}", list(actions))
+        self.episodes.decide([actions[agent] for agent in self._sensors])
+        over, infos = self.episodes.is_over, self._all(self.episodes.info)
+        rewards = dict.fromkeys(self._sensors, self.episodes.reward())
+        ended = dict.fromkeys(self._sensors, over)
+        if over:
+            self.agents = []
+        return self._observations(), rewards, dict.fromkeys(self._sensors, False), ended, infos
+
+    def _observations(self) -> dict[str, Observation]:
+        outlook, found = self.episodes.outlook, {}
+        for (agent, (row, s)), num in zip(self._sensors.items(), self.episodes.layout.num_actions, strict=True):
+            shown, poses = outlook.observation, outlook.observation["poses"]
+            own = {name: shown[name][row, :num] for name in ("ends", "action_mask")}
+            own["poses"] = np.concatenate([poses[s : s + 1], poses[:s], poses[s + 1 :]])
+            if self._own:
+                own |= belief_arrays(outlook.state.local[s], outlook.state.step, self._num_labels)
+            found[agent] = {name: array.copy() for name, array in (shown | own).items()}
+        return found
+
+    def _all(self, told: Callable[[], dict[str, Any]]) -> dict[str, dict[str, Any]]:
+        return {agent: told() for agent in self._sensors}
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """As of `ScenarioEnv.render`."""
+        return self.episodes.render()
+
+    def close(self) -> None:
+        """Close the window."""
+        self.episodes.close()

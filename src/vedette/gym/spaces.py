@@ -1,0 +1,25 @@
+"""The spaces that observations lie in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+_FLAGS, _NOT_NEGATIVE = ("mask", "action_mask"), ("existence", "time", "undetected")
+_LARGEST = float(np.finfo(np.float32).max)  # Gymnasium's checks take bounds that are infinite for forgotten
+
+
+def space_of(shapes: Mapping[str, tuple[int, ...]]) -> spaces.Dict[NDArray[Any]]:
+    """Of observations with arrays of these shapes, by name."""
+    return spaces.Dict({name: _array(name, shape) for name, shape in shapes.items()})
+
+
+def _array(name: str, shape: tuple[int, ...]) -> spaces.Space[Any]:
+    if name in _FLAGS:
+        return spaces.MultiBinary(shape)
+    low, high = 0.0 if name in _NOT_NEGATIVE else -_LARGEST, 1.0 if name == "existence" else _LARGEST
+    return spaces.Box(low, high, shape, np.float32)

@@ -1,0 +1,33 @@
+"""A window that shows pictures."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vedette.extras import need
+
+
+class Window:
+    """One picture after another, where there is a display."""
+
+    def __init__(self) -> None:
+        need("a window", "matplotlib")
+        import matplotlib.pyplot as plt  # which looks for a display
+
+        self._plt = plt
+        plt.ion()
+        self._figure = plt.figure("Vedette", frameon=False)
+
+    def show(self, image: NDArray[np.uint8]) -> None:
+        """In place of the one before."""
+        self._figure.clear()
+        axes = self._figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        axes.imshow(image)
+        axes.set_axis_off()
+        self._figure.canvas.draw()
+        self._figure.canvas.flush_events()
+
+    def close(self) -> None:
+        """Take it away."""
+        self._plt.close(self._figure)
