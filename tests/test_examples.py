@@ -75,6 +75,7 @@ SHOWN = {
     ],
     "docs/scenarios.md": ["array([-90.])"],
     "docs/signatures.md": ["500."],
+    "docs/stonesoup.md": ["targets, ", "looks along 30 degrees; the ship is at 33"],
     "docs/tracking.md": ["scan 20: 2.96 not yet found, ", "the boats are sure of 1 and 1 ships"],
     "examples/own_sensor.py": ["greatest difference between the two"],
 }

@@ -128,6 +128,7 @@ def test_filters_fusion_control_and_scenarios_need_no_extra(tmp_path: Path) -> N
         for path in sorted((ROOT / "src/vedette").rglob("*.py"))
         if path.name != "__init__.py"
         and not {"campaigns", "gym", "reports", "figures"} & set(path.relative_to(ROOT / "src/vedette").parts)
+        and not {"campaigns", "reports", "figures", "stonesoup"} & set(path.parts)
         and path.name not in ("picture.py", "web.py")
     ]
     assert len(rooms) > 200
@@ -189,6 +190,7 @@ def test_only_a_scheduler_needs_the_extra_of_clusters(tmp_path: Path) -> None:
         ("import vedette.reports", "jinja2 and matplotlib and pyarrow", "report"),
         ("import vedette.campaigns", "pyarrow", "campaigns"),
         ("import vedette.gym", "gymnasium and pettingzoo", "gym"),
+        ("from vedette.stonesoup import convert", "stonesoup", "stonesoup"),
         ("from vedette.simulation.arrow import write_table; write_table({}, None)", "pyarrow", "campaigns"),
         ("from vedette.recorded.tables import read_table; read_table('a.parquet')", "pyarrow", "campaigns"),
     ],

@@ -22,6 +22,7 @@ _ROOMS = (
     "reports",
     "scenarios",
     "simulation",
+    "stonesoup",
     "tracking",
 )
 

@@ -24,6 +24,7 @@ EXTRA_OF = {
     "websockets": "live",
     "gymnasium": "gym",
     "pettingzoo": "gym",
+    "stonesoup": "stonesoup",
 }
 
 

@@ -13,14 +13,14 @@ import sys
 from typing import Any
 
 import numpy as np
-from stonesoup.dataassociator.clearmot import ClearMotAssociator  # type: ignore[import-not-found]
-from stonesoup.measures import Euclidean, SquaredMahalanobis  # type: ignore[import-not-found]
-from stonesoup.metricgenerator.clearmotmetrics import ClearMotMetrics  # type: ignore[import-not-found]
-from stonesoup.metricgenerator.manager import MultiManager  # type: ignore[import-not-found]
-from stonesoup.metricgenerator.ospametric import GOSPAMetric, OSPAMetric  # type: ignore[import-not-found]
-from stonesoup.types.groundtruth import GroundTruthPath  # type: ignore[import-not-found]
-from stonesoup.types.state import GaussianState, State  # type: ignore[import-not-found]
-from stonesoup.types.track import Track  # type: ignore[import-not-found]
+from stonesoup.dataassociator.clearmot import ClearMotAssociator
+from stonesoup.measures import Euclidean, SquaredMahalanobis
+from stonesoup.metricgenerator.clearmotmetrics import ClearMotMetrics
+from stonesoup.metricgenerator.manager import MultiManager
+from stonesoup.metricgenerator.ospametric import GOSPAMetric, OSPAMetric
+from stonesoup.types.groundtruth import GroundTruthPath
+from stonesoup.types.state import GaussianState, State
+from stonesoup.types.track import Track
 
 START = datetime.datetime(2020, 1, 1)
 NUM_SCANS = 12

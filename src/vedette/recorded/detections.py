@@ -81,6 +81,20 @@ def _row(
         if "sensor" not in told:
             raise InputError(f"detections, {place}, metadata: expected a sensor, as no other is named; got none")
         name = str(told["sensor"])
+    model = getattr(detection, "measurement_model", None)
+    values = elements_of(detection, quantities, model, f"detections, {place}")
+    offset = getattr(model, "translation_offset", None)
+    if offset is None or not {"bearing", "range"} & set(quantities):
+        return name, values, None
+    east, north = (float(element) for element in np.ravel(np.asarray(offset, dtype=object))[:2])
+    return name, values, (east, north)
+
+
+def elements_of(detection: Any, quantities: Sequence[str | None], model: Any, place: str) -> tuple[float, ...]:
+    """What is taken of a detection's state vector; bearings turned by the `rotation_offset` of its measurement model.
+
+    place: what stands in an error before the attribute. Raises `InputError` for what is no such vector.
+    """
     vector = getattr(detection, "state_vector", None)
     try:
         elements = [float(element) for element in np.ravel(np.asarray(vector, dtype=object))]
@@ -88,17 +102,12 @@ def _row(
         elements = []
     if len(elements) != len(quantities) or not np.isfinite(elements).all():
         wanted = f"{len(quantities)} finite numbers ({', '.join(map(str, quantities))})"
-        raise InputError(f"detections, {place}, state_vector: expected {wanted}; got {shown(str(vector))}")
-    model = getattr(detection, "measurement_model", None)
-    offset, rotation = (getattr(model, f"{of}_offset", None) for of in ("translation", "rotation"))
+        raise InputError(f"{place}, state_vector: expected {wanted}; got {shown(str(vector))}")
+    rotation = getattr(model, "rotation_offset", None)
     if "bearing" in quantities and rotation is not None:
         place_of = quantities.index("bearing")
         elements[place_of] = math.remainder(elements[place_of] + float(np.ravel(rotation)[-1]), 2.0 * math.pi)
-    values = tuple(element for quantity, element in zip(quantities, elements, strict=True) if quantity is not None)
-    if offset is None or not {"bearing", "range"} & set(quantities):
-        return name, values, None
-    east, north = (float(element) for element in np.ravel(np.asarray(offset, dtype=object))[:2])
-    return name, values, (east, north)
+    return tuple(element for quantity, element in zip(quantities, elements, strict=True) if quantity is not None)
 
 
 __all__ = ["table_of_detections"]

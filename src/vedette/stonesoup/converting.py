@@ -1,0 +1,151 @@
+"""Targets and sensors as Stone Soup has them, converted together; a tracker and a sensor manager share what results."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from stonesoup.types.state import GaussianState
+
+from vedette.filters import DeltaGlmbFilter, LmbFilter, MultiSensorGlmbFilter, SequentialLmbFilter
+from vedette.fusion import Fusion
+from vedette.models import (
+    BirthModel,
+    ClutterModel,
+    DetectionModel,
+    MeasurementBirth,
+    SensorModel,
+    TargetModel,
+    constant_survival,
+)
+from vedette.models.arguments import one_of, reject
+from vedette.models.functions import write_rows
+from vedette.stonesoup.motions import Layout, motion_of
+from vedette.stonesoup.sensors import clutter_of, detection_of, measurement_of, model_of, noise_of, quantities_of
+from vedette.tracking import Central, Distributed, Tracker
+
+_FILTERS = {"lmb": LmbFilter, "glmb": DeltaGlmbFilter}
+_CENTRAL_FILTERS = {"lmb": SequentialLmbFilter, "glmb": MultiSensorGlmbFilter}
+Births: TypeAlias = BirthModel | MeasurementBirth | GaussianState | Sequence[Any]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Converted:
+    """What `convert` makes of Stone Soup's models.
+
+    Attributes:
+        targets: how targets move, live on and appear.
+        sensors: what each sensor sees.
+        layout: where Stone Soup's states have the components of those here.
+        sources: for each sensor, that of Stone Soup or its measurement model, by which scans know where it is.
+        names: for each sensor, what a detection's `metadata["sensor"]` calls it.
+    """
+
+    targets: TargetModel
+    sensors: tuple[SensorModel, ...]
+    layout: Layout
+    sources: tuple[Any, ...]
+    names: tuple[str, ...]
+
+    def tracker(
+        self, kind: Literal["lmb", "glmb"] = "lmb", *, fusion: Fusion | None = None, feedback: bool = False
+    ) -> Tracker:
+        """A tracker of the library: of one sensor its filter, of several one filter of all scans, or a fusion.
+
+        Args:
+            kind: of filter.
+            fusion: of a filter at each sensor; None: one takes all scans (decision 8).
+            feedback: whether sensors take over what is fused, see `vedette.tracking.Distributed`.
+        """
+        one_of("kind", kind, _FILTERS)
+        if fusion is None and len(self.sensors) > 1:
+            return Central(_CENTRAL_FILTERS[kind](self.targets, self.sensors))
+        own = tuple(_FILTERS[kind](self.targets, sensor) for sensor in self.sensors)
+        return Distributed(own, fusion, feedback)
+
+    def predicted(self, mean: Any, cov: Any, seconds: float) -> tuple[Any, Any]:
+        """Mean and covariance, in the order of this library, after some seconds, the motion linearised."""
+        motion, state = self.targets.motion, np.asarray(mean, np.float64)[np.newaxis]
+        slope = np.empty((1, motion.state_dim, motion.state_dim))
+        write_rows(motion.transition_jacobian, state, float(seconds), motion.transition_params, slope)  # type: ignore[arg-type]
+        spread = slope[0] @ cov @ slope[0].T + motion.noise_cov(state[0], seconds)
+        return motion.propagate(state, seconds)[0], 0.5 * (spread + spread.T)
+
+
+def convert(
+    transition_model: Any,
+    sensors: Mapping[str, Any] | Sequence[Any],
+    *,
+    births: Births,
+    clutter: Any = None,
+    prob_detection: float | DetectionModel = 0.9,
+    prob_survival: float = 0.99,
+    expected_births: float = 0.5,
+    max_existence: float = 0.03,
+) -> Converted:
+    """Models of Stone Soup as those of this library that are equal to them.
+
+    Args:
+        transition_model: see `motion_of`.
+        sensors: sensors or measurement models (see `measurement_of`), one or more; of several by the names that
+            detections call them in their `metadata["sensor"]`, or in a list, for names "0", "1", ...
+        births: where targets appear. A `GaussianState`, as the prior of a `SimpleMeasurementInitiator`: wherever
+            something is measured that no track explains, its variances those of a birth about it. A list of
+            `WeightedGaussianState`: at these places, each with its weight as the probability of a birth at a scan. Or a
+            `BirthModel` or `MeasurementBirth` of `vedette.models`.
+        clutter: see `clutter_of`; None: the `clutter_model` of each sensor.
+        prob_detection: where a sensor looks (`detection_of`), or a detection model.
+        prob_survival: probability of living on to the next scan.
+        expected_births, max_existence: of births from measurements, see `vedette.models.MeasurementBirth`.
+
+    Raises:
+        InputError: what has no equal here: it names the model, the field and what there is.
+    """
+    named = dict(sensors) if isinstance(sensors, Mapping) else {str(k): own for k, own in enumerate(sensors)}
+    if not named:
+        raise reject("sensors", "one or more", "none")
+    motion, layout = motion_of(transition_model)
+    birth = _births(births, layout, motion.state_dim, expected_births, max_existence)
+    made = []
+    for source in named.values():
+        model = model_of(source)
+        measured = measurement_of(model, layout)
+        seen = prob_detection if isinstance(prob_detection, DetectionModel) else detection_of(source, prob_detection)
+        unwanted = _clutter(source, clutter, model)
+        made.append(SensorModel(measured, noise_of(model), seen, unwanted))
+    targets = TargetModel(motion, constant_survival(prob_survival), birth)
+    return Converted(targets, tuple(made), layout, tuple(named.values()), tuple(map(str, named)))
+
+
+def _clutter(sensor: Any, given: Any, model: Any) -> ClutterModel:
+    source = getattr(sensor, "clutter_model", None) if given is None else given
+    if source is None:
+        what = f"one of {type(sensor).__name__} itself, or given"
+        raise reject("clutter", what, f"none ({', '.join(quantities_of(model))} measured)")
+    return clutter_of(source, model)
+
+
+def _births(given: Any, layout: Layout, dim: int, expected: float, most: float) -> BirthModel:
+    if isinstance(given, BirthModel):
+        return given
+    if isinstance(given, GaussianState):
+        variances = np.diag(layout.covs(np.asarray(given.covar, np.float64)[np.newaxis])[0])
+        if (variances <= 0.0).any():
+            raise reject("births.covar", "variances above 0: of a birth about what was measured", variances.tolist())
+        given = MeasurementBirth(expected, most, np.sqrt(variances))
+    none = BirthModel.none(dim)
+    if isinstance(given, MeasurementBirth):
+        return BirthModel(none.existence, none.means, none.covs, None, given)
+    try:
+        weights = [float(site.weight) for site in given]
+        means = [np.asarray(site.mean, np.float64).ravel() for site in given]
+        covs = [np.asarray(site.covar, np.float64) for site in given]
+    except (AttributeError, TypeError):
+        wanted = "a GaussianState, WeightedGaussianStates, or a BirthModel or MeasurementBirth of vedette.models"
+        raise reject("births", wanted, type(given).__name__) from None
+    return BirthModel(np.array(weights), layout.states(np.array(means)), layout.covs(np.array(covs)))
+
+
+__all__ = ["Births", "Converted", "convert"]

@@ -1,0 +1,176 @@
+"""Stone Soup's measurement models, noise, fields of view and clutter as models of a sensor.
+
+Its bearings are counter-clockwise from the x axis as those here are, but from where the sensor points: what is measured
+is turned by the `rotation_offset` (`vedette.recorded.detections.elements_of`), and the pose is told by it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from stonesoup.models.clutter import ClutterModel as CartesianClutter
+from stonesoup.models.measurement.linear import LinearGaussian
+from stonesoup.models.measurement.nonlinear import Cartesian2DToBearing, CartesianToBearingRange
+from stonesoup.sensor.radar.radar import (
+    RadarBearing,
+    RadarBearingRange,
+    RadarRotatingBearing,
+    RadarRotatingBearingRange,
+)
+from stonesoup.simulator.simple import SimpleDetectionSimulator
+
+from vedette.kernels.base.types import Floats
+from vedette.models import (
+    ClutterModel,
+    DetectionModel,
+    MeasurementModel,
+    NoiseModel,
+    Region,
+    bearing_only,
+    bearing_range,
+    constant_detection,
+    constant_noise,
+    limited_range,
+    limited_sector,
+    measurement_space_clutter,
+    model_function,
+    position,
+    region_clutter,
+)
+from vedette.models.arguments import float_array, positive_definite, reject
+from vedette.stonesoup.motions import Layout
+
+# What each measures, by the names of `vedette.recorded.table_of_detections`; how; and as which clutter knows it.
+_MEASURED: dict[type, tuple[tuple[str, ...], Any, str]] = {
+    LinearGaussian: (("x", "y"), position, "position"),
+    CartesianToBearingRange: (("bearing", "range"), bearing_range, "bearing_range"),
+    Cartesian2DToBearing: (("bearing",), bearing_only, "bearing_only"),
+}
+_ROUND = (RadarBearingRange, RadarBearing)
+_ROTATING = (RadarRotatingBearingRange, RadarRotatingBearing)
+_NO_LIMIT = 1e9  # m, of a field of view without one
+
+
+def _entry(model: Any) -> tuple[tuple[str, ...], Any, str]:
+    if type(model) not in _MEASURED:
+        wanted = f"one of {', '.join(kind.__name__ for kind in _MEASURED)}"
+        raise reject("measurement_model", wanted, type(model).__name__)
+    return _MEASURED[type(model)]
+
+
+def model_of(sensor: Any) -> Any:
+    """The measurement model of a sensor as it stands, or the model itself."""
+    return getattr(sensor, "measurement_model", sensor)
+
+
+def quantities_of(model: Any) -> tuple[str, ...]:
+    """What the elements of a measurement are, by the names of `vedette.recorded.table_of_detections`."""
+    return _entry(model)[0]
+
+
+def measurement_of(model: Any, layout: Layout) -> MeasurementModel:
+    """A measurement model of Stone Soup's that has an equal here, once bearings are turned by its `rotation_offset`.
+
+    `LinearGaussian` of the position, `CartesianToBearingRange` and `Cartesian2DToBearing`.
+
+    Raises:
+        InputError: another model, or one of another `mapping` than the motion has the position in.
+    """
+    made: MeasurementModel = _entry(model)[1]()
+    if tuple(model.mapping) != layout.position:
+        wanted = f"{layout.position}, where the transition model has x and y"
+        raise reject("measurement_model.mapping", wanted, str(tuple(model.mapping)))
+    return made
+
+
+def pose_of(model: Any) -> Floats:
+    """[px, py, heading_rad] of the sensor that a measurement model is of; zeros of one that is nowhere.
+
+    Raises:
+        InputError: a sensor that is turned about the x or the y axis.
+    """
+    _entry(model)
+    offset, rotation = getattr(model, "translation_offset", None), getattr(model, "rotation_offset", None)
+    if offset is None or rotation is None:
+        return np.zeros(3)
+    place, turned = (np.asarray(given, object).ravel().astype(np.float64) for given in (offset, rotation))
+    if np.any(turned[:-1] != 0.0):
+        raise reject("measurement_model.rotation_offset", "turns about the z axis alone, (0, 0, yaw)", turned.tolist())
+    return float_array("measurement_model.translation_offset", [*place[:2], turned[-1]], (3,))
+
+
+@model_function("measurement_noise_cov")
+def _constant_cov(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] = params[i * out.shape[1] + j]
+
+
+def noise_of(model: Any) -> NoiseModel:
+    """Its noise covariance, of independent components or not.
+
+    Raises:
+        InputError: a matrix that is not positive definite.
+    """
+    num = len(quantities_of(model))
+    cov = float_array("measurement_model.noise_covar", np.asarray(model.covar(), np.float64), (num, num))
+    positive_definite("measurement_model.noise_covar", cov)
+    stds = np.sqrt(np.diag(cov))
+    if (cov == np.diag(np.diag(cov))).all():
+        return constant_noise(stds)
+    return NoiseModel(_constant_cov, cov.ravel(), num, stds)
+
+
+def detection_of(sensor: Any, prob_detection: float) -> DetectionModel:
+    """Detection with a probability wherever a sensor looks, and nowhere else; of a measurement model, everywhere.
+
+    Stone Soup's radars detect all that is in their field of view; the probability says how far to trust that.
+
+    Raises:
+        InputError: a sensor whose field of view is none that is known here, or that looks past obstacles.
+    """
+    if type(sensor) in _MEASURED:
+        return constant_detection(prob_detection)
+    if type(sensor) not in (*_ROUND, *_ROTATING):
+        kinds = ", ".join(kind.__name__ for kind in (*_ROUND, *_ROTATING))
+        wanted = f"one of {kinds}, or a measurement model with a detection model of your own"
+        raise reject("sensors", wanted, type(sensor).__name__)
+    if sensor.obstacles:
+        raise reject("sensors.obstacles", "none", f"{len(sensor.obstacles)} of {type(sensor).__name__}")
+    reach = float(sensor.max_range)
+    if type(sensor) in _ROTATING:
+        return limited_sector(prob_detection, min(reach, _NO_LIMIT), 0.5 * float(sensor.fov_angle))
+    return limited_range(prob_detection, reach) if math.isfinite(reach) else constant_detection(prob_detection)
+
+
+def clutter_of(source: Any, model: Any) -> ClutterModel:
+    """Uniform clutter of a measurement model.
+
+    Args:
+        source: a `ClutterModel` of Stone Soup's that is uniform in x and y; a `SimpleDetectionSimulator`, of which the
+            `meas_range` and `clutter_rate` are taken; or a clutter model of this library.
+        model: of the sensor that measures it.
+
+    Raises:
+        InputError: another source or distribution.
+    """
+    quantities, _, kind = _entry(model)
+    if isinstance(source, ClutterModel):
+        return source
+    if isinstance(source, CartesianClutter):
+        name = getattr(source.distribution, "__name__", type(source.distribution).__name__)
+        bounds = np.asarray(source.dist_params, np.float64)
+        if name != "uniform" or bounds.shape != (2, 2):
+            wanted = "a uniform distribution with two bounds for x and y"
+            raise reject("clutter.distribution", wanted, f"{name} with dist_params of shape {bounds.shape}")
+        return region_clutter(float(source.clutter_rate), Region(*bounds[0], *bounds[1]), kind)
+    if not isinstance(source, SimpleDetectionSimulator):
+        wanted = "a ClutterModel or a SimpleDetectionSimulator of Stone Soup, or a ClutterModel of vedette.models"
+        raise reject("clutter", wanted, type(source).__name__)
+    bounds = float_array("clutter.meas_range", np.asarray(source.meas_range, np.float64), (len(quantities), 2))
+    angular = [name == "bearing" for name in quantities]
+    if any(angular):
+        bounds[angular] += pose_of(model)[2]
+    return measurement_space_clutter(float(source.clutter_rate), bounds[:, 0], bounds[:, 1], angular=angular)
