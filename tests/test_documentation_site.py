@@ -24,7 +24,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in ("style.css", "search-from-disk.js"):
         (pages / "assets" / name).write_bytes((ROOT / "docs/assets" / name).read_bytes())
     (pages / "index.md").write_text("# Welcome\n\nNothing of the kind.\n")
-    (pages / "birds.md").write_text("# Birds\n\nThe cormorant dives.\n")
+    (pages / "birds.md").write_text("# Birds\n\nThe cormorant dives, $w^2$ deep:\n\n$$a < b$$\n")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of what mkdocs itself imports
         from mkdocs.commands.build import build
@@ -33,6 +33,13 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
         settings: dict[str, Any] = {"docs_dir": str(pages), "site_dir": str(place / "site"), "plugins": ["search"]}
         build(load_config(str(ROOT / "mkdocs.yml"), nav=["index.md", "birds.md"], **settings))
     return place / "site"
+
+
+def test_formulas_are_typeset_without_a_network(site: Path) -> None:
+    page = (site / "birds.html").read_text("utf-8")
+    assert "<msup><mi>w</mi><mn>2</mn></msup>" in page
+    assert '<div class="formula"><math' in page
+    assert "<mi>a</mi><mo>&#x0003C;</mo><mi>b</mi>" in page
 
 
 @pytest.mark.skipif(PROGRAM is None, reason="no chromium or chrome on PATH to open the pages in")

@@ -4,16 +4,34 @@ from __future__ import annotations
 
 import html
 import json
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from latex2mathml.converter import convert
+
 FIELDS_MARK = "<!-- scenario fields -->"
+
+# What `pymdownx.arithmatex` makes of $...$ and $$...$$: \\(...\\) in a span, \\[...\\] in a div.
+_FORMULA = re.compile(r'<(span|div) class="arithmatex">\\([(\[])(.*?)\\[)\]]</\1>', re.DOTALL)
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
     """Put the field tables of scenario files where a page asks for them."""
     return markdown.replace(FIELDS_MARK, field_tables()) if FIELDS_MARK in markdown else markdown
+
+
+def on_page_content(content: str, **_: Any) -> str:
+    """Typeset formulas: as MathML, which browsers draw by themselves, without a network."""
+    return _FORMULA.sub(_typeset, content)
+
+
+def _typeset(formula: re.Match[str]) -> str:
+    _, opening, latex = formula.groups()
+    if opening == "[":
+        return f'<div class="formula">{convert(html.unescape(latex), display="block")}</div>'
+    return convert(html.unescape(latex))
 
 
 def on_post_build(config: Mapping[str, Any], **_: Any) -> None:
