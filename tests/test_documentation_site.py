@@ -164,3 +164,12 @@ def answers(request: object) -> bool:
     except OSError:
         return False
     return True
+
+
+def test_formulas_are_typeset_without_a_network(tmp_path: Path, docs: ModuleType) -> None:
+    project = small_project(tmp_path, index="# Welcome\n\nThe cormorant dives, $w^2$ deep:\n\n$$a < b$$\n")
+    assert docs.build(project) == []
+    page = (project / "build" / "site" / "index.html").read_text("utf-8")
+    assert "<msup><mi>w</mi><mn>2</mn></msup>" in page
+    assert '<div class="formula"><math' in page
+    assert "<mi>a</mi><mo>&#x0003C;</mo><mi>b</mi>" in page

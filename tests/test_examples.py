@@ -78,6 +78,7 @@ SHOWN = {
     "docs/signatures.md": ["500."],
     "docs/stonesoup.md": ["targets, ", "looks along 30 degrees; the ship is at 33"],
     "docs/tracking.md": ["scan 20: 2.96 not yet found, ", "the boats are sure of 1 and 1 ships"],
+    "docs/tutorial.md": ["best: sensor 1 goes east and sensor 2 north", "Plan of jdm for 2 sensors"],
     "examples/from_stonesoup.py": ["states, existence at the end"],
     "examples/own_sensor.py": ["greatest difference between the two"],
 }

@@ -6,6 +6,7 @@ usage: docs.py                        make it; any fault is an error
 
 from __future__ import annotations
 
+import os
 import socket
 import subprocess
 import sys
@@ -68,10 +69,18 @@ def build(root: Path) -> list[str]:
     pages = lay_out(root)
     missing = FieldPages(root / "docs").faults() if (root / "docs" / "fields").is_dir() else []
     command = [sys.executable, "-m", "zensical", "build", "--strict", "--clean"]
-    made = subprocess.run(command, cwd=root, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+    made = subprocess.run(
+        command, cwd=root, env=_environment(), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False
+    )
     if made.returncode:
         return [made.stdout]
     return [*missing, *unlisted(root, pages), *faults(root / "build" / "site")]
+
+
+def _environment() -> dict[str, str]:
+    """In which Markdown finds `formulas`."""
+    paths = [str(Path(__file__).parent), *filter(None, [os.environ.get("PYTHONPATH")])]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
 
 
 def unlisted(root: Path, pages: list[str]) -> list[str]:
@@ -115,7 +124,7 @@ def serve(root: Path, port: int, *, show: bool) -> None:
     lay_out(root)
     address = f"127.0.0.1:{free_port(port)}"
     command = [sys.executable, "-m", "zensical", "serve", "--dev-addr", address, *(["--open"] if show else [])]
-    with subprocess.Popen(command, cwd=root, stdout=subprocess.DEVNULL) as server:
+    with subprocess.Popen(command, cwd=root, env=_environment(), stdout=subprocess.DEVNULL) as server:
         print(f"the documentation is at http://{address}/ until Ctrl-C", flush=True)
         try:
             while server.poll() is None:
