@@ -1,6 +1,6 @@
-"""Stone Soup's simulator and plotter around a filter of this library; writes `from_stonesoup.png`.
+"""Stone Soup's simulator and plotter around a filter of this library.
 
-    python examples/from_stonesoup.py
+    python examples/from_stonesoup.py [--picture FILE]
 
 Needs `pip install 'vedette[stonesoup]'`.
 """
@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import datetime
 
-import matplotlib
 import numpy as np
 from stonesoup.models.measurement.linear import LinearGaussian
 from stonesoup.models.transition.linear import CombinedLinearGaussianTransitionModel, ConstantVelocity
@@ -19,11 +18,10 @@ from stonesoup.types.state import GaussianState
 
 from vedette.stonesoup import LabelledTracker, convert
 
-matplotlib.use("Agg")
 START = datetime.datetime(2026, 1, 1)
 
 
-def main() -> None:
+def main() -> tuple[set, set]:
     motion = CombinedLinearGaussianTransitionModel([ConstantVelocity(0.05)] * 2, seed=1)
     measurement = LinearGaussian(4, (0, 2), np.diag([25.0, 25.0]), seed=1)
     anywhere = GaussianState([0.0] * 4, np.diag([4e4, 25.0, 4e4, 25.0]), timestamp=START)
@@ -38,13 +36,21 @@ def main() -> None:
         tracks |= current
         paths |= set(truth.groundtruth_paths)
 
+    for track in sorted(tracks, key=lambda track: track.id):
+        print(f"label {track.id}: {len(track)} states, existence at the end {track.metadata['existence']:.3f}")
+    return paths, tracks
+
+
+def draw(found: tuple[set, set]):
+    """By Stone Soup's own plotter."""
+    paths, tracks = found
     plotter = Plotter()
     plotter.plot_ground_truths(paths, [0, 2])
     plotter.plot_tracks(tracks, [0, 2])
-    plotter.fig.savefig("from_stonesoup.png")
-    for track in sorted(tracks, key=lambda track: track.id):
-        print(f"label {track.id}: {len(track)} states, existence at the end {track.metadata['existence']:.3f}")
+    return plotter.fig
 
 
 if __name__ == "__main__":
-    main()
+    from pictures import show
+
+    show(main, draw)

@@ -1,6 +1,6 @@
 """A sensor of your own: plain Python functions with a decorator, compiled, and run through the library's own filter.
 
-    python examples/own_sensor.py
+    python examples/own_sensor.py [--picture FILE]
 
 First a copy of the built-in bearing-range sensor, which gives the built-in's results. Then a sensor that the library
 does not have, a microphone that hears direction and loudness, without a Jacobian: sigma points are used. Nothing in the
@@ -129,7 +129,7 @@ def track(sensor: models.SensorModel, truth: Truth, report: Callable[[str], None
     return errors
 
 
-def main() -> None:
+def main() -> dict[str, np.ndarray]:
     truth = ScriptedTargets(models.constant_velocity(5.0), TARGETS).truth(TIMES, rng=np.random.default_rng(0))
     print("built-in bearing-range sensor")
     built_in = track(built_in_sensor(), truth)
@@ -137,8 +137,16 @@ def main() -> None:
     mine = track(my_sensor(), truth)
     print(f"  greatest difference between the two: {np.nanmax(np.abs(mine - built_in)):.1e} m")
     print("a microphone written here, without a Jacobian")
-    track(microphone(), truth)
+    return {"built in": built_in, "its copy": mine, "microphone": track(microphone(), truth)}
+
+
+def draw(errors: dict[str, np.ndarray]):
+    figure, axes = panels(1, width=5.0)
+    draw_errors(axes, TIMES, errors)
+    return figure
 
 
 if __name__ == "__main__":
-    main()
+    from pictures import draw_errors, panels, show
+
+    show(main, draw)

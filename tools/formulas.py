@@ -16,7 +16,7 @@ from markdown.postprocessors import Postprocessor
 _FORMULA = re.compile(r'<(span|div) class="arithmatex">\\([(\[])(.*?)\\[)\]]</\1>', re.DOTALL)
 
 
-class Typeset(Postprocessor):
+class Typeset(Postprocessor):  # type: ignore[misc]
     """Puts MathML where formulas are."""
 
     def run(self, text: str) -> str:
@@ -31,7 +31,7 @@ def _typeset(formula: re.Match[str]) -> str:
     return convert(html.unescape(latex))
 
 
-class Formulas(Extension):
+class Formulas(Extension):  # type: ignore[misc]
     """See the module."""
 
     def extendMarkdown(self, md: Markdown) -> None:
