@@ -16,7 +16,7 @@ from vedette.campaigns.manifest import campaign_of, contents_checksum, read_mani
 from vedette.campaigns.rows import Entry
 from vedette.campaigns.tables import FinishedRun, tables_of_runs
 from vedette.errors import InputError
-from vedette.evaluation.comparison import Comparison, scored
+from vedette.evaluation.comparison import Comparison, Outline, outline, scored
 from vedette.evaluation.metrics import Metric, RunMetrics, decode_metrics
 from vedette.evaluation.runs import measure_run
 from vedette.simulation.records import RunRecord
@@ -153,11 +153,16 @@ class CampaignResults(Speaking):
             return None
         axis = self.campaign.compare
         labels = tuple(str(cell.settings[axis]) for cell in cells)
-        runs = {label: [self.run(cell.name, run) for run in common] for label, cell in zip(labels, cells, strict=True)}
-        records = {label: [run.record for run in of] for label, of in runs.items()}
-        metrics = {label: [run.metrics for run in of] for label, of in runs.items()}
+        outlines: dict[str, list[RunRecord | Outline]] = {}
+        metrics: dict[str, list[RunMetrics]] = {}
+        for label, cell in zip(labels, cells, strict=True):
+            outlines[label], metrics[label] = [], []
+            for number in common:  # of a hundred thousand runs the records would take gigabytes
+                run = self.run(cell.name, number)
+                outlines[label].append(outline(run.record))
+                metrics[label].append(run.metrics)
         settings = {name: value for name, value in cells[0].settings.items() if name != axis}
-        return GroupComparison(settings, cells, labels, scored(cells[0].scenario, records, metrics))
+        return GroupComparison(settings, cells, labels, scored(cells[0].scenario, outlines, metrics))
 
     def _decoded(self, entry: Entry) -> FinishedRun:
         try:

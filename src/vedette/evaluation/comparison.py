@@ -121,8 +121,35 @@ class Comparison(Speaking):
         return self.strategies.index(strategy)
 
 
+@dataclass(frozen=True, slots=True)
+class Outline:
+    """What is compared of a run, in a tenth of its memory.
+
+    Attributes:
+        scenario, seed, run, times, ospa: as of the record.
+        decision_times: (num_decisions,) s.
+        choices: what each decision chose.
+    """
+
+    scenario: str
+    seed: int
+    run: int
+    times: Floats
+    ospa: Floats
+    decision_times: tuple[float, ...]
+    choices: tuple[Choice, ...]
+
+
+def outline(record: RunRecord) -> Outline:
+    """What is compared of a run."""
+    times = tuple(decision.time for decision in record.decisions)
+    return Outline(
+        record.scenario, record.seed, record.run, record.times, record.ospa.copy(), times, choices_of(record)
+    )
+
+
 def compare(
-    runs: Mapping[str, Sequence[RunRecord]],
+    runs: Mapping[str, Sequence[RunRecord | Outline]],
     metrics: Mapping[str, Sequence[RunMetrics]] | None = None,
     *,
     since: float | None = None,
@@ -144,11 +171,11 @@ def compare(
     if not runs or not all(runs.values()):
         raise InputError("runs: expected at least one run of each of one or more strategies")
     strategies = tuple(runs)
-    reference = runs[strategies[0]]
+    outlines = {name: [run if isinstance(run, Outline) else outline(run) for run in runs[name]] for name in strategies}
+    reference = outlines[strategies[0]]
     for name in strategies:
-        _check_paired(name, runs[name], strategies[0], reference)
-    records = [record for name in strategies for record in runs[name]]
-    decision_times = np.unique([decision.time for record in records for decision in record.decisions])
+        _check_paired(name, outlines[name], strategies[0], reference)
+    decision_times = np.unique([time for of in outlines.values() for each in of for time in each.decision_times])
     times = reference[0].times
     if since is None:
         decided = len(decision_times) > 0 and decision_times[0] < times[-1]
@@ -162,10 +189,10 @@ def compare(
         strategies=strategies,
         times=times,
         decision_times=decision_times,
-        ospa=np.array([[record.ospa for record in runs[name]] for name in strategies]),
+        ospa=np.array([[each.ospa for each in outlines[name]] for name in strategies]),
         since=since,
         until=until,
-        choices=tuple(tuple(choices_of(record) for record in runs[name]) for name in strategies),
+        choices=tuple(tuple(each.choices for each in outlines[name]) for name in strategies),
         measures=_measures([metrics[name] for name in strategies]) if metrics else {},
         unit=unit,
     )
@@ -179,7 +206,7 @@ def _measures(of_strategies: Sequence[Sequence[RunMetrics]]) -> dict[str, Floats
 
 def scored(
     scenario: Scenario,
-    runs: Mapping[str, Sequence[RunRecord]],
+    runs: Mapping[str, Sequence[RunRecord | Outline]],
     metrics: Mapping[str, Sequence[RunMetrics]] | None = None,
 ) -> Comparison:
     """The comparison over the scans that the scenario counts."""
@@ -206,7 +233,7 @@ def choice_of(plan: Plan) -> Choice:
     return tuple(rounded(own.columns, row) for own, row in zip(plan.actions, plan.chosen_actions, strict=True))
 
 
-def _check_paired(name: str, records: Sequence[RunRecord], other: str, reference: Sequence[RunRecord]) -> None:
+def _check_paired(name: str, records: Sequence[Outline], other: str, reference: Sequence[Outline]) -> None:
     if len(records) != len(reference):
         raise InputError(f"runs[{name!r}]: expected {len(reference)} runs, as of {other!r}; got {len(records)}")
     for record, partner in zip(records, reference, strict=True):
