@@ -101,7 +101,7 @@ def test_a_user_made_sensor_and_motion_give_the_built_ins_beliefs(make_filter, m
 
 
 def test_the_example_runs(capsys):
-    runpy.run_path(str(EXAMPLE), run_name="__main__")
+    runpy.run_path(str(EXAMPLE))["main"]()
     lines = capsys.readouterr().out.splitlines()
     assert sum("3 targets estimated" in line for line in lines) >= 8
     difference = next(line for line in lines if "greatest difference" in line)
