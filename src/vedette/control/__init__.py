@@ -20,6 +20,7 @@ from vedette.control.explanation import Bound, Explanation, Had, RunnerUp, Targe
 from vedette.control.lookahead import BeamSearch, HorizonPlanner, SequenceProblem, SequenceSearch, TreeSearch
 from vedette.control.plan import Certainty, Plan, RewardTable, SearchCurve
 from vedette.control.planners import IndependentPlanner, JointPlanner
+from vedette.control.program import ProgramPlanner
 from vedette.control.rewards import (
     CardinalityVarianceReward,
     CauchySchwarzReward,
@@ -80,6 +81,7 @@ __all__ = [
     "Planner",
     "PlanningSettings",
     "PowerReward",
+    "ProgramPlanner",
     "RandomPlanner",
     "RenyiReward",
     "Reward",

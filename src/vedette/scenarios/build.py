@@ -8,6 +8,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -194,7 +196,9 @@ def _central_filter(scenario: Scenario, filters: tuple[Filter, ...]) -> CentralF
         return None
     targets, sensors, own = shared_targets(filters), tuple(local.sensor for local in filters), model.fusion.filter
     if own is not None:
-        made: CentralFilter = own.made(scenario.folder, targets=targets, sensors=sensors)
+        made: CentralFilter = own.made(
+            scenario.folder, targets=targets, sensors=sensors, scene=partial(_told, scenario)
+        )
         return made
     in_turn = model.fusion.kind == "sequential"
     return model.filter.build_central(targets, sensors, scenario.folder, in_turn=in_turn)
@@ -275,7 +279,20 @@ def build_parts(
         (control.lookahead or Lookahead()).build(),
         model.estimator.build(folder),
         {"timetable": _timetable(scenario), "cutoff": model.ospa.cutoff},
+        partial(_told, scenario),
     )
+
+
+# What programs are told; the true targets, and what sensors are in truth, are not among it.
+_TOLD = {"name", "time", "region", "motion", "survival", "birth", "control", "ospa"}
+
+
+def _told(scenario: Scenario) -> dict[str, Any]:
+    """What a program is told of a scenario: its sections as plain data, and the horizon."""
+    model, (horizon_steps, horizon_period) = scenario.model, scenario.model.horizon
+    told = model.model_dump(mode="json", include=_TOLD)
+    told["sensors"] = [sensor.model_dump(mode="json", exclude={"truth"}) for sensor in model.sensors]
+    return told | {"decision_steps": list(model.decision_steps), "horizon": [horizon_steps, horizon_period]}
 
 
 def _timetable(scenario: Scenario) -> Timetable:

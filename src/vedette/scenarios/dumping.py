@@ -15,6 +15,7 @@ from vedette.recorded.tables import sha256_of
 from vedette.scenarios.sections import ScenarioModel, Section
 from vedette.scenarios.sections.base import sections_in
 from vedette.scenarios.sections.custom import Custom
+from vedette.scenarios.sections.program import ProgramSection
 from vedette.scenarios.sections.recording import RecordingSection
 from vedette.scenarios.sections.targets import RecordedTargets
 from vedette.scenarios.yaml_reader import plain_scalar
@@ -57,22 +58,21 @@ def dump_data(data: Any, folder: Path | None = None) -> str:
 
 
 def files_of(model: ScenarioModel, folder: Path) -> tuple[Path, ...]:
-    """The files beside the scenario that decide what it means: recorded targets, and Python files of custom models."""
+    """The files beside the scenario that decide what it means: recorded targets, custom Python files, programs."""
     beside = folder.resolve()
-    found = [beside / name for _, section in sections_in(model) if (name := _file(section))]
+    found = [beside / name for _, section in sections_in(model) for name in _files(section, beside)]
     return tuple(dict.fromkeys(found))
 
 
-def _file(section: Section) -> str:
-    """The file that a section itself names; empty where it names none."""
+def _files(section: Section, folder: Path) -> tuple[str, ...]:
+    """The files that a section itself names."""
     if isinstance(section, RecordedTargets | RecordingSection):
-        return section.path
-    module = section.function.rpartition(":")[0] if isinstance(section, Custom) else ""
-    return module if module.endswith(".py") else ""
+        return (section.path,)
+    return section.files(folder) if isinstance(section, Custom | ProgramSection) else ()
 
 
 def _anchored(value: Any, folder: Path) -> Any:
-    """The data with the files of recorded targets and of custom models as absolute paths; so is a coastline."""
+    """The data with the files of recorded targets, custom models, programs and coastlines as absolute paths."""
     if isinstance(value, list):
         return [_anchored(item, folder) for item in value]
     if not isinstance(value, dict):
@@ -84,6 +84,8 @@ def _anchored(value: Any, folder: Path) -> Any:
         anchored["path"] = str((folder / value["path"]).resolve())
     elif value.get("kind") == "custom" and ".py:" in value["function"]:
         anchored = {**value, "function": str(folder / value["function"])}
+    elif value.get("kind") == "program":
+        anchored = {**value, "folder": str((folder / value["folder"]).resolve())}
     return anchored
 
 

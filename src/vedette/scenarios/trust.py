@@ -4,28 +4,33 @@ from __future__ import annotations
 
 import os
 import stat
+from collections.abc import Iterator
 from pathlib import Path
 
 from vedette.scenarios.loading import BUILTIN_FOLDER, Scenario
-from vedette.scenarios.sections.base import Section
-from vedette.scenarios.sections.custom import customs
+from vedette.scenarios.sections.base import Section, sections_in
+from vedette.scenarios.sections.custom import Custom
+from vedette.scenarios.sections.program import ProgramSection
 
 
 def code_of(section: Section) -> tuple[str, ...]:
-    """What of the user's own a scenario, or a section of one, has imported and called, each once, in order."""
-    return tuple(dict.fromkeys(custom.function for _, custom in customs(section)))
+    """What of the user's own a scenario, or a section of one, has imported, called or started, each once, in order."""
+    return tuple(dict.fromkeys(own.code for own in _own(section)))
+
+
+def _own(section: Section) -> Iterator[Custom | ProgramSection]:
+    return (found for _, found in sections_in(section) if isinstance(found, Custom | ProgramSection))
 
 
 def not_own(scenario: Scenario) -> str:
     """Why the code that a scenario names may be somebody else's, in words; empty where there is no reason.
 
-    It is the user's own where the scenario file, the Python files that it names, and the folders that these are in
-    belong to the user or to the system's administrator, and nobody else may write to them. Systems without owners of
-    files give no reason.
+    It is the user's own where the scenario file, the Python files and programs that it names, and the folders that
+    these are in belong to the user or to the system's administrator, and nobody else may write to them. Systems without
+    owners of files give no reason.
     """
     files = [] if scenario.path is None else [scenario.path]
-    names = (reference.rpartition(":")[0] for reference in code_of(scenario.model))
-    files += [scenario.folder / name for name in names if name.endswith(".py")]
+    files += [scenario.folder / name for own in _own(scenario.model) for name in own.files(scenario.folder)]
     files = [file for file in files if file.parent != BUILTIN_FOLDER]
     return next(filter(None, map(others_may_change, files)), "")
 

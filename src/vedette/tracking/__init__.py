@@ -7,6 +7,7 @@ from vedette.tracking.delayed import Delay, Delayed
 from vedette.tracking.distributed import Distributed
 from vedette.tracking.late import Instant, LateInfo, LateScans, SensorScan, Timeline
 from vedette.tracking.network import Network
+from vedette.tracking.program import ProgramFilter
 from vedette.tracking.scan_network import ScanNetwork
 from vedette.tracking.searching import Searching
 from vedette.tracking.snapshots import load_snapshot, save_snapshot
@@ -22,6 +23,7 @@ __all__ = [
     "LateInfo",
     "LateScans",
     "Network",
+    "ProgramFilter",
     "ScanNetwork",
     "Searching",
     "SensorScan",

@@ -64,6 +64,16 @@ class Custom(Section):
         """What it is to be, in a word, for messages."""
         return type(self).__name__.removeprefix("Custom").lower()
 
+    @property
+    def code(self) -> str:
+        """What it runs, for people."""
+        return self.function
+
+    def files(self, folder: Path) -> tuple[str, ...]:
+        """The Python file that it names, where it does."""
+        name = self.function.rpartition(":")[0]
+        return (name,) if name.endswith(".py") else ()
+
     @classmethod
     def protocol(cls) -> type:
         """The class or protocol of what it gives."""

@@ -13,6 +13,7 @@ from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import Chance, Probability, Section, check
 from vedette.scenarios.sections.custom import Custom
 from vedette.scenarios.sections.derived import Derived, derived
+from vedette.scenarios.sections.program import ProgramCentral
 
 if TYPE_CHECKING:  # with the fusions comes the compiler, which a check does without
     from vedette.fusion import Fusion as FusionRule
@@ -58,7 +59,7 @@ class FusionLimits(Derived):
 
 
 class CustomCentral(Custom):
-    """A user's own `vedette.tracking.CentralFilter`, of all sensors' scans; called with `targets` and `sensors`."""
+    """A user's own `vedette.tracking.CentralFilter`, of all scans; called with `targets`, `sensors` and `scene`."""
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of filter [-].")
     gives: ClassVar[str] = "vedette.tracking:CentralFilter"
@@ -78,7 +79,7 @@ class Fusion(Section):
         "do so under sequential, parallel, central, arithmetic_average and by views, and are by plain covariance "
         "intersection under cm_delta_glmb and clmb [-].",
     )
-    filter: CustomCentral | None = Field(
+    filter: Annotated[CustomCentral | ProgramCentral, Field(discriminator="kind")] | None = Field(
         default=None,
         description="Of a central fusion: a filter of your own for all sensors' scans; none: that of the filter's kind "
         "[-].",

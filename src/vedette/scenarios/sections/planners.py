@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
@@ -15,6 +15,7 @@ from vedette.scenarios.sections.base import Count, Section, check
 from vedette.scenarios.sections.custom import Custom
 from vedette.scenarios.sections.deciding import AnyReward, AnySearch, Lookahead
 from vedette.scenarios.sections.derived import Derived, derived
+from vedette.scenarios.sections.program import ProgramSection
 
 if TYPE_CHECKING:  # with the planners comes the compiler, which a check does without
     from vedette.control import Constraint, JointSearch, MobileSensor, Plan, Planner, PlanningSettings
@@ -33,7 +34,8 @@ class Parts(NamedTuple):
     first_actions: what each sensor does where nothing decides. constraints: what they must not do. notes: what plans
     are to say of the fusion and of who hears whom. lookahead: arguments of `vedette.control.HorizonPlanner` by name,
     about sequences of decisions. estimate: reads the targets off the fused belief. oracle: arguments of
-    `vedette.simulation.OraclePlanner` by name, about scans and scores.
+    `vedette.simulation.OraclePlanner` by name, about scans and scores. scene: what a program is told of the scenario,
+    as plain data.
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -47,6 +49,7 @@ class Parts(NamedTuple):
     lookahead: dict[str, Any]
     estimate: Estimator
     oracle: dict[str, Any]
+    scene: Callable[[], dict[str, Any]]
 
 
 class Strategy(Section):
@@ -161,7 +164,7 @@ class NamedOracle(Strategy, Derived):
 
 class CustomPlanner(Strategy, Custom):
     """A user's own planner; called with `sensors`, `fusion`, `settings`, `reward`, `search`, `first_actions`,
-    `constraints`, `notes`, `lookahead`, `estimate`, `oracle`, of which it names those that it wants."""
+    `constraints`, `notes`, `lookahead`, `estimate`, `oracle`, `scene`, of which it names those that it wants."""
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of planner [-].")
     spared: ClassVar[tuple[str, ...]] = ("name",)  # which the scenario gives
@@ -170,6 +173,17 @@ class CustomPlanner(Strategy, Custom):
     def planner(self, parts: Parts, folder: Path) -> Planner:
         """The user's own."""
         return _watched(self.made(folder, **parts._asdict()), parts)
+
+
+class ProgramStrategy(Strategy, ProgramSection):
+    """A planner that is a program."""
+
+    def planner(self, parts: Parts, folder: Path) -> Planner:
+        """The one that asks it."""
+        from vedette.control import ProgramPlanner
+
+        names = ("sensors", "scene", "settings", "constraints", "estimate")
+        return ProgramPlanner(**{name: getattr(parts, name) for name in names}, **self.asked(folder))
 
 
 class _Random(Strategy):
@@ -229,6 +243,6 @@ class Named:
 
 
 AnyPlanner = Annotated[
-    NamedJoint | NamedIndependent | NamedLookahead | NamedRule | NamedOracle | CustomPlanner,
+    NamedJoint | NamedIndependent | NamedLookahead | NamedRule | NamedOracle | CustomPlanner | ProgramStrategy,
     Field(discriminator="kind"),
 ]

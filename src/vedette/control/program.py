@@ -1,0 +1,147 @@
+"""A planner that is a program of its own, in any language: it gets a line of JSON a decision, and answers with one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vedette.control.constraints import Constraint, Mask
+from vedette.control.inputs import check_poses, check_steering, mask_of_decision, options_of, single_mask
+from vedette.control.plan import Plan
+from vedette.control.settings import MobileSensor, PlanningSettings
+from vedette.densities import Estimate, Estimator, Labelled, best_estimate
+from vedette.kernels.base.types import Floats
+from vedette.models.arguments import generator, instance
+from vedette.platforms import Options
+from vedette.programs import Program, greeted
+from vedette.tracking import State
+
+COUNTED = ("filter_steps", "fusions", "rewards")
+
+
+@dataclass(slots=True, eq=False)
+class ProgramPlanner:
+    """Asks a program where to send the sensors; docs/benchmark.md says what it is told and what it answers.
+
+    The program is started at the first decision of a run, and again where time goes back. Its seed is drawn from the
+    numbers of that decision.
+
+    Attributes:
+        sensors: the sensors.
+        command: the program and its arguments.
+        scene: what it is told first, as plain data.
+        settings: the horizon, over which courses are told apart.
+        constraints: what the sensors must not do; an answer that does it is refused.
+        estimate: reads the targets off the fused belief.
+        folder: in which the program is started.
+        seconds: that it may take for an answer.
+        start_seconds: that it may take for its first answer, that it is ready.
+
+    Raises:
+        InputError: parts of another kind.
+    """
+
+    sensors: tuple[MobileSensor, ...]
+    command: Sequence[str]
+    scene: Callable[[], dict[str, Any]] = dict
+    settings: PlanningSettings = field(default_factory=PlanningSettings)
+    constraints: tuple[Constraint, ...] = ()
+    estimate: Estimator = best_estimate
+    folder: Path = Path()
+    seconds: float = 1.0
+    start_seconds: float = 60.0
+    _program: Program | None = field(init=False, default=None, repr=False)
+    _step: int = field(init=False, default=0, repr=False)
+
+    def __post_init__(self) -> None:
+        check_steering(self)
+
+    @property
+    def name(self) -> str:
+        """The strategy "program"."""
+        return "program"
+
+    def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
+        """What the program answers.
+
+        Raises:
+            InputError: inputs that do not fit, or a command that cannot be started.
+            VedetteError: no answer in time, or one that is none; the program is ended.
+        """
+        generator(rng)
+        instance("state", state, State)
+        options, at = options_of(self.sensors, poses, self.settings), check_poses(poses, len(self.sensors))
+        mask = mask_of_decision(self.constraints, self.sensors, options, state.fused, at, self.settings)
+        if self._program is None or state.step <= self._step:
+            self._program = greeted(self.command, self.folder, "planner", self.scene(), rng, self.start_seconds)
+        self._step = state.step
+        question = {"step": state.step, "time": state.time, "sensors": _choices(options, mask)}
+        if mask is not None and mask.together:
+            pairs = mask.together.items()
+            question["pairs"] = [{"sensors": list(pair), "allowed": table.tolist()} for pair, table in pairs]
+        estimate = self.estimate(state.fused, state.step)
+        question |= {"estimates": _told(estimate), "tracks": _told(state.fused)}
+        answer = self._program.ask(question, self.seconds)
+        joint, counts = _joint(self._program, answer, options, mask), _counts(self._program, answer)
+        chosen = tuple(own.first_action(course) for own, course in zip(options, joint, strict=True))
+        return Plan(self.name, tuple(own.actions for own in options), chosen, (), counts, mask.notes if mask else ())
+
+
+def _choices(options: Sequence[Options], mask: Mask | None) -> list[dict[str, Any]]:
+    """Of each sensor where it is and its different courses, each with the action that first takes it."""
+    return [
+        {
+            "pose": own.pose.tolist(),
+            "columns": list(own.actions.columns),
+            "actions": [own.actions.values[own.first_action(course)].tolist() for course in range(len(own.courses))],
+            "courses": own.courses.tolist(),
+            "allowed": single_mask(mask, s, len(own.courses)).tolist(),
+        }
+        for s, own in enumerate(options)
+    ]
+
+
+def _told(belief: Any) -> list[dict[str, Any]]:
+    """Every target of an estimate, or of a density that names them."""
+    if not isinstance(belief, Estimate | Labelled):
+        return []
+    return [
+        {
+            "label": list(target.label or ()),
+            "existence": float(target.existence),
+            "mean": target.mean.tolist(),
+            "cov": target.cov.tolist(),
+        }
+        for target in belief.targets()
+    ]
+
+
+def _joint(program: Program, answer: dict[str, Any], options: Sequence[Options], mask: Mask | None) -> tuple[int, ...]:
+    """The course of each sensor that the answer names; refuses what is no choice, or a forbidden one."""
+    given, num = answer.get("actions"), len(options)
+    if not isinstance(given, list) or len(given) != num or any(type(each) is not int for each in given):
+        program.refuse(f'"actions": {num} whole numbers, one a sensor', repr(given))
+    for s, (course, own) in enumerate(zip(given, options, strict=True)):
+        if not 0 <= course < len(own.courses):
+            program.refuse(f"actions[{s}] from 0 to {len(own.courses) - 1}", str(course))
+        if not single_mask(mask, s, len(own.courses))[course]:
+            program.refuse(f"actions[{s}] that is allowed", str(course))
+    if mask is not None:
+        for (first, second), table in mask.together.items():
+            if not table[given[first], given[second]]:
+                wanted = f"actions[{first}] and actions[{second}] that are allowed together"
+                program.refuse(wanted, f"{given[first]} and {given[second]}")
+    return tuple(given)
+
+
+def _counts(program: Program, answer: dict[str, Any]) -> dict[str, int]:
+    """What the program says that it has evaluated."""
+    counts = answer.get("counts", {})
+    known = isinstance(counts, dict) and set(counts) <= set(COUNTED)
+    if not known or any(type(each) is not int or not 0 <= each < 2**53 for each in counts.values()):
+        program.refuse(f'"counts": whole numbers of {", ".join(COUNTED)}', repr(counts))
+    return dict(counts)

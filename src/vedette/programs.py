@@ -1,0 +1,165 @@
+"""Programs beside this one, in any language, that are asked by lines of JSON over a pipe: docs/benchmark.md."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import signal
+import subprocess
+import weakref
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from threading import Thread
+from typing import IO, Any, NoReturn, TypeAlias
+
+import numpy as np
+
+from vedette.errors import InputError, VedetteError
+from vedette.text import elided, printable
+
+PROTOCOL = "vedette 1"
+MOST_BYTES = 2**24  # of an answer
+_LAST_WORDS = 500  # bytes of standard error that are kept
+_FAREWELL_SECONDS = 1.0  # that a program has to end once its input has ended
+# As many runs as there are processors share the work already.
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "JULIA_NUM_THREADS")
+
+_Questions: TypeAlias = "SimpleQueue[bytes | None]"
+
+
+class Program:
+    """A program that answers each line of JSON with a line of JSON; it ends with this object, or with this process.
+
+    Args:
+        command: the program and its arguments.
+        folder: in which it is started.
+
+    Raises:
+        InputError: a command that cannot be started.
+    """
+
+    def __init__(self, command: Sequence[str], folder: Path) -> None:
+        self.name = elided(shlex.join(command), 100)
+        self.answered = 0
+        self._said = bytearray()
+        self._questions: _Questions = SimpleQueue()
+        self._answers: SimpleQueue[bytes] = SimpleQueue()
+        environment, pipe = {**dict.fromkeys(_THREADS, "1"), **os.environ}, subprocess.PIPE
+        try:  # a session of its own: Ctrl-C is for this process, which then ends it
+            child = subprocess.Popen(
+                list(command), cwd=folder, env=environment, stdin=pipe, stdout=pipe, stderr=pipe, start_new_session=True
+            )
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", None) or error
+            raise InputError(f"command: expected a program that can be started; got {self.name}: {reason}") from None
+        self._child = child
+        Thread(target=_talk, args=(child, self._questions, self._answers), daemon=True).start()
+        assert child.stderr is not None
+        self._listener = Thread(target=_listen, args=(child.stderr, self._said), daemon=True)
+        self._listener.start()
+        self._end = weakref.finalize(self, _end, child, self._questions)
+
+    def ask(self, question: Mapping[str, Any], seconds: float) -> dict[str, Any]:
+        """The answer to a question. One that does not come in time, or is no JSON object, ends the program.
+
+        Raises `VedetteError` with what was expected, what came and the last words on standard error.
+        """
+        self.answered += 1
+        self._questions.put(json.dumps(question, separators=(",", ":"), allow_nan=False).encode() + b"\n")
+        try:
+            line = self._answers.get(timeout=seconds)
+        except Empty:
+            self.refuse(f"an answer within {seconds:g} s", "none")
+        if len(line) > MOST_BYTES:
+            self.refuse(f"a line of at most {MOST_BYTES} bytes", "a longer one")
+        if not line.endswith(b"\n"):
+            self.refuse("a line", f"{_shown(line)} and {self._ended()}" if line else self._ended())
+        try:
+            answer = json.loads(line, parse_constant=_no_number)
+        except (ValueError, RecursionError):
+            self.refuse("a JSON object", _shown(line))
+        if not isinstance(answer, dict):
+            self.refuse("a JSON object", _shown(line))
+        return answer
+
+    def refuse(self, wanted: str, got: str) -> NoReturn:
+        """End the program for its last answer, and say why. Raises `VedetteError`."""
+        self._end.detach()
+        self._questions.put(None)
+        _kill(self._child)
+        self._listener.join(_FAREWELL_SECONDS)
+        words = printable(self._said.decode(errors="replace").strip()[-_LAST_WORDS:])
+        said = f"; it said last: {words}" if words else ""
+        raise VedetteError(f"program {self.name}, answer {self.answered}: expected {wanted}; got {got}{said}")
+
+    def _ended(self) -> str:
+        """How it ended, in words."""
+        try:
+            return f"its end, with status {self._child.wait(_FAREWELL_SECONDS)}"
+        except subprocess.TimeoutExpired:
+            return "the end of its output"
+
+
+def greeted(
+    command: Sequence[str], folder: Path, role: str, scene: Mapping[str, Any], rng: np.random.Generator, seconds: float
+) -> Program:
+    """A program that has been told what it is to be and of which scene, and has answered that it is ready.
+
+    rng: its seed is drawn from it. Raises as `Program` and `Program.ask`.
+    """
+    program = Program(command, folder)
+    told = {"protocol": PROTOCOL, "role": role, "seed": int(rng.integers(2**31)), "scene": scene}
+    if program.ask(told, seconds).get("ready") is not True:
+        program.refuse('"ready": true, in answer to its first line', "another answer")
+    return program
+
+
+def _no_number(text: str) -> NoReturn:
+    raise ValueError(text)
+
+
+def _shown(line: bytes) -> str:
+    return elided(printable(line[:300].decode(errors="replace").strip()), 100) or "an empty line"
+
+
+def _talk(child: subprocess.Popen[bytes], questions: _Questions, answers: SimpleQueue[bytes]) -> None:
+    """Pass on questions and answers, so that whoever asks can stop waiting for either; None ends its input."""
+    assert child.stdin is not None
+    assert child.stdout is not None
+    with child.stdout:
+        for question in iter(questions.get, None):
+            with suppress(OSError):  # it has ended; what it said last is read
+                child.stdin.write(question)
+                child.stdin.flush()
+            answers.put(child.stdout.readline(MOST_BYTES + 1))
+        with suppress(OSError):
+            child.stdin.close()
+
+
+def _listen(stream: IO[bytes], said: bytearray) -> None:
+    """Keep the last words of a stream, so that a program never waits for it to be read."""
+    with stream:
+        while part := os.read(stream.fileno(), 4096):
+            said += part
+            del said[:-_LAST_WORDS]
+
+
+def _end(child: subprocess.Popen[bytes], questions: _Questions) -> None:
+    """Say by the end of its input that nothing more will be asked; kill what does not end by itself."""
+    questions.put(None)
+    with suppress(subprocess.TimeoutExpired):
+        child.wait(_FAREWELL_SECONDS)
+    _kill(child)
+
+
+def _kill(child: subprocess.Popen[bytes]) -> None:
+    """End it, where it has not ended, with what it has started."""
+    if child.poll() is None:
+        if hasattr(os, "killpg"):
+            with suppress(ProcessLookupError, PermissionError):
+                os.killpg(child.pid, signal.SIGKILL)
+        child.kill()
+        child.wait()
