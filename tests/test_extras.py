@@ -74,6 +74,7 @@ HEAVY = {
     ("report", "there"): ("jinja2 and matplotlib and pyarrow", "report"),
     ("demo",): ("jinja2 and matplotlib and pyarrow", "report"),
     ("reproduce",): ("jinja2 and matplotlib and pyarrow", "report"),
+    ("benchmark",): ("jinja2 and matplotlib and pyarrow", "report"),
 }
 
 

@@ -74,7 +74,7 @@ CALLS: list[tuple[tuple[str, ...], set[str]]] = [
     (("demo", "short.yaml", "--planners", "still,own", "--workers", "1"), {"comparisons", "page"}),
     (("reproduce", "short.yaml", "--runs", "1", "--planners", "still", "--workers", "1"), {"comparisons", "report"}),
 ]
-LISTS = [("list",), ("reproduce", "--list"), ("schema",)]
+LISTS = [("list",), ("reproduce", "--list"), ("benchmark", "--list"), ("schema",)]
 
 
 def test_every_command_has_both_options() -> None:

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from vedette import __version__
+from vedette.cli.benchmarking import benchmark
 from vedette.cli.calibrating import calibrate
 from vedette.cli.campaign import campaign
 from vedette.cli.demo import demo
@@ -60,6 +61,7 @@ app.command()(speaking(track))
 app.command()(speaking(live))
 app.command()(speaking(calibrate))
 app.command()(speaking(reproduce))
+app.command()(speaking(benchmark))
 app.command()(speaking(campaign))
 app.command()(speaking(merge))
 app.command()(speaking(results))

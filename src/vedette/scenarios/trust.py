@@ -19,7 +19,9 @@ def code_of(section: Section) -> tuple[str, ...]:
 
 
 def _own(section: Section) -> Iterator[Custom | ProgramSection]:
-    return (found for _, found in sections_in(section) if isinstance(found, Custom | ProgramSection))
+    """What is named that is not the library's."""
+    found = (each for _, each in sections_in(section) if isinstance(each, Custom | ProgramSection))
+    return (each for each in found if not each.code.startswith("vedette."))
 
 
 def not_own(scenario: Scenario) -> str:

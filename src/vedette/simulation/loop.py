@@ -138,7 +138,8 @@ class World:
         num = experiment.num_sensors
         self._scan_rngs, self._filter_rngs = (sensor_streams(seed, run, stream, num) for stream in (SCANS, FILTER))
         self._scans_at = scans_of_run(experiment.scans_at, experiment.drop_out, len(experiment.times), seed, run)
-        self.fleet, self._state = experiment.fleet(moving=moving), experiment.tracker.initial()
+        self._tracker = _told(experiment.tracker, self.truth)
+        self.fleet, self._state = experiment.fleet(moving=moving), self._tracker.initial()
         self.moment: Moment | None = None
 
     @property
@@ -184,7 +185,7 @@ class World:
             else:
                 measurements = tuple(recording.scans[step - 1])
         with clock.timing("filter"):
-            state, info = experiment.tracker.step(self._state, measurements, poses, time, rngs=self._filter_rngs)
+            state, info = self._tracker.step(self._state, measurements, poses, time, rngs=self._filter_rngs)
         with clock.timing("estimate"):
             estimate = experiment.estimate(state.fused, step)
         self._state, self.moment = state, Moment(step, time, poses, measurements, scans, state, info, estimate)
@@ -255,10 +256,9 @@ def simulate(
         raise RunStopped(message, journal.step, journal.time, journal.stage(error), record) from error
 
 
-def _told(planner: Any, truth: Truth) -> Planner | None:
-    """The planner of this run, where it is one that knows the targets."""
-    told: Planner | None = planner.told(truth) if isinstance(planner, KnowsTruth) else planner
-    return told
+def _told(own: Any, truth: Truth) -> Any:
+    """The planner or tracker of this run, where it is one that knows the targets."""
+    return own.told(truth) if isinstance(own, KnowsTruth) else own
 
 
 def _go(experiment: Experiment, planner: Planner | None, journal: Journal, watch: Callable[[int], None] | None) -> None:

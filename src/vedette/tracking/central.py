@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -95,6 +95,10 @@ class Central(OfAllScans):
 
     Attributes and errors: as `OfAllScans`.
     """
+
+    def told(self, truth: Any) -> Central:
+        """The same, where the filter is one that is told the targets of a run."""
+        return replace(self, filter=self.filter.told(truth)) if hasattr(self.filter, "told") else self
 
     def initial(self) -> State:
         """No target."""

@@ -1,0 +1,230 @@
+"""How entrants stand on the scenes of a benchmark beside the library's own, and tables of it."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from vedette.campaigns.benchmark import OWN, Entrant, Scene
+from vedette.campaigns.results import CampaignResults, open_results
+from vedette.campaigns.scores import decision_seconds
+from vedette.evaluation import Summary, summarise
+from vedette.evaluation.comparison import scored
+from vedette.kernels.base.types import Floats
+from vedette.scenarios.dumping import dump_scenario
+from vedette.simulation.records import RunRecord
+from vedette.simulation.storage import versions
+from vedette.text import markdown_table, named_in, with_minus
+
+COUNTED = ("filter_steps", "fusions", "rewards")
+# Below this mean NEES, estimates said nothing of their certainty: see `vedette.tracking.ProgramFilter`.
+_SAYS_NOTHING = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """How one strategy stands on a scene, over the runs that were tried of it. A lost run counts as the cutoff.
+
+    Attributes:
+        label: of it.
+        is_own: whether it is one of the library's own.
+        num_runs, num_lost: runs, and of these the ones that could not be finished.
+        ospa: mean over scans and runs, with its 95 % interval.
+        difference: of that to the first strategy, run by run; None: it is the first.
+        cardinality_error: mean number of estimates minus that of targets; NaN: no run was finished.
+        nees: mean NEES of positions over 2, with its interval: 1 where covariances are right; None: it says nothing.
+        seconds: wall time of a decision, or of the filters and fusion of a scan, median, s; a program's is in it.
+        counts: of each of `COUNTED`, how many a decision took; NaN: not known.
+        reason: why runs were lost, of the first.
+    """
+
+    label: str
+    is_own: bool
+    num_runs: int
+    num_lost: int
+    ospa: Summary
+    difference: Summary | None
+    cardinality_error: float
+    nees: Summary | None
+    seconds: float
+    counts: Mapping[str, float]
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class SceneTable:
+    """All that stand on a scene, the one to compare with first.
+
+    Attributes:
+        scene: which.
+        unit: of OSPA.
+        digest: SHA-256 of the scenario without who is entered.
+        standings: of each.
+    """
+
+    scene: Scene
+    unit: str
+    digest: str
+    standings: tuple[Standing, ...]
+
+
+def scene_table(scene: Scene, folder: Path) -> SceneTable | None:
+    """Of the results in the folder of a benchmark; None where the first strategy has no run there."""
+    place = folder / scene.name
+    found = [each for each in sorted(place.iterdir()) if each.is_dir()] if place.is_dir() else []
+    opened = [open_results(each) for each in sorted(found, key=lambda each: (each.name != OWN, each.name))]
+    tried = [each for results in opened for each in _tried(scene, results)]
+    if not tried or tried[0].label != scene.beside[0] or not tried[0].ospa:
+        return None
+    first = tried[0].ospa
+    scenario = opened[0].campaign.cells[0].scenario
+    model = scenario.model.model_copy(update={"planners": {}, "metrics": {}})
+    text = dump_scenario(model, folder=scenario.folder)
+    standings = tuple(filter(None, (_standing(each, first, each is tried[0]) for each in tried)))
+    return SceneTable(scene, scenario.model.ospa.unit, hashlib.sha256(text.encode()).hexdigest(), standings)
+
+
+@dataclass(frozen=True, slots=True)
+class _Tried:
+    label: str
+    is_own: bool
+    ospa: dict[int, float]  # by run, lost ones at the cutoff
+    lost: tuple[str, ...]
+    cardinality: Floats
+    nees: Floats
+    seconds: Floats
+    counts: dict[str, Floats]
+
+
+def _tried(scene: Scene, results: CampaignResults) -> Iterator[_Tried]:
+    for cell in results.campaign.cells:
+        label = str(cell.settings["planner" if scene.role == "planner" else "variant"])
+        lost = {each.run: each.message for each in results.failures() if each.cell == cell.name}
+        runs = [results.run(cell.name, run) for run in results.finished(cell.name)]
+        ospa = dict.fromkeys(lost, float(cell.scenario.model.ospa.cutoff))
+        cardinality = nees = np.empty(0)
+        if runs:
+            records = [run.record for run in runs]
+            comparison = scored(cell.scenario, {label: records}, {label: [run.metrics for run in runs]})
+            ospa |= dict(zip([record.run for record in records], comparison.run_means(label).tolist(), strict=True))
+            cardinality = comparison.run_means(label, "cardinality_error")
+            nees = comparison.run_means(label, "position_nees_mean") / 2.0
+        decided = [decision.plan.counts for run in runs for decision in run.record.decisions]
+        yield _Tried(
+            label,
+            results.folder.name == OWN,
+            ospa,
+            tuple(lost[run] for run in sorted(lost)),
+            cardinality,
+            nees[~np.isnan(nees)],
+            np.concatenate([np.empty(0), *(_spent(scene, run.record) for run in runs)]),
+            {name: np.array([counts[name] for counts in decided if name in counts], float) for name in COUNTED},
+        )
+
+
+def _spent(scene: Scene, record: RunRecord) -> Floats:
+    """s of wall time, of each decision, or of the filters and fusion of each scan."""
+    if scene.role == "planner":
+        return decision_seconds(record)
+    return np.asarray(record.timings["filter"] + record.timings["fusion"])
+
+
+def _standing(tried: _Tried, first: Mapping[int, float], is_first: bool) -> Standing | None:
+    if not tried.ospa:
+        return None
+    common = sorted(tried.ospa.keys() & first.keys())
+    more = summarise([tried.ospa[run] - first[run] for run in common]) if common and not is_first else None
+    return Standing(
+        tried.label,
+        tried.is_own,
+        len(tried.ospa),
+        len(tried.lost),
+        summarise([tried.ospa[run] for run in sorted(tried.ospa)]),
+        more,
+        _mean(tried.cardinality),
+        summarise(tried.nees) if len(tried.nees) and tried.nees.mean() > _SAYS_NOTHING else None,
+        float(np.median(tried.seconds)) if len(tried.seconds) else np.nan,
+        {name: _mean(values) for name, values in tried.counts.items()},
+        tried.lost[0] if tried.lost else "",
+    )
+
+
+def _mean(values: Floats) -> float:
+    return float(values.mean()) if len(values) else np.nan
+
+
+def header(table: SceneTable) -> tuple[str, ...]:
+    """Of the columns of `row`."""
+    unit, first = table.unit, table.scene.beside[0]
+    spent = "ms a decision" if table.scene.role == "planner" else "ms a scan"
+    names = (named_in("OSPA", unit), named_in(f"More than {first}", unit), "95 %", "N error", "NEES", "95 %", spent)
+    counts = ("Filter steps", "Fusions", "Rewards") if table.scene.role == "planner" else ()
+    return (table.scene.role.capitalize(), *names, *counts, "Lost", "Runs")
+
+
+def row(table: SceneTable, own: Standing) -> tuple[str, ...]:
+    """One row under `header`; empty where something is not known."""
+    more, nees = own.difference, own.nees
+    counts = [_known(own.counts[name], ",.0f") for name in COUNTED] if table.scene.role == "planner" else []
+    return (
+        own.label,
+        _known(float(own.ospa.mean), ".2f"),
+        "" if more is None else _known(float(more.mean), "+.2f"),
+        "" if more is None else _interval(more, "+.2f"),
+        _known(own.cardinality_error, "+.2f"),
+        "" if nees is None else _known(float(nees.mean), ".2f"),
+        "" if nees is None else _interval(nees, ".2f"),
+        _known(1e3 * own.seconds, ".3g"),
+        *counts,
+        str(own.num_lost) if own.num_lost else "",
+        str(own.num_runs),
+    )
+
+
+def _known(value: float, form: str) -> str:
+    return "" if np.isnan(value) else with_minus(format(value, form))
+
+
+def _interval(summary: Summary, form: str) -> str:
+    return "" if np.isnan(summary.low) else f"{_known(float(summary.low), form)} to {_known(float(summary.high), form)}"
+
+
+def origin(tables: Sequence[SceneTable], entrants: Sequence[Entrant], seed: int) -> dict[str, str]:
+    """What the tables are of: versions, scenarios and entrants with their SHA-256."""
+    found = {"seed": str(seed), **versions()}
+    found |= {f"scene {table.scene.name}": table.digest for table in tables}
+    return found | {f"{each.role} {each.name}": each.digest for each in entrants}
+
+
+def benchmark_markdown(tables: Sequence[SceneTable], facts: Mapping[str, str]) -> str:
+    """All tables as Markdown."""
+    lines = ["# The benchmark of the field", ""]
+    for table in tables:
+        lines += [f"## {table.scene.name}", "", f"{table.scene.about}.", ""]
+        lines += [markdown_table(header(table), [row(table, own) for own in table.standings]), ""]
+        lines += [f"Lost, {own.label}: {own.reason}\n" for own in table.standings if own.reason]
+    return "\n".join([*lines, "## Of what", "", *(f"- {name}: `{value}`" for name, value in facts.items()), ""])
+
+
+def benchmark_csv(tables: Sequence[SceneTable]) -> str:
+    """All standings as CSV, numbers in full, one row a scene and strategy."""
+    out = io.StringIO()
+    names = ["ospa", "ospa_low", "ospa_high", "difference", "difference_low", "difference_high", "cardinality_error"]
+    names += ["nees", "nees_low", "nees_high", "seconds", *COUNTED, "num_lost", "num_runs"]
+    write = csv.writer(out, lineterminator="\n").writerow
+    write(("scene", "scene_sha256", "role", "strategy", "is_own", "unit", *names))
+    for table in tables:
+        for own in table.standings:
+            summaries = [own.ospa, own.difference, own.nees]
+            parts = [["", "", ""] if each is None else [each.mean, each.low, each.high] for each in summaries]
+            numbers = [*parts[0], *parts[1], own.cardinality_error, *parts[2], own.seconds, *own.counts.values()]
+            told = [("" if value == "" or np.isnan(value) else repr(float(value))) for value in numbers]
+            start = [table.scene.name, table.digest, table.scene.role, own.label, int(own.is_own), table.unit]
+            write([*start, *told, own.num_lost, own.num_runs])
+    return out.getvalue()

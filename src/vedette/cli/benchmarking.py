@@ -1,0 +1,126 @@
+"""The command that puts planners and trackers beside the library's own: benchmark."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from vedette.cli.campaign import carry_out, load_workers
+from vedette.cli.errors import named_options, usage_error
+from vedette.cli.options import Seed, Trust, Workers
+from vedette.cli.output import console, note, print_names, publish, say
+from vedette.cli.results import print_failures
+from vedette.cli.running import Approval, interruptible
+from vedette.cli.scenario_files import write_text
+from vedette.extras import need
+
+if TYPE_CHECKING:
+    from vedette.campaigns import Failed
+    from vedette.campaigns.benchmark import Entrant, Scene
+    from vedette.campaigns.standings import SceneTable
+
+_RUNS, _QUICK_RUNS = 30, 2
+_WHAT = "NAME=COMMAND of a program that speaks JSON lines, NAME=file.py:attribute or NAME=package.module:attribute."
+
+
+def benchmark(
+    planners: Annotated[
+        list[str] | None, typer.Option("--planner", metavar="NAME=WHAT", help=f"A planner: {_WHAT}")
+    ] = None,
+    trackers: Annotated[
+        list[str] | None, typer.Option("--tracker", metavar="NAME=WHAT", help="A tracker, likewise.")
+    ] = None,
+    names: Annotated[
+        str | None, typer.Option("--scenes", metavar="LIST", help="Scenes of --list; else all that suit the entrants.")
+    ] = None,
+    runs: Annotated[
+        int | None, typer.Option("--runs", min=1, help="Paired runs on each scene, 30; with --quick 2.")
+    ] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="The small scenes alone, in a minute.")] = False,
+    seconds: Annotated[float, typer.Option("--seconds", min=1e-3, help="That a program may take for an answer.")] = 1.0,
+    seed: Seed = 0,
+    workers: Workers = 0,
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="Folder for all of it; more may be added at any time.")
+    ] = Path("benchmark"),
+    list_: Annotated[bool, typer.Option("--list", help="List the scenes, and stop.")] = False,
+    trust: Trust = False,
+) -> None:
+    """Put your planners and trackers beside the library's own, rules of thumb and oracles, on the same scenes.
+
+    Runs that the folder holds are not run again. Ends with a table for each scene, and a page.
+    """
+    need("vedette benchmark", "jinja2", "matplotlib", "pyarrow")
+    if not list_:
+        load_workers(workers)
+    from vedette.campaigns.benchmark import OWN, campaign_of, entrant, scenes
+    from vedette.campaigns.standings import scene_table
+
+    if list_:
+        print_names({name: scene.about for name, scene in scenes().items()})
+        publish([{"name": name, "role": scene.role, "about": scene.about} for name, scene in scenes().items()])
+        return
+    with named_options({"planner": "--planner", "tracker": "--tracker"}):
+        entered = [entrant("planner", each, seconds=seconds, folder=Path()) for each in planners or ()]
+        entered += [entrant("tracker", each, seconds=seconds, folder=Path()) for each in trackers or ()]
+    approve, num_runs = Approval(trust), runs or (_QUICK_RUNS if quick else _RUNS)
+    failed: list[Failed] = []
+    chosen = _chosen(names, quick, entered)
+    for scene in chosen:
+        for own in (None, *(each for each in entered if each.role == scene.role)):
+            folder = out / scene.name / (OWN if own is None else own.name)
+            note(f"{scene.name}: {folder.name}")
+            campaign = campaign_of(scene, own, num_runs, seed, out, approve=approve)
+            failed += carry_out(campaign, folder, workers).failed
+    tables = [table for scene in scenes().values() if (table := scene_table(scene, out)) is not None]
+    page = _write(tables, entered, seed, out)
+    for table in tables:
+        if table.scene in chosen:
+            _print(table)
+    if failed:
+        say("lost runs, which count as the cutoff:")
+        print_failures(failed, say)
+    say(f"wrote {out}; open {page}")
+    publish({"folder": out, "report": page, "scenes": [asdict(table) for table in tables if table.scene in chosen]})
+
+
+def _chosen(names: str | None, quick: bool, entered: list[Entrant]) -> list[Scene]:
+    from vedette.campaigns.benchmark import scenes
+
+    known = scenes()
+    if names is not None:
+        wanted = [name.strip() for name in names.split(",")]
+        for name in wanted:
+            if name not in known:
+                raise usage_error(f"expected some of {', '.join(known)}; got {name!r}", "--scenes")
+        return [known[name] for name in wanted]
+    roles = {each.role for each in entered} or {scene.role for scene in known.values()}
+    return [scene for scene in known.values() if scene.role in roles and (scene.quick or not quick)]
+
+
+def _write(tables: list[SceneTable], entered: list[Entrant], seed: int, out: Path) -> Path:
+    from vedette.campaigns.standings import benchmark_csv, benchmark_markdown, origin
+    from vedette.reports.benchmark import write_benchmark
+
+    with interruptible(f"{out} keeps every run; the same command writes the tables"):
+        facts = origin(tables, entered, seed)
+        write_text(out / "benchmark.md", benchmark_markdown(tables, facts))
+        write_text(out / "benchmark.csv", benchmark_csv(tables))
+        write_benchmark(tables, facts, page := out / "benchmark.html")
+    return page
+
+
+def _print(table: SceneTable) -> None:
+    from rich.table import Table
+
+    from vedette.campaigns.standings import header, row
+
+    shown = Table(box=None, pad_edge=False, title=f"{table.scene.name}: {table.scene.about}", title_justify="left")
+    for place, heading in enumerate(header(table)):
+        shown.add_column(heading, justify="right" if place else "left", no_wrap=place > 0)
+    for own in table.standings:
+        shown.add_row(*row(table, own))
+    console().print(shown)

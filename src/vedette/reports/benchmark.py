@@ -1,0 +1,27 @@
+"""The results of a benchmark as one HTML file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from vedette.campaigns.standings import SceneTable, header, row
+from vedette.reports.tables import Table
+from vedette.reports.writing import make_room, render, write_page
+
+_NOTE = (
+    "All on the same runs. A lost run counts as the cutoff. NEES: of positions over 2, 1 where covariances are right; "
+    "empty where nothing is said of them. 95 %: interval over the runs by Student's t."
+)
+
+
+def write_benchmark(tables: Sequence[SceneTable], facts: Mapping[str, str], path: Path) -> None:
+    """Write the page of a benchmark. facts: of what it is, by name. Raises `InputError` for a place that is none."""
+    make_room(path)
+    named = [
+        (table, Table(_NOTE, header(table), tuple(row(table, own) for own in table.standings))) for table in tables
+    ]
+    of_what = Table(
+        "Versions, and SHA-256 of scenes and entrants.", ("What", "Value"), tuple(facts.items()), is_words=True
+    )
+    write_page(path, render("benchmark.html", [], scripts=(), tables=named, facts=of_what))
