@@ -73,6 +73,7 @@ CALLS: list[tuple[tuple[str, ...], set[str]]] = [
     (("report", "trial-results"), {"page", "figures"}),
     (("demo", "short.yaml", "--planners", "still,own", "--workers", "1"), {"comparisons", "page"}),
     (("reproduce", "short.yaml", "--runs", "1", "--planners", "still", "--workers", "1"), {"comparisons", "report"}),
+    (("benchmark", "--scenes", "polar-10", "--runs", "1", "--workers", "1"), {"folder", "report", "scenes"}),
 ]
 LISTS = [("list",), ("reproduce", "--list"), ("benchmark", "--list"), ("schema",)]
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import re
 import shlex
+import shutil
 import tomllib
 from dataclasses import dataclass
 from functools import cache
@@ -16,6 +17,8 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 from vedette.campaigns.cells import Campaign, resolve, safe_name
+from vedette.campaigns.manifest import MANIFEST, read_manifest
+from vedette.campaigns.results import open_results
 from vedette.campaigns.spec import CampaignSpec
 from vedette.errors import InputError
 from vedette.scenarios import GeneratedCrowd
@@ -147,3 +150,19 @@ def campaign_of(scene: Scene, entrant: Entrant | None, runs: int, seed: int, fol
         ]
         spec = CampaignSpec(**given, planners=("still",), variants=variants, compare="variant")  # type: ignore[arg-type]
     return resolve(spec, **how)
+
+
+def make_way(campaign: Campaign, folder: Path) -> None:
+    """Clear a folder of an entrant that has changed since and finished no run there.
+
+    Raises `InputError` where it has finished some, which are not to be mixed with those of now.
+    """
+    if not (folder / MANIFEST).is_file() or read_manifest(folder)["digest"] == campaign.digest():
+        return
+    there = open_results(folder)
+    if any(there.finished(cell.name) for cell in there.campaign.cells):
+        raise InputError(
+            f"{folder}: expected runs of {folder.name} as it is now; got those of another program, scene or seed "
+            "of that name (enter it under another name, or remove the folder)"
+        )
+    shutil.rmtree(folder)

@@ -56,7 +56,7 @@ def benchmark(
     need("vedette benchmark", "jinja2", "matplotlib", "pyarrow")
     if not list_:
         load_workers(workers)
-    from vedette.campaigns.benchmark import OWN, campaign_of, entrant, scenes
+    from vedette.campaigns.benchmark import OWN, campaign_of, entrant, make_way, scenes
     from vedette.campaigns.standings import scene_table
 
     if list_:
@@ -74,6 +74,7 @@ def benchmark(
             folder = out / scene.name / (OWN if own is None else own.name)
             note(f"{scene.name}: {folder.name}")
             campaign = campaign_of(scene, own, num_runs, seed, out, approve=approve)
+            make_way(campaign, folder)
             failed += carry_out(campaign, folder, workers).failed
     tables = [table for scene in scenes().values() if (table := scene_table(scene, out)) is not None]
     page = _write(tables, entered, seed, out)
