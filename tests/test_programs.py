@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -15,35 +16,17 @@ from vedette.campaigns import CampaignSpec, open_results, resolve, run_campaign
 from vedette.cli.running import Approval
 from vedette.errors import InputError
 from vedette.evaluation.runs import run_scenario
+from vedette.evaluation.scans import scans_of_record
 from vedette.programs import MOST_BYTES
 from vedette.scenarios import Scenario, load_scenario
+from vedette.scenarios.build import build_sensors
 from vedette.scenarios.overrides import with_fields
 from vedette.simulation.loop import RunStopped
 from vedette.simulation.records import RunRecord
 
-NEAREST = """
-import json, math, sys
-
-for line in sys.stdin:
-    told = json.loads(line)
-    if "role" in told:
-        print('{"ready": true}', flush=True)
-        continue
-    places = [each["mean"][:2] for each in told["estimates"]]
-    taken, actions = [0] * len(places), []
-    for sensor in told["sensors"]:
-        x, y = sensor["pose"][:2]
-        if not places:
-            actions.append(sensor["allowed"].index(True))
-            continue
-        free = [i for i in range(len(places)) if taken[i] == min(taken)]
-        goal = min(free, key=lambda i: math.hypot(x - places[i][0], y - places[i][1]))
-        taken[goal] += 1
-        gx, gy = places[goal]
-        far = [sum(math.hypot(gx - p[0], gy - p[1]) for p in course) / len(course) for course in sensor["courses"]]
-        actions.append(min((f, k) for k, f in enumerate(far) if sensor["allowed"][k])[1])
-    print(json.dumps({"actions": actions}), flush=True)
-"""
+PAGE = (Path(__file__).resolve().parents[1] / "docs/benchmark.md").read_text("utf-8")
+SHOWN = dict(re.findall(r'^```\w+ title="([^"]+)"\n(.*?)^```$', PAGE, re.DOTALL | re.MULTILINE))
+NEAREST = SHOWN["nearest.py"]
 # A program of one answer; `told` is what it was asked.
 ANSWERS = """
 import json, os, sys, time
@@ -239,6 +222,18 @@ def test_a_tracker_is_told_every_scan_with_its_time_and_pose(tmp_path: Path) -> 
     scenario = tracked(section(tmp_path, ANSWERS.replace("ANSWER", SAYS % own)), **silent)
     record = run_scenario(scenario, "still", seed=0)
     assert [estimate.means[0, :2].tolist() for estimate in record.estimates] == [[t, 0.0] for t in record.times]
+
+
+@pytest.mark.parametrize("name", ["polar-10", "three-positions"])
+def test_the_tracker_of_the_page_reports_what_the_first_sensor_says(name: str, tmp_path: Path) -> None:
+    program = section(tmp_path, SHOWN["last.py"])
+    scenario = with_fields(load_scenario(name), {"fusion": {"kind": "central", "filter": program}})
+    sensor = build_sensors(scenario)[0].filter.sensor
+    record = run_scenario(scenario, "still", seed=0)
+    scan = scans_of_record(record, scenario)[4][0]
+    assert scan is not None
+    places = sensor.measurement.positions(scan.measurements, record.poses[4, 0])
+    assert np.allclose(np.sort(record.estimates[4].means[:, 0]), np.sort(places[:, 0]))
 
 
 BAD_ESTIMATES = {
