@@ -72,7 +72,7 @@ class Program:
         try:
             line = self._answers.get(timeout=seconds)
         except Empty:
-            self.refuse(f"an answer within {seconds:g} s", "none")
+            self.refuse(f"an answer within {seconds:g} s", "none (is what it prints flushed?)")
         if len(line) > MOST_BYTES:
             self.refuse(f"a line of at most {MOST_BYTES} bytes", "a longer one")
         if not line.endswith(b"\n"):

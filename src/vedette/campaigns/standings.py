@@ -163,7 +163,8 @@ def header(table: SceneTable) -> tuple[str, ...]:
     """Of the columns of `row`."""
     unit, first = table.unit, table.scene.beside[0]
     spent = "ms a decision" if table.scene.role == "planner" else "ms a scan"
-    names = (named_in("OSPA", unit), named_in(f"More than {first}", unit), "95 %", "N error", "NEES", "95 %", spent)
+    ours = named_in("OSPA", unit), named_in(f"More than {first}", unit), "95 %"
+    names = (*ours, "N error", "NEES", "NEES, 95 %", spent)
     counts = ("Filter steps", "Fusions", "Rewards") if table.scene.role == "planner" else ()
     return (table.scene.role.capitalize(), *names, *counts, "Lost", "Runs")
 

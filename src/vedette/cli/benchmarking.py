@@ -9,16 +9,15 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vedette.cli.campaign import carry_out, load_workers
+from vedette.cli.comparisons import print_standings
 from vedette.cli.errors import named_options, usage_error
 from vedette.cli.options import Seed, Trust, Workers
-from vedette.cli.output import console, note, print_names, publish, say
-from vedette.cli.results import print_failures
+from vedette.cli.output import note, print_names, publish, say
 from vedette.cli.running import Approval, interruptible
 from vedette.cli.scenario_files import write_text
 from vedette.extras import need
 
 if TYPE_CHECKING:
-    from vedette.campaigns import Failed
     from vedette.campaigns.benchmark import Entrant, Scene
     from vedette.campaigns.standings import SceneTable
 
@@ -67,23 +66,20 @@ def benchmark(
         entered = [entrant("planner", each, seconds=seconds, folder=Path()) for each in planners or ()]
         entered += [entrant("tracker", each, seconds=seconds, folder=Path()) for each in trackers or ()]
     approve, num_runs = Approval(trust), runs or (_QUICK_RUNS if quick else _RUNS)
-    failed: list[Failed] = []
     chosen = _chosen(names, quick, entered)
     for scene in chosen:
-        for own in (None, *(each for each in entered if each.role == scene.role)):
+        for own in (*(each for each in entered if each.role == scene.role), None):  # who may fail comes first
             folder = out / scene.name / (OWN if own is None else own.name)
             note(f"{scene.name}: {folder.name}")
             campaign = campaign_of(scene, own, num_runs, seed, out, approve=approve)
             make_way(campaign, folder)
-            failed += carry_out(campaign, folder, workers).failed
+            carry_out(campaign, folder, workers)
     tables = [table for scene in scenes().values() if (table := scene_table(scene, out)) is not None]
     page = _write(tables, entered, seed, out)
     for table in tables:
         if table.scene in chosen:
-            _print(table)
-    if failed:
-        say("lost runs, which count as the cutoff:")
-        print_failures(failed, say)
+            print_standings(table)
+            say()
     say(f"wrote {out}; open {page}")
     publish({"folder": out, "report": page, "scenes": [asdict(table) for table in tables if table.scene in chosen]})
 
@@ -112,16 +108,3 @@ def _write(tables: list[SceneTable], entered: list[Entrant], seed: int, out: Pat
         write_text(out / "benchmark.csv", benchmark_csv(tables))
         write_benchmark(tables, facts, page := out / "benchmark.html")
     return page
-
-
-def _print(table: SceneTable) -> None:
-    from rich.table import Table
-
-    from vedette.campaigns.standings import header, row
-
-    shown = Table(box=None, pad_edge=False, title=f"{table.scene.name}: {table.scene.about}", title_justify="left")
-    for place, heading in enumerate(header(table)):
-        shown.add_column(heading, justify="right" if place else "left", no_wrap=place > 0)
-    for own in table.standings:
-        shown.add_row(*row(table, own))
-    console().print(shown)

@@ -17,11 +17,14 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from vedette.campaigns.scores import StrategyScore
+    from vedette.campaigns.standings import SceneTable
     from vedette.evaluation import Comparison
 
 # Of `vedette.evaluation.tables.header`, for a terminal of 80 columns; the caption under the table says the rest.
 _SHORT_HEADER = ("loc.", "card.", "difference", "95 %", "won")
 _SHORT_SCORES = ("worst", "difference", "N error", "tracked", "s", "runs")  # of `vedette.campaigns.scores.score_header`
+_LEFT_OUT = ("NEES, 95 %", "Filter steps", "Fusions", "Rewards")  # of `vedette.campaigns.standings.header`
+_SHORT_STANDINGS = ("more", "95 %", "N error", "NEES", "ms", "lost", "runs")  # of the others
 _LONGEST_LABEL, _SHORTEST_LABEL = 24, 8
 _MOST_DECISIONS = 6  # times of them; the tables and the report have all
 
@@ -53,6 +56,20 @@ def print_scores(scores: Sequence[StrategyScore], unit: str) -> None:
     rows = [score_row(score)[1:] for score in scores]
     names = (named_in("OSPA", unit), *_SHORT_SCORES)
     _print_rows(new_console(), [score.label for score in scores], names, rows)
+
+
+def print_standings(table: SceneTable) -> None:
+    """How entrants stand on a scene, as far as a terminal has room; the page has the rest."""
+    from vedette.campaigns.standings import header, row
+
+    names, rows = header(table), [row(table, own) for own in table.standings]
+    shown = [place for place, name in enumerate(names) if place and name not in _LEFT_OUT]
+    new_console().print(f"{table.scene.name}: {table.scene.about}")
+    numbers = [tuple(each[place] for place in shown) for each in rows]
+    _print_rows(new_console(), [each[0] for each in rows], (names[1], *_SHORT_STANDINGS), numbers)
+    for own in table.standings:
+        if own.reason:
+            new_console().print(f"lost, {own.label}: {own.reason}", soft_wrap=True)
 
 
 def _print_rows(

@@ -124,7 +124,8 @@ def _joint(program: Program, answer: dict[str, Any], options: Sequence[Options],
     """The course of each sensor that the answer names; refuses what is no choice, or a forbidden one."""
     given, num = answer.get("actions"), len(options)
     if not isinstance(given, list) or len(given) != num or any(type(each) is not int for each in given):
-        program.refuse(f'"actions": {num} whole numbers, one a sensor', repr(given))
+        got = repr(given)[:200] if "actions" in answer else f"only {', '.join(answer) or 'an empty object'}"
+        program.refuse(f'"actions": {num} whole numbers, one a sensor', got)
     for s, (course, own) in enumerate(zip(given, options, strict=True)):
         if not 0 <= course < len(own.courses):
             program.refuse(f"actions[{s}] from 0 to {len(own.courses) - 1}", str(course))
