@@ -23,6 +23,7 @@ from vedette.scenarios.build import build_sensors
 from vedette.scenarios.overrides import with_fields
 from vedette.simulation.loop import RunStopped
 from vedette.simulation.records import RunRecord
+from vedette.tracking.program import UNKNOWN_VARIANCE
 
 PAGE = (Path(__file__).resolve().parents[1] / "docs/benchmark.md").read_text("utf-8")
 SHOWN = dict(re.findall(r'^```\w+ title="([^"]+)"\n(.*?)^```$', PAGE, re.DOTALL | re.MULTILINE))
@@ -222,6 +223,15 @@ def test_a_tracker_is_told_every_scan_with_its_time_and_pose(tmp_path: Path) -> 
     scenario = tracked(section(tmp_path, ANSWERS.replace("ANSWER", SAYS % own)), **silent)
     record = run_scenario(scenario, "still", seed=0)
     assert [estimate.means[0, :2].tolist() for estimate in record.estimates] == [[t, 0.0] for t in record.times]
+
+
+def test_a_tracker_need_not_know_turn_rates(tmp_path: Path) -> None:
+    told = "[{'state': [1.0, 2.0, 3.0, 4.0], 'cov': [[float(i == j) for i in range(4)] for j in range(4)]}]"
+    program = section(tmp_path, ANSWERS.replace("ANSWER", SAYS % told))
+    scenario = with_fields(load_scenario("polar-10"), {"fusion": {"kind": "central", "filter": program}})
+    estimate = run_scenario(scenario, "still", seed=0).estimates[0]
+    assert estimate.means.tolist() == [[1.0, 2.0, 3.0, 4.0, 0.0]]
+    assert np.diagonal(estimate.covs[0]).tolist() == [1.0, 1.0, 1.0, 1.0, UNKNOWN_VARIANCE]
 
 
 @pytest.mark.parametrize("name", ["polar-10", "three-positions"])

@@ -42,19 +42,9 @@ def begin(told: Told) -> Callable[[Told], Told]:
             best = int(np.argmax(track.w))
             found.append({"state": list(track.mu[best]), "cov": np.asarray(track.sigma[best]).tolist()})
             found[-1] |= {"existence": min(float(track.existence), 1.0), "label": list(track.label)}
-        return {"estimates": [own if dim(scene) == 4 else padded(own) for own in found]}
+        return {"estimates": found}
 
     return step
-
-
-def dim(scene: Told) -> int:
-    return 5 if scene["motion"]["kind"] == "coordinated_turn" else 4
-
-
-def padded(own: Told) -> Told:
-    """The position alone, where states have a turn rate, too."""
-    cov = np.array(own["cov"])[:2, :2].tolist()
-    return {**own, "state": own["state"][:2], "cov": cov}
 
 
 def transition(dt: float) -> np.ndarray:

@@ -109,7 +109,9 @@ class _Row:
             program.refuse(
                 f'estimates[{place}] with "state" and perhaps "cov", "existence", "label"', repr(given)[:200]
             )
-        state = _numbers(program, f"estimates[{place}].state", given["state"], ((dim,), (2,)))
+        state = _numbers(
+            program, f"estimates[{place}].state", given["state"], tuple({dim: (dim,), 4: (4,), 2: (2,)}.values())
+        )
         self.mean = np.zeros(dim)
         self.mean[: len(state)] = state
         self.cov = UNKNOWN_VARIANCE * np.eye(dim)
