@@ -118,4 +118,4 @@ class LastScanFilter(_Reference):
         if len(scan):
             means[:, :2] = self.sensors[s].measurement.positions(np.asarray(scan), np.asarray(poses[s], np.float64))
         covs = np.tile(UNKNOWN_VARIANCE * np.eye(self.targets.state_dim), (len(scan), 1, 1))
-        return self._believed([(step, i) for i in range(len(scan))], means, covs)
+        return self._believed([(1, i) for i in range(len(scan))], means, covs)

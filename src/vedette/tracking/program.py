@@ -122,7 +122,7 @@ class _Row:
         label = given.get("label")
         if isinstance(label, list):
             label = tuple(label)
-        self.label: Hashable = ("unnamed", program.answered, place) if label is None else label
+        self.label: Hashable = ("unnamed", place) if label is None else label
         try:
             hash(label)
         except TypeError:
