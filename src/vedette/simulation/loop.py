@@ -21,7 +21,7 @@ from vedette.simulation.journal import Journal, Score
 from vedette.simulation.records import RunRecord
 from vedette.simulation.scans import Scan, simulate_scans
 from vedette.simulation.truth import Truth
-from vedette.tracking import Stages, State, TrackerInfo
+from vedette.tracking import Central, Stages, State, TrackerInfo
 
 _LIBRARIES = (str(Path(__file__).parents[1]), *(sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")))
 
@@ -138,7 +138,8 @@ class World:
         num = experiment.num_sensors
         self._scan_rngs, self._filter_rngs = (sensor_streams(seed, run, stream, num) for stream in (SCANS, FILTER))
         self._scans_at = scans_of_run(experiment.scans_at, experiment.drop_out, len(experiment.times), seed, run)
-        self._tracker = _told(experiment.tracker, self.truth)
+        tracker = experiment.tracker
+        self._tracker = tracker.told(self.truth) if isinstance(tracker, Central) else tracker
         self.fleet, self._state = experiment.fleet(moving=moving), self._tracker.initial()
         self.moment: Moment | None = None
 
@@ -256,9 +257,10 @@ def simulate(
         raise RunStopped(message, journal.step, journal.time, journal.stage(error), record) from error
 
 
-def _told(own: Any, truth: Truth) -> Any:
-    """The planner or tracker of this run, where it is one that knows the targets."""
-    return own.told(truth) if isinstance(own, KnowsTruth) else own
+def _told(planner: Any, truth: Truth) -> Planner | None:
+    """The planner of this run, where it is one that knows the targets."""
+    told: Planner | None = planner.told(truth) if isinstance(planner, KnowsTruth) else planner
+    return told
 
 
 def _go(experiment: Experiment, planner: Planner | None, journal: Journal, watch: Callable[[int], None] | None) -> None:
