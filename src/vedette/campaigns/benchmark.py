@@ -47,6 +47,7 @@ class Scene:
         about: it, in a line.
         beside: the library's own strategies, the first to compare with.
         sensors, crowd: how many of each, where the scene is generated; else 0.
+        decide_every: scans between decisions, where it is generated with sensors.
         quick: whether it is one of those that take a minute together.
     """
 
@@ -56,6 +57,7 @@ class Scene:
     beside: tuple[str, ...]
     sensors: int = 0
     crowd: int = 0
+    decide_every: int = 1
     quick: bool = False
 
     def scenario(self, folder: Path) -> str:
@@ -65,7 +67,7 @@ class Scene:
         text = (
             crowd_text(GeneratedCrowd(num_targets=self.crowd))
             if self.crowd
-            else scene_text(GeneratedScene(num_sensors=self.sensors))
+            else scene_text(GeneratedScene(num_sensors=self.sensors, decide_every=self.decide_every))
         )
         folder.mkdir(parents=True, exist_ok=True)
         (folder / f"{self.name}.yaml").write_text(text, encoding="utf-8")
