@@ -55,6 +55,7 @@ SHOWN = {
     "README.md": ["["],
     "docs/calibration.md": ["biases are found from 60.0 s on"],
     "docs/campaigns.md": ["paper-a"],
+    "docs/choosing.md": ["expected_loss: assigned has +"],
     "docs/coming-from.md": ["N = 1"],
     "docs/control.md": [
         "+-",
@@ -67,6 +68,15 @@ SHOWN = {
     "docs/filters.md": ["target at", "LMB of 4 labels", "4 labels\n(1, 0) 1.0", "((1, 0), (10, 0))"],
     "docs/fusion.md": ["ParallelUpdate ", "Clmb by views "],
     "docs/live.md": ['"line": 12, "time": 5.0, "tracks": [{"label":'],
+    "docs/lost-tracks.md": [
+        "OSPA, m",
+        "up to 2 targets were dropped with their labels",
+        "covariances are too small at",
+        "covariances are too large at",
+        "standard deviations from the nearest birth site",
+        "labels are kept, and 4 targets are there at once",
+        "GCI lost a target that one sensor was sure of",
+    ],
     "docs/metrics.md": ["True"],
     "docs/recordings.md": ["5 scans, 1 late, 0 dropped", "at 10.0 s"],
     "docs/report.md": [],
