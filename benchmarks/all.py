@@ -32,7 +32,7 @@ from timing import Figures, Measure
 
 MODULES = (
     "filter_scan", "planning", "many_sensors", "crowd", "central_scan", "fusion_rules", "eight_sensors", "store",
-    "whole_run", "start", "campaign",
+    "whole_run", "start", "campaign", "gym_steps",
 )  # fmt: skip
 HERE = Path(__file__).resolve().parent
 QUICK_ROUNDS = 3
