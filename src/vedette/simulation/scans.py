@@ -14,6 +14,7 @@ from vedette.kernels.base.types import Floats, Ints
 from vedette.models import SensorModel
 from vedette.models.arguments import float_array, generator, pose_vector, reject
 from vedette.models.bias import LEAST_RANGE
+from vedette.models.functions import numbers_at, write_rows
 from vedette.models.measurement import wrap_angular
 from vedette.simulation.true_sensors import TrueSensor
 from vedette.speaking import Speaking
@@ -156,10 +157,10 @@ def _detected_at(sensor: TrueSensor, states: Floats, pose: Floats, measured: Flo
 
 
 def _probabilities(sensor: SensorModel, states: Floats, pose: Floats) -> Floats:
-    probabilities = sensor.detection.prob(states, pose)
-    bad = np.flatnonzero(~((probabilities >= 0.0) & (probabilities <= 1.0)))
-    if len(bad):
-        state, got = states[bad[0]], probabilities[bad[0]]
+    probabilities = numbers_at(sensor.detection.function, states, pose, sensor.detection.params)
+    valid = (probabilities >= 0.0) & (probabilities <= 1.0)
+    if not valid.all():
+        state, got = states[valid.argmin()], probabilities[valid.argmin()]
         raise ModelError(f"detection model at state {state}, pose {pose}: expected a probability; got {got}")
     return probabilities
 
@@ -167,17 +168,21 @@ def _probabilities(sensor: SensorModel, states: Floats, pose: Floats) -> Floats:
 def _noisy_measurements(sensor: SensorModel, states: Floats, pose: Floats, normals: Floats) -> Floats:
     factors = _noise_factors(sensor, states, pose)
     noise = (factors @ normals[:, :, np.newaxis])[:, :, 0]
-    measured = sensor.measurement.measure(states, pose) + noise
-    bad = np.flatnonzero(~np.isfinite(measured).all(axis=1))
-    if len(bad):
-        state, got = states[bad[0]], measured[bad[0]]
+    measured = np.empty(normals.shape)
+    write_rows(sensor.measurement.function, states, pose, sensor.measurement.params, measured)
+    measured += noise
+    finite = np.isfinite(measured)
+    if not finite.all():
+        bad = finite.all(axis=1).argmin()
+        state, got = states[bad], measured[bad]
         raise ModelError(f"sensor model at state {state}, pose {pose}: expected a finite measurement; got {got}")
     return wrap_angular(measured, sensor.measurement.angular)
 
 
 def _noise_factors(sensor: SensorModel, states: Floats, pose: Floats) -> Floats:
     """(num_targets, meas_dim, meas_dim) lower Cholesky factors of the noise covariances."""
-    covs = sensor.noise.covs(states, pose, sensor.meas_dim)
+    covs = np.empty((len(states), sensor.meas_dim, sensor.meas_dim))
+    write_rows(sensor.noise.function, states, pose, sensor.noise.params, covs)
     try:
         return np.asarray(np.linalg.cholesky(covs), dtype=np.float64)
     except np.linalg.LinAlgError:
