@@ -67,6 +67,13 @@ SHOWN = {
     "docs/faq.md": ["the same"],
     "docs/filters.md": ["target at", "LMB of 4 labels", "4 labels\n(1, 0) 1.0", "((1, 0), (10, 0))"],
     "docs/fusion.md": ["ParallelUpdate ", "Clmb by views "],
+    "docs/gym.md": [
+        "3 decisions; at the end 40.0 s",
+        "'ends': (2, 13, 3)",
+        "(3, 10, 4) (3,)",
+        "['sensor_1', 'sensor_2'] True",
+        "the same run: True",
+    ],
     "docs/live.md": ['"line": 12, "time": 5.0, "tracks": [{"label":'],
     "docs/lost-tracks.md": [
         "OSPA, m",
@@ -95,6 +102,7 @@ SHOWN = {
     "docs/tutorial.md": ["best: sensor 1 goes east and sensor 2 north", "Plan of jdm for 2 sensors"],
     "examples/cameras.py": ["jdm     OSPA", "100%"],
     "examples/from_stonesoup.py": ["states, existence at the end"],
+    "examples/gym_policy.py": ["eight-mobile: in the environment run 0 gives", "policy    OSPA"],
     "examples/hundred_sensors.py": ["900 courses of 100 sensors"],
     "examples/late_scans.py": ["26 of 60 scans dropped", "0 of 60 scans dropped"],
     "examples/limited_views.py": ["of the targets in sight tracked"],

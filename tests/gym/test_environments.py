@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -149,6 +152,24 @@ def test_beliefs_are_laid_out_by_existence() -> None:
         np.testing.assert_array_equal(array, found[name][:2])
     empty = belief_arrays(LMB.empty(4), 3, 2)
     assert not any(array.any() for array in empty.values())
+
+
+@pytest.mark.parametrize("name", ["paper-a", "six-cameras", "one moves"])
+def test_the_page_has_the_layout(name: str) -> None:
+    """Names, shapes and types of the table of docs/gym.md, in its order."""
+    env = ScenarioEnv(scene(name))
+    env.reset(seed=1)
+    layout, (num_sensors, pose_dim) = env.episodes.layout, env.world.experiment.poses.shape
+    sizes = {"L": 10, "d": env.world.truth.states.shape[1], "S": num_sensors, "p": pose_dim, "2": 2}
+    sizes |= {"D": len(layout.deciding), "A": max(layout.num_actions)}
+    sizes["U"] = math.prod(layout.shapes.get("undetected", ()))
+    page = (Path(__file__).parents[2] / "docs/gym.md").read_text("utf-8")
+    rows = re.findall(r"^\| `(\w+)` \| ([LdSpDAU2, ]+) \| (float32|int8) \|", page, re.MULTILINE)
+    told = {name: (tuple(sizes[own] for own in shape.split(", ")), kind) for name, shape, kind in rows}
+    spaces = dict(env.observation_space.items())  # type: ignore[attr-defined]
+    if "undetected" not in spaces:
+        del told["undetected"]
+    assert told == {name: (own.shape, str(own.dtype)) for name, own in spaces.items()}
 
 
 def test_times_poses_and_where_actions_lead() -> None:
