@@ -134,6 +134,7 @@ def draw(found: dict[str, np.ndarray]) -> Any:
     figure, axes = panels(1)
     times = np.arange(found["jdm"].shape[1]) + 2.0  # s, from the first scan after a decision
     draw_errors(axes, times, {name: own.mean(axis=0) for name, own in found.items()}, "OSPA (m)")
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
     return figure
 
 
