@@ -81,3 +81,11 @@ def test_files_beside_the_scenario_stay_beside_it(tmp_path: Path) -> None:
 def test_what_is_wrong_is_named(paper: Scenario, fields: dict[str, Any], message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
         with_fields(paper, fields)
+
+
+def test_a_file_beside_a_built_in_scenario_is_said_to_need_a_copy() -> None:
+    reward = {"kind": "custom", "function": "mine.py:Reward"}
+    with pytest.raises(
+        ScenarioError, match=r"relative to the scenario file \(a built-in one: copy it with `vedette init`\)"
+    ):
+        with_fields(load_scenario("paper-a"), {"control.reward": reward})

@@ -22,6 +22,7 @@ from vedette.scenarios.sections.custom import Custom, customs
 from vedette.scenarios.sections.targets import RecordedTargets
 from vedette.text import elided, printable
 
+BUILTIN_FOLDER = FilePath(__file__).parent / "builtin"
 _LONGEST_PATH = 200
 
 
@@ -122,7 +123,8 @@ def _reference(path: Path, custom: Custom, folder: FilePath) -> Iterator[Finding
     module, _, name = custom.function.rpartition(":")
     if module.endswith(".py"):
         if not os.path.isfile(folder / module):
-            yield (*path, "function"), "a file, relative to the scenario file", _absent(module)
+            copied = " (a built-in one: copy it with `vedette init`)" if folder == BUILTIN_FOLDER else ""
+            yield (*path, "function"), f"a file, relative to the scenario file{copied}", _absent(module)
         elif fault := _unnamed(folder / module, name.partition(".")[0]):
             yield (*path, "function"), *fault
     elif not _is_findable(module.partition(".")[0]):

@@ -13,7 +13,7 @@ from vedette.reading import read_text
 from vedette.scenarios.coastline import coastline_findings
 from vedette.scenarios.diagnostics import UNKNOWN, read_section, suggestion
 from vedette.scenarios.faults import Fault, Path, Told, describe
-from vedette.scenarios.file_checks import recorded_findings, reference_findings
+from vedette.scenarios.file_checks import BUILTIN_FOLDER, recorded_findings, reference_findings
 from vedette.scenarios.geojson import with_zones
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.base import attempt
@@ -22,7 +22,6 @@ from vedette.scenarios.yaml_reader import MOST_BYTES, Document, read_yaml
 from vedette.text import elided, printable
 
 _LONGEST_NAME = 200
-BUILTIN_FOLDER = FilePath(__file__).parent / "builtin"
 
 
 @dataclass(frozen=True, slots=True)

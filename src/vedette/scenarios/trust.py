@@ -7,7 +7,8 @@ import stat
 from collections.abc import Iterator
 from pathlib import Path
 
-from vedette.scenarios.loading import BUILTIN_FOLDER, Scenario
+from vedette.scenarios.file_checks import BUILTIN_FOLDER
+from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections.base import Section, sections_in
 from vedette.scenarios.sections.custom import Custom
 from vedette.scenarios.sections.program import ProgramSection
