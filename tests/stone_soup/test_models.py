@@ -289,13 +289,19 @@ def of_parts(**given: Any) -> Any:
             {"sensors": [PassiveElevationBearing(ndim_state=4, mapping=(0, 1, 2), noise_covar=np.eye(2))]},
             "measurement_model: .*; got CartesianToElevationBearing",
         ),
-        ({"clutter": None}, "clutter: expected one of LinearGaussian itself, or given; got none"),
+        ({"sensors": MEASURED["position"]}, "sensors: expected a list of them, or a mapping .*; got LinearGaussian"),
+        ({"clutter": None}, "clutter: expected a clutter_model of LinearGaussian, or here, as of .*; got none"),
         ({"clutter": 0.01}, "clutter: expected a ClutterModel or a SimpleDetectionSimulator .*; got float"),
         (
             {"clutter": ClutterModel(distribution=np.random.default_rng(1).normal)},
             "clutter.distribution: expected a uniform distribution .*; got normal",
         ),
         ({"births": GaussianState([0.0] * 4, np.diag([0.0, 1, 0, 1]))}, "births.covar: expected variances above 0"),
+        ({"births": GaussianState([0.0] * 2, np.eye(2))}, r"births.covar: expected 4 by 4, .*; got \[2, 2\]"),
+        (
+            {"births": [WeightedGaussianState([0.0] * 2, np.eye(2), weight=0.1)]},
+            r"births.covar: expected 4 by 4, .*; got \[2, 2\]",
+        ),
         ({"births": 3}, "births: expected a GaussianState, WeightedGaussianStates, or a BirthModel .*; got int"),
     ],
 )

@@ -11,6 +11,7 @@ from stonesoup.types.state import GaussianState
 
 from vedette.filters import DeltaGlmbFilter, LmbFilter, MultiSensorGlmbFilter, SequentialLmbFilter
 from vedette.fusion import Fusion
+from vedette.kernels.base.types import Floats
 from vedette.models import (
     BirthModel,
     ClutterModel,
@@ -103,7 +104,10 @@ def convert(
     Raises:
         InputError: what has no equal here: it names the model, the field and what there is.
     """
-    named = dict(sensors) if isinstance(sensors, Mapping) else {str(k): own for k, own in enumerate(sensors)}
+    try:
+        named = dict(sensors) if isinstance(sensors, Mapping) else {str(k): own for k, own in enumerate(sensors)}
+    except TypeError:
+        raise reject("sensors", "a list of them, or a mapping from their names", type(sensors).__name__) from None
     if not named:
         raise reject("sensors", "one or more", "none")
     motion, layout = motion_of(transition_model)
@@ -122,7 +126,7 @@ def convert(
 def _clutter(sensor: Any, given: Any, model: Any) -> ClutterModel:
     source = getattr(sensor, "clutter_model", None) if given is None else given
     if source is None:
-        what = f"one of {type(sensor).__name__} itself, or given"
+        what = f"a clutter_model of {type(sensor).__name__}, or here, as of vedette.models.measurement_space_clutter"
         raise reject("clutter", what, f"none ({', '.join(quantities_of(model))} measured)")
     return clutter_of(source, model)
 
@@ -131,7 +135,7 @@ def _births(given: Any, layout: Layout, dim: int, expected: float, most: float) 
     if isinstance(given, BirthModel):
         return given
     if isinstance(given, GaussianState):
-        variances = np.diag(layout.covs(np.asarray(given.covar, np.float64)[np.newaxis])[0])
+        variances = np.diag(layout.covs(_covs([given], dim))[0])
         if (variances <= 0.0).any():
             raise reject("births.covar", "variances above 0: of a birth about what was measured", variances.tolist())
         given = MeasurementBirth(expected, most, np.sqrt(variances))
@@ -141,11 +145,19 @@ def _births(given: Any, layout: Layout, dim: int, expected: float, most: float) 
     try:
         weights = [float(site.weight) for site in given]
         means = [np.asarray(site.mean, np.float64).ravel() for site in given]
-        covs = [np.asarray(site.covar, np.float64) for site in given]
+        covs = _covs(given, dim)
     except (AttributeError, TypeError):
         wanted = "a GaussianState, WeightedGaussianStates, or a BirthModel or MeasurementBirth of vedette.models"
         raise reject("births", wanted, type(given).__name__) from None
-    return BirthModel(np.array(weights), layout.states(np.array(means)), layout.covs(np.array(covs)))
+    return BirthModel(np.array(weights), layout.states(np.array(means)), layout.covs(covs))
+
+
+def _covs(states: Sequence[Any], dim: int) -> Floats:
+    covs = [np.asarray(state.covar, np.float64) for state in states]
+    for cov in covs:
+        if cov.shape != (dim, dim):
+            raise reject("births.covar", f"{dim} by {dim}, as the transition model's state is", list(cov.shape))
+    return np.array(covs)
 
 
 __all__ = ["Births", "Converted", "convert"]
