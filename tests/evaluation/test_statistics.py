@@ -97,6 +97,13 @@ def test_interval_and_p_value_of_skewed_differences_agree(shift: float) -> None:
         assert (paired.p_value, float(paired.summary.low)) == (again.p_value, float(again.summary.low))
 
 
+def test_differences_of_which_most_are_equal_have_students_interval() -> None:
+    """Samples of one value only have no error: their quantiles are no numbers."""
+    paired = paired_difference([0.0] * 9 + [1.0], np.zeros(10))
+    assert not paired.is_skewed
+    assert paired.p_value == pytest.approx(scipy.stats.ttest_1samp([0.0] * 9 + [1.0], 0.0).pvalue)
+
+
 def test_equal_and_constant_differences_have_a_p_value() -> None:
     assert paired_difference([1.0, 2.0, 3.0], [1.0, 2.0, 3.0]).p_value == 1.0
     assert paired_difference([2.0, 3.0, 4.0], [1.0, 2.0, 3.0]).p_value == 0.0

@@ -128,7 +128,8 @@ def _tested(differences: Floats) -> tuple[Summary, float, bool]:
         return summary, float(mean == 0.0), False
     if summary.num_runs >= _FEWEST and _misplaced(differences) > _MOST_MISPLACED:
         drawn = _studentised(differences)
-        low, high = np.quantile(drawn, ((1.0 + CONFIDENCE) / 2.0, (1.0 - CONFIDENCE) / 2.0))
+        with np.errstate(invalid="ignore"):  # samples of one value only are infinite: then it is Student's
+            low, high = np.quantile(drawn, ((1.0 + CONFIDENCE) / 2.0, (1.0 - CONFIDENCE) / 2.0))
         if np.isfinite(low) and np.isfinite(high):
             tail = min((drawn >= mean / error).sum(), (drawn <= mean / error).sum())
             skewed = replace(summary, low=np.asarray(mean - low * error), high=np.asarray(mean - high * error))
