@@ -8,7 +8,7 @@ import pytest
 from vedette.errors import InputError
 from vedette.evaluation.comparison import scored, typical_run
 from vedette.evaluation.runs import run_scenario
-from vedette.scenarios import Scenario, list_builtin
+from vedette.scenarios import Scenario, list_builtin, load_scenario
 from vedette.scenarios.build import build_planner
 from vedette.scenarios.loading import parse_scenario
 
@@ -69,3 +69,10 @@ def test_the_typical_run_is_in_the_middle(scenario, runs):
 def test_unknown_strategy(scenario):
     with pytest.raises(InputError, match="planner"):
         build_planner(scenario, "clever")
+
+
+def test_a_scenario_may_be_named() -> None:
+    named = run_scenario("paper-a", "still", seed=3)
+    assert named.ospa.tobytes() == run_scenario(load_scenario("paper-a"), "still", seed=3).ospa.tobytes()
+    with pytest.raises(InputError, match="paper-z"):
+        run_scenario("paper-z", "still", seed=3)

@@ -16,9 +16,9 @@ from vedette.cli.documents import results_document
 from vedette.cli.options import Seed, Trust, Workers
 from vedette.cli.output import note, publish, say
 from vedette.cli.reproducing import compared
-from vedette.cli.results import print_results
 from vedette.cli.running import Approval, interruptible
 from vedette.extras import need
+from vedette.text import amount
 
 _SCENE = "solent-patrol"
 _STRATEGIES = "jdm,nearest,oracle"
@@ -48,7 +48,9 @@ def demo(
     outcome = carry_out(campaign, out, workers)
     opened = open_results(out)
     groups = opened.comparisons()
-    print_results(opened, groups)
+    for comparison in (group.comparison for group in groups):
+        for name in comparison.strategies:
+            say(f"{name}: OSPA {amount(f'{float(comparison.summary(name).mean):.1f}', comparison.unit)}")
     with interruptible(f"{out} keeps every run; the same command writes the page"):
         page = write_demo(opened, out / "demo.html", trust=True)  # what it names has just been run
     say(f"wrote {page}")

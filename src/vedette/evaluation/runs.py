@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 
 from vedette.densities import Estimate
 from vedette.evaluation.metrics import Metric, RunMetrics, measure, ospa_of_run
 from vedette.kernels.base.types import Floats
-from vedette.scenarios import Scenario
+from vedette.scenarios import Scenario, load_scenario
 from vedette.scenarios.build import build_experiment, build_planner, build_sensors, build_true_sensors
 from vedette.scenarios.sections.scoring import AnyMetric
 from vedette.simulation.journal import Score
@@ -20,7 +21,7 @@ from vedette.simulation.truth import Truth
 
 
 def run_scenario(
-    scenario: Scenario,
+    scenario: Scenario | str | Path,
     planner: str,
     *,
     seed: int,
@@ -31,7 +32,7 @@ def run_scenario(
     """One run of a scenario under a strategy.
 
     Args:
-        scenario: as `vedette.scenarios.load_scenario` reads it.
+        scenario: as `vedette.scenarios.load_scenario` reads it, or the name or file that it is read by.
         planner: "jdm" (joint), "idm" (independent), "lookahead" (joint, over several decisions), "nearest", "assigned"
             or "centroid" (rules of thumb), "oracle" (who knows the targets), "random", "fixed", "still", or one of the
             scenario's own.
@@ -42,6 +43,8 @@ def run_scenario(
     Raises:
         VedetteError: the scenario's models, filters or planner cannot do what is asked.
     """
+    if not isinstance(scenario, Scenario):
+        scenario = load_scenario(scenario)
     decides = build_planner(scenario, planner, num_threads)
     return simulate(build_experiment(scenario), decides, seed=seed, run=run, score=score_of(scenario), watch=watch)
 

@@ -157,8 +157,14 @@ def caption(comparison: Comparison) -> str:
         return f"{said} Difference: strategy minus {first}." if len(comparison.strategies) > 1 else said
     return (
         f"Scenario {comparison.scenario}, {comparison.num_runs} paired runs, {over}, ± one standard error. Difference: "
-        f"strategy minus {first}, run by run; runs won: by {first}."
+        f"strategy minus {first}, run by run; runs won: by {first}.{_intervals(comparison)}"
     )
+
+
+def _intervals(comparison: Comparison) -> str:
+    """Which intervals are not Student's."""
+    skewed = [name for name in comparison.strategies[1:] if comparison.difference(name).is_skewed]
+    return f" Interval by bootstrap, as differences are skewed: {', '.join(skewed)}." if skewed else ""
 
 
 def _row(comparison: Comparison, strategy: str) -> tuple[str, ...]:
