@@ -192,7 +192,8 @@ def test_one_colour_has_one_meaning_beside_the_errors(scenario: Scenario, record
         overview_figure(records["idm"][0], comparison, strategy="random")
 
 
-def test_sensors_have_other_colours_than_the_first_strategies() -> None:
+def test_sensors_have_other_colours_than_strategies() -> None:
+    assert not {shade for shade, _, _ in sensor_looks(range(6)).values()} & {colour(place) for place in range(6)}
     of_sensors = {shade for shade, _, _ in sensor_looks([0, 1, 2]).values()}
     assert not of_sensors & {colour(0), colour(1), colour(2)}
     assert sensor_looks([1, 2])[1] == sensor_looks([0, 1, 2])[1]

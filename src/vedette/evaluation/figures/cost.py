@@ -20,6 +20,8 @@ MIN_FOR_TAILS = 20  # values, below which their 5th and 95th percentile are but 
 def cost_figure(seconds: Mapping[str, Mapping[str, Floats]]) -> Figure:
     """Time of each stage: the median, and from 20 values on a line from the 5th to the 95th percentile, in ms.
 
+    Beside each stage stands of how many values (of several strategies, the most).
+
     Args:
         seconds: for each strategy, for each stage (such as "filter, a scan"), one number a scan or a decision, s.
 
@@ -43,7 +45,8 @@ def cost_figure(seconds: Mapping[str, Mapping[str, Floats]]) -> Figure:
         axes.plot(middle, places, linestyle="", marker=marker, markersize=4, color=shade, label=label)
     axes.set_xscale("log")
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.set_yticks(range(len(stages)), stages)
+    counts = [max(len(spent.get(stage, ())) for spent in seconds.values()) for stage in stages]
+    axes.set_yticks(range(len(stages)), [f"{stage}\nn = {count}" for stage, count in zip(stages, counts, strict=True)])
     axes.set_ylim(len(stages) - 0.5, -0.5)
     axes.grid(False, axis="y")
     axes.tick_params(axis="y", length=0)

@@ -35,6 +35,8 @@ TEXT_WIDTH = 7.16  # inches, of both columns
 # M. Okabe and K. Ito, "Color Universal Design" (2008), without the yellow that is lost on white; darkest last.
 BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION = "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00"
 COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
+# Of sensors, none of them a strategy's: P. Tol's "muted" ones that are farthest from those, and two darker.
+SENSOR_COLOURS = ("#332288", "#999933", "#882255", "#7A5C3E", "#1B4D3E", "#44AA99")
 GREY = "#6E6E6E"
 INK = "#222222"
 MARKERS = "osD^vP"
@@ -156,13 +158,12 @@ def colour(index: int) -> str:
 def sensor_looks(sensors: Sequence[int]) -> dict[int, tuple[str, str, Any]]:
     """Colour, marker and dashes of each sensor of a figure, no two of six alike.
 
-    They are the same in every figure of at most six sensors, and those of the first three have colours that none of the
-    first three strategies has.
+    They are the same in every figure of at most six sensors, and no strategy has one of these colours.
     """
-    are_few = max(sensors, default=0) < len(COLOURS)
+    are_few = max(sensors, default=0) < len(SENSOR_COLOURS)
     places = {sensor: sensor if are_few else place for place, sensor in enumerate(sensors)}
     return {
-        sensor: (COLOURS[(place + 3) % len(COLOURS)], MARKERS[place % len(MARKERS)], line_style(place))
+        sensor: (SENSOR_COLOURS[place % len(SENSOR_COLOURS)], MARKERS[place % len(MARKERS)], line_style(place))
         for sensor, place in places.items()
     }
 
