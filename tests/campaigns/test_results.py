@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 
 from campaigns.filled import NUM_RUNS, add, fill, make_campaign, make_run
 from simulation.test_storage import assert_same
+from vedette import __version__
 from vedette.campaigns.codec import encode
 from vedette.campaigns.manifest import contents_checksum
 from vedette.campaigns.results import open_results
@@ -309,3 +310,12 @@ def test_a_table_that_was_dropped_is_damage_and_not_a_fresh_start(folder, campai
     for ask in (lambda: open_results(folder).finished("jdm-rate-5.0"), lambda: Store.open(folder, campaign)):
         with pytest.raises(InputError, match=r"campaign\.sqlite: expected the tables of a campaign"):
             ask()
+
+
+def test_latex_tables_say_what_they_are_of(whole, campaign, tmp_path):
+    assert CliRunner().invoke(app, ["results", str(whole), "--tex", str(tmp_path / "t.tex")]).exit_code == 0
+    lines = (tmp_path / "t.tex").read_text("utf-8").splitlines()
+    said = [line for line in lines if line.startswith("% ")]
+    digest = open_results(whole).manifest["digest"][:12]
+    assert len(said) == len(campaign.groups())
+    assert all(line.endswith(f": seed 7, vedette {__version__}, {digest}") for line in said)

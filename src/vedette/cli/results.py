@@ -205,8 +205,11 @@ def _write_tex(opened: CampaignResults, groups: Sequence[GroupComparison], path:
     from vedette.evaluation.tables import strategy_latex
     from vedette.files import write_whole
 
+    session = opened.manifest["sessions"][-1]
+    origin = f"seed {opened.campaign.seed}, vedette {session['versions']['vedette']}, {opened.manifest['digest'][:12]}"
     tables = [
-        f"% {opened.title(group) or opened.campaign.name}\n{strategy_latex(group.comparison)}" for group in groups
+        f"% {opened.title(group) or opened.campaign.name}: {origin}\n{strategy_latex(group.comparison)}"
+        for group in groups
     ]
     try:
         write_whole(path, lambda file: file.write("\n".join(tables).encode()))
