@@ -65,7 +65,7 @@ def on_workers(workers: Workers, queue: TaskQueue) -> Iterator[Outcome]:
     batch: Outcome = ()
     under_way = 0
     while True:
-        while under_way < workers.room() and (task := queue.take(workers.room())) is not None:
+        while under_way < (room := workers.room()) and (task := queue.take(room)) is not None:
             workers.submit(task)
             under_way += 1
         if batch:  # while the next are being done

@@ -21,10 +21,6 @@ class Packed(NamedTuple):
     content: bytes
     checksum: str
 
-    def unpacked(self) -> bytes:
-        """The bytes before. Raises `ValueError` for what was never packed."""
-        return inflate(self.content)
-
 
 def pack(cell: str, run: int, content: bytes) -> Packed:
     """What is kept of some bytes of a run."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -127,7 +128,7 @@ def _tested(differences: Floats) -> tuple[Summary, float, bool]:
     if error == 0.0:
         return summary, float(mean == 0.0), False
     if summary.num_runs >= _FEWEST and _misplaced(differences) > _MOST_MISPLACED:
-        drawn = _studentised(differences)
+        drawn = _studentised(tuple(differences.tolist()))
         with np.errstate(invalid="ignore"):  # samples of one value only are infinite: then it is Student's
             low, high = np.quantile(drawn, ((1.0 + CONFIDENCE) / 2.0, (1.0 - CONFIDENCE) / 2.0))
         if np.isfinite(low) and np.isfinite(high):
@@ -150,11 +151,13 @@ def _misplaced(values: Floats) -> float:
     return float(abs(skewness) * (2.0 * z * z + 1.0) * density / (6.0 * np.sqrt(len(values))))
 
 
-def _studentised(values: Floats) -> Floats:
+@lru_cache(maxsize=32)  # each table, claim and caption of a comparison asks for the same
+def _studentised(differences: tuple[float, ...]) -> Floats:
     """(resamples,) (mean* - mean) / error* of samples drawn from the values; infinite where a sample is of one value.
 
     The same draws for the same number of values, so that a table is the same whenever it is made.
     """
+    values = np.array(differences)
     rng, number = np.random.default_rng(0), len(values)
     found = np.empty(_RESAMPLES)
     block = max(1, _BLOCK // number)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from math import nan
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from vedette.kernels.base.types import Floats
 from vedette.models import SensorModel, TargetModel
 from vedette.simulation.cramer_rao import scan_information, transition_jacobians
 from vedette.simulation.truth import Truth
-from vedette.tracking.program import UNKNOWN_VARIANCE
+from vedette.tracking.program import UNKNOWN_VARIANCE, untold
 
 _SURE = 0.999
 _LOST = 1000.0  # m and m/s: of a target before its first scan
@@ -38,7 +37,7 @@ class _Reference:
         return LMB.empty(self.targets.state_dim)
 
     def _believed(self, labels: Any, means: Floats, covs: Floats) -> tuple[LMB, FilterInfo]:
-        info = FilterInfo(nan, 1, len(means), 0.0, 0.0, 0, 0, 0, search_cut=False, cap_met=False)
+        info = untold(len(means))
         if len(means) == 0:
             return self.initial(), info
         return LMB.from_bernoullis(labels, np.full(len(means), _SURE), means, covs), info

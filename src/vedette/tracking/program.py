@@ -90,7 +90,7 @@ class ProgramFilter:
         labels = [self._names.setdefault(row.label, (step, i)) for i, row in enumerate(rows)]
         if len(set(labels)) < len(labels):
             self._program.refuse("estimates of different labels", str([row.label for row in rows]))
-        info = FilterInfo(nan, 1, len(rows), 0.0, 0.0, 0, 0, 0, search_cut=False, cap_met=False)
+        info = untold(len(rows))
         if not rows:
             return self.initial(), info
         numbers = [row.existence for row in rows], [row.mean for row in rows], [row.cov for row in rows]
@@ -98,6 +98,11 @@ class ProgramFilter:
             return LMB.from_bernoullis(labels, *numbers), info
         except InputError as error:
             self._program.refuse("states, covariances and existences", str(error))
+
+
+def untold(num_labels: int) -> FilterInfo:
+    """What is reported of a step of which nothing but its labels is known."""
+    return FilterInfo(nan, 1, num_labels, 0.0, 0.0, 0, 0, 0, search_cut=False, cap_met=False)
 
 
 class _Row:
