@@ -8,6 +8,7 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing.context import BaseContext
 from pathlib import Path
@@ -67,6 +68,14 @@ def as_children() -> Iterator[None]:
             os.environ.pop(name, None)
         if in_main:
             signal.signal(signal.SIGINT, before)
+
+
+def let_go_of_results(pool: ProcessPoolExecutor) -> None:
+    """Close this process's end of what the processes of a pool write to; they have started, and have their own.
+
+    While it is open, half a message of one that was killed is waited for for ever.
+    """
+    pool._result_queue._writer.close()  # type: ignore[attr-defined]
 
 
 def end_with_parent() -> None:

@@ -13,7 +13,7 @@ import re
 import stat
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -120,18 +120,22 @@ def inflate(packed: bytes, most: int = MOST_BYTES) -> bytes:
     return content
 
 
-def read_members(archive: bytes) -> dict[str, bytes]:
-    """The members of a zip archive by name; together they are no larger than the archive, as nothing is compressed."""
+def read_members(archive: bytes, wanted: Container[str] | None = None) -> dict[str, bytes]:
+    """The members of a zip archive by name, or those of them that are wanted.
+
+    Together they are no larger than the archive, as nothing is compressed. Raises `ValueError` for other bytes.
+    """
     try:
         with zipfile.ZipFile(io.BytesIO(archive)) as opened:
             infos = opened.infolist()
             size = sum(info.file_size for info in infos)
             if size > len(archive):
                 raise ValueError(f"its {len(archive)} bytes would unpack to {size}")
-            members = {info.filename: opened.read(info) for info in infos}
+            names = [info.filename for info in infos]
+            members = {name: opened.read(name) for name in names if wanted is None or name in wanted}
     except Exception as error:  # damage can raise nearly anything in there
         raise ValueError(said(error)) from error
-    if len(members) < len(infos):
+    if len(set(names)) < len(names):
         raise ValueError("it has two members of one name")
     return members
 

@@ -25,6 +25,7 @@ from vedette.campaigns.store import Store
 from vedette.cli import app
 from vedette.errors import InputError
 from vedette.evaluation.comparison import scored
+from vedette.evaluation.ensembles import ensemble_of
 from vedette.simulation.kept import encode_timings
 
 
@@ -90,9 +91,9 @@ def test_strategies_are_compared_over_the_runs_that_all_have(whole, campaign):
     assert group.settings.keys() == {"scenario", "sensors.*.clutter.rate"}
     assert group.labels == group.comparison.strategies == ("jdm", "random")
     assert [cell.name for cell in group.cells] == ["jdm-rate-5.0", "random-rate-5.0"]
-    records = {planner: [make_run(planner, run)[0] for run in range(2)] for planner in ("jdm", "random")}
-    metrics = {planner: [make_run(planner, run)[1] for run in range(2)] for planner in ("jdm", "random")}
-    assert_same(group.comparison, scored(campaign.cells[0].scenario, records, metrics))
+    runs = {planner: [make_run(planner, run) for run in range(2)] for planner in ("jdm", "random")}
+    ensembles = {name: ensemble_of((record.outline(), metrics) for record, metrics in of) for name, of in runs.items()}
+    assert_same(group.comparison, scored(campaign.cells[0].scenario, ensembles))
 
 
 def test_another_axis_than_the_planner_is_compared(tmp_path):

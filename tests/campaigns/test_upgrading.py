@@ -88,7 +88,7 @@ def test_nothing_is_lost_and_what_was_not_known_is_not(campaign: Path, run: Path
     upgrade_results(run)
     record = load_run(run)
     assert np.isnan(record.health.factoring_error).all()
-    assert "taking labels as independent is not known" in health_line(record)
+    assert "taking labels as independent is not known" in health_line(record.health)
     for name in ("discarded_weight_bound", "num_tracks", "log_likelihood"):
         np.testing.assert_array_equal(getattr(record.health, name).ravel(), before[name])
     after = contents(run)

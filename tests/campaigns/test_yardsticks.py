@@ -11,7 +11,6 @@ from campaigns.filled import NUM_RUNS, fill, make_campaign
 from vedette.campaigns import load_spec, open_results, resolve
 from vedette.campaigns.scores import (
     StrategyScore,
-    decision_seconds,
     score_header,
     score_markdown,
     score_row,
@@ -66,7 +65,7 @@ def test_published_figures_are_those_of_the_source() -> None:
 def test_scores_are_those_of_the_runs(tmp_path: Path) -> None:
     results = open_results(fill(tmp_path, make_campaign()))
     for group in results.comparisons():
-        scores = score_strategies(results, group)
+        scores = score_strategies(group)
         assert [score.label for score in scores] == ["jdm", "random"]
         runs = {cell.planner: [results.run(cell.name, run) for run in range(NUM_RUNS)] for cell in group.cells}
         counted = group.comparison.counted
@@ -77,7 +76,12 @@ def test_scores_are_those_of_the_runs(tmp_path: Path) -> None:
             assert score.ospa == pytest.approx(mine.mean())
             assert score.standard_error == pytest.approx(mine.std(ddof=1) / np.sqrt(NUM_RUNS))
             assert score.worst == pytest.approx(mine.max())
-            spent = np.concatenate([decision_seconds(run.record) for run in runs[score.label]])
+            spent = np.concatenate(
+                [
+                    run.record.timings["planning"][[decision.step - 1 for decision in run.record.decisions]]
+                    for run in runs[score.label]
+                ]
+            )
             assert len(spent) == sum(len(run.record.decisions) for run in runs[score.label])
             assert score.decision_seconds == pytest.approx(np.median(spent))
         assert scores[0].difference is None

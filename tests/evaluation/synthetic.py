@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from vedette.control.plan import Plan, RewardTable
 from vedette.densities.estimates import Estimate
 from vedette.evaluation.metrics import ospa_of_run
+from vedette.evaluation.rewards import MeanRewards, mean_rewards
 from vedette.kernels.base.types import Floats
 from vedette.platforms import Actions
 from vedette.simulation.health import Health
@@ -115,3 +117,8 @@ def _estimate(truth: Truth, scan: int, noise: float, rng: np.random.Generator) -
     labels = np.c_[np.ones(len(means), np.int64), truth.ids[rows][seen]]
     covs = np.broadcast_to(np.diag([noise**2, noise**2, 1.0, 1.0]), (len(means), 4, 4)).copy()
     return Estimate(labels, means, covs, rng.uniform(0.9, 1.0, len(means)))
+
+
+def means_of(records: Sequence[RunRecord]) -> list[MeanRewards]:
+    """The mean rewards of every decision of some runs."""
+    return [mean_rewards(records, decision) for decision in range(len(records[0].decisions))]

@@ -8,7 +8,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from evaluation.synthetic import make_record
+from evaluation.synthetic import make_record, means_of
 from vedette.errors import InputError
 from vedette.evaluation import Comparison, average_nees, compare, summarise
 from vedette.evaluation.figures import (
@@ -74,11 +74,11 @@ def test_roses_need_decisions(comparison: Comparison) -> None:
 
 
 def test_mean_rewards_are_curves_or_maps_a_decision() -> None:
-    curves = mean_rewards_figure([make_record("idm", run) for run in range(3)])
+    curves = mean_rewards_figure(means_of([make_record("idm", run) for run in range(3)]))
     assert [axes.get_title() for axes in curves.axes] == ["10 s", "20 s", "30 s"]
     assert [len(axes.lines) for axes in curves.axes] == [2, 2, 2]
     records = [make_record("jdm", run) for run in range(3)]
-    maps = mean_rewards_figure(records)
+    maps = mean_rewards_figure(means_of(records))
     mesh, marks = panels(maps)[0].collections
     expected = np.mean([record.decisions[0].plan.tables[0].mean for record in records], axis=0)
     np.testing.assert_allclose(np.asarray(mesh.get_array()).ravel(), expected.T.ravel())
@@ -88,7 +88,7 @@ def test_mean_rewards_are_curves_or_maps_a_decision() -> None:
 
 def test_mean_rewards_need_decisions() -> None:
     with pytest.raises(InputError, match="got none"):
-        mean_rewards_figure([replace(make_record("jdm"), decisions=())])
+        mean_rewards_figure([])
 
 
 def test_a_sweep_has_a_curve_a_strategy_with_confidence_intervals() -> None:

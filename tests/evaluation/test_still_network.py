@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch, Wedge
 
 from evaluation.still_network import NAMES, POLYGON, STILL_NETWORK
-from evaluation.synthetic import ACTIONS, make_plan, make_record
+from evaluation.synthetic import ACTIONS, make_plan, make_record, means_of
 from vedette.cli.picture import scenario_figure
 from vedette.cli.show import truth_of
 from vedette.control.plan import Plan, RewardTable
@@ -65,11 +65,11 @@ def texts(figure: Figure) -> set[str]:
 def test_rewards_are_of_the_sensors_that_have_a_choice(
     scenario: Scenario, records: dict[str, list[RunRecord]], tmp_path: Path
 ) -> None:
-    joint = mean_rewards_figure(records["jdm"], scene_of(scenario, "jdm"))
+    joint = mean_rewards_figure(means_of(records["jdm"]), scene_of(scenario, "jdm"))
     maps = [axes for axes in joint.axes if axes.get_title().endswith(" s")]
     assert [np.asarray(axes.collections[0].get_array()).size for axes in maps] == [13 * 13] * 2
     assert {"Heading of Boat Anna (deg)", "Heading of Boat Bertha (deg)"} <= texts(joint)
-    alone = mean_rewards_figure(records["idm"], scene_of(scenario, "idm"))
+    alone = mean_rewards_figure(means_of(records["idm"]), scene_of(scenario, "idm"))
     assert {*NAMES[1:]} <= texts(alone)
     assert not {NAMES[0], "sensor 1"} & texts(alone)
     assert [axes.get_xlabel() for axes in alone.axes] == ["Heading (deg)"] * 2
@@ -113,7 +113,7 @@ def test_nobody_with_a_choice_is_told() -> None:
     still = replace(record, decisions=tuple(replace(each, plan=plan) for each in record.decisions))
     for draw in (
         lambda: reward_figure(plan),
-        lambda: mean_rewards_figure([still]),
+        lambda: mean_rewards_figure(means_of([still])),
         lambda: roses_figure(compare({"idm": [still]})),
     ):
         with pytest.raises(InputError, match="expected a sensor with a choice"):
@@ -228,7 +228,7 @@ def within(figure: Figure) -> bool:
 
 def test_of_many_sensors_those_with_the_most_at_stake_are_drawn_and_legends_fit() -> None:
     record = many_sensors("idm")
-    rewards = mean_rewards_figure([record])
+    rewards = mean_rewards_figure(means_of([record]))
     assert [text.get_text() for text in rewards.legends[0].get_texts()] == [f"sensor {n}" for n in range(35, 41)]
     roses = roses_figure(compare({"idm": [record]}))
     assert [text.get_text() for text in roses.legends[0].get_texts()] == ["40 sensors, taken together"]
@@ -247,7 +247,7 @@ def test_legends_of_six_names_fit(letters: str) -> None:
     scene = replace(scene_of(load_scenario("paper-a"), "idm"), names=tuple(f"{letters}{n}" for n in range(6)))
     comparison = compare({"idm": [record], "W" * 30: [record], "M" * 30: [record]})
     for figure in (
-        mean_rewards_figure([record], scene),
+        mean_rewards_figure(means_of([record]), scene),
         roses_figure(comparison, scene),
         tracks_figure(record, scene=scene),
         reward_figure(record.decisions[0].plan, scene=scene),

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from reports.examples import campaign_of, results_of
+from vedette.evaluation import RunMetrics
+from vedette.evaluation.ensembles import ensemble_of
 from vedette.evaluation.runs import measure_run
-from vedette.reports.groups import Group, gather
+from vedette.reports.groups import Group, Strategy, gather
 from vedette.reports.health import group_health
 from vedette.reports.tables import measure_table, nees_spread
 from vedette.simulation.records import RunRecord
@@ -35,15 +37,17 @@ def off_once(record: RunRecord, step: int) -> RunRecord:
     return replace(record, estimates=changed)
 
 
-def with_record(group: Group, label: str, run: int, record: RunRecord) -> Group:
-    strategies = []
-    for each in group.strategies:
-        if each.label == label:
-            records = (*each.records[:run], record, *each.records[run + 1 :])
-            metrics = (*each.metrics[:run], measure_run(record, each.cell.scenario), *each.metrics[run + 1 :])
-            each = replace(each, records=records, metrics=metrics)
-        strategies.append(each)
-    return replace(group, strategies=tuple(strategies))
+def with_runs(group: Group, label: str, runs: Iterable[tuple[RunRecord, RunMetrics]]) -> Group:
+    """The group with other runs of a strategy."""
+    ensemble = ensemble_of((record.outline(), metrics) for record, metrics in runs)
+    others = [replace(each, ensemble=ensemble) if each.label == label else each for each in group.strategies]
+    return replace(group, strategies=tuple(others))
+
+
+def runs_of(strategy: Strategy) -> Iterator[tuple[RunRecord, RunMetrics]]:
+    for run in strategy.ensemble.runs.tolist():
+        record = strategy.record(run)
+        yield record, measure_run(record, strategy.cell.scenario)
 
 
 def rows_of(group: Group) -> Mapping[str, tuple[str, ...]]:
@@ -54,11 +58,15 @@ def rows_of(group: Group) -> Mapping[str, tuple[str, ...]]:
 
 
 def test_the_worst_estimate_is_named_with_its_run(group: Group) -> None:
-    before = nees_spread(group.strategies[1], group.counted)
+    strategy = group.strategies[1]
+    before = nees_spread(strategy)
     assert before is not None
     assert before.is_by_chance
-    off = with_record(group, "random", 1, off_once(group.strategies[1].records[1], 20))
-    spread = nees_spread(off.strategies[1], off.counted)
+    worse = off_once(strategy.record(1), 20)
+    off = with_runs(
+        group, "random", [*list(runs_of(strategy))[:1], (worse, measure_run(worse, strategy.cell.scenario))]
+    )
+    spread = nees_spread(off.strategies[1])
     assert spread is not None
     assert (spread.run, spread.time, spread.is_by_chance) == (1, 20.0, False)
     assert spread.median == pytest.approx(before.median, rel=0.05)
@@ -74,19 +82,21 @@ def test_the_worst_estimate_is_named_with_its_run(group: Group) -> None:
 
 def test_the_largest_is_that_of_a_pair_of_a_counted_scan(group: Group) -> None:
     strategy = group.strategies[0]
-    spread = nees_spread(strategy, group.counted)
+    spread, counted = nees_spread(strategy), strategy.counted
     assert spread is not None
-    largest = np.array([metrics.position_nees_max for metrics in strategy.metrics])[:, group.counted]
-    assert spread.largest == np.nanmax(largest) / 2.0
-    late = np.array([metrics.position_nees_max for metrics in strategy.metrics]) / 2.0
-    late[:, ~group.counted] = np.nan
+    largest = np.array([metrics.position_nees_max for _, metrics in runs_of(strategy)])
+    assert spread.largest == np.nanmax(largest[:, counted]) / 2.0
+    late = largest / 2.0
+    late[:, ~counted] = np.nan
     assert late[spread.run, int(spread.time) - 1] == spread.largest
 
 
 def test_without_an_estimate_there_is_no_spread(group: Group) -> None:
     strategy = group.strategies[0]
-    none = [replace(each, position_nees_max=np.full(each.num_scans, np.nan)) for each in strategy.metrics]
-    assert nees_spread(replace(strategy, metrics=tuple(none)), group.counted) is None
-    assert rows_of(replace(group, strategies=(replace(strategy, metrics=tuple(none)),)))["  largest"] == (
-        "\N{EN DASH}",
-    )
+    none = [
+        (record, replace(metrics, position_nees_max=np.full(metrics.num_scans, np.nan)))
+        for record, metrics in runs_of(strategy)
+    ]
+    bare = with_runs(group, strategy.label, none).strategies[0]
+    assert nees_spread(bare) is None
+    assert rows_of(replace(group, strategies=(bare,)))["  largest"] == ("\N{EN DASH}",)

@@ -35,7 +35,7 @@ def strategies(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, Strateg
 
 
 def test_it_holds_the_truth_the_poses_and_the_errors(strategies: Mapping[str, Strategy]) -> None:
-    record = strategies["jdm"].records[0]
+    record = strategies["jdm"].record(0)
     data = replay_data(strategies["jdm"], record, "group", trust=True)
     json.dumps(data, allow_nan=False)
     ids, states = record.truth.at(30)
@@ -46,7 +46,7 @@ def test_it_holds_the_truth_the_poses_and_the_errors(strategies: Mapping[str, St
 
 
 def test_estimates_have_their_two_sigma_ellipse_and_their_error(strategies: Mapping[str, Strategy]) -> None:
-    record = strategies["jdm"].records[0]
+    record = strategies["jdm"].record(0)
     for scan, rows in enumerate(replay_data(strategies["jdm"], record, "", trust=True)["estimates"]):
         estimate = record.estimates[scan]
         assert len(rows) == estimate.num_targets
@@ -65,7 +65,7 @@ def test_estimates_have_their_two_sigma_ellipse_and_their_error(strategies: Mapp
 
 def test_bearing_and_range_become_a_point(strategies: Mapping[str, Strategy]) -> None:
     strategy = strategies["fixed"]
-    record = strategy.records[0]
+    record = strategy.record(0)
     data = replay_data(strategy, record, "", trust=True)
     scans: Any = scans_of(record, build_experiment(strategy.cell.scenario))
     for step in (0, 39):
@@ -79,11 +79,11 @@ def test_bearing_and_range_become_a_point(strategies: Mapping[str, Strategy]) ->
 
 def test_bearings_and_ranges_alone_stay_what_they_are(tmp_path: Path) -> None:
     strategy = strategies_of(tmp_path / "results", planners=["still"], set=MIXED_SENSORS)["still"]
-    data = replay_data(strategy, strategy.records[0], "", trust=True)
+    data = replay_data(strategy, strategy.record(0), "", trust=True)
     assert [sensor["kind"] for sensor in data["sensors"]] == ["ray", "circle"]
     assert data["sensors"][0]["half_width"] == pytest.approx(math.pi / 3.0, abs=1e-4)
     assert data["sensors"][1]["range"] == 1200.0
-    scans: Any = scans_of(strategy.records[0], build_experiment(strategy.cell.scenario))
+    scans: Any = scans_of(strategy.record(0), build_experiment(strategy.cell.scenario))
     bearings = [row[1] for row in data["scans"][7][0]]
     ranges = [row[1] for row in data["scans"][7][1]]
     np.testing.assert_allclose(bearings, scans[7][0].measurements[:, 0], atol=1e-4)
@@ -91,7 +91,7 @@ def test_bearings_and_ranges_alone_stay_what_they_are(tmp_path: Path) -> None:
 
 
 def test_a_joint_decision_is_a_map_and_curves_with_the_choice(strategies: Mapping[str, Strategy]) -> None:
-    record = strategies["jdm"].records[0]
+    record = strategies["jdm"].record(0)
     decision = replay_data(strategies["jdm"], record, "", trust=True)["decisions"][0]
     plan = record.decisions[0].plan
     i, j = decision["map"]["chosen"]
@@ -106,7 +106,7 @@ def test_a_joint_decision_is_a_map_and_curves_with_the_choice(strategies: Mappin
 
 def test_a_sensor_that_stands_has_no_rewards_and_zones_are_there(tmp_path: Path) -> None:
     both = strategies_of(tmp_path / "results", planners=["jdm", "idm"], set=STILL_NETWORK)
-    joint, alone = (replay_data(both[name], both[name].records[0], "", trust=True) for name in ("jdm", "idm"))
+    joint, alone = (replay_data(both[name], both[name].record(0), "", trust=True) for name in ("jdm", "idm"))
     assert [sensor["name"] for sensor in joint["sensors"]] == list(NAMES)
     assert joint["decisions"][0]["map"]["sensors"] == (1, 2)
     for data in (joint, alone):
@@ -117,17 +117,17 @@ def test_a_sensor_that_stands_has_no_rewards_and_zones_are_there(tmp_path: Path)
 
 
 def test_independent_decisions_are_curves_and_fixed_ones_nothing(strategies: Mapping[str, Strategy]) -> None:
-    decision = replay_data(strategies["idm"], strategies["idm"].records[0], "", trust=True)["decisions"][0]
+    decision = replay_data(strategies["idm"], strategies["idm"].record(0), "", trust=True)["decisions"][0]
     assert decision["map"] is None
     assert [curve["sensor"] for curve in decision["curves"]] == [0, 1]
-    decision = replay_data(strategies["fixed"], strategies["fixed"].records[0], "", trust=True)["decisions"][0]
+    decision = replay_data(strategies["fixed"], strategies["fixed"].record(0), "", trust=True)["decisions"][0]
     assert (decision["map"], decision["curves"]) == (None, [])
 
 
 def test_why_a_decision_was_taken_stands_with_it(tmp_path: Path) -> None:
     """Of sums over targets all that is told; the same numbers as in the plan's explanation, largest gains first."""
     strategy = strategies_of(tmp_path / "results", planners=["jdm"], set=SUMS)["jdm"]
-    record = strategy.records[0]
+    record = strategy.record(0)
     data = replay_data(strategy, record, "", trust=True)
     json.dumps(data, allow_nan=False)
     for decision, told in zip(record.decisions, data["decisions"], strict=True):
@@ -166,7 +166,7 @@ def test_many_targets_are_told_by_the_ten_that_matter_most() -> None:
 def test_decisions_that_tell_less_say_why(strategies: Mapping[str, Strategy]) -> None:
     """Case by case there is a second best; fixed actions have nothing to explain."""
     told = {
-        name: replay_data(each, each.records[0], "", trust=True)["decisions"][0] for name, each in strategies.items()
+        name: replay_data(each, each.record(0), "", trust=True)["decisions"][0] for name, each in strategies.items()
     }
     for name in ("jdm", "idm"):
         facts = dict(told[name]["why"]["facts"])
@@ -183,4 +183,4 @@ def test_without_the_models_there_are_no_measurements(
         raise InputError("function: expected a file; got none")
 
     monkeypatch.setattr(Sensor, "build", missing)
-    assert replay_data(strategies["fixed"], strategies["fixed"].records[0], "", trust=True)["scans"] == []
+    assert replay_data(strategies["fixed"], strategies["fixed"].record(0), "", trust=True)["scans"] == []

@@ -12,7 +12,7 @@ import pytest
 
 from vedette.control import FixedPlanner
 from vedette.errors import NumericalError
-from vedette.evaluation.health import health_findings, health_line, summarise_health
+from vedette.evaluation.health import health_findings, health_line, health_sums, summarise_health
 from vedette.filters import FilterInfo
 from vedette.fusion import CmDeltaGlmb
 from vedette.fusion.base import FusionInfo
@@ -109,7 +109,7 @@ def test_labels_that_a_sensor_lacks_are_counted_at_that_sensor(experiment: Exper
 
     record = run(with_second(experiment, blind))
     assert record.health.num_missing_labels[-1].tolist() == [0, 4]
-    summary = summarise_health([record, record])
+    summary = summarise_health(health_sums([record.health] * 2))
     assert summary.num_scans == 16
     assert summary.unknown_labels[0] == 0.0
     assert summary.unknown_labels[1] > 0.5
@@ -121,32 +121,34 @@ def test_a_target_that_one_sensor_alone_sees_is_told_as_lost(experiment: Experim
 
     record = run(with_second(experiment, near))
     assert record.health.fusion_num_lost_labels[-1] >= 1
-    assert "GCI lost a target that one sensor was sure of" in health_line(record)
-    assert "of the scans GCI lost a target" in health_findings([record])[0]
+    assert "GCI lost a target that one sensor was sure of" in health_line(record.health)
+    assert "of the scans GCI lost a target" in health_findings(health_sums([record.health]))[0]
 
 
 def test_all_exact_is_said_only_where_nothing_was_cut_off() -> None:
     record = replace(_synthetic(), health=Health.unreported(40, 2))
-    assert health_line(record) == "health: all exact"
-    assert health_findings([record]) == ()
+    assert health_line(record.health) == "health: all exact"
+    assert health_findings(health_sums([record.health])) == ()
     for name in ("cap_met", "search_cut", "num_inexact_clusters", "num_duplicates", "num_clutter_raised"):
         health = Health.unreported(40, 2)
         getattr(health, name)[7, 1] = 1
-        assert health_line(replace(record, health=health)) != "health: all exact", name
+        assert health_line(health) != "health: all exact", name
     for name in ("fusion_num_lost_labels", "fusion_empty_intersection", "fusion_discarded_weight"):
         health = Health.unreported(40, 2)
         getattr(health, name)[7] = 1
-        assert health_line(replace(record, health=health)) != "health: all exact", name
+        assert health_line(health) != "health: all exact", name
 
 
 def test_a_bound_is_told_as_one() -> None:
     record = _synthetic()
     record.health.discarded_weight_bound[:] = 0.0004
     record.health.factoring_error[:] = 0.0
-    assert "less than 1 % of a filter's weight was cut off at a scan (less than 1 % on average)" in health_line(record)
+    assert "less than 1 % of a filter's weight was cut off at a scan (less than 1 % on average)" in health_line(
+        record.health
+    )
     record.health.discarded_weight_bound[3, 1] = 0.72
     record.health.factoring_error[2, 0] = 0.5
-    line = health_line(record)
+    line = health_line(record.health)
     assert "at most 72 % of a filter's weight was cut off at a scan (less than 1 % on average)" in line
     assert "taking labels as independent moved at most 25 % of a filter's weight at a scan" in line
 
@@ -154,9 +156,8 @@ def test_a_bound_is_told_as_one() -> None:
 def test_weight_that_is_unknown_is_not_said_to_be_none() -> None:
     health = Health.unreported(40, 2)
     health.discarded_weight_bound[:] = math.nan
-    record = replace(_synthetic(), health=health)
-    assert math.isnan(summarise_health([record]).worst_discarded)
-    assert health_line(record) == "health: how much weight was cut off is not known"
+    assert math.isnan(summarise_health(health_sums([health])).worst_discarded)
+    assert health_line(health) == "health: how much weight was cut off is not known"
 
 
 def _synthetic() -> RunRecord:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from scenarios.minimal import changed
-from vedette.evaluation import choices_of
+from vedette.evaluation import choices_of, mean_rewards
 from vedette.evaluation.actions import choice_words
 from vedette.evaluation.comparison import compare
 from vedette.evaluation.figures import mean_rewards_figure, reward_figure, roses_figure, tracks_figure
@@ -80,7 +80,7 @@ def test_runs_are_kept_and_drawn(records: dict[str, RunRecord], tmp_path: Path) 
     titles = ["Heading (deg), speed, pointing (deg)", "Dx, dy"]
     assert [axes.get_xlabel() for axes in joint.axes][1:3] == titles
     assert [axes.get_xlabel() for axes in alone.axes] == titles
-    assert mean_rewards_figure([records["idm"]]).axes[0].get_xlabel() == "Number of the action"
-    mean_rewards_figure([records["jdm"]])
+    assert mean_rewards_figure([mean_rewards([records["idm"]], 0)]).axes[0].get_xlabel() == "Number of the action"
+    mean_rewards_figure([mean_rewards([records["jdm"]], 0)])
     bars = roses_figure(compare({name: [record] for name, record in records.items()}))
     assert not any(axes.name == "polar" for axes in bars.axes)

@@ -20,6 +20,7 @@ from vedette.text import printable, shown
 DATABASE, LOCK = "campaign.sqlite", "campaign.lock"
 
 _WAIT = 60.0  # s, for a reader or writer of the same file; each holds it for milliseconds
+_AT_ONCE = 256  # rows that are asked for together
 _TABLES = (
     "CREATE TABLE campaign (contents TEXT NOT NULL)",
     "CREATE TABLE runs (cell TEXT NOT NULL, run INTEGER NOT NULL, session INTEGER NOT NULL, "
@@ -241,14 +242,22 @@ class Reader:
 
     def entry(self, cell: str, run: int) -> Entry:
         """A finished run, its checksums verified. `InputError` where there is none, or its row is damaged."""
-        where = _place(cell, run)
-        rows = self._ask(f"SELECT {_COLUMNS} FROM runs WHERE cell = ? AND run = ?", (cell, run), where)
-        if not rows:
-            raise InputError(f"{self._path}: {where}expected a finished run; it is not there yet")
-        entry = verified(rows[0])
-        if entry is None:
-            raise InputError(f"{self._path}: {where}{_ALTERED}")
+        (entry,) = self.entries(cell, [run])
         return entry
+
+    def entries(self, cell: str, runs: Sequence[int]) -> Iterator[Entry]:
+        """Finished runs of a cell, a few hundred read at a time; raises as `entry`."""
+        for start in range(0, len(runs), _AT_ONCE):
+            few = runs[start : start + _AT_ONCE]
+            question = f"SELECT {_COLUMNS} FROM runs WHERE cell = ? AND run IN ({', '.join('?' * len(few))})"
+            found = {row[1]: row for row in self._ask(question, (cell, *few), _place(cell, few[0]))}
+            for run in few:
+                if run not in found:
+                    raise InputError(f"{self._path}: {_place(cell, run)}expected a finished run; it is not there yet")
+                entry = verified(found[run])
+                if entry is None:
+                    raise InputError(f"{self._path}: {_place(cell, run)}{_ALTERED}")
+                yield entry
 
     def _ask(self, question: str, values: Sequence[Any] = (), where: str = "") -> list[Any]:
         with _explained(self._path, where):
@@ -269,7 +278,13 @@ def _answer(path: Path, question: str, values: Sequence[Any], mode: str = "ro") 
 
 
 def _opened(path: Path, mode: str = "ro") -> sqlite3.Connection:
-    return sqlite3.connect(f"{path.resolve().as_uri()}?mode={mode}", timeout=_WAIT, uri=True)
+    database = sqlite3.connect(f"{path.resolve().as_uri()}?mode={mode}", timeout=_WAIT, uri=True)
+    database.text_factory = _text  # so that one damaged row does not hide behind all that are asked for with it
+    return database
+
+
+def _text(content: bytes) -> str:
+    return content.decode(errors="replace")
 
 
 def _check_tables(path: Path, database: sqlite3.Connection) -> None:

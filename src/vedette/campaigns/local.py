@@ -15,7 +15,7 @@ from multiprocessing.process import BaseProcess
 
 from vedette.campaigns.tasks import Outcome, Task, WorkerDied, perform
 from vedette.errors import VedetteError
-from vedette.processes import as_children, context, end_with_parent, load_ahead
+from vedette.processes import as_children, context, end_with_parent, let_go_of_results, load_ahead
 from vedette.reading import said
 
 _TASKS_A_WORKER = 2  # one that waits, so that none idles while results travel
@@ -83,9 +83,7 @@ class _Worker:
             raise VedetteError(
                 f"workers: expected that another process can be started; {said(error)} (--workers 1 needs none)"
             ) from error
-        # The process has its own by now. While this one is open, too, half a message of a worker that was killed is
-        # waited upon for ever.
-        pool._result_queue._writer.close()  # type: ignore[attr-defined]
+        let_go_of_results(pool)
         return cls(pool, begun, set(active_children()) - others)
 
     def has_begun(self) -> bool:

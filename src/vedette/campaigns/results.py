@@ -4,22 +4,25 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, SupportsIndex
 
 from vedette.campaigns.cells import Campaign, Cell
-from vedette.campaigns.codec import decode
+from vedette.campaigns.codec import decode, decode_outline
 from vedette.campaigns.dataset import dataset_of_scans
+from vedette.campaigns.gathering import gathered
 from vedette.campaigns.journal import DATABASE, Failure, Reader
 from vedette.campaigns.manifest import campaign_of, contents_checksum, read_manifest
 from vedette.campaigns.rows import Entry
 from vedette.campaigns.tables import FinishedRun, tables_of_runs
 from vedette.errors import InputError
-from vedette.evaluation.comparison import Comparison, Outline, outline, scored
+from vedette.evaluation.comparison import Comparison, scored
+from vedette.evaluation.ensembles import Ensemble
 from vedette.evaluation.metrics import Metric, RunMetrics, decode_metrics
 from vedette.evaluation.runs import measure_run
-from vedette.simulation.records import RunRecord
+from vedette.simulation.records import Outline, RunRecord
 from vedette.speaking import Speaking
 from vedette.text import counted, elided, shown
 
@@ -36,12 +39,14 @@ class GroupComparison:
         settings: axis and value, of the axes that all of them share.
         cells: in the order of the comparison's strategies.
         labels: values of the compared axis as text: the names of the comparison's strategies.
-        comparison: over the runs that are finished in every cell, and the scans that the scenario counts.
+        ensembles: of each cell, the runs that are finished in every cell.
+        comparison: over these runs, and the scans that the scenario counts.
     """
 
     settings: dict[str, Any]
     cells: tuple[Cell, ...]
     labels: tuple[str, ...]
+    ensembles: tuple[Ensemble, ...]
     comparison: Comparison
 
 
@@ -63,6 +68,7 @@ class CampaignResults(Speaking):
     manifest: dict[str, Any]
     _reader: Reader = field(repr=False)
     _own: tuple[Metric, ...] = field(default=(), repr=False)
+    _num_workers: int = field(default=1, repr=False)
 
     def _summary(self) -> str:
         campaign = self.campaign
@@ -112,6 +118,19 @@ class CampaignResults(Speaking):
         """The measures of a finished run: as they were kept, or where this version has others, computed anew."""
         return self.run(cell, run).metrics
 
+    def ensemble(self, cell: str, runs: Sequence[int] | None = None) -> Ensemble:
+        """What is compared and reported of finished runs of a cell, by their increasing numbers; None: of all.
+
+        Raises `InputError` for no run.
+        """
+        wanted = self.finished(cell) if runs is None else runs
+        return gathered(self, cell, wanted, 1 if self._own else self._num_workers)
+
+    def outlines(self, cell: str, runs: Sequence[int]) -> Iterator[tuple[Outline, RunMetrics]]:
+        """What is compared of these finished runs, with their measures."""
+        for entry in self._reader.entries(self.campaign.cell(cell).name, runs):
+            yield self._outlined(entry)
+
     def comparisons(self) -> tuple[GroupComparison, ...]:
         """One for each group of cells, in order, that has finished runs in common."""
         return tuple(filter(None, map(self._comparison, self.campaign.groups())))
@@ -153,38 +172,51 @@ class CampaignResults(Speaking):
             return None
         axis = self.campaign.compare
         labels = tuple(str(cell.settings[axis]) for cell in cells)
-        outlines: dict[str, list[RunRecord | Outline]] = {}
-        metrics: dict[str, list[RunMetrics]] = {}
-        for label, cell in zip(labels, cells, strict=True):
-            outlines[label], metrics[label] = [], []
-            for number in common:  # of a hundred thousand runs the records would take gigabytes
-                run = self.run(cell.name, number)
-                outlines[label].append(outline(run.record))
-                metrics[label].append(run.metrics)
+        ensembles = tuple(self.ensemble(cell.name, common) for cell in cells)
         settings = {name: value for name, value in cells[0].settings.items() if name != axis}
-        return GroupComparison(settings, cells, labels, scored(cells[0].scenario, outlines, metrics))
+        comparison = scored(cells[0].scenario, dict(zip(labels, ensembles, strict=True)))
+        return GroupComparison(settings, cells, labels, ensembles, comparison)
+
+    def _outlined(self, entry: Entry) -> tuple[Outline, RunMetrics]:
+        if entry.metrics and not self._own:
+            with self._placed(entry):
+                outline = decode_outline(entry.payload, entry.timings)
+                self._check(entry, outline.run, outline.health.num_tracks.shape[1])
+                metrics, _ = decode_metrics(entry.metrics, len(outline.times))
+            if metrics is not None:  # otherwise another version's
+                return outline, metrics
+        run = self._decoded(entry)
+        return run.record.outline(), run.metrics
 
     def _decoded(self, entry: Entry) -> FinishedRun:
-        try:
+        with self._placed(entry):
             record = decode(entry.payload, entry.timings)
-            if record.run != entry.run:
-                raise InputError(f"run: expected the number {entry.run}; got {record.run}")
-            scenario = self.campaign.cell(entry.cell).scenario
-            num_sensors = len(scenario.model.sensors)
-            if record.num_sensors != num_sensors:
-                raise InputError(f"run: expected the {num_sensors} sensors of its scenario; got {record.num_sensors}")
+            self._check(entry, record.run, record.num_sensors)
             metrics, own = decode_metrics(entry.metrics, record.num_scans) if entry.metrics else (None, {})
             if metrics is None:
-                metrics = replace(measure_run(record, scenario), own=own)
-            metrics = metrics.with_own(record, self._own)
+                metrics = replace(measure_run(record, self.campaign.cell(entry.cell).scenario), own=own)
+            return FinishedRun(entry.cell, record, metrics.with_own(record, self._own), entry.session, entry.checksum)
+
+    def _check(self, entry: Entry, run: int, num_sensors: int) -> None:
+        """`InputError` for a run that is not of that entry."""
+        expected = len(self.campaign.cell(entry.cell).scenario.model.sensors)
+        if run != entry.run:
+            raise InputError(f"run: expected the number {entry.run}; got {run}")
+        if num_sensors != expected:
+            raise InputError(f"run: expected the {expected} sensors of its scenario; got {num_sensors}")
+
+    @contextmanager
+    def _placed(self, entry: Entry) -> Iterator[None]:
+        """What is wrong with an entry, with the place where it stands."""
+        try:
+            yield
         except InputError as error:
             place = f"{self.folder / DATABASE}: cell {entry.cell}, run {entry.run}"
             raise InputError(f"{place}: {error}") from error
-        return FinishedRun(entry.cell, record, metrics, entry.session, entry.checksum)
 
 
 def open_results(
-    folder: Path | str, metrics: Sequence[Metric] = (), campaign: Campaign | None = None
+    folder: Path | str, metrics: Sequence[Metric] = (), campaign: Campaign | None = None, num_workers: int = 1
 ) -> CampaignResults:
     """Open the results folder of a campaign to read.
 
@@ -192,6 +224,8 @@ def open_results(
         folder: finished, unfinished, or while it is written.
         metrics: measures of one's own, computed of every run that is read, beside those that were kept.
         campaign: what the folder is of, where that is known, so that its scenarios need not be read; else None.
+        num_workers: processes that read where there are thousands of runs, in a program that guards its main module as
+            `multiprocessing` demands; 0: one a processor. It changes no number.
 
     Raises `InputError`, naming the file, for a folder that holds no campaign, or one whose manifest or runs are
     missing, cut short or altered.
@@ -204,4 +238,4 @@ def open_results(
     reader = Reader(target)
     reader.check(contents_checksum(manifest))
     known = campaign_of(target, manifest) if campaign is None else campaign.with_runs(manifest["num_runs"])
-    return CampaignResults(target, known, manifest, reader, tuple(metrics))
+    return CampaignResults(target, known, manifest, reader, tuple(metrics), num_workers)

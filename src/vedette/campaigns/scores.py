@@ -6,10 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vedette.campaigns.results import CampaignResults, GroupComparison
+from vedette.campaigns.results import GroupComparison
 from vedette.evaluation import Summary
-from vedette.kernels.base.types import Floats
-from vedette.simulation.records import RunRecord
 from vedette.text import markdown_table, named_in, with_error, with_minus
 
 TRACKED_OF_ALL = "tracked_of_all"  # as scenes and campaigns name the measure
@@ -45,13 +43,11 @@ class StrategyScore:
     num_runs: int
 
 
-def score_strategies(results: CampaignResults, group: GroupComparison) -> tuple[StrategyScore, ...]:
+def score_strategies(group: GroupComparison) -> tuple[StrategyScore, ...]:
     """The strategies of a group, over the runs that it has in common, in its order; the first is the reference."""
     comparison, scores = group.comparison, []
-    for label, cell in zip(group.labels, group.cells, strict=True):
-        total = comparison.summary(label)
-        seconds = [decision_seconds(results.record(cell.name, run)) for run in results.finished(cell.name)]
-        decisions = np.concatenate(seconds)
+    for label, ensemble in zip(group.labels, group.ensembles, strict=True):
+        total, decisions = comparison.summary(label), ensemble.seconds.get("planning", ())
         known = TRACKED_OF_ALL in comparison.measures
         scores.append(
             StrategyScore(
@@ -67,12 +63,6 @@ def score_strategies(results: CampaignResults, group: GroupComparison) -> tuple[
             )
         )
     return tuple(scores)
-
-
-def decision_seconds(record: RunRecord) -> Floats:
-    """(num_decisions,) wall time that each decision of a run took, s."""
-    decided = np.isin(record.times, [decision.time for decision in record.decisions])
-    return np.asarray(record.timings["planning"][decided]) if "planning" in record.timings else np.empty(0)
 
 
 def score_header(unit: str, reference: str) -> tuple[str, ...]:

@@ -13,12 +13,11 @@ import numpy as np
 
 from vedette.campaigns.benchmark import OWN, Entrant, Scene
 from vedette.campaigns.results import CampaignResults, open_results
-from vedette.campaigns.scores import decision_seconds
-from vedette.evaluation import Summary, summarise
+from vedette.evaluation import Summary, paired_difference, summarise
 from vedette.evaluation.comparison import scored
+from vedette.evaluation.ensembles import Ensemble
 from vedette.kernels.base.types import Floats
 from vedette.scenarios.dumping import dump_scenario
-from vedette.simulation.records import RunRecord
 from vedette.simulation.storage import versions
 from vedette.text import markdown_table, named_in, with_minus
 
@@ -106,16 +105,14 @@ def _tried(scene: Scene, results: CampaignResults) -> Iterator[_Tried]:
     for cell in results.campaign.cells:
         label = str(cell.settings["planner" if scene.role == "planner" else "variant"])
         lost = {each.run: each.message for each in results.failures() if each.cell == cell.name}
-        runs = [results.run(cell.name, run) for run in results.finished(cell.name)]
         ospa = dict.fromkeys(lost, float(cell.scenario.model.ospa.cutoff))
+        ensemble = results.ensemble(cell.name) if results.finished(cell.name) else None
         cardinality = nees = np.empty(0)
-        if runs:
-            records = [run.record for run in runs]
-            comparison = scored(cell.scenario, {label: records}, {label: [run.metrics for run in runs]})
-            ospa |= dict(zip([record.run for record in records], comparison.run_means(label).tolist(), strict=True))
+        if ensemble is not None:
+            comparison = scored(cell.scenario, {label: ensemble})
+            ospa |= dict(zip(ensemble.runs.tolist(), comparison.run_means(label).tolist(), strict=True))
             cardinality = comparison.run_means(label, "cardinality_error")
             nees = comparison.run_means(label, "position_nees_mean") / 2.0
-        decided = [decision.plan.counts for run in runs for decision in run.record.decisions]
         yield _Tried(
             label,
             results.folder.name == OWN,
@@ -123,23 +120,25 @@ def _tried(scene: Scene, results: CampaignResults) -> Iterator[_Tried]:
             tuple(lost[run] for run in sorted(lost)),
             cardinality,
             nees[~np.isnan(nees)],
-            np.concatenate([np.empty(0), *(_spent(scene, run.record) for run in runs)]),
-            {name: np.array([counts[name] for counts in decided if name in counts], float) for name in COUNTED},
+            np.empty(0) if ensemble is None else _spent(scene, ensemble),
+            {name: np.asarray(() if ensemble is None else ensemble.counts.get(name, ())) for name in COUNTED},
         )
 
 
-def _spent(scene: Scene, record: RunRecord) -> Floats:
+def _spent(scene: Scene, ensemble: Ensemble) -> Floats:
     """s of wall time, of each decision, or of the filters and fusion of each scan."""
     if scene.role == "planner":
-        return decision_seconds(record)
-    return np.asarray(record.timings["filter"] + record.timings["fusion"])
+        return np.asarray(ensemble.seconds.get("planning", ()), np.float64)
+    return np.add(ensemble.seconds["filter"], ensemble.seconds["fusion"], dtype=np.float64)
 
 
 def _standing(tried: _Tried, first: Mapping[int, float], is_first: bool) -> Standing | None:
     if not tried.ospa:
         return None
     common = sorted(tried.ospa.keys() & first.keys())
-    more = summarise([tried.ospa[run] - first[run] for run in common]) if common and not is_first else None
+    more = None
+    if common and not is_first:
+        more = paired_difference([tried.ospa[run] for run in common], [first[run] for run in common]).summary
     return Standing(
         tried.label,
         tried.is_own,

@@ -73,7 +73,7 @@ def yardstick_markdown(results: CampaignResults, yardstick: Yardstick) -> str:
     lines = [f"# {yardstick.title}", ""]
     for group in results.comparisons():
         title = results.title(group)
-        scores = (*score_strategies(results, group), *yardstick.published)
+        scores = (*score_strategies(group), *yardstick.published)
         table = score_markdown(scores, group.comparison.unit, group.labels[0])
         lines += [*([f"## {title}", ""] if title else []), table]
     return "\n".join([*lines, "\n\n".join(provenance(yardstick)), ""])

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
 
 def run_document(record: RunRecord, unit: str) -> dict[str, Any]:
     """A run: what was decided, how good it was (OSPA in `unit`), what it cost, and what was cut off."""
-    from vedette.evaluation.comparison import PARTS, choices_of
+    from vedette.evaluation.comparison import choices_of
+    from vedette.evaluation.ensembles import PARTS
     from vedette.evaluation.health import health_line
 
     decisions = [
@@ -37,7 +38,7 @@ def run_document(record: RunRecord, unit: str) -> dict[str, Any]:
         "decisions": decisions,
         "ospa": {"unit": unit, **dict(zip(PARTS, record.ospa.mean(axis=0), strict=True))},
         "seconds": {stage: seconds.sum() for stage, seconds in record.timings.items()},
-        "health": health_line(record),
+        "health": health_line(record.health),
     }
 
 

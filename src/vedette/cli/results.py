@@ -73,7 +73,7 @@ def _report_campaign(
     from vedette.campaigns.results import open_results
     from vedette.reports import code_in_replays, write_figures, write_report
 
-    results = open_results(folder)
+    results = open_results(folder, num_workers=0)
     with named_options({"path": "--out", "replays": "--runs", "cell": "--runs"}):
         write_report(results, page, replays=replays, trust=trust)
     unmeasured = () if trust else code_in_replays(results)
@@ -185,7 +185,7 @@ def results(
         print_run(opened, scenario)
         document = run_document(opened, "" if scenario is None else scenario.model.ospa.unit)
     else:
-        opened = open_results(folder)
+        opened = open_results(folder, num_workers=0)
         groups = opened.comparisons()
         print_results(opened, groups)
         document = results_document(opened, groups)

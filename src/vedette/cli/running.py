@@ -205,7 +205,7 @@ def print_run(record: RunRecord, scenario: Scenario | None) -> None:
         console.print(f"mean OSPA {amount(f'{total:.2f}', unit)} {parts}")
     spent = ", ".join(f"{stage} {seconds.sum():.2f} s" for stage, seconds in record.timings.items())
     console.print(f"time spent: {spent}")
-    console.print(health_line(record, names), soft_wrap=True)
+    console.print(health_line(record.health, names), soft_wrap=True)
 
 
 def _draw_run(record: RunRecord, scenario: Scenario, folder: Path) -> None:

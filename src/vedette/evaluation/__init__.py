@@ -31,6 +31,7 @@ from vedette.evaluation.metrics import (
     ospa_of_run,
     seen_targets,
 )
+from vedette.evaluation.rewards import MeanRewards, mean_rewards
 from vedette.evaluation.runs import measure_run, own_metrics, run_scenario
 from vedette.evaluation.statistics import PairedDifference, Summary, holm, paired_difference, summarise
 from vedette.evaluation.tables import decision_rows, strategy_csv, strategy_markdown, strategy_rows
@@ -42,6 +43,7 @@ __all__ = [
     "GospaResult",
     "GospaSeries",
     "Matching",
+    "MeanRewards",
     "Metric",
     "OspaResult",
     "PairedDifference",
@@ -60,6 +62,7 @@ __all__ = [
     "gospa_of_run",
     "holm",
     "match_run",
+    "mean_rewards",
     "measure",
     "measure_run",
     "nees",

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from vedette.control import Plan
 from vedette.errors import InputError
-from vedette.evaluation.actions import Row, rounded
+from vedette.evaluation.ensembles import PARTS, Choice, Ensemble, choice_of, ensemble_of
 from vedette.evaluation.metrics import RunMetrics
 from vedette.evaluation.statistics import PairedDifference, Summary, holm, paired_difference, summarise
 from vedette.kernels.base.types import Bools, Floats
@@ -21,9 +21,6 @@ from vedette.speaking import Speaking
 from vedette.text import counted, elided
 
 _MOST_TOLD = 4
-PARTS = ("total", "localisation", "cardinality")
-# What was chosen at one decision, one row a sensor.
-Choice: TypeAlias = tuple[Row, ...]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -40,7 +37,7 @@ class Comparison(Speaking):
         ospa: (num_strategies, num_runs, num_scans, 3) total, localisation and cardinality parts, in `unit`.
         since, until: scans after `since` (s) and up to `until` (s) count in the mean over time.
         choices: for each strategy, for each run, what each of its decisions chose.
-        measures: (num_strategies, num_runs, num_scans) of each measure that all runs have, by the name of its column.
+        measures: by the name of its column, each measure that all runs have: (num_runs, num_scans) of every strategy.
         unit: of OSPA: "m", or none ("") where it compares whole states.
     """
 
@@ -52,7 +49,7 @@ class Comparison(Speaking):
     since: float
     until: float
     choices: tuple[tuple[tuple[Choice, ...], ...], ...]
-    measures: Mapping[str, Floats] = field(default_factory=dict)
+    measures: Mapping[str, tuple[NDArray[Any], ...]] = field(default_factory=dict)
     unit: str = "m"
 
     def _summary(self) -> str:
@@ -75,12 +72,7 @@ class Comparison(Speaking):
 
     def run_means(self, strategy: str, part: str = "total") -> Floats:
         """(num_runs,) mean over the counted scans of each run that have a value; NaN where none has one."""
-        values = self.values(strategy, part)[:, self.counted]
-        known = ~np.isnan(values)
-        if known.all():
-            return np.asarray(values.mean(axis=1))
-        sums, counts = np.where(known, values, 0.0).sum(axis=1), known.sum(axis=1)
-        return np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
+        return mean_of_known(self.values(strategy, part)[:, self.counted])
 
     def summary(self, strategy: str, part: str = "total") -> Summary:
         """Mean over runs of `run_means`."""
@@ -113,7 +105,7 @@ class Comparison(Speaking):
             return np.asarray(self.ospa[self._index(strategy), :, :, PARTS.index(part)])
         if part not in self.measures:
             raise InputError(f"part: expected one of {', '.join((*PARTS, *self.measures))}; got {part!r}")
-        return np.asarray(self.measures[part][self._index(strategy)])
+        return np.asarray(self.measures[part][self._index(strategy)], np.float64)
 
     def _index(self, strategy: str) -> int:
         if strategy not in self.strategies:
@@ -121,35 +113,8 @@ class Comparison(Speaking):
         return self.strategies.index(strategy)
 
 
-@dataclass(frozen=True, slots=True)
-class Outline:
-    """What is compared of a run, in a tenth of its memory.
-
-    Attributes:
-        scenario, seed, run, times, ospa: as of the record.
-        decision_times: (num_decisions,) s.
-        choices: what each decision chose.
-    """
-
-    scenario: str
-    seed: int
-    run: int
-    times: Floats
-    ospa: Floats
-    decision_times: tuple[float, ...]
-    choices: tuple[Choice, ...]
-
-
-def outline(record: RunRecord) -> Outline:
-    """What is compared of a run."""
-    times = tuple(decision.time for decision in record.decisions)
-    return Outline(
-        record.scenario, record.seed, record.run, record.times, record.ospa.copy(), times, choices_of(record)
-    )
-
-
 def compare(
-    runs: Mapping[str, Sequence[RunRecord | Outline]],
+    runs: Mapping[str, Sequence[RunRecord]],
     metrics: Mapping[str, Sequence[RunMetrics]] | None = None,
     *,
     since: float | None = None,
@@ -170,13 +135,23 @@ def compare(
     """
     if not runs or not all(runs.values()):
         raise InputError("runs: expected at least one run of each of one or more strategies")
-    strategies = tuple(runs)
-    outlines = {name: [run if isinstance(run, Outline) else outline(run) for run in runs[name]] for name in strategies}
-    reference = outlines[strategies[0]]
-    for name in strategies:
-        _check_paired(name, outlines[name], strategies[0], reference)
-    decision_times = np.unique([time for of in outlines.values() for each in of for time in each.decision_times])
-    times = reference[0].times
+    measured = {name: [None] * len(of) for name, of in runs.items()} if metrics is None else metrics
+    ensembles = {
+        name: ensemble_of((record.outline(), own) for record, own in zip(of, measured[name], strict=True))
+        for name, of in runs.items()
+    }
+    return compare_ensembles(ensembles, since=since, until=until, unit=unit)
+
+
+def compare_ensembles(
+    ensembles: Mapping[str, Ensemble], *, since: float | None = None, until: float = np.inf, unit: str = "m"
+) -> Comparison:
+    """As `compare`, of runs that are gathered already, with the measures that all of them have."""
+    strategies, reference = tuple(ensembles), next(iter(ensembles.values()))
+    for name, ensemble in ensembles.items():
+        _check_paired(name, ensemble, strategies[0], reference)
+    decision_times = np.unique(np.concatenate([ensemble.decision_times for ensemble in ensembles.values()]))
+    times = reference.times
     if since is None:
         decided = len(decision_times) > 0 and decision_times[0] < times[-1]
         since = float(decision_times[0]) if decided else -np.inf
@@ -184,43 +159,42 @@ def compare(
         raise InputError(
             f"since: expected scans after it and up to until, of {times[0]} to {times[-1]} s; got {since} to {until}"
         )
+    common = [name for name in reference.measures if all(name in each.measures for each in ensembles.values())]
     return Comparison(
-        scenario=reference[0].scenario,
+        scenario=reference.scenario,
         strategies=strategies,
         times=times,
         decision_times=decision_times,
-        ospa=np.array([[each.ospa for each in outlines[name]] for name in strategies]),
+        ospa=np.array([ensemble.ospa for ensemble in ensembles.values()]),
         since=since,
         until=until,
-        choices=tuple(tuple(each.choices for each in outlines[name]) for name in strategies),
-        measures=_measures([metrics[name] for name in strategies]) if metrics else {},
+        choices=tuple(ensemble.choices for ensemble in ensembles.values()),
+        measures={name: tuple(ensemble.measures[name] for ensemble in ensembles.values()) for name in common},
         unit=unit,
     )
 
 
-def _measures(of_strategies: Sequence[Sequence[RunMetrics]]) -> dict[str, Floats]:
-    columns = [[metrics.columns() for metrics in of_runs] for of_runs in of_strategies]
-    common = [name for name in columns[0][0] if all(name in run for of_runs in columns for run in of_runs)]
-    return {name: np.array([[run[name] for run in of_runs] for of_runs in columns], np.float64) for name in common}
-
-
-def scored(
-    scenario: Scenario,
-    runs: Mapping[str, Sequence[RunRecord | Outline]],
-    metrics: Mapping[str, Sequence[RunMetrics]] | None = None,
-) -> Comparison:
+def scored(scenario: Scenario, ensembles: Mapping[str, Ensemble]) -> Comparison:
     """The comparison over the scans that the scenario counts."""
-    window = scenario.model.ospa
-    times = next(iter(runs.values()))[0].times
+    window, times = scenario.model.ospa, next(iter(ensembles.values())).times
     since = None if window.from_step is None else float(np.nextafter(times[window.from_step - 1], -np.inf))
     until = np.inf if window.to_step is None else float(times[window.to_step - 1])
-    return compare(runs, metrics, since=since, until=until, unit=window.unit)
+    return compare_ensembles(ensembles, since=since, until=until, unit=window.unit)
 
 
-def typical_run(comparison: Comparison, strategy: str, records: Sequence[RunRecord]) -> RunRecord:
-    """Of the runs of a strategy, the one whose mean OSPA is the median (of an even number, the better one."""
+def mean_of_known(values: Floats) -> Floats:
+    """(num_runs,) mean of each row over its numbers; NaN where it has none."""
+    known = ~np.isnan(values)
+    if known.all():
+        return np.asarray(values.mean(axis=1))
+    sums, counts = np.where(known, values, 0.0).sum(axis=1), known.sum(axis=1)
+    return np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
+
+
+def typical_run(comparison: Comparison, strategy: str) -> int:
+    """Of the runs of a strategy, the place of the one whose mean OSPA is the median (of an even number, the better)."""
     means = comparison.run_means(strategy)
-    return records[int(np.argsort(means, kind="stable")[(len(means) - 1) // 2])]
+    return int(np.argsort(means, kind="stable")[(len(means) - 1) // 2])
 
 
 def choices_of(record: RunRecord) -> tuple[Choice, ...]:
@@ -228,18 +202,17 @@ def choices_of(record: RunRecord) -> tuple[Choice, ...]:
     return tuple(choice_of(decision.plan) for decision in record.decisions)
 
 
-def choice_of(plan: Plan) -> Choice:
-    """What a plan chose, rounded."""
-    return tuple(rounded(own.columns, row) for own, row in zip(plan.actions, plan.chosen_actions, strict=True))
-
-
-def _check_paired(name: str, records: Sequence[Outline], other: str, reference: Sequence[Outline]) -> None:
-    if len(records) != len(reference):
-        raise InputError(f"runs[{name!r}]: expected {len(reference)} runs, as of {other!r}; got {len(records)}")
-    for record, partner in zip(records, reference, strict=True):
-        got = (record.scenario, record.seed, record.run)
-        expected = (reference[0].scenario, partner.seed, partner.run)
-        if got != expected:
-            raise InputError(f"runs[{name!r}]: expected scenario, seed and run {expected}; got {got}")
-        if not np.array_equal(record.times, reference[0].times):
-            raise InputError(f"runs[{name!r}]: expected the scan times of {other!r}; run {record.run} has others")
+def _check_paired(name: str, ensemble: Ensemble, other: str, reference: Ensemble) -> None:
+    if ensemble.num_runs != reference.num_runs:
+        raise InputError(
+            f"runs[{name!r}]: expected {reference.num_runs} runs, as of {other!r}; got {ensemble.num_runs}"
+        )
+    apart = (ensemble.seeds != reference.seeds) | (ensemble.runs != reference.runs)
+    if ensemble.scenario != reference.scenario or apart.any():
+        place = int(apart.argmax())
+        expected, got = (
+            (each.scenario, int(each.seeds[place]), int(each.runs[place])) for each in (reference, ensemble)
+        )
+        raise InputError(f"runs[{name!r}]: expected scenario, seed and run {expected}; got {got}")
+    if not np.array_equal(ensemble.times, reference.times):
+        raise InputError(f"runs[{name!r}]: expected the scan times of {other!r}; its runs have others")

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.kernels.base.types import Bools, Floats
+from vedette.kernels.base.types import Floats
 from vedette.simulation.health import Health
 from vedette.text import counted
 
@@ -17,18 +17,79 @@ from vedette.text import counted
 _MUCH = 0.01
 
 
-class Reported(Protocol):
-    """What has a health, such as the record of a run."""
+class HealthSums(NamedTuple):
+    """What filters and fusion reported over all scans of some runs: numbers of scans, sums, and the worst of all.
 
-    @property
-    def num_sensors(self) -> int:
-        """That are reported."""
-        ...
+    A scan counts once where it happened at any sensor. What is worst of no number is -inf.
+    """
 
-    @property
-    def health(self) -> Health:
-        """What the filters and the fusion reported."""
-        ...
+    num_scans: int
+    cap_met: int  # scans
+    search_cut: int  # scans
+    inexact: int  # scans
+    discarded: float  # sum over scans and sensors where it is known
+    num_discarded: int  # of these
+    worst_discarded: float
+    factoring: float  # sum over scans and sensors where it is known
+    num_factoring: int  # of these
+    worst_factoring: float
+    worst_dropped: float
+    duplicates: int
+    clutter_raised: int
+    num_missing_sets: Floats  # (num_sensors,)
+    num_sets: int
+    unknown_labels: Floats  # (num_sensors,) scans
+    lost: int  # scans
+    worst_lost: float
+    disjoint: int  # scans
+    worst_fusion_discarded: float
+
+
+def health_sums(healths: Sequence[Health]) -> HealthSums:
+    """Of runs with the same sensors; raises `InputError` for no run or other numbers of sensors."""
+    if len({health.num_tracks.shape[1] for health in healths}) != 1:
+        raise InputError("records: expected one run or more, of equally many sensors")
+
+    def joined(name: str) -> Floats:
+        return np.concatenate([getattr(health, name) for health in healths])
+
+    def scans(name: str) -> int:
+        happened = joined(name) > 0
+        return int(happened.reshape(len(happened), -1).any(axis=1).sum())
+
+    discarded, factoring = joined("discarded_weight_bound"), joined("factoring_error")
+    lacking = joined("num_missing_labels") > 0
+    return HealthSums(
+        len(lacking),
+        scans("cap_met"),
+        scans("search_cut"),
+        scans("num_inexact_clusters"),
+        *_sum_and_worst(discarded),
+        *_sum_and_worst(factoring),
+        float(joined("dropped_existence").max()),
+        int(joined("num_duplicates").sum()),
+        int(joined("num_clutter_raised").sum()),
+        joined("num_missing_sets").sum(axis=0, dtype=np.float64),
+        int(joined("fusion_num_sets").sum()),
+        lacking.sum(axis=0, dtype=np.float64),
+        scans("fusion_num_lost_labels"),
+        float(joined("fusion_num_lost_labels").max()),
+        scans("fusion_empty_intersection"),
+        float(joined("fusion_discarded_weight").max()),
+    )
+
+
+def _sum_and_worst(values: Floats) -> tuple[float, int, float]:
+    known = values[~np.isnan(values)]
+    return float(known.sum()), len(known), float(known.max(initial=-np.inf))
+
+
+def added(parts: Sequence[HealthSums]) -> HealthSums:
+    """Of all the runs of these; raises as `health_sums`."""
+    if len({part.unknown_labels.shape for part in parts}) != 1:
+        raise InputError("records: expected one run or more, of equally many sensors")
+    columns = dict(zip(HealthSums._fields, zip(*parts, strict=True), strict=True))
+    return HealthSums(**{name: max(of) if name.startswith("worst_") else sum(of) for name, of in columns.items()})
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,55 +135,45 @@ class HealthSummary:
     sensors: tuple[str, ...]
 
 
-def summarise_health(records: Sequence[Reported], sensors: Sequence[str] = ()) -> HealthSummary:
-    """The reports of runs with the same sensors, which are called `sensors`, or else `sensor 1` and so on.
+def summarise_health(sums: HealthSums, sensors: Sequence[str] = ()) -> HealthSummary:
+    """The reports of runs, whose sensors are called `sensors`, or else `sensor 1` and so on."""
 
-    Raises `InputError` for no run or other numbers of sensors.
-    """
-    if len({record.num_sensors for record in records}) != 1:
-        raise InputError("records: expected one run or more, of equally many sensors")
+    def mean(total: float, number: int) -> float:
+        return total / number if number else np.nan
 
-    def joined(name: str) -> Floats:
-        return np.concatenate([getattr(record.health, name) for record in records]).astype(np.float64)
-
-    def share(at_sensors: Bools) -> float:
-        return float(at_sensors.reshape(len(at_sensors), -1).any(axis=1).mean())
-
-    discarded, factoring = joined("discarded_weight_bound"), joined("factoring_error")
-    known, factoring = discarded[~np.isnan(discarded)], factoring[~np.isnan(factoring)]
-    lost = joined("fusion_num_lost_labels")
+    num_scans, known, factored = sums.num_scans, sums.num_discarded, sums.num_factoring
     return HealthSummary(
-        num_scans=len(discarded),
-        cap_met=share(joined("cap_met") > 0),
-        search_cut=share(joined("search_cut") > 0),
-        inexact=share(joined("num_inexact_clusters") > 0),
-        mean_discarded=float(known.mean()) if len(known) else np.nan,
-        worst_discarded=float(known.max()) if len(known) else np.nan,
-        mean_factoring=float(factoring.mean()) if len(factoring) else np.nan,
-        worst_factoring=float(factoring.max()) if len(factoring) else np.nan,
-        worst_dropped=float(joined("dropped_existence").max()),
-        duplicates=int(joined("num_duplicates").sum()),
-        clutter_raised=int(joined("num_clutter_raised").sum()),
-        missing_sets=joined("num_missing_sets").sum(axis=0) / max(1.0, float(joined("fusion_num_sets").sum())),
-        unknown_labels=(joined("num_missing_labels") > 0).mean(axis=0),
-        lost=share(lost > 0),
-        worst_lost=int(lost.max()),
-        disjoint=share(joined("fusion_empty_intersection") > 0),
-        worst_fusion_discarded=float(joined("fusion_discarded_weight").max()),
-        sensors=tuple(sensors) or tuple(f"sensor {number + 1}" for number in range(records[0].num_sensors)),
+        num_scans=num_scans,
+        cap_met=sums.cap_met / num_scans,
+        search_cut=sums.search_cut / num_scans,
+        inexact=sums.inexact / num_scans,
+        mean_discarded=mean(sums.discarded, known),
+        worst_discarded=sums.worst_discarded if known else np.nan,
+        mean_factoring=mean(sums.factoring, factored),
+        worst_factoring=sums.worst_factoring if factored else np.nan,
+        worst_dropped=sums.worst_dropped,
+        duplicates=sums.duplicates,
+        clutter_raised=sums.clutter_raised,
+        missing_sets=sums.num_missing_sets / max(1, sums.num_sets),
+        unknown_labels=sums.unknown_labels / num_scans,
+        lost=sums.lost / num_scans,
+        worst_lost=int(sums.worst_lost),
+        disjoint=sums.disjoint / num_scans,
+        worst_fusion_discarded=sums.worst_fusion_discarded,
+        sensors=tuple(sensors) or tuple(f"sensor {number + 1}" for number in range(len(sums.unknown_labels))),
     )
 
 
-def health_line(record: Reported, sensors: Sequence[str] = ()) -> str:
+def health_line(health: Health, sensors: Sequence[str] = ()) -> str:
     """A run's health in a line: `health: all exact`, or what was cut off, missing or left out."""
-    health = summarise_health([record], sensors)
-    statements = _statements(health, lambda share: f"{round(share * health.num_scans)} of {health.num_scans} scans")
+    summary = summarise_health(health_sums([health]), sensors)
+    statements = _statements(summary, lambda share: f"{round(share * summary.num_scans)} of {summary.num_scans} scans")
     return f"health: {'; '.join(text for text, _ in statements) or 'all exact'}"
 
 
-def health_findings(records: Sequence[Reported], sensors: Sequence[str] = ()) -> tuple[str, ...]:
+def health_findings(sums: HealthSums, sensors: Sequence[str] = ()) -> tuple[str, ...]:
     """What of the health of some runs may have cost accuracy, in words; none where nothing did."""
-    statements = _statements(summarise_health(records, sensors), lambda share: f"{percent(share)} of the scans")
+    statements = _statements(summarise_health(sums, sensors), lambda share: f"{percent(share)} of the scans")
     return tuple(text for text, is_much in statements if is_much)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,6 +14,8 @@ from vedette.kernels.base.types import Floats
 from vedette.models.measurement import wrap_angles
 from vedette.platforms import Actions
 from vedette.simulation.records import Decision, RunRecord
+
+_ALIKE = 1e-4  # degrees, or any other unit
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,38 +39,121 @@ class MeanRewards:
     num_runs: int
 
 
+class RewardSums(NamedTuple):
+    """The rewards of one decision, added up over runs: of each entry of a table the mean and the squares about it.
+
+    first: what the other runs are held against. faults: why no mean can be had, the first decides; empty: it can.
+    counts, means, squares, chosen: for each table, arrays of its shape. is_absolute, is_relative: whether all runs had
+    the actions of the first, or the turns from their headings.
+    """
+
+    first: Decision
+    faults: tuple[str, ...]
+    counts: tuple[Floats, ...]
+    means: tuple[Floats, ...]
+    squares: tuple[Floats, ...]
+    chosen: tuple[Floats, ...]
+    is_absolute: bool
+    is_relative: bool
+    num_runs: int
+
+    @classmethod
+    def of(cls, decision: int, made: Sequence[Decision]) -> RewardSums:
+        """Of runs that made the decision of that index."""
+        first, tables = made[0], [each.plan.tables for each in made]
+        shapes = [tuple(table.mean.shape for table in of_run) for of_run in tables]
+        faults = []
+        if not all(tables):
+            faults.append(f"records: expected runs with rewards at decision {decision}; got none")
+        elif len(set(shapes)) > 1:
+            faults.append("records: expected tables of one shape; got several")
+        summed = [] if faults else [_summed(place, made) for place in range(len(tables[0]))]
+        counts, means, squares, chosen = zip(*summed, strict=True) if summed else ((), (), (), ())
+        alike = _all_alike([each.plan.actions for each in made])
+        turned = _all_alike([_turns(each) for each in made]) if not alike else _head_alike(made)
+        return cls(first, tuple(faults), counts, means, squares, chosen, alike, turned, len(made))
+
+    @staticmethod
+    def added(parts: Sequence[RewardSums]) -> RewardSums:
+        """Of all the runs of these."""
+        total = parts[0]
+        for part in parts[1:]:
+            total = total._with(part)
+        return total
+
+    def _with(self, other: RewardSums) -> RewardSums:
+        """By T. Chan, G. Golub and R. LeVeque, "Updating formulae and a pairwise algorithm", 1979, eq. 2.1."""
+        faults, num_runs = self.faults + other.faults, self.num_runs + other.num_runs
+        if not faults and [each.shape for each in self.means] != [each.shape for each in other.means]:
+            faults = ("records: expected tables of one shape; got several",)
+        if faults:
+            return self._replace(faults=faults, num_runs=num_runs)
+        counts, means, squares = [], [], []
+        for mine, theirs in zip(self._moments(), other._moments(), strict=True):
+            count, apart = mine[0] + theirs[0], theirs[1] - mine[1]
+            share = theirs[0] / np.maximum(count, 1.0)
+            counts.append(count)
+            means.append(mine[1] + share * apart)
+            squares.append(mine[2] + theirs[2] + mine[0] * share * apart**2)
+        pair = self.first, other.first
+        return self._replace(
+            counts=tuple(counts),
+            means=tuple(means),
+            squares=tuple(squares),
+            chosen=tuple(mine + theirs for mine, theirs in zip(self.chosen, other.chosen, strict=True)),
+            is_absolute=self.is_absolute and other.is_absolute and _all_alike([each.plan.actions for each in pair]),
+            is_relative=self.is_relative and other.is_relative and _all_alike(list(map(_turns, pair))),
+            num_runs=num_runs,
+        )
+
+    def _moments(self) -> list[tuple[Floats, Floats, Floats]]:
+        return list(zip(self.counts, self.means, self.squares, strict=True))
+
+    def mean(self) -> MeanRewards:
+        """Raises `InputError` where a run weighed no actions, or runs had other actions to choose from."""
+        if self.faults:
+            raise InputError(self.faults[0])
+        if not self.is_absolute and not self.is_relative:
+            raise InputError("records: expected the same actions in every run; got others")
+        tables = [
+            RewardTable(
+                table.sensors,
+                np.where(count > 0, mean, np.nan),
+                np.where(count > 0, np.sqrt(squares / np.maximum(count - 1, 1) / np.maximum(count, 1)), np.nan),
+            )
+            for table, (count, mean, squares) in zip(self.first.plan.tables, self._moments(), strict=True)
+        ]
+        actions = self.first.plan.actions if self.is_absolute else _turns(self.first)
+        shares = tuple(chosen / self.num_runs for chosen in self.chosen)
+        return MeanRewards(self.first.time, actions, tuple(tables), shares, self.num_runs)
+
+
 def mean_rewards(records: Sequence[RunRecord], decision: int) -> MeanRewards:
     """Average the reward tables of one decision, given by its index, over the runs that made it.
 
     Raises `InputError` where no run made it, the planner weighs no actions, or runs had other actions to choose from.
     """
     made = [record.decisions[decision] for record in records if decision < len(record.decisions)]
-    if not made or not all(each.plan.tables for each in made):
+    if not made:
         raise InputError(f"records: expected runs with rewards at decision {decision}; got none")
-    actions = _common_actions(made)
-    tables, shares = [], []
-    for place, table in enumerate(made[0].plan.tables):
-        if any(each.plan.tables[place].mean.shape != table.mean.shape for each in made):
-            raise InputError("records: expected tables of one shape; got several")
-        stacked = np.array([each.plan.tables[place].mean for each in made])
-        tables.append(RewardTable(table.sensors, *_mean_and_error(stacked)))
-        share = np.zeros(table.mean.shape)
-        for each in made:
-            share[tuple(each.plan.chosen[sensor] for sensor in table.sensors)] += 1.0 / len(made)
-        shares.append(share)
-    return MeanRewards(made[0].time, actions, tuple(tables), tuple(shares), len(made))
+    return RewardSums.of(decision, made).mean()
 
 
-def _common_actions(made: Sequence[Decision]) -> tuple[Actions, ...]:
-    actions = [each.plan.actions for each in made]
-    if _all_alike(actions):
-        return actions[0]
-    turns = [
-        tuple(_as_turns(own, pose[2]) for own, pose in zip(each.plan.actions, each.poses, strict=True)) for each in made
-    ]
-    if _all_alike(turns):
-        return turns[0]
-    raise InputError("records: expected the same actions in every run; got others")
+def _summed(place: int, made: Sequence[Decision]) -> tuple[Floats, Floats, Floats, Floats]:
+    """Of one table: number of runs that evaluated each entry, mean and squares about it, number that chose it."""
+    values = np.array([each.plan.tables[place].mean for each in made])
+    known = np.isfinite(values)
+    count = known.sum(axis=0).astype(np.float64)
+    mean = np.where(known, values, 0.0).sum(axis=0) / np.maximum(count, 1.0)
+    squares = np.where(known, (values - mean) ** 2, 0.0).sum(axis=0)
+    chosen = np.zeros(values.shape[1:])
+    for each in made:
+        chosen[tuple(each.plan.chosen[sensor] for sensor in each.plan.tables[place].sensors)] += 1.0
+    return count, mean, squares, chosen
+
+
+def _turns(decision: Decision) -> tuple[Actions, ...]:
+    return tuple(_as_turns(own, pose[2]) for own, pose in zip(decision.plan.actions, decision.poses, strict=True))
 
 
 def _as_turns(actions: Actions, heading: float) -> Actions:
@@ -78,10 +164,18 @@ def _as_turns(actions: Actions, heading: float) -> Actions:
     return Actions(tuple("turn_deg" if name == "heading_deg" else name for name in actions.columns), values)
 
 
+def _head_alike(made: Sequence[Decision]) -> bool:
+    """Whether all sensors had the headings of the first run, up to rounding and full turns."""
+    headings = np.array([each.poses[:, 2] for each in made])
+    return bool(np.abs(wrap_angles(headings - headings[0])).max(initial=0.0) < np.radians(_ALIKE))
+
+
 def _all_alike(actions: Sequence[tuple[Actions, ...]]) -> bool:
     """Whether all runs had the same actions, up to rounding and full turns."""
     return all(
-        mine.columns == first.columns and len(mine) == len(first) and _off(mine, first) < 1e-4
+        mine.columns == first.columns
+        and len(mine) == len(first)
+        and (np.array_equal(mine.values, first.values) or _off(mine, first) < _ALIKE)
         for run in actions
         for mine, first in zip(run, actions[0], strict=True)
     )
@@ -92,15 +186,3 @@ def _off(mine: Actions, first: Actions) -> float:
     angles = [name.endswith("_deg") for name in mine.columns]
     off[:, angles] = np.abs(np.remainder(off[:, angles] + 180.0, 360.0) - 180.0)
     return float(off.max(initial=0.0))
-
-
-def _mean_and_error(stacked: Floats) -> tuple[Floats, Floats]:
-    """Mean over the first axis and its standard error, gaps left out."""
-    known = np.isfinite(stacked)
-    count = known.sum(axis=0)
-    gap = count == 0
-    number = np.maximum(count, 1)
-    mean = np.where(known, stacked, 0.0).sum(axis=0) / number
-    squares = np.where(known, (stacked - mean) ** 2, 0.0).sum(axis=0)
-    error = np.sqrt(squares / np.maximum(count - 1, 1) / number)
-    return np.where(gap, np.nan, mean), np.where(gap, np.nan, error)

@@ -11,7 +11,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from vedette.evaluation.actions import choice_words
-from vedette.evaluation.comparison import PARTS, Comparison
+from vedette.evaluation.comparison import Comparison
+from vedette.evaluation.ensembles import PARTS
 from vedette.evaluation.statistics import CONFIDENCE, PairedDifference, Summary, summarise
 from vedette.text import markdown_table, named_in, spreadsheet_text, with_error
 

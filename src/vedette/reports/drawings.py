@@ -25,7 +25,8 @@ from vedette.evaluation.figures import (
     tracks_figure,
 )
 from vedette.evaluation.figures.cost import MIN_FOR_TAILS
-from vedette.evaluation.figures.style import strategy_label
+from vedette.evaluation.figures.distributions import MOST_DOTS
+from vedette.evaluation.figures.style import shown_decisions, strategy_label
 from vedette.kernels.base.types import Floats
 from vedette.reports.groups import Group, Strategy, axis_label, axis_unit, describe_settings
 from vedette.reports.tables import nees_over_runs, stage_seconds
@@ -61,7 +62,7 @@ def group_drawings(group: Group) -> Iterator[Drawing]:
     yield from _decision_drawings(group)
     yield from _reward_drawings(group)
     yield from _tracks_drawings(group)
-    if any(metrics.num_scans for each in group.strategies for metrics in each.metrics):
+    if any(each.ensemble.measures for each in group.strategies):
         yield _consistency_drawing(group.strategies)
     spent = {each.label: stage_seconds(each) for each in group.strategies}
     if any(spent.values()):
@@ -112,11 +113,12 @@ def error_drawings(group: Group) -> Iterator[Drawing]:
         )
     elif len(comparison.strategies) > 1:
         differences = " Below: the differences, which one run gives no confidence interval."
+    first = f" (of the first {MOST_DOTS})" if comparison.num_runs > MOST_DOTS else ""
     yield Drawing(
         "distributions",
         "Run by run",
-        "Mean OSPA of each run. A dot is a run, the box holds the middle half with the median, the diamond is the "
-        f"mean.{differences}",
+        f"Mean OSPA of each run. A dot is a run{first}, the box holds the middle half with the median, the diamond "
+        f"is the mean.{differences}",
         distributions_figure(comparison),
     )
 
@@ -142,10 +144,10 @@ def _reward_drawings(group: Group) -> Iterator[Drawing]:
         figure = _rewards(strategy)
         if figure is not None:
             caption = (
-                f"Rewards that {strategy.name} decided on, averaged over {_runs(len(strategy.records))}. The area of a "
-                "mark is the share of the runs that chose the action; joint rewards of more than two sensors are the "
-                "largest over the others. Sensors without a choice are left out; of more than six, those with the most "
-                "at stake are drawn."
+                f"Rewards that {strategy.name} decided on, averaged over {_runs(strategy.ensemble.num_runs)}. The area "
+                "of a mark is the share of the runs that chose the action; joint rewards of more than two sensors are "
+                "the largest over the others. Sensors without a choice are left out; of more than six, those with the "
+                "most at stake are drawn."
             )
             yield Drawing(f"rewards-{strategy.cell.name}", f"Rewards, {strategy.name}", caption, figure)
 
@@ -157,7 +159,8 @@ def _runs(number: int) -> str:
 def _rewards(strategy: Strategy) -> Figure | None:
     """None for strategies that weigh no actions or have but one, or whose runs had different ones to weigh."""
     try:
-        return mean_rewards_figure(strategy.records, strategy.scene)
+        decisions = shown_decisions(len(strategy.ensemble.rewards))
+        return mean_rewards_figure([strategy.ensemble.rewards[each].mean() for each in decisions], strategy.scene)
     except InputError:
         return None
 
@@ -166,16 +169,13 @@ def typical_records(group: Group) -> tuple[tuple[Strategy, RunRecord], ...]:
     """Of each strategy, the run whose mean OSPA is the median; without a comparison, its first run."""
     found = []
     for strategy in group.strategies:
-        if group.comparison is None:
-            record = strategy.records[0]
-        else:
-            record = typical_run(group.comparison, strategy.label, strategy.records)
-        found.append((strategy, record))
+        place = 0 if group.comparison is None else typical_run(group.comparison, strategy.label)
+        found.append((strategy, strategy.record(int(strategy.ensemble.runs[place]))))
     return tuple(found)
 
 
 def _consistency_drawing(strategies: Sequence[Strategy]) -> Drawing:
-    times = next(record.times for each in strategies for record in each.records)
+    times = strategies[0].ensemble.times
     averages = {each.label: nees_over_runs(each, 2) for each in strategies}
     caption = (
         "Normalised squared error of the estimated positions, averaged over the runs; 1 where covariances are right. "

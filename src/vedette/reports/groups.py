@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,9 @@ from pydantic import BaseModel
 from vedette.campaigns.cells import Campaign, Cell
 from vedette.campaigns.results import CampaignResults
 from vedette.errors import InputError
-from vedette.evaluation import Comparison, RunMetrics
+from vedette.evaluation import Comparison
 from vedette.evaluation.comparison import scored
+from vedette.evaluation.ensembles import Ensemble, ensemble_of
 from vedette.evaluation.figures.scene import Scene, scene_of
 from vedette.evaluation.figures.style import strategy_label
 from vedette.evaluation.runs import measure_run
@@ -33,14 +35,17 @@ class Strategy:
         cell: strategy and setting.
         label: its value of the compared axis, as text.
         num_finished: runs that there are.
-        records, metrics: of the runs that the group has in common; of all finished runs where it has none in common.
+        ensemble: of the runs that the group has in common; of all finished runs where it has none in common.
+        counted: (num_scans,) whether a scan counts in means over time; all of them without a comparison.
+        record: gives the record of a run of these by its number.
     """
 
     cell: Cell
     label: str
     num_finished: int
-    records: tuple[RunRecord, ...]
-    metrics: tuple[RunMetrics, ...]
+    ensemble: Ensemble
+    counted: Bools
+    record: Callable[[int], RunRecord]
 
     @property
     def name(self) -> str:
@@ -78,17 +83,6 @@ class Group:
     comparison: Comparison | None
     reason: str
 
-    @property
-    def counted(self) -> Bools:
-        """(num_scans,) whether a scan counts in means over time; all of them without a comparison."""
-        if self.comparison is not None:
-            return self.comparison.counted
-        return np.ones(max((record.num_scans for each in self.strategies for record in each.records), default=0), bool)
-
-    def without_runs(self) -> Group:
-        """The same group, its runs let go of."""
-        return replace(self, strategies=tuple(replace(each, records=(), metrics=()) for each in self.strategies))
-
 
 def gather(results: CampaignResults) -> Iterator[Group]:
     """Every group in the order of the specification, its runs read when it is asked for."""
@@ -105,22 +99,34 @@ def _group(results: CampaignResults, cells: tuple[Cell, ...], name: str, title: 
     labels = {cell.name: _label(axis, cell.settings[axis]) for cell in cells}
     finished = {cell.name: results.finished(cell.name) for cell in cells}
     common = sorted(set.intersection(*(set(runs) for runs in finished.values())))
-    strategies = []
-    for cell in cells:
-        runs = [results.run(cell.name, run) for run in common or finished[cell.name]]
-        if runs:
-            records, metrics = tuple(run.record for run in runs), tuple(run.metrics for run in runs)
-            strategies.append(Strategy(cell, labels[cell.name], len(finished[cell.name]), records, metrics))
     missing = tuple(strategy_label(label) for cell, label in labels.items() if not finished[cell])
-    paired = {each.label: each.records for each in strategies}
-    measured = {each.label: each.metrics for each in strategies}
+    present = [cell for cell in cells if finished[cell.name]]
+    ensembles = {labels[cell.name]: results.ensemble(cell.name, common or finished[cell.name]) for cell in present}
     comparison, reason = None, "no run number is finished for every one of them yet"
     if common:
         try:
-            comparison, reason = scored(cells[0].scenario, paired, measured), ""
+            comparison, reason = scored(cells[0].scenario, ensembles), ""
         except InputError as error:  # such as scans of other times
             reason = str(error)
+    strategies = []
+    for cell in present:
+        label, record = labels[cell.name], partial(results.record, cell.name)
+        strategies.append(_strategy(cell, label, len(finished[cell.name]), ensembles[label], comparison, record))
     return Group(name, title, tuple(strategies), missing, comparison, reason)
+
+
+def _strategy(
+    cell: Cell,
+    label: str,
+    num_finished: int,
+    ensemble: Ensemble,
+    comparison: Comparison | None,
+    record: Callable[[int], RunRecord],
+) -> Strategy:
+    if comparison is None:
+        return Strategy(cell, label, num_finished, ensemble, np.ones(len(ensemble.times), bool), record)
+    own = comparison.ospa[comparison.strategies.index(label)]  # the same numbers: of many runs, much memory
+    return Strategy(cell, label, num_finished, replace(ensemble, ospa=own), comparison.counted, record)
 
 
 def group_of_run(record: RunRecord, scenario: Scenario) -> Group:
@@ -134,14 +140,14 @@ def group_of_run(record: RunRecord, scenario: Scenario) -> Group:
     settings = {"scenario": record.scenario, "planner": record.planner}
     cell = Cell(_file_part(record.planner) or "run", settings, scenario, record.planner)
     is_known = scenario.model.targets.kind != "unknown"
-    metrics = (measure_run(record, scenario),) if is_known else ()
-    strategy = Strategy(cell, record.planner, 1, (record,), metrics)
+    ensemble = ensemble_of([(record.outline(), measure_run(record, scenario) if is_known else None)])
     comparison, reason = None, "nobody knows the targets"
     if is_known:
         try:
-            comparison = scored(scenario, {strategy.label: [record]}, {strategy.label: metrics})
+            comparison = scored(scenario, {record.planner: ensemble})
         except InputError as error:  # such as a run that stopped before the scans that count
             reason = str(error)
+    strategy = _strategy(cell, record.planner, 1, ensemble, comparison, lambda _: record)
     return Group("run", record.scenario, (strategy,), (), comparison, "" if comparison is not None else reason)
 
 

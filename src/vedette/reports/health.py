@@ -10,7 +10,7 @@ import numpy as np
 
 from vedette.evaluation.health import HealthSummary, health_findings, percent, summarise_health
 from vedette.fusion.base import LOST, SURE
-from vedette.kernels.base.types import Bools, Floats
+from vedette.kernels.base.types import Floats
 from vedette.reports.groups import Group, Strategy
 from vedette.reports.tables import Table, nees_over_runs, nees_spread
 from vedette.scenarios.sections.fusion import ONE_BELIEF
@@ -111,11 +111,10 @@ _ROWS = (
 
 def health_table(group: Group) -> Table | None:
     """What the filters and the fusion reported, a column a strategy; None where nothing has run."""
-    strategies = [each for each in group.strategies if each.records]
-    if not strategies:
+    if not (strategies := group.strategies):
         return None
     has_fusion = any(each.cell.scenario.model.fusion.kind not in ONE_BELIEF for each in strategies)
-    summaries = [summarise_health(each.records, each.scene.names) for each in strategies]
+    summaries = [summarise_health(each.ensemble.health, each.scene.names) for each in strategies]
     rows = [row for row in _ROWS if has_fusion or not row.needs_fusion]
     caption = "What filters and fusion had to leave out, over all scans of all runs in common."
     return Table(
@@ -133,36 +132,36 @@ def group_health(group: Group) -> tuple[tuple[str, str], ...]:
     farther off than its covariance allows.
     """
     said = (
-        (each.name, (*health_findings(each.records, each.scene.names), *_findings(each, group.counted)))
+        (each.name, (*health_findings(each.ensemble.health, each.scene.names), *_findings(each)))
         for each in group.strategies
-        if each.records
     )
     return tuple((name, f"{'; '.join(findings)}.") for name, findings in said if findings)
 
 
-def _findings(strategy: Strategy, counted: Bools) -> Iterator[str]:
-    if strategy.metrics:  # the targets are known
-        yield from _lost_findings(strategy, counted)
-        yield from _consistency_findings(strategy, counted)
+def _findings(strategy: Strategy) -> Iterator[str]:
+    if strategy.ensemble.measures:  # the targets are known
+        yield from _lost_findings(strategy)
+        yield from _consistency_findings(strategy)
 
 
-def _lost_findings(strategy: Strategy, counted: Bools) -> Iterator[str]:
+def _lost_findings(strategy: Strategy) -> Iterator[str]:
     """Targets without an estimate, and the run where that is most frequent."""
-    alive = np.array([np.diff(record.truth.offsets)[counted].sum() for record in strategy.records], np.float64)
-    missed = np.array([metrics.num_missed[counted].sum() for metrics in strategy.metrics], np.float64)
+    ensemble, counted = strategy.ensemble, strategy.counted
+    alive = ensemble.num_targets[:, counted].sum(axis=1, dtype=np.float64)
+    missed = ensemble.values("num_missed")[:, counted].sum(axis=1)
     if not alive.any() or missed.sum() < _TRIFLE * alive.sum():
         return
     shares = missed / np.maximum(alive, 1.0)
     worst = int(np.argmax(shares))
     yield (
         f"{percent(float(missed.sum() / alive.sum()))} of the targets, over the scans, have no estimate within the "
-        f"cutoff, most in run {strategy.records[worst].run} ({percent(float(shares[worst]))})"
+        f"cutoff, most in run {ensemble.runs[worst]} ({percent(float(shares[worst]))})"
     )
 
 
-def _consistency_findings(strategy: Strategy, counted: Bools) -> Iterator[str]:
+def _consistency_findings(strategy: Strategy) -> Iterator[str]:
     """Covariances that are wrong on average, and the estimate that is worst for its own, if not by chance."""
-    average = nees_over_runs(strategy, 2)
+    average, counted = nees_over_runs(strategy, 2), strategy.counted
     known = counted & (average.count > 0)
     for said, outside in (("small", average.mean > average.upper), ("large", average.mean < average.lower)):
         share = float(outside[known].mean()) if known.any() else 0.0
@@ -172,7 +171,7 @@ def _consistency_findings(strategy: Strategy, counted: Bools) -> Iterator[str]:
                 f"covariances are too {said} at {percent(share)} of the scans, where 2.5 % may be by chance: position "
                 f"NEES / 2, averaged over the runs, is {middle:.2f} in the middle, and 1 is consistent"
             )
-    spread = nees_spread(strategy, counted)
+    spread = nees_spread(strategy)
     if spread is not None and not spread.is_by_chance:
         yield (
             f"in run {spread.run} at {spread.time:g} s an estimate was far worse than its covariance says: position "

@@ -58,12 +58,6 @@ class Remembering:
         return self.last
 
 
-@dataclass(frozen=True, slots=True)
-class _Reported:
-    num_sensors: int
-    health: Health
-
-
 class LiveScreen:
     """What the pages of a loop show.
 
@@ -192,7 +186,7 @@ class LiveScreen:
         for place, instant in enumerate(latest):
             health.note_filters(place, instant.info.filters)
             health.note_fusion(place, instant.info.fusion)
-        return health_line(_Reported(len(self._sections), health), self._names).removeprefix("health: ")
+        return health_line(health, self._names).removeprefix("health: ")
 
     def _silence(self, state: LiveState) -> list[float | None]:
         """s of each sensor since its latest scan, by the clock of the scans; None before its first."""

@@ -13,7 +13,7 @@ from vedette.densities import Estimate
 from vedette.errors import VedetteError
 from vedette.evaluation import match_run
 from vedette.evaluation.actions import action_axis, choice_words
-from vedette.evaluation.comparison import choice_of
+from vedette.evaluation.ensembles import choice_of
 from vedette.evaluation.figures.rewards import best_over_others, best_over_pair, first_pair
 from vedette.evaluation.scans import LIE, code_of_sensors, in_plane, scans_of_record
 from vedette.evaluation.told import told_by

@@ -6,21 +6,25 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from vedette.evaluation import AverageNees, RunMetrics, average_nees, summarise
+from vedette.evaluation import AverageNees, average_nees, summarise
+from vedette.evaluation.comparison import mean_of_known
+from vedette.evaluation.ensembles import Ensemble
 from vedette.evaluation.figures.cost import MIN_FOR_TAILS
 from vedette.evaluation.figures.style import strategy_label
 from vedette.evaluation.health import percent
+from vedette.evaluation.metrics.run import COLUMNS
 from vedette.evaluation.tables import decision_rows, header, strategy_rows
 from vedette.kernels.base.types import Bools, Floats
 from vedette.reports.groups import Group, Strategy
-from vedette.simulation.records import RunRecord
 from vedette.text import elided_apart, with_error, with_minus
 
 _BY_CHANCE = 1e-3  # chance below which a largest value says that the filter is not consistent
 _LONGEST_NAME = 32  # letters, beyond which the page gives the full name as a title
 
-Measure = Callable[[RunMetrics, Bools], float]
+# (num_runs,) of an ensemble over the counted scans, NaN where a run has no value.
+Measure = Callable[[Ensemble, Bools], Floats]
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,15 +62,19 @@ class Table:
 
 
 def _mean(name: str) -> Measure:
-    return lambda metrics, counted: float(getattr(metrics, name)[counted].mean())
+    return lambda ensemble, counted: ensemble.values(name)[:, counted].mean(axis=1)
 
 
 def _total(name: str) -> Measure:
-    return lambda metrics, counted: float(getattr(metrics, name)[counted].sum())
+    return lambda ensemble, counted: ensemble.values(name)[:, counted].sum(axis=1)
 
 
-def _mean_size(metrics: RunMetrics, counted: Bools) -> float:
-    return float(np.abs(metrics.cardinality_error[counted]).mean())
+def _mean_size(ensemble: Ensemble, counted: Bools) -> Floats:
+    return np.asarray(np.abs(ensemble.values("cardinality_error")[:, counted]).mean(axis=1))
+
+
+def _mean_of_known(name: str) -> Measure:
+    return lambda ensemble, counted: mean_of_known(ensemble.values(name)[:, counted])
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,19 +106,9 @@ def _kinds(order: float) -> tuple[_Kind, ...]:
 
 def _own_kinds(strategies: Sequence[Strategy]) -> Iterator[_Kind]:
     """The user's own measures that every run has."""
-
-    def mean(name: str) -> Measure:
-        def over(metrics: RunMetrics, counted: Bools) -> float:
-            values = metrics.own[name][counted]
-            known = values[~np.isnan(values)]
-            return float(known.mean()) if len(known) else np.nan
-
-        return over
-
-    runs = [metrics for each in strategies for metrics in each.metrics]
-    for name in runs[0].own:
-        if all(name in metrics.own for metrics in runs):
-            yield _Kind(name, "a measure of one's own, mean over the scans", mean(name))
+    for name in strategies[0].ensemble.measures:
+        if name not in COLUMNS and all(name in each.ensemble.measures for each in strategies):
+            yield _Kind(name, "a measure of one's own, mean over the scans", _mean_of_known(name))
 
 
 def error_table(group: Group) -> Table | None:
@@ -138,20 +136,21 @@ def error_table(group: Group) -> Table | None:
 
 def measure_table(group: Group) -> Table | None:
     """Measures beside OSPA, a column a strategy; None where nothing has run."""
-    strategies = [each for each in group.strategies if each.metrics]
+    strategies = [each for each in group.strategies if each.ensemble.measures]
     if not strategies:
         return None
     score = strategies[0].cell.scenario.model.ospa
     kinds = (*_kinds(score.order), *_own_kinds(strategies))
-    rows = [(kind.name, *(_over_runs(kind, each, group.counted) for each in strategies)) for kind in kinds]
+    rows = [(kind.name, *(_over_runs(kind, each) for each in strategies)) for kind in kinds]
     notes = [kind.note for kind in kinds]
     for name, note, dim in _consistency_kinds(strategies):
-        rows.append((name, *(_consistency(each, group.counted, dim) for each in strategies)))
+        rows.append((name, *(_consistency(each, dim) for each in strategies)))
         notes.append(note)
         if dim == 2:
-            rows += _spread_rows(strategies, group.counted)
+            rows += _spread_rows(strategies)
             notes += ["of the means at the scans of all runs", "of a single estimate, with its run and time"]
-    over = "Mean over the runs ± one standard error" if any(len(each.metrics) > 1 for each in strategies) else "One run"
+    several = any(each.ensemble.num_runs > 1 for each in strategies)
+    over = "Mean over the runs ± one standard error" if several else "One run"
     caption = (
         f"{over}, over the same scans as above; cutoff {score.cutoff:g} m, order "
         f"{score.order:g}, window of OSPA(2) {score.window} scans. NEES / dimension is 1 for a consistent "
@@ -162,9 +161,8 @@ def measure_table(group: Group) -> Table | None:
 
 def _consistency_kinds(strategies: Sequence[Strategy]) -> list[tuple[str, str, int]]:
     kinds = [("Position NEES / 2", "squared error over what the covariance says", 2)]
-    metrics = [metrics for each in strategies for metrics in each.metrics]
-    dims = {record.truth.states.shape[1] for each in strategies for record in each.records}
-    if len(dims) == 1 and any(run.nees_count.any() for run in metrics):
+    dims = {each.record(int(each.ensemble.runs[0])).truth.states.shape[1] for each in strategies}
+    if len(dims) == 1 and any(each.ensemble.measures["nees_count"].any() for each in strategies):
         dim = dims.pop()
         kinds.append((f"State NEES / {dim}", "the same of the whole state", dim))
     return kinds
@@ -172,22 +170,15 @@ def _consistency_kinds(strategies: Sequence[Strategy]) -> list[tuple[str, str, i
 
 def nees_over_runs(strategy: Strategy, dim: int) -> AverageNees:
     """NEES averaged over the runs at each scan: of the position for `dim` 2, or else of the full state."""
+    ensemble = strategy.ensemble
     if dim == 2:
-        means = np.array([metrics.position_nees_mean for metrics in strategy.metrics])
-        counts = np.array([_num_pairs(*each) for each in zip(strategy.records, strategy.metrics, strict=True)])
-    else:
-        means = np.array([metrics.nees_mean for metrics in strategy.metrics])
-        counts = np.array([metrics.nees_count for metrics in strategy.metrics])
-    return average_nees(means, counts, dim=dim)
+        return average_nees(ensemble.values("position_nees_mean"), ensemble.num_pairs(), dim=dim)
+    return average_nees(ensemble.values("nees_mean"), ensemble.measures["nees_count"], dim=dim)
 
 
-def _num_pairs(record: RunRecord, metrics: RunMetrics) -> Floats:
-    return np.diff(record.truth.offsets) - metrics.num_missed
-
-
-def _consistency(strategy: Strategy, counted: Bools, dim: int) -> str:
+def _consistency(strategy: Strategy, dim: int) -> str:
     average = nees_over_runs(strategy, dim)
-    known = counted & (average.count > 0)
+    known = strategy.counted & (average.count > 0)
     if not known.any():
         return "\N{EN DASH}"
     mean = float((average.mean[known] * average.count[known]).sum() / average.count[known].sum()) / dim
@@ -212,26 +203,25 @@ class NeesSpread:
     is_by_chance: bool
 
 
-def nees_spread(strategy: Strategy, counted: Bools) -> NeesSpread | None:
+def nees_spread(strategy: Strategy) -> NeesSpread | None:
     """Over the counted scans; None where no estimate is matched."""
-    means = np.array([metrics.position_nees_mean[counted] for metrics in strategy.metrics]) / 2.0
-    largest = np.array([metrics.position_nees_max[counted] for metrics in strategy.metrics]) / 2.0
+    ensemble, counted = strategy.ensemble, strategy.counted
+    means, largest = (ensemble.values(f"position_nees_{name}")[:, counted] / 2.0 for name in ("mean", "max"))
     if np.isnan(largest).all():
         return None
     run, scan = np.unravel_index(np.nanargmax(largest), largest.shape)
-    record = strategy.records[run]
-    pairs = sum(_num_pairs(*each)[counted].sum() for each in zip(strategy.records, strategy.metrics, strict=True))
+    pairs = ensemble.num_pairs()[:, counted].sum()
     return NeesSpread(
         median=float(np.nanmedian(means)),
         largest=float(largest[run, scan]),
-        run=record.run,
-        time=float(record.times[counted][scan]),
+        run=int(ensemble.runs[run]),
+        time=float(ensemble.times[counted][scan]),
         is_by_chance=bool(pairs * np.exp(-largest[run, scan]) > _BY_CHANCE),  # half of chi-square of 2 is exponential
     )
 
 
-def _spread_rows(strategies: Sequence[Strategy], counted: Bools) -> Iterator[tuple[str, ...]]:
-    spreads = [nees_spread(each, counted) for each in strategies]
+def _spread_rows(strategies: Sequence[Strategy]) -> Iterator[tuple[str, ...]]:
+    spreads = [nees_spread(each) for each in strategies]
     yield "  median", *("\N{EN DASH}" if each is None else f"{each.median:.2f}" for each in spreads)
     places = [None if each is None else f"(run {each.run}, {each.time:g} s)" for each in spreads]
     yield (
@@ -243,31 +233,24 @@ def _spread_rows(strategies: Sequence[Strategy], counted: Bools) -> Iterator[tup
     )
 
 
-def _over_runs(kind: _Kind, strategy: Strategy, counted: Bools) -> str:
+def _over_runs(kind: _Kind, strategy: Strategy) -> str:
     if kind.needs_labels and not strategy.has_labels:
         return "\N{EN DASH}"
-    values = [kind.value(metrics, counted) for metrics in strategy.metrics]
-    known = [value for value in values if not np.isnan(value)]
-    return _with_error(known) if known else "\N{EN DASH}"
-
-
-def _with_error(values: Sequence[float]) -> str:
-    summary = summarise(values)
+    values = kind.value(strategy.ensemble, strategy.counted)
+    known = values[~np.isnan(values)]
+    if not len(known):
+        return "\N{EN DASH}"
+    summary = summarise(known)
     return with_minus(with_error(float(summary.mean), float(summary.standard_error)))
 
 
-def stage_seconds(strategy: Strategy) -> dict[str, Floats]:
+def stage_seconds(strategy: Strategy) -> dict[str, NDArray[np.float32]]:
     """Seconds of each stage, at all scans of all runs: planning at the decisions alone, other stages at every scan."""
-    spent: dict[str, list[Floats]] = {}
-    for record in strategy.records:
-        steps = np.array([decision.step - 1 for decision in record.decisions], np.int64)
-        for stage, seconds in record.timings.items():
-            if stage == "planning":
-                spent.setdefault("planning, a decision", []).append(seconds[steps])
-            else:
-                spent.setdefault(f"{stage}, a scan", []).append(seconds)
-    joined = {stage: np.concatenate(parts) for stage, parts in spent.items()}
-    return {stage: seconds for stage, seconds in joined.items() if seconds.any()}
+    named = {
+        f"{stage}, a {'decision' if stage == 'planning' else 'scan'}": seconds
+        for stage, seconds in strategy.ensemble.seconds.items()
+    }
+    return {stage: seconds for stage, seconds in named.items() if seconds.any()}
 
 
 def cost_table(group: Group) -> Table | None:
@@ -284,7 +267,7 @@ def cost_table(group: Group) -> Table | None:
     return Table(caption, ("Stage", *spent), rows)
 
 
-def _milliseconds(seconds: Floats | None) -> str:
+def _milliseconds(seconds: NDArray[np.float32] | None) -> str:
     if seconds is None:
         return "\N{EN DASH}"
     middle, high = (np.quantile(seconds, (0.5, 0.95)) * 1e3).tolist()

@@ -46,19 +46,17 @@ _FILES = resources.files("vedette.reports") / "page"
 class _Section:
     """What the page shows of one group; `is_brief` where all figures but those of the error are left out."""
 
-    group: Group
+    title: str
+    finished: tuple[tuple[str, int], ...]  # strategies, with how many runs
+    missing: tuple[str, ...]
+    reason: str  # why there is no comparison, or nothing
+    difference: str  # heading of the paired differences
     is_brief: bool
     claims: tuple[Claim, ...]
     pairs: tuple[Claim, ...]
     health: tuple[tuple[str, str], ...]
     tables: tuple[tuple[str, Table], ...]
     figures: tuple[tuple[Drawing, Markup], ...]
-
-    @property
-    def difference(self) -> str:
-        """Heading of the paired differences."""
-        comparison = self.group.comparison
-        return named_in("Difference", "m" if comparison is None else comparison.unit)
 
     @property
     def blocks(self) -> list[tuple[bool, list[tuple[Drawing, Markup]]]]:
@@ -210,7 +208,11 @@ def section_of(group: Group, prefix: str, is_brief: bool = False) -> _Section:
     }
     comparison = group.comparison
     return _Section(
-        group=group.without_runs(),
+        title=group.title,
+        finished=tuple((each.name, each.num_finished) for each in group.strategies),
+        missing=group.missing,
+        reason=group.reason,
+        difference=named_in("Difference", "m" if comparison is None else comparison.unit),
         is_brief=is_brief,
         claims=() if comparison is None else claims(comparison),
         pairs=() if comparison is None or len(comparison.strategies) < 3 else all_pairs(comparison),

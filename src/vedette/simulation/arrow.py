@@ -10,6 +10,7 @@ import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -57,7 +58,7 @@ _NAMES = {np.int64: "int64", np.float64: "double", np.bool_: "bool"}
 _ARROW_TYPES = {**{kind: _NAMES[dtype] for kind, dtype in _DTYPES.items()}, Kind.TEXT: "string"}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Layout:
     """The columns of a table.
 
@@ -208,21 +209,24 @@ def read_table(content: bytes, layout: Layout, place: str) -> Columns:
     holds something else.
     """
     try:
-        schema, batch = _messages(content)
-        return _read_columns(schema, batch, _kinds(schema, layout, place), place)
-    except InputError:
-        raise
+        described, batch = _messages(content)
+        return _read_columns(*_described(described.serialize().to_pybytes(), layout), batch)
+    except InputError as error:
+        raise InputError(f"{place}{error}") from error
     except Exception as error:  # damage can raise nearly anything in there
         raise InputError(f"{place}: expected a table as an Arrow file; it is damaged: {said(error)}") from error
 
 
 def read_metadata(content: bytes) -> dict[str, str]:
     """What was given to `write_table` beside the columns. Raises nearly anything for bytes that are no Arrow file."""
-    metadata = _messages(content)[0].metadata or {}
+    need("a run on disk", "pyarrow")
+    import pyarrow as pa
+
+    metadata = pa.ipc.read_schema(_messages(content)[0]).metadata or {}
     return {key.decode(): value.decode() for key, value in metadata.items()}
 
 
-def _messages(content: bytes) -> tuple[pa.Schema, pa.Message]:
+def _messages(content: bytes) -> tuple[pa.Message, pa.Message]:
     """The schema and the one batch of a file. The index at its end, made for files of many batches, is not read."""
     need("a run on disk", "pyarrow")
     import pyarrow as pa
@@ -236,7 +240,7 @@ def _messages(content: bytes) -> tuple[pa.Schema, pa.Message]:
         raise ValueError("expected a schema and one batch of rows")
     if _is_compressed(messages[1].metadata.to_pybytes()):
         raise ValueError("expected rows that are not compressed")
-    return pa.ipc.read_schema(messages[0]), messages[1]
+    return messages[0], messages[1]
 
 
 def _is_compressed(metadata: bytes) -> bool:
@@ -255,25 +259,32 @@ def _is_compressed(metadata: bytes) -> bool:
     return bool(entry(header + struct.unpack_from("<I", metadata, header)[0], 3))
 
 
-def _kinds(schema: pa.Schema, layout: Layout, place: str) -> dict[str, Kind]:
-    """What each column holds, if they are those of the layout."""
+@lru_cache(maxsize=256)
+def _described(message: bytes, layout: Layout) -> tuple[pa.Schema, dict[str, Kind]]:
+    """The schema of a message, and what each column holds; `InputError` for columns that are not the layout's.
+
+    Tables of a thousand runs have a few schemas among them.
+    """
+    import pyarrow as pa
+
+    schema = pa.ipc.read_schema(pa.py_buffer(message))
     missing = [name for name in layout.fixed if name not in schema.names]
     if missing:
-        raise InputError(f"{place}: expected a column {missing[0]}; got {shown(', '.join(schema.names))}")
+        raise InputError(f": expected a column {missing[0]}; got {shown(', '.join(schema.names))}")
     kinds: dict[str, Kind] = {}
     for name, arrow_type in zip(schema.names, map(str, schema.types), strict=True):
         kind = layout.kind(name)
         if kind is None:
-            raise InputError(f"{place}: expected no other column than {', '.join(layout.fixed)}; got {shown(name)}")
+            raise InputError(f": expected no other column than {', '.join(layout.fixed)}; got {shown(name)}")
         if name in kinds:
-            raise InputError(f"{place}: expected each column once; got {shown(name)} twice")
+            raise InputError(f": expected each column once; got {shown(name)} twice")
         if arrow_type != _ARROW_TYPES[kind]:
-            raise InputError(f"{place}, column {shown(name)}: expected {kind.value}; got the type {shown(arrow_type)}")
+            raise InputError(f", column {shown(name)}: expected {kind.value}; got the type {shown(arrow_type)}")
         kinds[name] = kind
-    return kinds
+    return schema, kinds
 
 
-def _read_columns(schema: pa.Schema, message: pa.Message, kinds: Mapping[str, Kind], place: str) -> Columns:
+def _read_columns(schema: pa.Schema, kinds: Mapping[str, Kind], message: pa.Message) -> Columns:
     import pyarrow as pa
 
     batch = pa.ipc.read_record_batch(message, schema)
@@ -281,6 +292,6 @@ def _read_columns(schema: pa.Schema, message: pa.Message, kinds: Mapping[str, Ki
     columns: Columns = {}
     for (name, kind), column in zip(kinds.items(), batch.columns, strict=True):
         if column.null_count and kind not in (Kind.COUNT, Kind.VALUE):
-            raise InputError(f"{place}, column {shown(name)}: expected {kind.value}; got nothing")
+            raise InputError(f", column {shown(name)}: expected {kind.value}; got nothing")
         columns[name] = column.to_pylist() if kind is Kind.TEXT else _values(column, kind)
     return columns

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.reading import said
-from vedette.simulation.arrow import read_table, write_table
-from vedette.simulation.records import RunRecord
+from vedette.simulation.arrow import Columns, read_table, write_table
+from vedette.simulation.records import Outline, RunRecord
 from vedette.simulation.tables import (
     LAYOUTS,
     OPTIONAL,
+    OUTLINED_TABLES,
     TIMINGS,
     check_record,
+    outline_of,
     record_of,
     tables_of,
     timing_table,
@@ -30,6 +33,8 @@ FORMAT_VERSION = 6
 # not known: by it they are upgraded (`vedette.simulation.upgrading`). What was released once stays here.
 LACKING: dict[int, dict[str, dict[str, float]]] = {5: {"sensors": {"factoring_error": math.nan}}}
 ENDING = ".arrow"
+_FILES = frozenset(f"{name}{ENDING}" for name in (*LAYOUTS, *OPTIONAL))
+OUTLINED = frozenset(f"{name}{ENDING}" for name in OUTLINED_TABLES)  # that `decode_outline` reads
 
 
 def encode_run(record: RunRecord) -> dict[str, bytes]:
@@ -49,22 +54,50 @@ def decode_run(
 
     Raises `InputError`, naming `place` and the file, for files that are missing, damaged or do not fit together.
     """
+    tables, spent = _tables(files, place, timings)
+    with _fitting_together(place):
+        record = record_of(facts, tables, spent)
+        check_record(record)
+    return record
+
+
+def decode_outline(
+    facts: Mapping[str, Any], files: Mapping[str, bytes], place: str, timings: bytes | None = None
+) -> Outline:
+    """What is compared and reported of a run, from its files, in a third of the time; raises as `decode_run`.
+
+    Tables of targets and tracks are not looked at.
+    """
+    tables, spent = _tables(files, place, timings, OUTLINED)
+    with _fitting_together(place):
+        return outline_of(facts, tables, spent)
+
+
+def _tables(
+    files: Mapping[str, bytes], place: str, timings: bytes | None, wanted: Collection[str] = _FILES
+) -> tuple[dict[str, Columns], dict[str, Floats]]:
+    """The tables of the wanted files that there are, and the timings."""
     tables = {}
     for name, layout in {**LAYOUTS, **OPTIONAL}.items():
         file = f"{name}{ENDING}"
+        if file not in wanted:
+            continue
         if file in files:
             tables[name] = read_table(files[file], layout, f"{place}/{file}")
         elif name in LAYOUTS:
             raise InputError(f"{place}: expected a file {file}; got {shown(', '.join(files)) if files else 'none'}")
-    spent = {} if timings is None else decode_timings(timings, f"{place}/timings{ENDING}")
+    return tables, {} if timings is None else decode_timings(timings, f"{place}/timings{ENDING}")
+
+
+@contextmanager
+def _fitting_together(place: str) -> Iterator[None]:
+    """What files of no run raise, as errors that name the place."""
     try:
-        record = record_of(facts, tables, spent)
-        check_record(record)
+        yield
     except InputError as error:
         raise InputError(f"{place}: {error}") from error
-    except Exception as error:  # files of no run can raise nearly anything on the way to one
+    except Exception as error:  # they can raise nearly anything on the way to a run
         raise InputError(f"{place}: expected the files of a run; they do not fit together: {said(error)}") from error
-    return record
 
 
 def encode_timings(record: RunRecord) -> bytes:

@@ -10,7 +10,7 @@ import numpy as np
 from vedette.control.plan import Plan
 from vedette.densities.estimates import Estimate
 from vedette.errors import InputError
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import Floats, Ints
 from vedette.simulation.arrow import Columns
 from vedette.simulation.health import FUSION_COLUMNS, Health
 from vedette.simulation.truth import Truth
@@ -57,6 +57,26 @@ class Decision(Speaking):
         self.plan.validate()
 
 
+@dataclass(frozen=True, slots=True)
+class Outline:
+    """What is compared and reported of a run: its record without the targets and tracks.
+
+    Attributes:
+        scenario, seed, run, times, decisions, ospa, health, timings: as of the record; decisions without explanations.
+        num_targets: (num_scans,) number of true targets.
+    """
+
+    scenario: str
+    seed: int
+    run: int
+    times: Floats
+    decisions: tuple[Decision, ...]
+    ospa: Floats
+    num_targets: Ints
+    health: Health
+    timings: dict[str, Floats]
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class RunRecord(Tabled):
     """One run of one strategy on one scenario.
@@ -101,6 +121,11 @@ class RunRecord(Tabled):
     def num_sensors(self) -> int:
         """Number of sensors."""
         return int(self.poses.shape[1])
+
+    def outline(self) -> Outline:
+        """What is compared and reported of the run."""
+        whose = (self.scenario, self.seed, self.run, self.times, self.decisions)
+        return Outline(*whose, self.ospa, np.diff(self.truth.offsets), self.health, self.timings)
 
     def scan_columns(self) -> Columns:
         """A row a scan, as the table `scans` of a run that is kept has them; see docs/results.md."""

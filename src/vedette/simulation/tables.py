@@ -21,7 +21,7 @@ from vedette.simulation.arrow import Columns, Kind, Layout
 from vedette.simulation.explained import EXPLAINED, explained_tables, with_explanations
 from vedette.simulation.health import FUSION_COLUMNS, SENSOR_COLUMNS, Health
 from vedette.simulation.planned import OWN_REWARDS, PLANNED, decisions_of, planned_tables
-from vedette.simulation.records import OSPA_COLUMNS, Decision, RunRecord
+from vedette.simulation.records import OSPA_COLUMNS, Outline, RunRecord
 from vedette.simulation.truth import Truth
 
 Tables: TypeAlias = dict[str, Columns]
@@ -106,41 +106,67 @@ def record_of(
 
     Raises `InputError`, `KeyError`, `TypeError` or `ValueError` for tables that do not fit together.
     """
-    scans, sensors = tables["scans"], tables["sensors"]
-    times = scans["time_s"]
-    if len(times) == 0 or len(sensors["step"]) % len(times):
-        raise InputError(
-            f"sensors: expected a row of every sensor for each of {len(times)} scans; got {len(sensors['step'])}"
-        )
-    pose_columns = [*POSE_COLUMNS, *LAYOUTS["sensors"].others(sensors)]
-    poses = np.stack([sensors[name] for name in pose_columns], axis=1).reshape(len(times), -1, len(pose_columns))
+    outline, poses = outline_of(facts, tables, timings), _poses_of(tables)
+    times, decisions = outline.times, outline.decisions
     return RunRecord(
-        scenario=str(facts["scenario"]),
+        scenario=outline.scenario,
         planner=str(facts["planner"]),
-        seed=int(facts["seed"]),
-        run=int(facts["run"]),
+        seed=outline.seed,
+        run=outline.run,
         times=times,
         truth=Truth(
             times, _offsets(tables["truth"], len(times)), tables["truth"]["target"], _matrix(tables["truth"], "state_")
         ),
         poses=poses,
         estimates=_estimates_of(tables["tracks"], len(times)),
-        decisions=_decisions_of(tables, poses),
-        ospa=np.stack([scans[name] for name in OSPA_COLUMNS], axis=1),
-        health=Health(
-            **{name: sensors[name].reshape(len(times), -1) for name in SENSOR_COLUMNS},
-            **{name: scans[name] for name in FUSION_COLUMNS},
-        ),
+        decisions=with_explanations(decisions, tables) if any(name in tables for name in EXPLAINED) else decisions,
+        ospa=outline.ospa,
+        health=outline.health,
         timings=timings,
         stopped=None if facts["stopped"] is None else str(facts["stopped"]),
     )
 
 
-def _decisions_of(tables: Mapping[str, Mapping[str, Any]], poses: Floats) -> tuple[Decision, ...]:
-    decisions = decisions_of(tables, poses)
-    if not any(name in tables for name in EXPLAINED):
-        return decisions
-    return with_explanations(decisions, tables)
+# What `outline_of` needs, of all the tables that a run may have.
+OUTLINED_TABLES = frozenset({"scans", "sensors", *PLANNED, *OWN_REWARDS})
+
+
+def outline_of(
+    facts: Mapping[str, Any], tables: Mapping[str, Mapping[str, Any]], timings: dict[str, Floats]
+) -> Outline:
+    """What is compared and reported of a run, from those of its tables that are in `OUTLINED_TABLES`.
+
+    Raises as `record_of`.
+
+    Its numbers of targets are those that the run wrote down, which no table of targets is held against.
+    """
+    scans, sensors, num_scans = tables["scans"], tables["sensors"], len(tables["scans"]["step"])
+    poses = _poses_of(tables)
+    return Outline(
+        scenario=str(facts["scenario"]),
+        seed=int(facts["seed"]),
+        run=int(facts["run"]),
+        times=scans["time_s"],
+        decisions=decisions_of(tables, poses),
+        ospa=np.stack([scans[name] for name in OSPA_COLUMNS], axis=1),
+        num_targets=scans["num_targets"],
+        health=Health(
+            **{name: sensors[name].reshape(num_scans, -1) for name in SENSOR_COLUMNS},
+            **{name: scans[name] for name in FUSION_COLUMNS},
+        ),
+        timings=timings,
+    )
+
+
+def _poses_of(tables: Mapping[str, Mapping[str, Any]]) -> Floats:
+    """(num_scans, num_sensors, pose_dim)."""
+    sensors, num_scans = tables["sensors"], len(tables["scans"]["step"])
+    if num_scans == 0 or len(sensors["step"]) % num_scans:
+        raise InputError(
+            f"sensors: expected a row of every sensor for each of {num_scans} scans; got {len(sensors['step'])}"
+        )
+    columns = [*POSE_COLUMNS, *LAYOUTS["sensors"].others(sensors)]
+    return np.stack([sensors[name] for name in columns], axis=1).reshape(num_scans, -1, len(columns))
 
 
 def _truth(record: RunRecord) -> Columns:

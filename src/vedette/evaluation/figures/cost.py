@@ -7,17 +7,17 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
+from numpy.typing import NDArray
 
 from vedette.errors import InputError
 from vedette.evaluation.figures.labels import short_labels
 from vedette.evaluation.figures.style import MARKERS, colour, legend_columns, new_figure, styled
-from vedette.kernels.base.types import Floats
 
 MIN_FOR_TAILS = 20  # values, below which their 5th and 95th percentile are but the outermost ones
 
 
 @styled
-def cost_figure(seconds: Mapping[str, Mapping[str, Floats]]) -> Figure:
+def cost_figure(seconds: Mapping[str, Mapping[str, NDArray[np.floating]]]) -> Figure:
     """Time of each stage: the median, and from 20 values on a line from the 5th to the 95th percentile, in ms.
 
     Beside each stage stands of how many values (of several strategies, the most).
@@ -55,7 +55,7 @@ def cost_figure(seconds: Mapping[str, Mapping[str, Floats]]) -> Figure:
     return figure
 
 
-def _quantiles(values: Floats) -> tuple[float, float, float]:
+def _quantiles(values: NDArray[np.floating]) -> tuple[float, float, float]:
     """5 %, median and 95 %; the median alone, three times, where there are too few values for the others."""
     low, middle, high = np.quantile(values, (0.05, 0.5, 0.95)).tolist()
     return (low, middle, high) if len(values) >= MIN_FOR_TAILS else (middle, middle, middle)

@@ -14,6 +14,7 @@ from vedette.evaluation.statistics import Summary, paired_difference
 from vedette.kernels.base.types import Floats
 from vedette.text import named_in
 
+MOST_DOTS = 2000  # in a row: more are one blot
 _ROW = 0.36  # inches
 _SHORT, _ONE_LINE = 8, 20  # letters
 _GOLDEN = 0.6180339887498949
@@ -23,8 +24,9 @@ _GOLDEN = 0.6180339887498949
 def distributions_figure(comparison: Comparison) -> Figure:
     """The mean OSPA of every run, and below it every paired difference from the first strategy.
 
-    A dot is a run; the box holds the middle half of the runs and its line is their median; the diamond is the mean,
-    with its 95 % confidence interval in the lower panel, where an interval that holds 0 tells nothing apart.
+    A dot is a run, of more than `MOST_DOTS` one of the first; the box holds the middle half of the runs and its line is
+    their median; the diamond is the mean, with its 95 % confidence interval in the lower panel, where an interval that
+    holds 0 tells nothing apart.
     """
     strategies = comparison.strategies
     others = strategies[1:]
@@ -65,10 +67,11 @@ def _minus(name: str, reference: str) -> str:
 
 
 def _draw_runs(axes: Axes, values: Floats, row: int, shade: str) -> None:
-    """Dots spread over half the height of the row, always the same way, so that equal values can be told apart."""
-    spread = (np.arange(1, len(values) + 1) * _GOLDEN) % 1.0 - 0.5
+    """Dots of the first runs, spread over half the height of the row, so that equal values can be told apart."""
+    shown = values[:MOST_DOTS]
+    spread = (np.arange(1, len(shown) + 1) * _GOLDEN) % 1.0 - 0.5
     axes.plot(
-        values, row + 0.55 * spread, linestyle="", marker="o", markersize=2.4, markeredgewidth=0, color=shade, alpha=0.6
+        shown, row + 0.55 * spread, linestyle="", marker="o", markersize=2.4, markeredgewidth=0, color=shade, alpha=0.6
     )
 
 

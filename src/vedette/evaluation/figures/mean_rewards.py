@@ -29,12 +29,10 @@ from vedette.evaluation.figures.style import (
     legend_columns,
     new_figure,
     sensor_looks,
-    shown_decisions,
     styled,
 )
-from vedette.evaluation.rewards import MeanRewards, mean_rewards
+from vedette.evaluation.rewards import MeanRewards
 from vedette.kernels.base.types import Floats
-from vedette.simulation.records import RunRecord
 
 _COLUMNS = 3
 _LARGEST_MARK = 60.0  # points squared, of a choice made in every run
@@ -42,26 +40,28 @@ _LEVELS = 48  # of colour, which a vector file holds one by one
 
 
 @styled
-def mean_rewards_figure(records: Sequence[RunRecord], scene: Scene | None = None) -> Figure:
+def mean_rewards_figure(decisions: Sequence[MeanRewards], scene: Scene | None = None) -> Figure:
     """Mean reward over the runs of one strategy against action, a panel a decision, with how often each was chosen.
 
     Independent decisions: one curve a sensor with a band of one standard error over the runs. Joint decisions: a heat
     map over the first two sensors with a choice, the largest over the others where there are more; where the joint
     table was too large to keep, curves with the other sensors at their choice. The area of a mark is the share of the
     runs that chose the action. A sensor that has but one action has no curve; of more than six, those have one whose
-    choice makes the most difference. Of many decisions at most six are shown.
+    choice makes the most difference.
 
-    Raises `InputError` for runs without rewards, without a choice, or without a common set of actions.
+    Args:
+        decisions: that are shown, in order; `vedette.evaluation.mean_rewards` gives those of runs.
+        scene: names of sensors and reward; None: numbers.
+
+    Raises `InputError` for no decision, or none with a choice.
     """
     scene = scene or Scene()
-    number = max((len(record.decisions) for record in records), default=0)
-    decisions = [mean_rewards(records, decision) for decision in shown_decisions(number)]
     if not decisions:
-        raise InputError("records: expected runs with decisions; got none")
+        raise InputError("decisions: expected the rewards of one or more; got none")
     pair = first_pair(decisions[0].tables, decisions[0].actions)
     drawn = choosing([(each.tables, each.actions) for each in decisions])
     if not drawn:
-        raise InputError("records: expected a sensor with a choice; got one action each")
+        raise InputError("decisions: expected a sensor with a choice; got one action each")
     columns = min(len(decisions), _COLUMNS)
     rows = -(-len(decisions) // columns)
     width = TEXT_WIDTH * (columns / _COLUMNS if columns < _COLUMNS else 1.0)

@@ -10,7 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from vedette.errors import InputError
-from vedette.evaluation.comparison import PARTS, Comparison
+from vedette.evaluation.comparison import Comparison
+from vedette.evaluation.ensembles import PARTS
 from vedette.evaluation.figures.labels import short_labels
 from vedette.evaluation.figures.style import (
     GREY,

@@ -12,7 +12,8 @@ from matplotlib.patches import Patch
 
 from vedette.errors import InputError
 from vedette.evaluation.actions import Row, row_words
-from vedette.evaluation.comparison import Choice, Comparison
+from vedette.evaluation.comparison import Comparison
+from vedette.evaluation.ensembles import Choice
 from vedette.evaluation.figures.labels import short_labels
 from vedette.evaluation.figures.scene import Scene
 from vedette.evaluation.figures.style import (

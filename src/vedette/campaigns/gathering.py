@@ -1,0 +1,62 @@
+"""The runs of a cell read into arrays, by several processes where there are many: each run is gone once it was read."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from typing import TYPE_CHECKING
+
+from vedette.errors import VedetteError
+from vedette.evaluation.ensembles import TOGETHER, Ensemble, ensemble_of, joined
+from vedette.processes import as_children, context, end_with_parent, let_go_of_results, load_ahead
+
+if TYPE_CHECKING:
+    from vedette.campaigns.results import CampaignResults
+
+_A_PART = 4 * TOGETHER  # runs; fewer are read sooner than another process starts
+
+
+def gathered(results: CampaignResults, cell: str, runs: Sequence[int], num_workers: int) -> Ensemble:
+    """What is compared and reported of these finished runs of a cell; the same for any number of processes (0: all).
+
+    Raises `InputError` for no run, or one that is damaged, and `VedetteError` where a process dies.
+    """
+    parts = [runs[start : start + _A_PART] for start in range(0, len(runs), _A_PART)]
+    number = min(num_workers or os.cpu_count() or 1, len(parts))
+    if number <= 1:
+        return joined([_part(results, cell, part) for part in parts])
+    return joined(list(_by_processes(results, cell, parts, number)))
+
+
+def _by_processes(
+    results: CampaignResults, cell: str, parts: Sequence[Sequence[int]], number: int
+) -> Iterator[Ensemble]:
+    load_ahead()
+    pool = ProcessPoolExecutor(number, context(), initializer=_begin, initargs=(results, cell))
+    try:
+        with as_children():
+            found = pool.map(_read, parts)
+        let_go_of_results(pool)
+        yield from found
+    except BrokenProcessPool as error:
+        raise VedetteError("workers: expected processes that read runs; one has died, for want of memory?") from error
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _part(results: CampaignResults, cell: str, runs: Sequence[int]) -> Ensemble:
+    return ensemble_of(results.outlines(cell, runs))
+
+
+_whose: list[tuple[CampaignResults, str]] = []  # of this process, if it is one that reads
+
+
+def _begin(results: CampaignResults, cell: str) -> None:
+    end_with_parent()
+    _whose.append((results, cell))
+
+
+def _read(runs: Sequence[int]) -> Ensemble:
+    return _part(*_whose[0], runs)

@@ -1,0 +1,191 @@
+"""The runs of one strategy as arrays over runs and scans: what is compared and reported of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import islice
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vedette.control import Plan
+from vedette.errors import InputError
+from vedette.evaluation.actions import Row, rounded
+from vedette.evaluation.health import HealthSums, added, health_sums
+from vedette.evaluation.metrics import RunMetrics
+from vedette.evaluation.rewards import RewardSums
+from vedette.kernels.base.types import Floats, Ints
+from vedette.simulation.records import Outline
+from vedette.speaking import Speaking
+from vedette.text import counted, elided
+
+PARTS = ("total", "localisation", "cardinality")
+# What was chosen at one decision, one row a sensor.
+Choice: TypeAlias = tuple[Row, ...]
+
+TOGETHER = 512  # runs that are held as they come
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Ensemble(Speaking):
+    """The runs of one strategy on one scenario, in a twentieth of the memory of their records.
+
+    Attributes:
+        scenario: name of the scenario.
+        seeds, runs: (num_runs,) of each run its seed and number.
+        times: (num_scans,) s.
+        ospa: (num_runs, num_scans, 3) total, localisation and cardinality parts.
+        num_targets: (num_runs, num_scans) number of true targets, in as few bytes as hold it.
+        measures: (num_runs, num_scans) of each measure that all runs have, by the name of its column; whole numbers in
+            as few bytes as hold them: `values` gives them as numbers to compute with.
+        choices: for each run, what each of its decisions chose; equal ones are one object.
+        decision_times: (num_decisions,) s, of all runs together, increasing.
+        health: what filters and fusion reported, added up.
+        rewards: of each decision, in order, the rewards added up.
+        seconds: of each stage, the wall time at all scans of all runs, s, in single precision; of `planning` at the
+            decisions alone.
+        counts: of each thing that plans count, its number in every decision that has it.
+    """
+
+    scenario: str
+    seeds: Ints
+    runs: Ints
+    times: Floats
+    ospa: Floats
+    num_targets: NDArray[Any]
+    measures: Mapping[str, NDArray[Any]]
+    choices: tuple[tuple[Choice, ...], ...]
+    decision_times: Floats
+    health: HealthSums
+    rewards: tuple[RewardSums, ...]
+    seconds: Mapping[str, NDArray[np.float32]]
+    counts: Mapping[str, NDArray[Any]]
+
+    def _summary(self) -> str:
+        return f"of {counted(self.num_runs, 'run')} on {elided(self.scenario)}, {counted(len(self.times), 'scan')} each"
+
+    @property
+    def num_runs(self) -> int:
+        """Number of runs."""
+        return len(self.runs)
+
+    def values(self, part: str) -> Floats:
+        """(num_runs, num_scans) of a part of OSPA or a measure. Raises `InputError` for a name that is none."""
+        if part in PARTS:
+            return np.asarray(self.ospa[:, :, PARTS.index(part)])
+        if part not in self.measures:
+            raise InputError(f"part: expected one of {', '.join((*PARTS, *self.measures))}; got {part!r}")
+        return np.asarray(self.measures[part], np.float64)
+
+    def num_pairs(self) -> Ints:
+        """(num_runs, num_scans) number of targets that have an estimate within the cutoff."""
+        return np.asarray(self.num_targets.astype(np.int64) - self.measures["num_missed"])
+
+
+def ensemble_of(runs: Iterable[tuple[Outline, RunMetrics | None]]) -> Ensemble:
+    """What is compared and reported of some runs, with their measures where they have any.
+
+    Runs may come from a stream: no more than a few hundred are held at a time.
+
+    Raises `InputError` for no run, and for runs of other scenarios or scan times than the first.
+    """
+    return joined([_of_few(few) for few in _batches(iter(runs))])
+
+
+def joined(parts: Sequence[Ensemble]) -> Ensemble:
+    """The runs of several ensembles, one after the other; raises as `ensemble_of`."""
+    if not parts:
+        raise InputError("runs: expected at least one run of each of one or more strategies")
+    if len(parts) == 1:
+        return parts[0]
+    first = parts[0]
+    for part in parts[1:]:
+        _check_alike(first.scenario, first.times, part.scenario, part.times, int(part.runs[0]))
+    names = [name for name in first.measures if all(name in part.measures for part in parts)]
+    known: dict[Choice, Choice] = {}
+    return Ensemble(
+        scenario=first.scenario,
+        seeds=np.concatenate([part.seeds for part in parts]),
+        runs=np.concatenate([part.runs for part in parts]),
+        times=first.times,
+        ospa=np.concatenate([part.ospa for part in parts]),
+        num_targets=np.concatenate([part.num_targets for part in parts]),
+        measures={name: np.concatenate([part.measures[name] for part in parts]) for name in names},
+        choices=tuple(tuple(known.setdefault(one, one) for one in run) for part in parts for run in part.choices),
+        decision_times=np.unique(np.concatenate([part.decision_times for part in parts])),
+        health=added([part.health for part in parts]),
+        rewards=tuple(map(RewardSums.added, _columns([part.rewards for part in parts]))),
+        seconds=_by_name([part.seconds for part in parts]),
+        counts=_by_name([part.counts for part in parts]),
+    )
+
+
+def choice_of(plan: Plan) -> Choice:
+    """What a plan chose, rounded."""
+    return tuple(rounded(own.columns, row) for own, row in zip(plan.actions, plan.chosen_actions, strict=True))
+
+
+def _batches(runs: Iterator[tuple[Outline, RunMetrics | None]]) -> Iterator[list[tuple[Outline, RunMetrics | None]]]:
+    while few := list(islice(runs, TOGETHER)):
+        yield few
+
+
+def _of_few(runs: Sequence[tuple[Outline, RunMetrics | None]]) -> Ensemble:
+    outlines, first = [run for run, _ in runs], runs[0][0]
+    for each in outlines[1:]:
+        _check_alike(first.scenario, first.times, each.scenario, each.times, each.run)
+    columns = [{} if metrics is None else metrics.columns() for _, metrics in runs]
+    names = [name for name in columns[0] if all(name in of_run for of_run in columns)]
+    decided = _columns([each.decisions for each in outlines])
+    return Ensemble(
+        scenario=first.scenario,
+        seeds=np.array([each.seed for each in outlines], np.int64),
+        runs=np.array([each.run for each in outlines], np.int64),
+        times=first.times,
+        ospa=np.array([each.ospa for each in outlines]),
+        num_targets=_in_few_bytes(np.array([each.num_targets for each in outlines])),
+        measures={name: _in_few_bytes(np.array([of_run[name] for of_run in columns])) for name in names},
+        choices=tuple(tuple(choice_of(decision.plan) for decision in each.decisions) for each in outlines),
+        decision_times=np.unique([decision.time for each in outlines for decision in each.decisions]),
+        health=health_sums([each.health for each in outlines]),
+        rewards=tuple(RewardSums.of(number, made) for number, made in enumerate(decided)),
+        seconds={stage: of.astype(np.float32) for stage, of in _by_name(list(map(_seconds, outlines))).items()},
+        counts={name: _in_few_bytes(of) for name, of in _by_name(_counts(outlines)).items()},
+    )
+
+
+def _columns(rows: Sequence[Sequence[Any]]) -> list[list[Any]]:
+    """The n-th entries of all rows that have so many, for every n."""
+    return [[row[n] for row in rows if n < len(row)] for n in range(max(map(len, rows)))]
+
+
+def _check_alike(scenario: str, times: Floats, other: str, other_times: Floats, run: int) -> None:
+    if other != scenario:
+        raise InputError(f"runs: expected runs of {scenario}; run {run} is of {other}")
+    if not np.array_equal(other_times, times):
+        raise InputError(f"runs: expected the same scan times in every run; run {run} has others")
+
+
+def _in_few_bytes(values: NDArray[Any]) -> NDArray[Any]:
+    """Whole numbers in the smallest type with a sign that holds them."""
+    if values.dtype != np.int64:
+        return values
+    return values.astype(np.min_scalar_type(-1 - int(np.abs(values).max(initial=0))))
+
+
+def _by_name(parts: Sequence[Mapping[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
+    """The arrays of each name, one after the other."""
+    names = dict.fromkeys(name for part in parts for name in part)
+    return {name: np.concatenate([part[name] for part in parts if name in part]) for name in names}
+
+
+def _seconds(outline: Outline) -> dict[str, Floats]:
+    decided = np.array([decision.step - 1 for decision in outline.decisions], np.int64)
+    return {stage: of[decided] if stage == "planning" else of for stage, of in outline.timings.items()}
+
+
+def _counts(outlines: Sequence[Outline]) -> list[dict[str, Ints]]:
+    plans = [decision.plan for each in outlines for decision in each.decisions]
+    return [{name: np.array([number]) for name, number in plan.counts.items()} for plan in plans]
