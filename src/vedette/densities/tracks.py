@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from vedette.densities import checks
-from vedette.densities.containers import Container, kernel_arrays, unchecked
+from vedette.densities.containers import Container, for_kernel, kernel_arrays, unchecked
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats, Ints
-from vedette.kernels.gaussian.mixtures import MixtureCaps
+from vedette.kernels.gaussian.mixtures import MixtureCaps, heaviest_of_runs
 from vedette.kernels.gaussian.pooling import pooled_tracks
 from vedette.models.arguments import no_gaussians
 from vedette.text import counted
@@ -212,13 +212,5 @@ def run_moments(weights: Floats, means: Floats, covs: Floats, offsets: Ints) -> 
 
 
 def heaviest_components(log_weights: Floats, offsets: Ints, chosen: Ints) -> Ints:
-    """(len(chosen),) the heaviest component of each chosen mixture, cut by offsets; the first of several."""
-    starts, sizes = offsets[chosen], np.diff(offsets)[chosen]
-    ends = np.cumsum(sizes)
-    if len(chosen) == 0:
-        return starts
-    components = np.repeat(starts - ends + sizes, sizes) + np.arange(ends[-1])
-    taken = log_weights[components]
-    peaks = np.maximum.reduceat(taken, ends - sizes)
-    at_peak = np.flatnonzero(taken == np.repeat(peaks, sizes))
-    return np.asarray(components[at_peak[np.searchsorted(at_peak, ends - sizes)]])
+    """(len(chosen),) the heaviest component of each chosen mixture of a density; the first of several."""
+    return heaviest_of_runs(for_kernel(log_weights), for_kernel(offsets), np.array(chosen, np.int64))

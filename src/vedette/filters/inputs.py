@@ -17,6 +17,7 @@ from vedette.densities import GLMB, LMB, FactoredGLMB, IidCluster, Labelled, Mul
 from vedette.densities.containers import unchecked
 from vedette.errors import InputError, ModelError, VedetteError
 from vedette.kernels.base.types import Bools, Floats, Lmb
+from vedette.kernels.gaussian.scans import examined_scan
 from vedette.models import BirthModel, SensorModel
 from vedette.models.arguments import as_array, reject, step_number
 from vedette.models.measurement import MeasurementModel, wrap_angular
@@ -50,12 +51,12 @@ def check_scan(scan: Any, sensor: SensorModel) -> tuple[Floats, int]:
     if given.ndim != 2 or given.shape[1] != meas_dim:
         raise InputError(f"scan: expected {expected}; got shape {given.shape}")
     array = np.array(given, dtype=np.float64, order="C")
-    bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
-    if len(bad):
-        raise InputError(f"scan: expected finite numbers; got {array[bad[0]].tolist()} in row {bad[0]}")
-    if (array < measurement.least).any():
+    bad, is_below, largest = examined_scan(array, measurement.least, measurement.angular)
+    if bad >= 0:
+        raise InputError(f"scan: expected finite numbers; got {array[bad].tolist()} in row {bad}")
+    if is_below:
         _tell_negative(array, measurement, sensor.noise.least_stds)
-    if np.abs(array[:, measurement.angular]).max(initial=0.0) > 3.14:  # few scans
+    if largest > 3.14:  # few scans
         array = _in_one_turn(array, measurement.angular)
     column = np.sort(array[:, 0])
     if (column[1:] != column[:-1]).all():  # most scans

@@ -141,7 +141,7 @@ def no_gaussians(state_dim: Any) -> tuple[Floats, Floats]:
 def step_number(value: Any) -> int:
     """The number of a step, from 1 on, as labels hold it."""
     whole = not isinstance(value, bool) and isinstance(value, numbers.Integral)
-    if not whole or not 1 <= value <= np.iinfo(np.int64).max:
+    if not whole or not 1 <= value < 2**63:
         raise reject("step", "a whole number from 1 on, below 2^63", value)
     return int(value)
 
@@ -192,7 +192,9 @@ def float_array(field: str, values: Any, shape: tuple[int | None, ...], *, finit
     if not fits:
         raise reject(field, f"an array of shape {_shape_text(shape)}", f"shape {given.shape}")
     array = np.array(given, dtype=np.float64, order="C")
-    if not (np.isfinite(array).all() if finite else not np.isnan(array).any()):
+    # Numbers are finite where the sum of their squares is: one call. Otherwise some may only be too large for that.
+    lacks_none = math.isfinite(np.vdot(array, array)) if finite else not np.isnan(array).any()
+    if not (lacks_none or (finite and np.isfinite(array).all())):
         raise reject(field, "finite numbers" if finite else "numbers that are not NaN", values)
     return array
 
@@ -211,7 +213,8 @@ def pose_vector(field: str, values: Any) -> Floats:
     pose = float_array(field, values, (None,))
     if len(pose) < 3:
         raise reject(field, "an array of shape (3 or more,)", f"shape {pose.shape}")
-    tell_degrees(field, float(pose[2]))
+    if abs(pose[2]) >= 10.0:
+        tell_degrees(field, float(pose[2]))
     return pose
 
 

@@ -33,7 +33,7 @@ import numpy as np
 
 from vedette.errors import InputError, ModelError
 from vedette.kernels.base.compile import SIGNATURES, check_arguments, compile_model_function
-from vedette.kernels.base.rows import FunctionOfStates, fill_rows, numbers_of_rows
+from vedette.kernels.base.rows import fill_rows, numbers_of_rows
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import reject
 
@@ -99,7 +99,7 @@ def write_rows(function: ModelFunction, states: Floats, at: Floats | float, para
     at: a pose, or a period in seconds. Raises `ModelError` as `call`.
     """
     try:
-        fill_rows(FunctionOfStates(function, at, params), states, out)
+        fill_rows(function, states, at, params, out)
     except Exception:  # which state it was is found by asking one after the other
         for state, row in zip(states, out, strict=True):
             call(function, state, at, params, row)
@@ -108,6 +108,6 @@ def write_rows(function: ModelFunction, states: Floats, at: Floats | float, para
 def numbers_at(function: ModelFunction, states: Floats, at: Floats | float, params: Floats) -> Floats:
     """(n,) numbers that a model function returns at (n, state_dim) states; `at` and errors as of `write_rows`."""
     try:
-        return numbers_of_rows(FunctionOfStates(function, at, params), states)
+        return numbers_of_rows(function, states, at, params)
     except Exception:
         return np.array([call(function, state, at, params) for state in states], dtype=np.float64)

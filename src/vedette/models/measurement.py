@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -11,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from vedette.errors import ModelError
 from vedette.kernels.base.types import Bools, Floats
+from vedette.kernels.gaussian.scans import put_on_circle
 from vedette.models.arguments import dimension, float_array, params_vector, pose_vector, reject, state_table
 from vedette.models.fields import part
 from vedette.models.functions import ModelFunction, model_function, require_kind, write_rows
@@ -54,8 +54,9 @@ def angular_flags(name: str, angular: Sequence[bool] | Bools, meas_dim: int) -> 
 
 def wrap_angles(angles: Floats) -> Floats:
     """The same directions in (-pi, pi]; angles already there keep every bit."""
-    away = (angles > math.pi) | (angles <= -math.pi)
-    return np.where(away, math.pi - np.remainder(math.pi - angles, 2.0 * math.pi), angles)
+    wrapped = np.array(angles, dtype=np.float64, order="C")
+    put_on_circle(wrapped.reshape(-1))
+    return wrapped
 
 
 def wrap_angular(measurements: Floats, angular: Bools) -> Floats:

@@ -16,7 +16,7 @@ from vedette.kernels.base.types import Floats
 from vedette.models.arguments import non_negative, one_of, reject
 from vedette.models.clutter import ClutterModel, log_or_minus_infinity
 from vedette.models.fields import NonNegative, part
-from vedette.models.functions import ModelFunction, model_function
+from vedette.models.functions import ModelFunction, model_function, write_rows
 from vedette.models.measurement import MeasurementModel
 from vedette.models.region import Region
 
@@ -106,7 +106,9 @@ class _RegionSampler:
         num = int(rng.poisson(self.rate))
         states = np.zeros((num, state_dim))
         states[:, :2] = self.region.sample(num, rng=rng)
-        return measurement.measure(states, pose)
+        drawn = np.empty((num, measurement.meas_dim))
+        write_rows(measurement.function, states, pose, measurement.params, drawn)
+        return drawn
 
 
 @part("region", "clutter")

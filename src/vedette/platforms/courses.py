@@ -63,7 +63,7 @@ class Courses:
     def courses(self, pose: Floats, actions: Floats, times: Floats) -> Floats:
         """Those of many actions at once."""
         headings = wrap_angles(np.radians(actions[:, 0]))
-        speeds = np.full(len(actions), self.speed) if isinstance(self.speed, float) else actions[:, 1]
+        speeds = self.speed if isinstance(self.speed, float) else actions[:, 1]
         poses = np.empty((len(actions), len(times), len(pose)))
         poses[...] = pose
         poses[:, :, 0] += times * (speeds * np.cos(headings))[:, np.newaxis]

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.errors import ModelError
-from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.kernels.gaussian.scans import add_noise, mixed_scan, seen_with
 from vedette.models import SensorModel
 from vedette.models.arguments import float_array, generator, pose_vector, reject
 from vedette.models.bias import LEAST_RANGE
@@ -19,8 +20,6 @@ from vedette.models.measurement import wrap_angular
 from vedette.simulation.true_sensors import TrueSensor
 from vedette.speaking import Speaking
 from vedette.tracking import Stages
-
-CLUTTER = -1
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -64,19 +63,17 @@ def simulate_scan(
     generator(rng)
     true = sensor if isinstance(sensor, TrueSensor) else TrueSensor(sensor)
     num, model = len(states), true.model
-    names = np.arange(num) if ids is None else np.asarray(ids)
+    names = np.arange(num) if ids is None else np.array(ids)
     if names.shape != (num,):
         raise reject("ids", f"{num} ids, one a target", names.tolist())
-    luck = rng.uniform(size=num)
+    luck = rng.random(num)
     states, at = _shown(true, states, pose)
     measured = _noisy_measurements(model, states, at, rng.standard_normal((num, model.meas_dim)))
-    seen = luck < _probabilities(model, _detected_at(true, states, at, measured), at)
+    seen = _seen(model, _detected_at(true, states, at, measured), at, luck)
     clutter = model.clutter.sample(at, model.measurement, state_dim=states.shape[1], rng=rng)
-    measurements = _biased(true, np.concatenate([measured, clutter]))
-    origins = np.concatenate([names, np.full(len(clutter), CLUTTER)]).astype(np.int64)
-    order = np.argsort(rng.uniform(size=len(measurements)))
-    kept = order[np.concatenate([seen, np.ones(len(clutter), np.bool_)])[order]]
-    return Scan(np.ascontiguousarray(measurements[kept]), origins[kept])
+    order = rng.random(num + len(clutter)).argsort()
+    said = _biased(true, measured), _biased(true, clutter)
+    return Scan(*mixed_scan(said[0], names.astype(np.int64, copy=False), seen, said[1], order))
 
 
 @overload
@@ -156,13 +153,13 @@ def _detected_at(sensor: TrueSensor, states: Floats, pose: Floats, measured: Flo
     return moved
 
 
-def _probabilities(sensor: SensorModel, states: Floats, pose: Floats) -> Floats:
-    probabilities = numbers_at(sensor.detection.function, states, pose, sensor.detection.params)
-    valid = (probabilities >= 0.0) & (probabilities <= 1.0)
-    if not valid.all():
-        state, got = states[valid.argmin()], probabilities[valid.argmin()]
+def _seen(sensor: SensorModel, states: Floats, pose: Floats, luck: Floats) -> Bools:
+    chances = numbers_at(sensor.detection.function, states, pose, sensor.detection.params)
+    seen, bad = seen_with(chances, luck)
+    if bad >= 0:
+        state, got = states[bad], chances[bad]
         raise ModelError(f"detection model at state {state}, pose {pose}: expected a probability; got {got}")
-    return probabilities
+    return seen
 
 
 def _noisy_measurements(sensor: SensorModel, states: Floats, pose: Floats, normals: Floats) -> Floats:
@@ -170,13 +167,11 @@ def _noisy_measurements(sensor: SensorModel, states: Floats, pose: Floats, norma
     noise = (factors @ normals[:, :, np.newaxis])[:, :, 0]
     measured = np.empty(normals.shape)
     write_rows(sensor.measurement.function, states, pose, sensor.measurement.params, measured)
-    measured += noise
-    finite = np.isfinite(measured)
-    if not finite.all():
-        bad = finite.all(axis=1).argmin()
+    bad = add_noise(measured, noise, sensor.measurement.angular)
+    if bad >= 0:
         state, got = states[bad], measured[bad]
         raise ModelError(f"sensor model at state {state}, pose {pose}: expected a finite measurement; got {got}")
-    return wrap_angular(measured, sensor.measurement.angular)
+    return measured
 
 
 def _noise_factors(sensor: SensorModel, states: Floats, pose: Floats) -> Floats:

@@ -168,11 +168,11 @@ class ScriptedTargets:
         moves = (elapsed > 0.0) & noisy[:, None]
         normals[moves] = rng.standard_normal((np.count_nonzero(moves), self.motion.state_dim))
         state = np.array(first)
-        for scan in range(len(scans)):
-            for dt in set(elapsed[elapsed[:, scan] > 0.0, scan].tolist()):
-                going = np.flatnonzero(elapsed[:, scan] == dt)
+        for scan, (since, there) in enumerate(zip(elapsed.T, alive.T, strict=True)):
+            for dt in set(since.tolist()) - {0.0}:
+                going = since == dt
                 state[going] = moved_states(self.motion, state[going], dt, normals[going, scan], noisy[going])
-            states[alive[:, scan], scan] = state[alive[:, scan]]
+            states[there, scan] = state[there]
         return Truth.from_arrays(scans, alive, states)
 
 
@@ -191,7 +191,7 @@ def moved_states(motion: MotionModel, states: Floats, dt: float, normals: Floats
 
     normals: (num, state_dim) standard normal deviates, read where `noisy`.
     """
-    moved, disturbed = motion.propagate(states, dt), np.flatnonzero(noisy)
+    moved, disturbed = motion.propagate(states, dt), noisy.nonzero()[0]
     if len(disturbed):
         factors: dict[bytes, Floats] = {}
         for i, cov in zip(disturbed.tolist(), motion.noise_covs(states[disturbed], dt), strict=True):
@@ -205,9 +205,9 @@ def moved_states(motion: MotionModel, states: Floats, dt: float, normals: Floats
 
 def check_moved(states: Floats, moved: Floats, dt: float) -> None:
     """`ModelError` unless all states (num, state_dim) that others have moved to are finite."""
-    bad = np.flatnonzero(~np.isfinite(moved).all(axis=1))
-    if len(bad):
-        place, got = states[bad[0]], moved[bad[0]]
+    if not np.isfinite(moved).all():
+        bad = np.isfinite(moved).all(axis=1).argmin()
+        place, got = states[bad], moved[bad]
         raise ModelError(f"motion of a target at state {place}, dt {dt}: expected a finite state; got {got}")
 
 

@@ -28,8 +28,9 @@ from vedette.evaluation.track_formats import utc_text
 from vedette.files import write_whole
 from vedette.kernels.base.types import Floats, Ints
 from vedette.scenarios import Scenario
+from vedette.simulation import CLUTTER
 from vedette.simulation.records import RunRecord
-from vedette.simulation.scans import CLUTTER, Scan
+from vedette.simulation.scans import Scan
 from vedette.text import elided
 
 if TYPE_CHECKING:

@@ -254,10 +254,24 @@ def reduce_mixture(
     return out_log_weights, out_means, out_covs
 
 
+@kernel
+def heaviest_of_runs(log_weights: Floats, offsets: Ints, chosen: Ints) -> Ints:
+    """(len(chosen),) the heaviest component of each chosen mixture, the first of several; none is empty."""
+    heaviest = np.empty(len(chosen), np.int64)
+    for i in range(len(chosen)):
+        best = offsets[chosen[i]]
+        for c in range(best + 1, offsets[chosen[i] + 1]):
+            if log_weights[c] > log_weights[best]:
+                best = c
+        heaviest[i] = best
+    return heaviest
+
+
 __all__ = [
     "MixtureCaps",
     "copy_component",
     "descending_order",
+    "heaviest_of_runs",
     "match_components",
     "moment_match",
     "reduce_mixture",

@@ -1,0 +1,85 @@
+"""What is done to true measurements until they are a scan (random numbers are drawn outside), and a look at scans."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from vedette.kernels.base.compile import inlined, kernel
+from vedette.kernels.base.types import Bools, Floats, Ints
+
+CLUTTER = -1  # origin of a measurement behind which there is no target
+
+
+@inlined
+def _on_circle(angle: float) -> float:
+    """The same direction in (-pi, pi], rounded as NumPy's remainder rounds."""
+    if angle > math.pi or angle <= -math.pi:
+        return math.pi - np.remainder(math.pi - angle, 2.0 * math.pi)
+    return angle
+
+
+@kernel
+def put_on_circle(angles: Floats) -> None:
+    """Wrap (n,) angles to (-pi, pi] in place; those already there keep every bit."""
+    for i in range(len(angles)):
+        angles[i] = _on_circle(angles[i])
+
+
+@kernel
+def add_noise(measured: Floats, noise: Floats, angular: Bools) -> int:
+    """z_i += v_i in place, angles in (-pi, pi]; the first row that is not finite, where all stops; -1: none."""
+    num, dim = measured.shape
+    for i in range(num):
+        for j in range(dim):
+            measured[i, j] += noise[i, j]
+        for j in range(dim):
+            if not math.isfinite(measured[i, j]):
+                return i
+            if angular[j]:
+                measured[i, j] = _on_circle(measured[i, j])
+    return -1
+
+
+@kernel
+def seen_with(chances: Floats, luck: Floats) -> tuple[Bools, int]:
+    """(num,) whether luck lies below the probability of detection, and the first that is none; -1: all are."""
+    seen = np.empty(len(chances), np.bool_)
+    for i in range(len(chances)):
+        if not 0.0 <= chances[i] <= 1.0:
+            return seen, i
+        seen[i] = luck[i] < chances[i]
+    return seen, -1
+
+
+@kernel
+def mixed_scan(measured: Floats, ids: Ints, seen: Bools, clutter: Floats, order: Ints) -> tuple[Floats, Ints]:
+    """The measurements of targets that are seen and the clutter, in the order of places in both together.
+
+    Returns (n, meas_dim) measurements and the (n,) ids of the targets behind them, or `CLUTTER`.
+    """
+    num, row = len(measured), 0
+    count = np.count_nonzero(seen) + len(clutter)
+    mixed, origins = np.empty((count, measured.shape[1])), np.empty(count, np.int64)
+    for place in order:
+        if place < num and not seen[place]:
+            continue
+        mixed[row] = measured[place] if place < num else clutter[place - num]
+        origins[row] = ids[place] if place < num else CLUTTER
+        row += 1
+    return mixed, origins
+
+
+@kernel
+def examined_scan(scan: Floats, least: Floats, angular: Bools) -> tuple[int, bool, float]:
+    """The first row that is not finite, or -1; whether any component is below its least value; the largest angle."""
+    is_below, largest = False, 0.0
+    for i in range(scan.shape[0]):
+        for j in range(scan.shape[1]):
+            if not math.isfinite(scan[i, j]):
+                return i, is_below, largest
+            is_below = is_below or scan[i, j] < least[j]
+            if angular[j]:
+                largest = max(largest, abs(scan[i, j]))
+    return -1, is_below, largest
