@@ -89,6 +89,9 @@ def test_what_a_plan_says(record: RunRecord) -> None:
     assert repr(plan) == "Plan of idm for 2 sensors\n  " + "; ".join(told)
     many = replace(plan, actions=plan.actions * 50, chosen=plan.chosen * 50, tables=())
     assert repr(many).endswith("; 96 more")
+    why = plan.explain()
+    assert repr(why) == str(why)
+    assert max(map(len, repr(why).splitlines())) <= 80
 
 
 def test_what_a_timeline_and_its_states_say(timeline: Timeline) -> None:
@@ -101,6 +104,17 @@ def test_what_a_timeline_and_its_states_say(timeline: Timeline) -> None:
     assert repr(State((), "my own")) == "State before the first scan, of 0 sensors\n  fused: str"
     scan = timeline.instants[0].scans[1]
     assert repr(scan) == "SensorScan of sensor 1, time 1, measurements [[0.1, 300.0]], pose [0.0, 0.0, 0.0]"
+
+
+def test_what_is_read_and_resolved_is_told_in_two_lines() -> None:
+    first, second = repr(SCENARIO).splitlines()
+    assert first == "Scenario paper-e: 40 scans, 2 sensors, filter delta_glmb, fusion cm_delta_glmb"
+    assert second.startswith("  Reconstruction of the scenario of the paper")
+    assert len(second) <= WIDEST + 2
+    axes = 'scenarios = ["paper-e", "linear-10"]\nplanners = ["still", "idm"]\nruns = 3\n'
+    campaign = resolve(parse_spec(f'name = "trial"\n{axes}'))
+    assert repr(campaign) == "Campaign trial: 4 cells, 12 runs\n  scenario: paper-e, linear-10; planner: still, idm"
+    assert "<br>scenario: paper-e, linear-10" in campaign._repr_html_()
 
 
 def test_others_that_hold_arrays() -> None:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 
 from densities.examples import glmbs, lmbs, poissons, random_glmb, random_lmb
-from vedette.densities import GLMB, LMB, Poisson, TrackTable, load_density, save_density
+from vedette.densities import GLMB, LMB, FactoredGLMB, Poisson, TrackTable, load_density, save_density
 from vedette.errors import InputError
 
 
@@ -17,7 +17,7 @@ def _arrays(density):
     found: dict = {}
     for field in fields(density):
         value = getattr(density, field.name)
-        found |= _arrays(value) if isinstance(value, TrackTable) else {field.name: value}
+        found |= _arrays(value) if isinstance(value, TrackTable) else {} if value is None else {field.name: value}
     return found
 
 
@@ -36,6 +36,18 @@ def test_every_bit_is_kept(tmp_path_factory, glmb, lmb, poisson):
     for density in (glmb, lmb, poisson):
         save_density(path, density)
         _same_bits(load_density(path), density)
+
+
+@pytest.mark.parametrize("kind", [GLMB, FactoredGLMB])
+def test_what_tracks_were_made_of_is_kept_where_it_is_known(tmp_path, kind):
+    glmb = random_glmb(np.random.default_rng(3), 3, 5, 2)
+    sources = np.arange(2 * glmb.tracks.num_tracks).reshape(-1, 2) - 2
+    sources[0] = -1, -2
+    known = replace(glmb, tracks=replace(glmb.tracks, sources=sources))
+    density = known if kind is GLMB else FactoredGLMB.of(known)
+    save_density(tmp_path / "belief", density)
+    _same_bits(load_density(tmp_path / "belief"), density)
+    assert "sources" in _arrays(load_density(tmp_path / "belief"))
 
 
 def test_infinite_logits_and_weights_are_kept(tmp_path):

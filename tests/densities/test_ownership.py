@@ -27,6 +27,7 @@ def densities() -> list[Any]:
     lmb = LMB(TRACKS, np.array([1.0, -1.0]))
     return [
         TRACKS,
+        replace(TRACKS, sources=np.array([[-1, -2], [3, 0]])),
         glmb,
         lmb,
         FactoredGLMB.from_lmb(lmb),

@@ -1,6 +1,7 @@
 """What densities and estimates say of themselves: lines, tables, targets and hypotheses, held against their arrays."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -152,6 +153,19 @@ def test_the_hypotheses_of_a_glmb_are_those_that_it_lists() -> None:
     assert [hyp.weight for hyp in found] == pytest.approx([0.4, 0.3, 0.2, 0.1], abs=1e-12)
     assert [hyp.labels for hyp in found] == [((1, 0), (2, 0)), ((2, 0),), ((1, 0),), ()]
     assert [hyp.tracks.tolist() for hyp in found] == [[1, 2], [2], [0], []]
+    assert [hyp.measurements for hyp in found] == [None] * 4
+
+
+def test_measurements_are_told_where_they_are_known() -> None:
+    belief, plain = glmb(), glmb().to_table()
+    told = replace(belief, tracks=replace(belief.tracks, sources=np.array([[0, 4], [0, -1], [2, 0], [-1, 4]])))
+    assert [hyp.measurements for hyp in told.hypotheses()] == [(None, 0), (0,), (4,), ()]
+    assert told.to_table() == {**plain, "measurement": [None, 0]}  # missed with .4, the fifth with .2
+    assert list(told.to_table())[:3] == ["label", "existence", "measurement"]
+    assert "<th>measurement</th>" in told._repr_html_()
+    predicted = replace(belief, tracks=replace(belief.tracks, sources=np.array([[0, -2], [1, -2], [2, -2], [-1, -2]])))
+    assert [hyp.measurements for hyp in predicted.hypotheses()] == [None] * 4
+    assert predicted.to_table() == plain
 
 
 def test_the_hypotheses_of_a_product_are_all_its_label_sets() -> None:

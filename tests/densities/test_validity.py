@@ -58,6 +58,15 @@ TRACK_FAULTS = [
     ("covs", _changed(TRACKS.covs, 2, LOPSIDED), NumericalError, r"\[2\]: expected a symmetric"),
     ("covs", _changed(TRACKS.covs, 1, INDEFINITE), NumericalError, r"\[1\]: expected a positive definite.* -1"),
     ("covs", _changed(TRACKS.covs, 1, 0.0), NumericalError, r"\[1\]: expected a positive definite"),
+    ("sources", [[0, 0]] * 3, InputError, "an array of int64; got list"),
+    ("sources", np.zeros((2, 2), np.int64), InputError, r"shape \(3, 2\)"),
+    (
+        "sources",
+        np.array([[0, 1], [-1, -3], [-1, -2]]),
+        InputError,
+        r"\[1\]: expected at least \[-1, -2\]; got \[-1, -3\]",
+    ),
+    ("sources", np.array([[0, 1], [-1, -2], [-2, 0]]), InputError, r"\[2\]: expected at least"),
 ]
 
 

@@ -140,4 +140,4 @@ def arrays(belief: Any) -> list[Any]:
     tracks = getattr(belief, "tracks", None)
     names = [name for name in type(belief).__match_args__ if name != "tracks"]
     own = [] if tracks is None else [getattr(tracks, name) for name in type(tracks).__match_args__]
-    return [*own, *(getattr(belief, name) for name in names)]
+    return [array for array in (*own, *(getattr(belief, name) for name in names)) if array is not None]

@@ -31,8 +31,9 @@ from filters.members import (
     targets,
 )
 from vedette import models
-from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable, unlabelled_estimate
+from vedette.densities import GLMB, LMB, FactoredGLMB, unlabelled_estimate
 from vedette.densities.containers import unchecked
+from vedette.densities.tracks import gaussian_tracks
 from vedette.errors import InputError, ModelError, NumericalError
 from vedette.filters import (
     CphdFilter,
@@ -206,7 +207,7 @@ def test_a_step_whose_labels_are_in_use(kind: Any) -> None:
 
 @pytest.mark.parametrize("kind", LABELLED)
 def test_a_belief_that_is_no_density(kind: Any) -> None:
-    tracks = unchecked(TrackTable, np.zeros((1, 2), np.int64), np.arange(2), np.zeros(1), np.zeros((1, 4)), -AT_SITE[1])
+    tracks = gaussian_tracks(np.zeros((1, 2), np.int64), np.zeros((1, 4)), -AT_SITE[1])
     glmb = unchecked(GLMB, tracks, np.arange(2), np.zeros(1, np.int64), np.zeros(1))
     lmb = unchecked(LMB, tracks, np.zeros(1))
     belief = {DeltaGlmbFilter: glmb, LmbFilter: lmb, FactoredGlmbFilter: FactoredGLMB.from_lmb(lmb)}[kind]

@@ -260,7 +260,7 @@ def test_beliefs_that_cannot_be_fused(name: str) -> None:
     with pytest.raises(InputError, match="state dimension"):
         rule.fuse([one, type(one).empty(2)])
     fields = {field: getattr(one, field) for field in type(one).__match_args__}
-    indefinite = unchecked(TrackTable, *one.tracks.to_kernel()[:4], -one.tracks.covs)
+    indefinite = one.tracks.with_fields(covs=-one.tracks.covs)
     with pytest.raises(InputError, match=r"beliefs\[0\].*positive definite"):
         rule.fuse([unchecked(type(one), *(fields | {"tracks": indefinite}).values()), one])
 

@@ -18,7 +18,8 @@ from vedette.scenarios.build import build_planner
 from vedette.scenarios.dumping import dump_scenario, files_of
 from vedette.scenarios.overrides import with_fields
 from vedette.scenarios.sections import ScenarioModel
-from vedette.text import listed, unused
+from vedette.speaking import Speaking
+from vedette.text import counted, listed, unused
 
 _LONGEST_NAME = 120
 _SECTIONS = {"filter": "filter.kind", "fusion": "fusion.kind"}
@@ -41,8 +42,8 @@ class Cell:
     planner: str
 
 
-@dataclass(frozen=True, slots=True)
-class Campaign:
+@dataclass(frozen=True, slots=True, repr=False)
+class Campaign(Speaking):
     """A specification with its cells made.
 
     Attributes:
@@ -62,6 +63,12 @@ class Campaign:
     compare: str
     spec: dict[str, Any]
     shard: Shard = WHOLE
+
+    def _summary(self) -> str:
+        return f"{self.name}: {counted(len(self.cells), 'cell')}, {counted(self.total, 'run')}"
+
+    def _detail(self) -> str:
+        return "; ".join(f"{axis}: {', '.join(map(str, values))}" for axis, values in self.axes.items())
 
     @property
     def total(self) -> int:

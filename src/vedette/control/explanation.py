@@ -101,7 +101,7 @@ class Had(NamedTuple):
         return f"sensor {self.sensor + 1} with {self.action}: reward {self.reward:.4g} ({off})"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Explanation:
     """Why a plan is what it is. Rewards are means over the samples; a field is None where `missing` says why.
 
@@ -171,7 +171,7 @@ class Explanation:
         values = {name: getattr(self, name) for name in self.__slots__ if name != "answer"}
         return Explanation(**values)
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         return text_of(self)
 
 

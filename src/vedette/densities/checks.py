@@ -86,6 +86,15 @@ def offsets_of(sizes: Sequence[int] | Ints) -> Ints:
     return np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes, dtype=np.int64)])
 
 
+def check_sources(field: str, sources: Any, count: int) -> None:
+    """Raise `InputError` unless `sources` has a track or -1, and a measurement, -1 or -2, for each of `count`."""
+    check_array(field, sources, np.int64, (count, 2))
+    faulty = (sources < [-1, -2]).any(axis=1)
+    if faulty.any():
+        place = _first(faulty)
+        raise InputError(f"{field}[{place}]: expected at least [-1, -2]; got {sources[place].tolist()}")
+
+
 def take_runs(offsets: Ints, places: Ints) -> tuple[Ints, Ints]:
     """Offsets of the runs at `places` when they are put one after another, and the entries that they then have."""
     taken = offsets_of(np.diff(offsets)[places])

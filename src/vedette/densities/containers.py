@@ -61,8 +61,9 @@ class MultiTarget(Container, Tabled):
         """A row a label, or else a Bernoulli or a component, by columns, as `pandas.DataFrame` takes them.
 
         `label` (`birth step.index`) where there are labels, `existence` (of an intensity's components
-        `expected_number`), mean and standard deviations as in the table of a run's tracks: `x_m`, `y_m`, `vx_mps`,
-        `vy_mps`, `std_x_m` and so on, those of the marginal density.
+        `expected_number`), the likeliest `measurement` of the last scan (None: missed) where it is known (see
+        `TrackTable`), mean and standard deviations as in the table of a run's tracks: `x_m`, `y_m`, `vx_mps`, `vy_mps`,
+        `std_x_m` and so on, those of the marginal density.
         """
         return self._targets().columns(self._weight)
 

@@ -106,6 +106,7 @@ class FactoredGLMB(Hypotheses):
             table.log_weights[start:stop],
             table.means[start:stop],
             table.covs[start:stop],
+            None if table.sources is None else table.sources[low:high],
         )
         offsets = self.hyp_offsets[first : last + 1] - begin
         return unchecked(GLMB, tracks, offsets, self.hyp_tracks[begin:end] - low, self.hyp_log_weights[first:last])

@@ -34,6 +34,7 @@ _KINDS: dict[str, type[Density]] = {
     "iid_cluster": IidCluster,
     "multi_bernoulli": MultiBernoulli,
 }
+_OPTIONAL = {f"tracks.{field.name}" for field in fields(TrackTable) if field.default is None}
 
 
 def save_density(path: str | os.PathLike[str], density: Density) -> None:
@@ -45,7 +46,7 @@ def save_density(path: str | os.PathLike[str], density: Density) -> None:
     if kind is None:
         raise InputError(f"density: expected a multi-target density; got {type(density).__name__}")
     arrays: dict[str, Any] = {"format": FORMAT_NAME, "version": FORMAT_VERSION, "kind": kind}
-    arrays |= {name: attrgetter(name)(density) for name in _names(type(density))}
+    arrays |= {name: array for name in _names(type(density)) if (array := attrgetter(name)(density)) is not None}
     target = Path(path)
     try:
         write_whole(target, lambda file: np.savez(file, **arrays))
@@ -94,7 +95,7 @@ def _names(container: type[Any]) -> list[str]:
 
 def _build(kind: str, arrays: Mapping[str, Any]) -> Density:
     container: Any = _KINDS[kind]
-    own = [arrays[name] for name in _names(container)]
+    own: list[Any] = [arrays.get(name) if name in _OPTIONAL else arrays[name] for name in _names(container)]
     num = len(own) - len(fields(container)) + 1
     made: Density = container(TrackTable(*own[:num]), *own[num:]) if num > 1 else container(*own)
     return made

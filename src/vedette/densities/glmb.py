@@ -113,9 +113,9 @@ class GLMB(Hypotheses):
         return kt.FactoredGlmb(own.tracks, tracks_end, *own[1:], np.array([0, self.num_hyps]))
 
     @classmethod
-    def from_kernel(cls, glmb: kt.Glmb) -> GLMB:
-        """The arrays of a bundle as they are; a kernel's own need no check."""
-        return unchecked(cls, TrackTable.from_kernel(glmb.tracks), *glmb[1:])
+    def from_kernel(cls, glmb: kt.Glmb, sources: Ints | None = None) -> GLMB:
+        """The arrays of a bundle, and the sources of its tracks, as they are; a kernel's own need no check."""
+        return unchecked(cls, TrackTable.from_kernel(glmb.tracks, sources), *glmb[1:])
 
     @classmethod
     def empty(cls, state_dim: int) -> GLMB:

@@ -11,7 +11,7 @@ import numpy as np
 
 from vedette.densities import checks
 from vedette.densities.containers import MultiTarget, for_kernel, unchecked
-from vedette.densities.telling import Hypothesis, Target, Targets
+from vedette.densities.telling import Hypothesis, Target, Targets, indices_or_none
 from vedette.densities.tracks import TrackTable, run_moments, take_tracks, track_moments
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base import types as kt
@@ -81,16 +81,21 @@ class Labelled(MultiTarget):
     def hypotheses(self, max_hypotheses: int = 1000) -> Iterator[Hypothesis]:
         """The likeliest hypotheses, by descending weight: `weight`, `labels`, and `tracks`, their rows of the table.
 
+        `measurements` has, label by label, the row of the last scan that the hypothesis takes for the target's, None
+        where it was missed. It is known, and not None as a whole, after the scan of a `DeltaGlmbFilter` that is not
+        marginalised; of which tracks those were before, see `TrackTable.sources`. In an LMB and in a product of
+        GLMBs a track is what all measurements together have left.
+
         Of a product, and an LMB is one, these are products of one hypothesis of each factor. The weights are
         probabilities: where there are more than `max_hypotheses`, they sum to less than one.
         Raises `InputError` for a `max_hypotheses` below 1.
         """
-        listed, left_out = self.heaviest_sets(max_hypotheses)
+        (listed, left_out), taken = self.heaviest_sets(max_hypotheses), self.tracks.measurements
         weights, ends = np.exp(listed.hyp_log_weights) * (1.0 - left_out), listed.hyp_offsets.tolist()
         for weight, first, last in zip(weights.tolist(), ends[:-1], ends[1:], strict=True):
             tracks = listed.hyp_tracks[first:last]
             labels = tuple((step, index) for step, index in self.tracks.labels[tracks].tolist())
-            yield Hypothesis(weight, labels, tracks)
+            yield Hypothesis(weight, labels, tracks, None if taken is None else tuple(indices_or_none(taken[tracks])))
 
     def heaviest_sets(self, max_hypotheses: int) -> tuple[kt.Glmb, float]:
         """See `vedette.densities.as_glmb`."""
@@ -112,7 +117,14 @@ class Labelled(MultiTarget):
         order = np.argsort(place, kind="stable")
         moments = run_moments(shares[order], means[order], covs[order], checks.offsets_of(counts))
         _, row = checks.distinct_labels(np.concatenate([table, labels]))  # a table may have more
-        return Targets(labels, existence, *(part[row[len(table) :]] for part in moments))
+        own = row[len(table) :]
+        taken = self.tracks.measurements
+        if taken is not None:
+            chances = np.zeros((len(table), taken.max() + 2))  # of each label, that it was missed, and by measurement
+            np.add.at(chances, (place, taken + 1), weights)
+            taken = chances.argmax(axis=1)[own] - 1
+        means, covs = (part[own] for part in moments)
+        return Targets(labels, existence, means, covs, taken)
 
     def _parts(self) -> str:
         """What it is made of beside labels."""

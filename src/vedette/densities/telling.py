@@ -27,15 +27,12 @@ class Target(NamedTuple):
 
 
 class Hypothesis(NamedTuple):
-    """One set of targets that there may be, each with its density.
-
-    Which measurements were taken for whose is not here: filters leave it behind, as more than one association may lead
-    to the same tracks.
-    """
+    """One set of targets that there may be, each with its density."""
 
     weight: float  # its probability
     labels: tuple[tuple[int, int], ...]  # in increasing order
     tracks: Ints  # (num_targets,) for each label, the row of the density's track table
+    measurements: tuple[int | None, ...] | None  # for each label, its row of the last scan, or None; None: not known
 
 
 class Targets(NamedTuple):
@@ -45,6 +42,7 @@ class Targets(NamedTuple):
     weights: Floats  # (num,) probability of existence, or expected number
     means: Floats  # (num, state_dim)
     covs: Floats  # (num, state_dim, state_dim)
+    measurements: Ints | None = None  # (num,) the likeliest of the last scan, -1: missed; None: not known
 
     def each(self) -> Iterator[Target]:
         """One by one."""
@@ -64,9 +62,10 @@ class Targets(NamedTuple):
         return "; ".join(told + ([f"{more} more"] if more else []))
 
     def columns(self, weight: str) -> dict[str, list[Any]]:
-        """By columns: `label` (`birth step.index`, where there are labels), `weight` and those of `state_columns`."""
+        """By columns, as `MultiTarget.to_table` has them."""
         names = {} if self.labels is None else {"label": [f"{step}.{index}" for step, index in self.labels.tolist()]}
-        return {**names, weight: self.weights.tolist(), **state_columns(self.means, self.covs)}
+        taken = {} if self.measurements is None else {"measurement": indices_or_none(self.measurements)}
+        return {**names, weight: self.weights.tolist(), **taken, **state_columns(self.means, self.covs)}
 
     def draw(self, axes: Any) -> None:
         """Ellipses of two standard deviations of the places into axes of Matplotlib, the fainter the less is there."""
@@ -93,6 +92,11 @@ class Targets(NamedTuple):
         return Targets(labels, self.weights[places], self.means[places], self.covs[places])
 
 
+def indices_or_none(measurements: Ints) -> list[int | None]:
+    """The indices, None in the place of -1."""
+    return [None if index < 0 else index for index in measurements.tolist()]
+
+
 def state_columns(means: Floats, covs: Floats) -> dict[str, list[float]]:
     """`x_m`, `y_m`, `vx_mps`, `vy_mps` of states (num, state_dim), and `std_...`, their standard deviations.
 
@@ -111,4 +115,4 @@ def _place(state: Floats) -> str:
     return f"({', '.join(told)})"
 
 
-__all__ = ["Hypothesis", "Target", "Targets", "state_columns"]
+__all__ = ["Hypothesis", "Target", "Targets", "indices_or_none", "state_columns"]

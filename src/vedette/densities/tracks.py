@@ -20,6 +20,7 @@ from vedette.kernels.gaussian.pooling import pooled_tracks
 from vedette.models.arguments import no_gaussians
 from vedette.text import counted
 
+UNSCANNED = -2  # in the place of a measurement
 _ARRAYS = kernel_arrays("labels", "offsets", "log_weights", "means", "covs")
 
 
@@ -33,6 +34,9 @@ class TrackTable(Container):
         log_weights: (num_components,) log mixture weights, normalised within each track.
         means: (num_components, state_dim).
         covs: (num_components, state_dim, state_dim), symmetric positive definite.
+        sources: (num_tracks, 2) what each track was made of by a `DeltaGlmbFilter`: its track in the belief before, -1
+            where it was born; and its measurement's row in the scan, -1 where it was missed, -2 where there was no scan
+            (a prediction). None of tracks that are made of several, or by another filter, and where nothing is known.
 
     The arrays are copied, checked once, here, and read-only from then on.
 
@@ -45,6 +49,7 @@ class TrackTable(Container):
     log_weights: Floats
     means: Floats
     covs: Floats
+    sources: Ints | None = None
 
     def __post_init__(self) -> None:
         self._own_arrays()
@@ -64,20 +69,25 @@ class TrackTable(Container):
         """Length of a target's state."""
         return int(self.means.shape[1])
 
+    @property
+    def measurements(self) -> Ints | None:
+        """(num_tracks,) those in `sources`; None where they are not known or there was no scan."""
+        return None if self.sources is None or (self.sources[:, 1] == UNSCANNED).any() else self.sources[:, 1]
+
     def to_kernel(self) -> kt.Tracks:
         """The same arrays as the bundle that kernels take."""
         return kt.Tracks(*_ARRAYS(self))
 
     @classmethod
-    def from_kernel(cls, tracks: kt.Tracks) -> TrackTable:
+    def from_kernel(cls, tracks: kt.Tracks, sources: Ints | None = None) -> TrackTable:
         """The arrays of a bundle as they are; a kernel's own need no check."""
-        return unchecked(cls, *tracks)
+        return unchecked(cls, *tracks, sources)
 
     @classmethod
     def empty(cls, state_dim: int) -> TrackTable:
         """A table without tracks. Raises `InputError` for what is no dimension of a state."""
         labels, offsets = np.empty((0, 2), np.int64), np.zeros(1, np.int64)
-        return unchecked(cls, labels, offsets, np.empty(0), *no_gaussians(state_dim))
+        return cls.from_kernel(kt.Tracks(labels, offsets, np.empty(0), *no_gaussians(state_dim)))
 
     @classmethod
     def from_gaussians(cls, labels: Any, means: Any, covs: Any) -> TrackTable:
@@ -118,6 +128,8 @@ class TrackTable(Container):
         """
         checks.check_array("tracks.labels", self.labels, np.int64, (None, 2))
         checks.check_mixtures("tracks.", self.offsets, self.log_weights, self.means, self.covs, self.num_tracks, error)
+        if self.sources is not None:
+            checks.check_sources("tracks.sources", self.sources, self.num_tracks)
 
 
 def log_weights(field: str, weights: Any) -> Floats:
@@ -139,6 +151,7 @@ def take_tracks(tracks: TrackTable, places: Ints) -> TrackTable:
         tracks.log_weights[components],
         tracks.means[components],
         tracks.covs[components],
+        None if tracks.sources is None else tracks.sources[places],
     )
 
 
@@ -151,7 +164,7 @@ def places_of(labels: Ints, table: Ints) -> Ints:
 def gaussian_tracks(labels: Ints, means: Floats, covs: Floats) -> TrackTable:
     """As `TrackTable.from_gaussians`, of arrays of the library's own."""
     num = len(labels)
-    return unchecked(TrackTable, labels, np.arange(num + 1), np.zeros(num), means, covs)
+    return TrackTable.from_kernel(kt.Tracks(labels, np.arange(num + 1), np.zeros(num), means, covs))
 
 
 def place_labels(tables: Sequence[Ints]) -> tuple[Ints, Ints]:

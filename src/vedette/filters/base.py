@@ -16,7 +16,7 @@ from vedette.filters.inputs import births_for, blame_model, check_belief, check_
 from vedette.filters.limits import Limits
 from vedette.filters.protocols import FilterInfo
 from vedette.kernels.association.truncation import Truncation
-from vedette.kernels.base.types import Floats, Motion, ScanInput, Sensor
+from vedette.kernels.base.types import Floats, Ints, Motion, ScanInput, Sensor
 from vedette.models import (
     SensorModel,
     TargetModel,
@@ -131,9 +131,9 @@ class OfKind(ABC, Generic[BeliefT]):
 
     @abstractmethod
     def _concluded(
-        self, posterior: Any, reports: Sequence[Any], *, log_likelihood: float, num_duplicates: int
+        self, posterior: Any, reports: Sequence[Any], *, log_likelihood: float, repeats: Sequence[Ints]
     ) -> tuple[BeliefT, FilterInfo]:
-        """As they are given back, after updates with one report each."""
+        """As they are given back, after updates with one report each. repeats: of each scan, the rows left out."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -176,10 +176,10 @@ class LabelledFilter(SingleSensorFilter, OfKind[BeliefT]):
             NumericalError: no hypothesis has positive weight.
         """
         generator(rng)
-        measurements, num_duplicates = check_scan(scan, self.sensor)
+        measurements, repeats = check_scan(scan, self.sensor)
         prior = check_belief(belief, self.kind, self.targets.state_dim)
         inputs = self._inputs_after(dt, measurements, pose, step, prior, births)
-        return self._taken(prior, inputs, rng, num_duplicates, f"step {step}: ")
+        return self._taken(prior, inputs, rng, [repeats], f"step {step}: ")
 
     def predict(
         self, belief: Labelled, dt: float, step: int, *, births: LMB | None = None
@@ -190,22 +190,22 @@ class LabelledFilter(SingleSensorFilter, OfKind[BeliefT]):
         """
         prior, blind = check_belief(belief, self.kind, self.targets.state_dim), self._blind()
         inputs = blind._inputs_after(dt, NO_SCAN, NO_POSE, step, prior, births)
-        return blind._taken(prior, inputs, None, 0, f"step {step}: ")
+        return blind._taken(prior, inputs, None, [], f"step {step}: ")
 
     def update(self, belief: Labelled, scan: Any, pose: Any, *, rng: np.random.Generator) -> tuple[BeliefT, FilterInfo]:
         """The belief after a scan of its own time; nobody moves, dies or is born. Arguments and errors as of `step`."""
         generator(rng)
-        measurements, num_duplicates = check_scan(scan, self.sensor)
+        measurements, repeats = check_scan(scan, self.sensor)
         prior = check_belief(belief, self.kind, self.targets.state_dim)
         inputs = self._update_inputs(measurements, pose)
-        return self._taken(prior, inputs, rng, num_duplicates, "")
+        return self._taken(prior, inputs, rng, [repeats], "")
 
     def _taken(
         self,
         prior: BeliefT,
         inputs: StepInputs,
         rng: np.random.Generator | None,
-        num_duplicates: int,
+        repeats: Sequence[Ints],
         place: str,
     ) -> tuple[BeliefT, FilterInfo]:
         try:
@@ -214,7 +214,7 @@ class LabelledFilter(SingleSensorFilter, OfKind[BeliefT]):
             blame_model(error)
             raise
         log_likelihood = self._check(posterior, report, place) + report.log_clutter - self.sensor.clutter.rate
-        return self._concluded(posterior, [report], log_likelihood=log_likelihood, num_duplicates=num_duplicates)
+        return self._concluded(posterior, [report], log_likelihood=log_likelihood, repeats=repeats)
 
     @abstractmethod
     def _stepped(self, prior: Any, step: SensorStep) -> tuple[Any, Any]:

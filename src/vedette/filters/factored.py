@@ -17,7 +17,7 @@ from vedette.filters.base import LabelledFilter, OfKind, SensorStep, blind_senso
 from vedette.filters.limits import Limits
 from vedette.filters.multi_sensor import InTurn, MultiSensorFilter
 from vedette.filters.protocols import FilterInfo
-from vedette.kernels.base.types import Bools, FactoredGlmb
+from vedette.kernels.base.types import Bools, FactoredGlmb, Ints
 from vedette.kernels.steps.factored import FactoredReport, Factoring, step_factored
 from vedette.kernels.steps.in_view import in_view
 from vedette.models.arguments import dimension, non_negative
@@ -52,7 +52,12 @@ class _OfFactors(OfKind[FactoredGLMB]):
         raise NumericalError(f"{place}no hypothesis has positive weight; do the models forbid this scan?")
 
     def _concluded(
-        self, posterior: FactoredGlmb, reports: Sequence[FactoredReport], *, log_likelihood: float, num_duplicates: int
+        self,
+        posterior: FactoredGlmb,
+        reports: Sequence[FactoredReport],
+        *,
+        log_likelihood: float,
+        repeats: Sequence[Ints],
     ) -> tuple[FactoredGLMB, FilterInfo]:
         found, dropped, is_full = self.limits.without_excess(FactoredGLMB.from_kernel(posterior))
         return found, FilterInfo(
@@ -62,7 +67,7 @@ class _OfFactors(OfKind[FactoredGLMB]):
             discarded_weight_bound=max(0.0, -math.expm1(sum(report.log_kept for report in reports))),
             dropped_existence=sum(float(report.dropped_existence) for report in reports) + dropped,
             num_clutter_raised=sum(int(report.num_raised) for report in reports),
-            num_duplicates=num_duplicates,
+            num_duplicates=sum(map(len, repeats)),
             num_inexact_clusters=0,
             search_cut=any(bool(report.cut) for report in reports),
             cap_met=is_full or any(bool(report.full) for report in reports),

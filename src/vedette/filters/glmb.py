@@ -7,14 +7,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
+import numpy as np
+
 from vedette.densities import GLMB
+from vedette.densities.tracks import UNSCANNED
 from vedette.errors import InputError, NumericalError
 from vedette.filters.assignment import Gibbs, OfChoices, Ranked
 from vedette.filters.base import LabelledFilter, OfKind, SensorStep, blind_sensor
 from vedette.filters.limits import Limits
 from vedette.filters.multi_sensor import InTurn
 from vedette.filters.protocols import FilterInfo
-from vedette.kernels.base.types import Glmb
+from vedette.kernels.base.types import Glmb, Ints
 from vedette.kernels.labelled.conversions import marginalise
 from vedette.kernels.steps.glmb import StepReport, step_gibbs, step_ranked
 from vedette.models.arguments import flag
@@ -37,12 +40,14 @@ class _OfGlmb(OfKind[GLMB]):
         return report.log_total
 
     def _concluded(
-        self, posterior: Glmb, reports: Sequence[StepReport], *, log_likelihood: float, num_duplicates: int
+        self, posterior: Glmb, reports: Sequence[StepReport], *, log_likelihood: float, repeats: Sequence[Ints]
     ) -> tuple[GLMB, FilterInfo]:
         if self.marginalised:
-            posterior = marginalise(posterior, self.limits.track_caps())
-        kept, spread = self.limits.without_spread(GLMB.from_kernel(posterior))
-        _, log_kept, _, num_raised, cut, full = zip(*reports, strict=True)
+            belief = GLMB.from_kernel(marginalise(posterior, self.limits.track_caps()))
+        else:
+            belief = GLMB.from_kernel(posterior, _sources(reports, repeats))
+        kept, spread = self.limits.without_spread(belief)
+        _, log_kept, _, num_raised, cut, full, _ = zip(*reports, strict=True)
         return kept, FilterInfo(
             log_likelihood=log_likelihood,
             num_hypotheses=len(kept.hyp_log_weights),
@@ -50,11 +55,24 @@ class _OfGlmb(OfKind[GLMB]):
             discarded_weight_bound=max(0.0, -math.expm1(sum(log_kept))),
             dropped_existence=spread,
             num_clutter_raised=sum(num_raised),
-            num_duplicates=num_duplicates,
+            num_duplicates=sum(map(len, repeats)),
             num_inexact_clusters=0,
             search_cut=any(cut),
             cap_met=any(full),
         )
+
+
+def _sources(reports: Sequence[StepReport], repeats: Sequence[Ints]) -> Ints | None:
+    """As of a `TrackTable`; of several updates in turn nothing is kept."""
+    if len(reports) > 1:
+        return None
+    sources = reports[0].sources
+    if len(repeats) == 0:  # a prediction
+        return np.column_stack([sources[:, 0], np.full(len(sources), UNSCANNED)])
+    if len(repeats[0]):  # from rows of what was taken to those of what was given
+        rows = np.setdiff1d(np.arange(sources[:, 1].max(initial=-1) + 1 + len(repeats[0])), repeats[0])
+        return np.column_stack([sources[:, 0], np.append(rows, -1)[sources[:, 1]]])
+    return sources
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -15,8 +15,9 @@ import numpy as np
 
 from vedette.densities import GLMB, LMB, FactoredGLMB, IidCluster, Labelled, MultiBernoulli, Poisson, TrackTable
 from vedette.densities.containers import unchecked
+from vedette.densities.tracks import gaussian_tracks
 from vedette.errors import InputError, ModelError, VedetteError
-from vedette.kernels.base.types import Bools, Floats, Lmb
+from vedette.kernels.base.types import Bools, Floats, Ints, Lmb
 from vedette.kernels.gaussian.scans import examined_scan
 from vedette.models import BirthModel, SensorModel
 from vedette.models.arguments import as_array, reject, step_number
@@ -25,12 +26,13 @@ from vedette.plausible import implausible
 from vedette.probabilities import log_expit
 
 _MOST_STDS = 10.0  # of noise below the least that a measurement is without it
+_NO_ROWS = np.empty(0, np.int64)
 _PACKAGE = Path(__file__).parents[1]
 _Density = TypeVar("_Density", GLMB, LMB, FactoredGLMB, Poisson, IidCluster, MultiBernoulli)
 
 
-def check_scan(scan: Any, sensor: SensorModel) -> tuple[Floats, int]:
-    """The scan as a contiguous (num, meas_dim) array without repeated rows, and how many rows were repeats.
+def check_scan(scan: Any, sensor: SensorModel) -> tuple[Floats, Ints]:
+    """The scan as a contiguous (num, meas_dim) array without repeated rows, and which rows were repeats.
 
     Angles come out in (-pi, pi]. Warns of what noise alone can hardly bring below the least, such as a negative range.
 
@@ -47,7 +49,7 @@ def check_scan(scan: Any, sensor: SensorModel) -> tuple[Floats, int]:
     if type(scan) is not np.ndarray or scan.dtype != np.float64:
         given = as_array("scan", scan, "fiu", f"numbers in {expected}")
     if given.size == 0 and given.ndim <= 2:
-        return np.empty((0, meas_dim)), 0
+        return np.empty((0, meas_dim)), _NO_ROWS
     if given.ndim != 2 or given.shape[1] != meas_dim:
         raise InputError(f"scan: expected {expected}; got shape {given.shape}")
     array = np.array(given, dtype=np.float64, order="C")
@@ -60,11 +62,10 @@ def check_scan(scan: Any, sensor: SensorModel) -> tuple[Floats, int]:
         array = _in_one_turn(array, measurement.angular)
     column = np.sort(array[:, 0])
     if (column[1:] != column[:-1]).all():  # most scans
-        return array, 0
+        return array, _NO_ROWS
     _, first = np.unique(array, axis=0, return_index=True)
-    if len(first) == len(array):
-        return array, 0
-    return np.ascontiguousarray(array[np.sort(first)]), len(array) - len(first)
+    repeats = np.setdiff1d(np.arange(len(array)), first)
+    return np.delete(array, repeats, axis=0), repeats
 
 
 def _tell_negative(scan: Floats, measurement: MeasurementModel, stds: Floats | None) -> None:
@@ -138,7 +139,7 @@ def births_at(birth: BirthModel, step: int) -> LMB:
     labels[:, 0] = step
     tracks = born.tracks
     same = (tracks.offsets, tracks.log_weights, tracks.means, tracks.covs)
-    return unchecked(LMB, unchecked(TrackTable, labels, *same), born.existence_logit)
+    return unchecked(LMB, unchecked(TrackTable, labels, *same, None), born.existence_logit)
 
 
 def births_within(born: LMB, period: float | None, dt: float) -> LMB:
@@ -157,9 +158,7 @@ def births_within(born: LMB, period: float | None, dt: float) -> LMB:
 def _births_of(birth: BirthModel) -> LMB:
     """Those of no step, laid out once a model."""
     labels = np.column_stack([np.zeros(birth.num_sites, np.int64), np.arange(birth.num_sites)])
-    tracks = unchecked(
-        TrackTable, labels, np.arange(birth.num_sites + 1), np.zeros(birth.num_sites), birth.means, birth.covs
-    )
+    tracks = gaussian_tracks(labels, birth.means, birth.covs)
     return unchecked(LMB, tracks, np.log(birth.existence) - np.log1p(-birth.existence))
 
 

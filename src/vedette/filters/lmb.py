@@ -17,7 +17,7 @@ from vedette.filters.limits import Limits
 from vedette.filters.multi_sensor import InTurn, MultiSensorFilter
 from vedette.filters.protocols import Filter, FilterInfo
 from vedette.kernels.association.marginals import Association
-from vedette.kernels.base.types import Bools, Lmb
+from vedette.kernels.base.types import Bools, Ints, Lmb
 from vedette.kernels.steps.in_view import in_view, marked, put_back
 from vedette.kernels.steps.lmb import LmbReport, step_lmb
 from vedette.kernels.steps.multi_sensor_combinations import predict_combinations, standing_combinations
@@ -37,7 +37,7 @@ class OfLmb(OfKind[LMB]):
         return report.sums.log_total
 
     def _concluded(
-        self, posterior: Lmb, reports: Sequence[LmbReport], *, log_likelihood: float, num_duplicates: int
+        self, posterior: Lmb, reports: Sequence[LmbReport], *, log_likelihood: float, repeats: Sequence[Ints]
     ) -> tuple[LMB, FilterInfo]:
         kept, spread = self.limits.without_spread(LMB.from_kernel(posterior))
         sums, _, num_raised, dropped, cut = zip(*reports, strict=True)
@@ -49,7 +49,7 @@ class OfLmb(OfKind[LMB]):
             discarded_weight_bound=max(-math.expm1(sum(log_kept)), 0.0),  # NaN stays
             dropped_existence=sum(dropped) + spread,
             num_clutter_raised=sum(num_raised),
-            num_duplicates=num_duplicates,
+            num_duplicates=sum(map(len, repeats)),
             num_inexact_clusters=sum(num_ranked),
             search_cut=any(cut),
             cap_met=len(posterior.existence_logit) >= self.limits.max_labels,

@@ -15,7 +15,7 @@ from vedette.filters.base import NO_POSE, NO_SCAN, BeliefT, OfKind, SensorStep, 
 from vedette.filters.inputs import births_for, check_belief, check_scan, model_errors, no_time, nobody
 from vedette.filters.limits import Limits
 from vedette.filters.protocols import FilterInfo
-from vedette.kernels.base.types import Bools, Floats, Lmb, Motion, ScanInput
+from vedette.kernels.base.types import Bools, Floats, Ints, Lmb, Motion, ScanInput
 from vedette.models import SensorModel, TargetModel, kernel_motion
 from vedette.models.arguments import generator, one_a_sensor, pose_vector, positive, reject
 
@@ -27,7 +27,7 @@ class SensorScans(NamedTuple):
     sensors: list[SensorModel]
     scans: list[Floats]
     poses: list[Floats]
-    num_duplicates: int  # measurements that repeat another
+    repeats: list[Ints]  # rows of each scan that repeat another; none where no sensor scanned
 
     def inputs(self, born: Lmb, dt: float) -> list[ScanInput]:
         """As kernels take them: each with the births and the period."""
@@ -132,20 +132,20 @@ class MultiSensorFilter(OfKind[BeliefT]):
         """
         generator(rng)
         one_a_sensor(len(self.sensors), scans=scans, poses=poses)
-        taken = SensorScans([], [], [], [], 0)
+        taken = SensorScans([], [], [], [], [])
         for s, sensor in enumerate(self.sensors):
             if scans[s] is None:
                 continue
             try:
-                scan, num = check_scan(scans[s], sensor)
+                scan, repeats = check_scan(scans[s], sensor)
             except InputError as error:
                 raise InputError(f"scans[{s}]: {error}") from None
             taken.names.append(f"sensor {s}")
             taken.sensors.append(sensor)
             taken.scans.append(scan)
             taken.poses.append(pose_vector(f"poses[{s}]", poses[s]))
-            taken = taken._replace(num_duplicates=taken.num_duplicates + num)
-        return taken if taken.names else SensorScans(["no sensor"], [blind_sensor()], [NO_SCAN], [NO_POSE], 0)
+            taken.repeats.append(repeats)
+        return taken if taken.names else SensorScans(["no sensor"], [blind_sensor()], [NO_SCAN], [NO_POSE], [])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -174,7 +174,7 @@ class InTurn(MultiSensorFilter[BeliefT]):
             log_total += self._check(posterior, report, f"{place}, {name}: ")
             reports.append(report)
         log_likelihood = taken.log_likelihood(log_total, [report.log_clutter for report in reports])
-        return self._concluded(posterior, reports, log_likelihood=log_likelihood, num_duplicates=taken.num_duplicates)
+        return self._concluded(posterior, reports, log_likelihood=log_likelihood, repeats=taken.repeats)
 
     @abstractmethod
     def _stepped(self, prior: Any, step: SensorStep) -> tuple[Any, Any]:

@@ -44,12 +44,12 @@ class UnlabelledFilter(SingleSensorFilter, ABC, Generic[_Density]):
         Nothing is drawn from `rng`; it is taken so that filters are interchangeable.
         """
         generator(rng)
-        measurements, num_duplicates = check_scan(scan, self.sensor)
+        measurements, repeats = check_scan(scan, self.sensor)
         prior = check_belief(belief, self.kind, self.targets.state_dim)
         inputs = self._inputs_after(dt, measurements, pose, step)
         with model_errors():
             posterior, info = self._updated(prior, inputs, f"step {step}: ")
-        return posterior, replace(info, num_duplicates=num_duplicates)
+        return posterior, replace(info, num_duplicates=len(repeats))
 
     @abstractmethod
     def _updated(self, prior: _Density, inputs: StepInputs, place: str) -> tuple[_Density, FilterInfo]:

@@ -19,13 +19,14 @@ from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.base import attempt
 from vedette.scenarios.sections.recording import recording_findings
 from vedette.scenarios.yaml_reader import MOST_BYTES, Document, read_yaml
-from vedette.text import elided, printable
+from vedette.speaking import Speaking
+from vedette.text import counted, elided, printable
 
 _LONGEST_NAME = 200
 
 
-@dataclass(frozen=True, slots=True)
-class Scenario:
+@dataclass(frozen=True, slots=True, repr=False)
+class Scenario(Speaking):
     """A valid scenario.
 
     Attributes:
@@ -45,6 +46,13 @@ class Scenario:
     def folder(self) -> FilePath:
         """What paths in the scenario are relative to."""
         return FilePath() if self.path is None else self.path.parent
+
+    def _summary(self) -> str:
+        sizes = counted(self.model.time.num_steps, "scan"), counted(len(self.model.sensors), "sensor")
+        return f"{self.name}: {', '.join(sizes)}, filter {self.model.filter.kind}, fusion {self.model.fusion.kind}"
+
+    def _detail(self) -> str:
+        return " ".join(self.model.description.split())
 
 
 def list_builtin() -> dict[str, FilePath]:

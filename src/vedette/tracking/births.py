@@ -13,7 +13,7 @@ import numpy as np
 from vedette.densities import LMB, Labelled, TrackTable, as_lmb
 from vedette.densities.containers import unchecked
 from vedette.densities.labelled import LABELLED
-from vedette.densities.tracks import take_tracks
+from vedette.densities.tracks import gaussian_tracks, take_tracks
 from vedette.errors import InputError
 from vedette.filters import Limits
 from vedette.filters.inputs import births_at, births_within, model_errors, nobody
@@ -222,6 +222,6 @@ def _born(found: Unexplained, model: MeasurementBirth, step: int, first_index: i
     means[:, :2] = found.positions
     shares = model.expected * found.probabilities / found.probabilities.sum()
     existence = np.minimum(model.max_existence, shares)
-    tracks = unchecked(TrackTable, labels, np.arange(num + 1), np.zeros(num), means, np.tile(model.cov, (num, 1, 1)))
+    tracks = gaussian_tracks(labels, means, np.tile(model.cov, (num, 1, 1)))
     with np.errstate(divide="ignore"):  # a share may be too small for a number
         return unchecked(LMB, tracks, np.log(existence) - np.log1p(-existence))

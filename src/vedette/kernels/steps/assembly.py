@@ -104,8 +104,10 @@ def update_tracks(naming: Naming, num_tracks: int, rows: Rows, options: Options,
 
 
 @kernel
-def assemble(children: Children, kept: Ints, parents: Parents, rows: Rows, options: Options) -> tuple[Glmb, float]:
-    """The posterior of the kept children, normalised, and the log of their unnormalised sum."""
+def assemble(
+    children: Children, kept: Ints, parents: Parents, rows: Rows, options: Options
+) -> tuple[Glmb, float, Naming]:
+    """The posterior of the kept children, normalised, the log of their unnormalised sum, and what its tracks are of."""
     naming = make_naming(options.offsets[-1])
     hyps = Parents(np.empty(len(kept) + 1, np.int64), np.empty(children.filled[1], np.int64), np.empty(len(kept)))
     num, filled, log_total = name_tracks(children, kept, parents, options, naming, hyps)
@@ -122,4 +124,4 @@ def assemble(children: Children, kept: Ints, parents: Parents, rows: Rows, optio
     )
     last = update_tracks(naming, num, rows, options, tracks)
     trimmed = Tracks(tracks.labels, tracks.offsets, tracks.log_weights[:last], tracks.means[:last], tracks.covs[:last])
-    return Glmb(trimmed, hyps.offsets, hyps.rows[:filled].copy(), hyps.log_weights), log_total
+    return Glmb(trimmed, hyps.offsets, hyps.rows[:filled].copy(), hyps.log_weights), log_total, naming

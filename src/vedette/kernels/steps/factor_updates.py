@@ -139,7 +139,7 @@ def update_group(group: Group, truncation: Truncation, work: Work) -> Glmb:
     # A search that ran dry has left nothing out.
     is_covered = children.filled[0] < truncation.search.max_hypotheses and not cut
     children, kept = kept_children(found, children, truncation, is_covered)
-    posterior, log_total = assemble(children, kept, group.parents, group.rows, group.options)
+    posterior, log_total, _ = assemble(children, kept, group.parents, group.rows, group.options)
     sums[TOTAL] += log_total
     sums[CUT] += 1.0 if cut else 0.0
     if len(kept) == 0:

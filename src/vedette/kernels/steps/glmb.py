@@ -30,7 +30,7 @@ from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Glmb, Ints, Motion, ScanInput, Sensor
 from vedette.kernels.gaussian.linalg import log_sum
 from vedette.kernels.gaussian.mixtures import require_gaussians
-from vedette.kernels.steps.assembly import assemble
+from vedette.kernels.steps.assembly import Naming, assemble
 
 
 class StepReport(NamedTuple):
@@ -42,6 +42,7 @@ class StepReport(NamedTuple):
     num_raised: int  # measurements whose clutter intensity was raised to the floor
     cut: bool  # the ranking stopped at its bound on nodes
     full: bool  # there are as many hypotheses as there may be
+    sources: Ints  # (num_tracks, 2) prior track of each track, -1: born; its measurement, -1: missed
 
 
 class Associated(NamedTuple):
@@ -131,16 +132,28 @@ def kept_children(
 
 
 @kernel
+def _sources(naming: Naming, num_tracks: int, num_prior: int, columns: Ints) -> Ints:
+    """The prior track, of so many, and the measurement of each track, as in `StepReport`. columns: of the options."""
+    sources = np.empty((num_tracks, 2), np.int64)
+    for i in range(num_tracks):
+        row = naming.rows[i]
+        sources[i, 0] = row if row < num_prior else -1  # birth sites stand after the tracks
+        sources[i, 1] = columns[naming.options[i]]  # MISSED is -1
+    return sources
+
+
+@kernel
 def _conclude(
-    found: Associated, children: Children, truncation: Truncation, cut: bool, is_covered: bool
+    num_prior: int, found: Associated, children: Children, truncation: Truncation, cut: bool, is_covered: bool
 ) -> tuple[Glmb, StepReport]:
-    """Truncate and assemble; is_covered as of `kept_children`."""
+    """Truncate and assemble. num_prior: tracks of the prior. is_covered: as of `kept_children`."""
     children, kept = kept_children(found, children, truncation, is_covered)
-    posterior, log_total = assemble(children, kept, found.parents, found.rows, found.options)
+    posterior, log_total, naming = assemble(children, kept, found.parents, found.rows, found.options)
     require_gaussians(posterior.tracks.means, posterior.tracks.covs)
     log_kept = min(0.0, log_total - log_total_bound(log_row_totals(found.options), found.parents))
     full = len(kept) >= truncation.search.max_hypotheses
-    return posterior, StepReport(log_total, log_kept, found.log_clutter, found.num_raised, cut, full)
+    sources = _sources(naming, len(posterior.tracks.labels), num_prior, found.options.columns)
+    return posterior, StepReport(log_total, log_kept, found.log_clutter, found.num_raised, cut, full, sources)
 
 
 @kernel
@@ -155,7 +168,7 @@ def step_ranked(
     children, cut = rank_children(found.options, found.parents, truncation.search)
     # A search that ran dry has left nothing out.
     is_covered = children.filled[0] < truncation.search.max_hypotheses and not cut
-    return _conclude(found, children, truncation, cut, is_covered)
+    return _conclude(len(prior.tracks.labels), found, children, truncation, cut, is_covered)
 
 
 @kernel
@@ -171,4 +184,4 @@ def step_gibbs(
     """One scan with hypotheses found by Gibbs sampling."""
     found = _associate(prior, scan, motion, sensor, truncation)
     children = sample_children(found.options, found.parents, num_samples, rng)
-    return _conclude(found, children, truncation, False, False)
+    return _conclude(len(prior.tracks.labels), found, children, truncation, False, False)
