@@ -25,8 +25,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from vedette.campaigns import Campaign, Shard, engine, journal, merge, resolve, run_campaign
+from vedette.campaigns import Campaign, Shard, engine, merge, resolve, run_campaign
 from vedette.campaigns.codec import encode
+from vedette.campaigns.database import Reader
 from vedette.campaigns.rows import row_of
 from vedette.campaigns.spec import spec_from_data
 from vedette.campaigns.tasks import Landed, Outcome, Task
@@ -69,7 +70,7 @@ def stub_of(campaign: Campaign) -> Callable[[Task], Outcome]:
 def rows_of(folder: Path) -> str:
     """SHA-256 over the runs of a results folder, in the order of cells and numbers."""
     digest = hashlib.sha256()
-    for values in journal.Reader(folder).rows():
+    for values in Reader(folder).rows():
         digest.update(f"{values[0]} {values[1]} {values[4]} {values[6]}\n".encode())  # checksums of run and measures
     return digest.hexdigest()
 

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from vedette.campaigns import journal
 from vedette.campaigns.cells import results_folder
+from vedette.campaigns.database import DATABASE, LOCK, Reader
 from vedette.campaigns.export import export_tables
+from vedette.campaigns.journal import Writer
 from vedette.campaigns.manifest import (
     MANIFEST,
     check_same,
@@ -69,7 +70,7 @@ def merge(folders: Sequence[Path | str], out: Path | str | None = None, *, table
     num_taken = _fill(target, whole, shares)
     results = open_results(target)
     count = max(share.shard.count for share in shares)
-    cells, done = results.campaign.cells, set(journal.Reader(target).finished())
+    cells, done = results.campaign.cells, set(Reader(target).finished())
     lacking = [
         owner(run, place, len(cells), count)
         for place, cell in enumerate(cells)
@@ -140,7 +141,7 @@ def _fill(target: Path, whole: dict[str, Any], shares: Sequence[_Share]) -> int:
     except OSError as error:
         raise InputError(f"{target}: expected a place for a results folder; {error}") from error
     started = (target / MANIFEST).exists()
-    writer = journal.Writer(target)
+    writer = Writer(target)
     try:
         if started:  # what is there comes first, as its runs name its sessions by their places
             whole = _joined(target, whole, read_manifest(target))
@@ -152,7 +153,7 @@ def _fill(target: Path, whole: dict[str, Any], shares: Sequence[_Share]) -> int:
     except BaseException:
         writer.close()
         if not started:
-            for name in (MANIFEST, journal.DATABASE, journal.LOCK):
+            for name in (MANIFEST, DATABASE, LOCK):
                 (target / name).unlink(missing_ok=True)
             with suppress(OSError):  # somebody else's files
                 target.rmdir()
@@ -163,12 +164,12 @@ def _fill(target: Path, whole: dict[str, Any], shares: Sequence[_Share]) -> int:
 
 def _has_begun(share: _Share) -> bool:
     """Whether it was not killed between its manifest and its runs."""
-    database = share.folder / journal.DATABASE
+    database = share.folder / DATABASE
     return database.exists() and database.stat().st_size > 0
 
 
-def _reader(share: _Share) -> journal.Reader:
-    reader = journal.Reader(share.folder)
+def _reader(share: _Share) -> Reader:
+    reader = Reader(share.folder)
     reader.check(share.contents)
     return reader
 

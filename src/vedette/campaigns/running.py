@@ -11,9 +11,9 @@ from typing import Protocol
 
 from vedette.campaigns.cells import Campaign
 from vedette.campaigns.cluster import remote_workers
+from vedette.campaigns.database import DATABASE
 from vedette.campaigns.engine import in_process, on_workers
 from vedette.campaigns.export import export_tables
-from vedette.campaigns.journal import DATABASE
 from vedette.campaigns.local import local_workers
 from vedette.campaigns.manifest import MANIFEST
 from vedette.campaigns.results import open_results
