@@ -13,7 +13,7 @@ import pyarrow as pa
 
 from vedette.reading import MOST_BYTES, inflate, said
 
-_ZSTD = pa.Codec("zstd", compression_level=1)  # a third of the size in a tenth of a millisecond; more gains little
+_ZSTD = pa.Codec("zstd", compression_level=-1)  # to a third of the size; 4 % less takes a third longer
 _MAGIC = b"\x28\xb5\x2f\xfd"  # that its frames begin with
 
 
