@@ -140,6 +140,7 @@ def lock_of(folder: Path) -> sqlite3.Connection:
 
 
 def check_contents(path: Path, found: Sequence[tuple[str]], contents: str) -> None:
+    """`InputError` unless what the file says of its campaign is the manifest's checksum alone."""
     if list(found) != [(contents,)]:
         raise InputError(
             f"{path}: expected the runs of the manifest beside it; they are another campaign's, or the manifest was "
@@ -148,6 +149,7 @@ def check_contents(path: Path, found: Sequence[tuple[str]], contents: str) -> No
 
 
 def place_of(cell: str, run: int | str) -> str:
+    """What messages about a run begin with."""
     return f"cell {cell}, run {run}: "
 
 
