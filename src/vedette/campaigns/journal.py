@@ -8,33 +8,19 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from vedette.campaigns.database import (
-    ALTERED,
-    COLUMNS,
-    DATABASE,
-    TABLES,
-    WAIT,
-    Failure,
-    Reader,
-    check_contents,
-    check_tables,
-    checked_keys,
-    explained,
-    lock_of,
-    place_of,
-)
+from vedette.campaigns import database
 from vedette.campaigns.rows import Entry, Row, pack, unpack, verified
 from vedette.errors import InputError
 
-_INSERT = f"INSERT INTO runs ({COLUMNS}) VALUES ({', '.join('?' * (COLUMNS.count(',') + 1))})"
+_INSERT = f"INSERT INTO runs ({database.COLUMNS}) VALUES ({', '.join('?' * (database.COLUMNS.count(',') + 1))})"
 
 
 class Writer:
     """Adds runs to the file of one folder, alone: `InputError` if another writer has it open."""
 
     def __init__(self, folder: Path) -> None:
-        self._path = folder / DATABASE
-        self._lock = lock_of(folder)
+        self._path = folder / database.DATABASE
+        self._lock = database.lock_of(folder)
         self._opened: sqlite3.Connection | None = None
 
     @property
@@ -44,20 +30,20 @@ class Writer:
 
     def open_runs(self, contents: str) -> None:
         """Make the file, or check that it is of the campaign whose manifest has the checksum `contents`."""
-        with explained(self._path):
-            database = sqlite3.connect(self._path, timeout=WAIT, isolation_level=None, check_same_thread=False)
-            self._opened = database
-            database.execute("PRAGMA journal_mode = PERSIST")
-            database.execute("PRAGMA synchronous = FULL")
-            database.execute("BEGIN IMMEDIATE")
+        with database.explained(self._path):
+            opened = sqlite3.connect(self._path, timeout=database.WAIT, isolation_level=None, check_same_thread=False)
+            self._opened = opened
+            opened.execute("PRAGMA journal_mode = PERSIST")
+            opened.execute("PRAGMA synchronous = FULL")
+            opened.execute("BEGIN IMMEDIATE")
             if self._path.stat().st_size == 0:  # what an interrupted start left is taken back by now
-                for statement in TABLES:
-                    database.execute(statement)
-                database.execute("INSERT INTO campaign VALUES (?)", (contents,))
-            check_tables(self._path, database)
-            found = database.execute("SELECT contents FROM campaign").fetchall()
-            database.execute("COMMIT")
-        check_contents(self._path, found, contents)
+                for statement in database.TABLES:
+                    opened.execute(statement)
+                opened.execute("INSERT INTO campaign VALUES (?)", (contents,))
+            database.check_tables(self._path, opened)
+            found = opened.execute("SELECT contents FROM campaign").fetchall()
+            opened.execute("COMMIT")
+        database.check_contents(self._path, found, contents)
 
     def put(self, rows: Sequence[Row], session: int) -> None:
         """Put runs on the disk, all or none; when this returns they stay, whatever happens to this process or machine.
@@ -68,8 +54,8 @@ class Writer:
 
         Raises `InputError`, and keeps none, where a run is there already, and where the disk is full or fails.
         """
-        places = [place_of(row.cell, row.run) for row in rows]
-        with explained(self._path, places[0] if len(places) == 1 else ""):
+        places = [database.place_of(row.cell, row.run) for row in rows]
+        with database.explained(self._path, places[0] if len(places) == 1 else ""):
             self._database.execute("BEGIN IMMEDIATE")
             with self._database:
                 for row, place in zip(rows, places, strict=True):
@@ -79,7 +65,7 @@ class Writer:
                         raise InputError(f"{self._path}: {place}expected another run; it is there") from None
                     self._database.execute("DELETE FROM failures WHERE cell = ? AND run = ?", (row.cell, row.run))
 
-    def put_failure(self, failure: Failure) -> None:
+    def put_failure(self, failure: database.Failure) -> None:
         """Keep why a run could not be finished, in place of an earlier reason, until it is."""
         self._change(
             failure.cell,
@@ -95,13 +81,13 @@ class Writer:
 
     def damaged(self) -> tuple[tuple[str, int], ...]:
         """Cell and number of every run whose row is not as it was written."""
-        with explained(self._path):
-            rows = self._database.execute(f"SELECT {COLUMNS} FROM runs ORDER BY cell, run")
+        with database.explained(self._path):
+            rows = self._database.execute(f"SELECT {database.COLUMNS} FROM runs ORDER BY cell, run")
             return tuple((row[0], row[1]) for row in rows if verified(row) is None)
 
     def metrics(self) -> Iterator[tuple[str, int, bytes]]:
         """Cell and number of every run, with its measures."""
-        with explained(self._path):
+        with database.explained(self._path):
             rows = self._database.execute("SELECT cell, run, metrics FROM runs ORDER BY cell, run").fetchall()
         return ((cell, run, unpack(packed)) for cell, run, packed in rows)
 
@@ -110,7 +96,7 @@ class Writer:
         where = "UPDATE runs SET metrics = ?, metrics_sha256 = ? WHERE cell = ? AND run = ?"
         self._change(cell, run, where, *pack(cell, run, metrics))
 
-    def take_in(self, others: Iterable[tuple[Reader, Callable[[int], int]]]) -> int:
+    def take_in(self, others: Iterable[tuple[database.Reader, Callable[[int], int]]]) -> int:
         """Copy the runs of other folders that are not here yet, all in one transaction; returns their number.
 
         Args:
@@ -118,7 +104,7 @@ class Writer:
 
         Raises `InputError`, and changes nothing, for a run that is not as it was written, or has other bytes here.
         """
-        with explained(self._path):
+        with database.explained(self._path):
             self._database.execute("BEGIN IMMEDIATE")
             with self._database:
                 num_taken = 0
@@ -131,13 +117,13 @@ class Writer:
                 self._database.execute("DELETE FROM failures WHERE (cell, run) IN (SELECT cell, run FROM runs)")
             return num_taken
 
-    def _take_in(self, reader: Reader, row: tuple[Any, ...]) -> bool:
+    def _take_in(self, reader: database.Reader, row: tuple[Any, ...]) -> bool:
         """Whether a run was new."""
         if self._database.execute(_INSERT.replace("INSERT", "INSERT OR IGNORE", 1), row).rowcount:
             return True
         kept = "SELECT payload_sha256 FROM runs WHERE cell = ? AND run = ?"
         if self._database.execute(kept, row[:2]).fetchone() != (row[4],):
-            place = place_of(*row[:2])
+            place = database.place_of(*row[:2])
             raise InputError(f"{reader}: {place}expected the bytes that another folder has of it; got others")
         return False
 
@@ -146,7 +132,7 @@ class Writer:
 
         Raises `InputError`, and changes nothing, for a run that is not as it was written, and as `payload` does.
         """
-        with explained(self._path):
+        with database.explained(self._path):
             keys = self._keys()
             self._database.execute("BEGIN IMMEDIATE")
             with self._database:
@@ -154,11 +140,11 @@ class Writer:
                     self._rewrite(*key, payload)
 
     def _rewrite(self, cell: str, run: int, payload: Callable[[Entry], bytes]) -> None:
-        where = f"{self._path}: {place_of(cell, run)}"
-        rows = self._database.execute(f"SELECT {COLUMNS} FROM runs WHERE cell = ? AND run = ?", (cell, run))
+        where = f"{self._path}: {database.place_of(cell, run)}"
+        rows = self._database.execute(f"SELECT {database.COLUMNS} FROM runs WHERE cell = ? AND run = ?", (cell, run))
         entry = verified(rows.fetchone())
         if entry is None:
-            raise InputError(f"{where}{ALTERED}")
+            raise InputError(f"{where}{database.ALTERED}")
         try:
             packed = pack(cell, run, payload(entry))
         except InputError as error:
@@ -171,13 +157,13 @@ class Writer:
         self._change(cell, run, "DELETE FROM runs WHERE cell = ? AND run = ?")
 
     def _keys(self) -> list[tuple[str, int]]:
-        with explained(self._path):
+        with database.explained(self._path):
             rows = self._database.execute("SELECT cell, run FROM runs ORDER BY cell, run").fetchall()
-        return checked_keys(self._path, rows)
+        return database.checked_keys(self._path, rows)
 
     def _change(self, cell: str, run: int, statement: str, *values: Any) -> None:
         """A statement about one run, which stands behind its values."""
-        with explained(self._path, place_of(cell, run)):
+        with database.explained(self._path, database.place_of(cell, run)):
             self._database.execute(statement, (*values, cell, run))
 
     def close(self) -> None:

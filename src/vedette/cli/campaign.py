@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import shlex
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -14,7 +15,7 @@ from vedette.cli.errors import named_options, usage_error
 from vedette.cli.options import Trust, Workers
 from vedette.cli.output import complain, console, note, publish, say
 from vedette.cli.results import print_failures
-from vedette.cli.running import Approval, compile_if_cold, interruptible, loading, processors
+from vedette.cli.running import Approval, compile_if_cold, interruptible, processors
 from vedette.extras import need
 from vedette.processes import load_ahead
 from vedette.text import counted
@@ -72,9 +73,11 @@ def campaign(
         raise usage_error("expected without --slurm, which gives each task its shard", "--shard")
     if scheduler is None and not dry_run and slurm is None:
         load_workers(workers)
-    with loading():
-        from vedette.campaigns import load_spec, parse_shard, resolve
+    gc.disable()
+    from vedette.campaigns import load_spec, parse_shard, resolve
 
+    gc.freeze()  # before a user's code: what is loaded is searched for garbage neither now nor as the process ends
+    gc.enable()
     resolved = resolve(load_spec(spec), spec.parent, approve=Approval(trust, spec))
     if runs is not None:
         resolved = resolved.with_runs(runs)

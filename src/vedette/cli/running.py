@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import math
 import os
 from collections.abc import Iterator
@@ -39,20 +38,6 @@ def compile_if_cold(scenario: Scenario) -> None:
 
         with compiling():
             precompile(scenario)
-
-
-@contextmanager
-def loading() -> Iterator[None]:
-    """What is loaded inside stays, so nobody looks for garbage in there: now, later, or at the end of the process.
-
-    Not for a user's own code, as some libraries complain of what is left of them at the end.
-    """
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.freeze()
-        gc.enable()
 
 
 @contextmanager
