@@ -18,7 +18,6 @@ import sqlite3
 import statistics
 import tempfile
 import time
-import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
@@ -32,7 +31,7 @@ from vedette.campaigns.cells import resolve
 from vedette.campaigns.codec import decode, encode
 from vedette.campaigns.export import export_tables
 from vedette.campaigns.results import open_results
-from vedette.campaigns.rows import row_of
+from vedette.campaigns.rows import pack, row_of, unpack
 from vedette.campaigns.spec import spec_from_data
 from vedette.campaigns.store import Store
 from vedette.evaluation.metrics import RunMetrics, decode_metrics, encode_metrics, measure
@@ -57,12 +56,12 @@ def sqlite_file(folder: Path, record: RunRecord, metrics: RunMetrics, journal: s
     )
 
     def land(run: int) -> None:
-        payload, measures = (zlib.compress(part, 1) for part in (encode(record), encode_metrics(metrics)))
+        payload, measures = (pack("jdm", run, part).content for part in (encode(record), encode_metrics(metrics)))
         database.execute("INSERT INTO runs VALUES ('jdm', ?, ?, ?)", (run, payload, measures))
 
     def read() -> int:
         rows = database.execute("SELECT payload, metrics FROM runs ORDER BY cell, run")
-        return sum(_read(zlib.decompress(payload), zlib.decompress(measures)) for payload, measures in rows)
+        return sum(_read(unpack(payload), unpack(measures)) for payload, measures in rows)
 
     return land, read
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Iterator
 
 import matplotlib
@@ -34,3 +35,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--fuzz-seconds", type=float, help="seconds for each fuzzer (default: a fixed number of cases)")
     group.addoption("--fuzz-seed", type=int, default=0, help="seed of the cases (default: 0)")
     group.addoption("--fuzz-case", type=int, help="try only the case of this number")
+
+
+def pytest_sessionfinish() -> None:
+    """Give back what commands have frozen in this process, as some libraries complain of what is left of them."""
+    gc.unfreeze()

@@ -10,7 +10,8 @@ import sys
 import time
 from pathlib import Path
 
-from vedette.campaigns.journal import DATABASE, Writer
+from vedette.campaigns.database import DATABASE
+from vedette.campaigns.journal import Writer
 from vedette.campaigns.rows import Entry, row_of
 from vedette.errors import InputError
 

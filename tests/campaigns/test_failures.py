@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from campaigns.examples import small_campaign
 from vedette.campaigns import open_results, run_campaign, tasks
-from vedette.campaigns.journal import Failure
+from vedette.campaigns.database import Failure
 from vedette.cli import app
 from vedette.errors import NumericalError
 from vedette.evaluation.runs import run_scenario

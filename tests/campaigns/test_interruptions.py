@@ -17,7 +17,7 @@ import pytest
 
 from campaigns.examples import SPEC as SPEC_DATA
 from campaigns.examples import small_campaign
-from vedette.campaigns.journal import Reader
+from vedette.campaigns.database import Reader
 from vedette.campaigns.results import open_results
 from vedette.campaigns.running import Unwatched, run_campaign
 from vedette.errors import InputError

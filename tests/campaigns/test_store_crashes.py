@@ -17,7 +17,8 @@ from pathlib import Path
 import pytest
 
 from campaigns.adding import CELL, CONTENTS, entry_of, put, started
-from vedette.campaigns.journal import DATABASE, Reader, Writer
+from vedette.campaigns.database import DATABASE, Reader
+from vedette.campaigns.journal import Writer
 from vedette.errors import InputError
 
 pytestmark = pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs kill -9")

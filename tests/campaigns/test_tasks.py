@@ -11,12 +11,11 @@ from campaigns.examples import small_campaign
 from vedette.campaigns import tasks
 from vedette.campaigns.cells import Campaign
 from vedette.campaigns.codec import decode
-from vedette.campaigns.rows import row_of
+from vedette.campaigns.rows import row_of, unpack
 from vedette.campaigns.tasks import MIN_TASK_SECONDS, Failed, Landed, Task, TaskQueue, perform
 from vedette.errors import ModelError, VedetteError
 from vedette.evaluation.metrics import decode_metrics, measure
 from vedette.evaluation.runs import run_scenario
-from vedette.reading import inflate
 
 
 def landed(cell: str, seconds: float) -> Landed:
@@ -103,8 +102,8 @@ def test_a_task_gives_back_the_runs_it_was_given() -> None:
     assert isinstance(first, Landed)
     assert isinstance(second, Landed)
     assert (first.cell, first.run, second.run) == ("idm", 0, 2)
-    record = decode(inflate(second.row.payload.content))
-    metrics, own = decode_metrics(inflate(second.row.metrics.content), record.num_scans)
+    record = decode(unpack(second.row.payload.content))
+    metrics, own = decode_metrics(unpack(second.row.metrics.content), record.num_scans)
     assert metrics is not None
     assert own == {}
     again = run_scenario(task.cell.scenario, "idm", seed=0, run=2)

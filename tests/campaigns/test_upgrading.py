@@ -16,7 +16,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from vedette.campaigns import journal, open_results
+from vedette.campaigns import open_results
+from vedette.campaigns.database import DATABASE
+from vedette.campaigns.journal import Writer
 from vedette.campaigns.upgrading import upgrade_results
 from vedette.cli import app
 from vedette.errors import InputError
@@ -52,7 +54,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 def dumped(folder: Path) -> list[Any]:
-    with sqlite3.connect(folder / journal.DATABASE) as database:
+    with sqlite3.connect(folder / DATABASE) as database:
         return database.execute("SELECT * FROM runs ORDER BY cell, run").fetchall()
 
 
@@ -206,7 +208,7 @@ def test_what_is_no_results_folder_is_named(campaign: Path, tmp_path: Path) -> N
 
 def test_a_campaign_that_is_worked_on_is_left_alone(campaign: Path) -> None:
     before = dumped(campaign)
-    writer = journal.Writer(campaign)
+    writer = Writer(campaign)
     try:
         with pytest.raises(InputError, match="another process is writing this campaign"):
             upgrade_results(campaign)
@@ -216,7 +218,7 @@ def test_a_campaign_that_is_worked_on_is_left_alone(campaign: Path) -> None:
 
 
 def test_a_damaged_run_stops_it_before_anything_is_changed(campaign: Path, run: Path) -> None:
-    with sqlite3.connect(campaign / journal.DATABASE) as database:
+    with sqlite3.connect(campaign / DATABASE) as database:
         database.execute("UPDATE runs SET payload = x'00' WHERE cell = 'random'")
     (run / TABLE).write_bytes((run / TABLE).read_bytes()[:-1])
     before = dumped(campaign), contents(run)

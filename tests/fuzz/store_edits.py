@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import sqlite3
-import zlib
 from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ import numpy as np
 from fuzz.edits import edit_arrow, edit_json, edit_npz
 from fuzz.mutations import JUNK, pick, spoil_bytes
 from vedette.campaigns.manifest import contents_checksum
+from vedette.campaigns.rows import pack, unpack
 
 Generator = np.random.Generator
 Statement = tuple[str, tuple[Any, ...]]
@@ -113,10 +113,10 @@ def edit_run(folder: Path, rng: Generator, *, sign: bool) -> None:
         rows = database.execute("SELECT cell, run, payload, metrics, timings FROM runs ORDER BY cell, run").fetchall()
     cell, run, *blobs = rows[rng.integers(len(rows))]
     column, old = list(zip(("payload", "metrics", "timings"), blobs, strict=True))[max(0, int(rng.integers(6)) - 3)]
-    content = (edit_npz if column == "payload" else edit_arrow)(zlib.decompress(old), rng)
+    content = (edit_npz if column == "payload" else edit_arrow)(unpack(old), rng)
     if not rng.integers(20):
         content = bytes(200_000_000)  # a fifth of a megabyte on the disk
-    packed = zlib.compress(content, 1)
+    packed = pack(cell, run, content).content
     ask(folder, (f"UPDATE runs SET {column} = ? WHERE cell = ? AND run = ?", (packed, cell, run)))
     if sign:
         checksum = hashlib.sha256(f"{cell}\n{run}\n".encode() + content).hexdigest()

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import pyarrow as pa
-from pyarrow import csv, parquet
 
 from vedette.campaigns.results import CampaignResults
 from vedette.campaigns.tables import tables_of_record
@@ -29,6 +28,8 @@ def export_tables(results: CampaignResults | RunRecord, folder: Path | str) -> t
     Raises `InputError` where the files cannot be written.
     """
 
+    from pyarrow import parquet
+
     def write(table: Any, file: BinaryIO) -> None:
         parquet.write_table(table, file, compression="zstd")
 
@@ -44,6 +45,8 @@ def export_csv(results: CampaignResults | RunRecord, folder: Path | str) -> tupl
 
 
 def _write_csv(table: pa.Table, file: BinaryIO) -> None:
+    from pyarrow import csv
+
     for place, column in enumerate(table.columns):
         if pa.types.is_string(column.type):
             texts = [None if text is None else spreadsheet_text(text) for text in column.to_pylist()]

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from vedette.campaigns import journal
+import numpy as np
+
 from vedette.campaigns.cells import results_folder
+from vedette.campaigns.database import DATABASE, LOCK, Reader
 from vedette.campaigns.export import export_tables
+from vedette.campaigns.journal import Writer
 from vedette.campaigns.manifest import (
     MANIFEST,
     check_same,
@@ -23,6 +27,7 @@ from vedette.campaigns.running import TABLES
 from vedette.campaigns.shards import Shard, owner, parse_shard
 from vedette.campaigns.store import check_place
 from vedette.errors import InputError
+from vedette.kernels.base.types import Ints
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,16 +74,24 @@ def merge(folders: Sequence[Path | str], out: Path | str | None = None, *, table
     num_taken = _fill(target, whole, shares)
     results = open_results(target)
     count = max(share.shard.count for share in shares)
-    cells, done = results.campaign.cells, set(journal.Reader(target).finished())
-    lacking = [
-        owner(run, place, len(cells), count)
-        for place, cell in enumerate(cells)
-        for run in results.campaign.runs(place)
-        if (cell.name, run) not in done
-    ]
-    if tables and not lacking:
+    lacking = _lacking(results, count)
+    if tables and not lacking.any():
         export_tables(results, target / TABLES)
-    return Merged(results, num_taken, count, tuple(sorted(set(lacking))), len(lacking), places[0].parent)
+    missing = tuple(np.flatnonzero(lacking).tolist())
+    return Merged(results, num_taken, count, missing, int(lacking.sum()), places[0].parent)
+
+
+def _lacking(results: CampaignResults, count: int) -> Ints:
+    """(count + 1,) runs of each share that are not there; of a million runs, so by columns and not one by one."""
+    campaign, done = results.campaign, defaultdict[str, list[int]](list)
+    for name, run in Reader(results.folder).finished():
+        done[name].append(run)
+    lacking = np.zeros(count + 1, np.int64)
+    runs = np.arange(campaign.num_runs)
+    for place, cell in enumerate(campaign.cells):
+        left = runs[np.isin(runs, done[cell.name], assume_unique=True, invert=True)]
+        lacking += np.bincount(owner(left, place, len(campaign.cells), count), minlength=count + 1)
+    return lacking
 
 
 def _places(folders: Sequence[Path | str]) -> list[Path]:
@@ -140,7 +153,7 @@ def _fill(target: Path, whole: dict[str, Any], shares: Sequence[_Share]) -> int:
     except OSError as error:
         raise InputError(f"{target}: expected a place for a results folder; {error}") from error
     started = (target / MANIFEST).exists()
-    writer = journal.Writer(target)
+    writer = Writer(target)
     try:
         if started:  # what is there comes first, as its runs name its sessions by their places
             whole = _joined(target, whole, read_manifest(target))
@@ -152,7 +165,7 @@ def _fill(target: Path, whole: dict[str, Any], shares: Sequence[_Share]) -> int:
     except BaseException:
         writer.close()
         if not started:
-            for name in (MANIFEST, journal.DATABASE, journal.LOCK):
+            for name in (MANIFEST, DATABASE, LOCK):
                 (target / name).unlink(missing_ok=True)
             with suppress(OSError):  # somebody else's files
                 target.rmdir()
@@ -163,12 +176,12 @@ def _fill(target: Path, whole: dict[str, Any], shares: Sequence[_Share]) -> int:
 
 def _has_begun(share: _Share) -> bool:
     """Whether it was not killed between its manifest and its runs."""
-    database = share.folder / journal.DATABASE
+    database = share.folder / DATABASE
     return database.exists() and database.stat().st_size > 0
 
 
-def _reader(share: _Share) -> journal.Reader:
-    reader = journal.Reader(share.folder)
+def _reader(share: _Share) -> Reader:
+    reader = Reader(share.folder)
     reader.check(share.contents)
     return reader
 

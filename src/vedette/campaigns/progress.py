@@ -55,7 +55,7 @@ class Progress(Watch):
         alone = len(campaign.groups()) == 1
         self._label = {cell.name: str(cell.settings[campaign.compare]) for cell in campaign.cells} if alone else {}
         self._unit = campaign.cells[0].scenario.model.ospa.unit
-        self._errors: dict[str, list[float]] = {}
+        self._errors: dict[str, tuple[int, float]] = {}  # number of runs, sum
         self._found = self._landed = self._total = self._failures = 0
         self._first_at = self._said_at = time.monotonic()
 
@@ -85,12 +85,13 @@ class Progress(Watch):
             self._first_at = now
         self._landed += 1
         if result.cell in self._label:
-            self._errors.setdefault(self._label[result.cell], []).append(result.ospa)
-        text = self._description(now)
-        self._bar.update(self._bars, advance=1, description=text)
-        if not self._terminal and now - self._said_at > self._line_seconds:
+            number, total = self._errors.get(self._label[result.cell], (0, 0.0))
+            self._errors[self._label[result.cell]] = number + 1, total + result.ospa
+        if self._terminal:
+            self._bar.update(self._bars, advance=1, description=self._description(now))
+        elif now - self._said_at > self._line_seconds:
             self._said_at = now
-            self.note(text)
+            self.note(self._description(now))
 
     def failed(self, result: Failed) -> None:
         """See `vedette.campaigns.Watch`."""
@@ -105,7 +106,5 @@ class Progress(Watch):
         if rate:
             seconds = round((self._total - done) / rate)
             parts += [f"{rate:.1f}/s", f"{seconds // 60}:{seconds % 60:02d} left"]
-        parts += [
-            f"{name} {amount(f'{sum(values) / len(values):.1f}', self._unit)}" for name, values in self._errors.items()
-        ]
+        parts += [f"{name} {amount(f'{total / num:.1f}', self._unit)}" for name, (num, total) in self._errors.items()]
         return "  ".join(parts)

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, SupportsIndex
 
 from vedette.campaigns.cells import Campaign, Cell
 from vedette.campaigns.codec import decode, decode_outline
+from vedette.campaigns.database import DATABASE, Failure, Reader
 from vedette.campaigns.dataset import dataset_of_scans
 from vedette.campaigns.gathering import gathered
-from vedette.campaigns.journal import DATABASE, Failure, Reader
 from vedette.campaigns.manifest import campaign_of, contents_checksum, read_manifest
 from vedette.campaigns.rows import Entry
 from vedette.campaigns.tables import FinishedRun, tables_of_runs

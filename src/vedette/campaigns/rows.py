@@ -6,13 +6,15 @@ Every row carries checksums, over its cell and run number too, of what was packe
 from __future__ import annotations
 
 import hashlib
-import zlib
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from vedette.reading import inflate
+import pyarrow as pa
 
-_LEVEL = 1  # of zlib: half the size in under a millisecond, and higher levels gain little
+from vedette.reading import MOST_BYTES, inflate, said
+
+_ZSTD = pa.Codec("zstd", compression_level=-1)  # to a third of the size; 4 % less takes a third longer
+_MAGIC = b"\x28\xb5\x2f\xfd"  # that its frames begin with
 
 
 class Packed(NamedTuple):
@@ -24,7 +26,27 @@ class Packed(NamedTuple):
 
 def pack(cell: str, run: int, content: bytes) -> Packed:
     """What is kept of some bytes of a run."""
-    return Packed(zlib.compress(content, _LEVEL), _checksum(cell, run, content))
+    return Packed(_ZSTD.compress(content, asbytes=True), _checksum(cell, run, content))
+
+
+def unpack(packed: bytes, most: int = MOST_BYTES) -> bytes:
+    """What was packed into these bytes, by zstd or, before that, by zlib. Raises `ValueError` for others.
+
+    A frame of zstd says what it unpacks to (RFC 8878, 3.1.1.1); it is that, or refused before it takes the memory.
+    """
+    if packed[: len(_MAGIC)] != _MAGIC:
+        return inflate(packed, most)
+    descriptor = int.from_bytes(packed[4:5], "little")
+    flag, single = descriptor >> 6, descriptor >> 5 & 1
+    field = packed[6 - single :][: (single, 2, 4, 8)[flag]]
+    size = int.from_bytes(field, "little") + 256 * (flag == 1)
+    if size > most:
+        raise ValueError(f"it unpacks to more than {most} bytes")
+    try:
+        content: bytes = _ZSTD.decompress(packed, decompressed_size=size, asbytes=True)
+    except OSError as error:
+        raise ValueError(said(error)) from None
+    return content
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +104,7 @@ def verified(values: tuple[Any, ...]) -> Entry | None:
     if not isinstance(cell, str) or not isinstance(run, int) or not isinstance(session, int):
         return None
     try:
-        parts = [inflate(part) for part in packed[::2]]
+        parts = [unpack(part) for part in packed[::2]]
     except (ValueError, TypeError):
         return None
     intact = [_checksum(cell, run, part) for part in parts] == packed[1::2]
@@ -90,4 +112,6 @@ def verified(values: tuple[Any, ...]) -> Entry | None:
 
 
 def _checksum(cell: str, run: int, content: bytes) -> str:
-    return hashlib.sha256(f"{cell}\n{run}\n".encode() + content).hexdigest()
+    digest = hashlib.sha256(f"{cell}\n{run}\n".encode())
+    digest.update(content)
+    return digest.hexdigest()

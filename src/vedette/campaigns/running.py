@@ -10,10 +10,9 @@ from pathlib import Path
 from typing import Protocol
 
 from vedette.campaigns.cells import Campaign
-from vedette.campaigns.cluster import remote_workers
+from vedette.campaigns.database import DATABASE
 from vedette.campaigns.engine import in_process, on_workers
 from vedette.campaigns.export import export_tables
-from vedette.campaigns.journal import DATABASE
 from vedette.campaigns.local import local_workers
 from vedette.campaigns.manifest import MANIFEST
 from vedette.campaigns.results import open_results
@@ -164,6 +163,8 @@ def _measure_anew(store: Store, campaign: Campaign, watch: Watch) -> None:
 
 def _results(queue: TaskQueue, num_workers: int, scheduler: str | None, watch: Watch) -> Generator[Done]:
     if scheduler is not None:
+        from vedette.campaigns.cluster import remote_workers  # asyncio, which nobody else needs
+
         with remote_workers(scheduler, watch.note, num_workers) as workers:
             yield from on_workers(workers, queue)
     elif num_workers > 1 and len(queue) > 1:

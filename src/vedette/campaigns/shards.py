@@ -6,11 +6,14 @@ import math
 import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 from vedette.errors import InputError
+from vedette.kernels.base.types import Ints
 from vedette.text import shown
 
 _MOST_SHARDS = 1_000_000
+_Runs = TypeVar("_Runs", int, Ints)
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +64,8 @@ class Shard:
 WHOLE = Shard()
 
 
-def owner(run: int, cell: int, num_cells: int, count: int) -> int:
-    """Number of the share that has a run of the cell at that place.
+def owner(run: _Runs, cell: int, num_cells: int, count: int) -> _Runs:
+    """Number of the share that has a run of the cell at that place; of many runs, that of each.
 
     Runs are dealt out one after the other, all cells of a run number together. Where that would come back to the same
     cell before every cell had its turn, the next round begins one share further.

@@ -11,8 +11,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from vedette.campaigns import journal
 from vedette.campaigns.cells import Campaign
+from vedette.campaigns.database import DATABASE, LOCK, Failure
+from vedette.campaigns.journal import Writer
 from vedette.campaigns.manifest import (
     MANIFEST,
     check_same,
@@ -27,7 +28,7 @@ from vedette.errors import InputError
 from vedette.evaluation.metrics import has_metrics
 
 
-class Store(journal.Writer):
+class Store(Writer):
     """The one writer of a results folder; a context manager. Its calls may come from any thread, one at a time."""
 
     def __init__(self, folder: Path, campaign: Campaign, fresh: dict[str, Any]) -> None:
@@ -99,7 +100,7 @@ class Store(journal.Writer):
 
     def note_failure(self, cell: str, run: int, message: str) -> None:
         """Keep why a run could not be finished, until it is."""
-        self.put_failure(journal.Failure(cell, int(run), self.session, message))
+        self.put_failure(Failure(cell, int(run), self.session, message))
 
     def _begin_session(self, fresh: dict[str, Any]) -> dict[str, Any]:
         """Write a new session into the folder's manifest, and open its runs; returns the manifest."""
@@ -132,8 +133,8 @@ def check_place(folder: Path) -> None:
         return
     if not folder.is_dir():
         raise InputError(f"{folder}: expected a folder for results; got a file")
-    names = {path.name for path in folder.iterdir() if not path.name.startswith(f".{MANIFEST}.")} - {journal.LOCK}
-    if journal.DATABASE in names:
-        raise InputError(f"{folder}: expected {MANIFEST} beside {journal.DATABASE}; it is missing, nothing was changed")
+    names = {path.name for path in folder.iterdir() if not path.name.startswith(f".{MANIFEST}.")} - {LOCK}
+    if DATABASE in names:
+        raise InputError(f"{folder}: expected {MANIFEST} beside {DATABASE}; it is missing, nothing was changed")
     if names:
         raise InputError(f"{folder}: expected a new or empty folder, or one of results; it holds something else")

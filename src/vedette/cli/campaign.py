@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import shlex
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -72,8 +73,11 @@ def campaign(
         raise usage_error("expected without --slurm, which gives each task its shard", "--shard")
     if scheduler is None and not dry_run and slurm is None:
         load_workers(workers)
+    gc.disable()
     from vedette.campaigns import load_spec, parse_shard, resolve
 
+    gc.freeze()  # before a user's code: what is loaded is searched for garbage neither now nor as the process ends
+    gc.enable()
     resolved = resolve(load_spec(spec), spec.parent, approve=Approval(trust, spec))
     if runs is not None:
         resolved = resolved.with_runs(runs)

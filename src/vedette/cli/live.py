@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import hashlib
 import sys
@@ -98,6 +97,8 @@ def live(
         loop = screen.live
     options = (window, ahead, speed, planner if loop.planner else "", decide_every, plan_within, seed)
     of = hashlib.sha256(repr(options).encode() + sensors.read_bytes()).hexdigest()
+    import asyncio
+
     with interruptible("what came is kept where --snapshot or --record say so"):
         compile_if_cold(known.scenario)
         keeping = Keeping(loop, of=of, snapshot=snapshot, every=every, record=record, tell=note)
@@ -138,6 +139,8 @@ def _say(answers: Iterable[dict[str, Any]]) -> None:
 
 async def _listen(keeping: Keeping, screen: LiveScreen | None, places: Sequence[_Place], token: str | None) -> None:
     """Take lines until standard input ends, or for ever where there are clients: Ctrl-C ends it, and waits for none."""
+    import asyncio
+
     from vedette.live import Exchange, TcpServer, lines_of
 
     def take(line: bytes) -> Iterable[dict[str, Any]]:

@@ -21,7 +21,7 @@ from vedette.text import counted
 
 if TYPE_CHECKING:
     from vedette.campaigns import Failed
-    from vedette.campaigns.journal import Failure
+    from vedette.campaigns.database import Failure
     from vedette.campaigns.results import CampaignResults, GroupComparison
     from vedette.scenarios import Scenario
     from vedette.simulation.records import RunRecord

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import numbers
+import sys
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
@@ -172,9 +173,10 @@ def as_array(field: str, values: Any, kinds: str, expected: str) -> NDArray[Any]
 
 def _is_masked(values: Any) -> bool:
     """Whether NumPy would drop a mask: of the array, or of one in a list."""
-    if isinstance(values, list | tuple):
-        return any(_is_masked(value) for value in values if isinstance(value, list | tuple | np.ma.MaskedArray))
-    return isinstance(values, np.ma.MaskedArray) and bool(np.ma.is_masked(values))
+    masks = sys.modules.get("numpy.ma")  # where nobody has loaded it there are none
+    if masks is not None and isinstance(values, list | tuple):
+        return any(_is_masked(value) for value in values if isinstance(value, list | tuple | masks.MaskedArray))
+    return masks is not None and isinstance(values, masks.MaskedArray) and bool(masks.is_masked(values))
 
 
 def float_array(field: str, values: Any, shape: tuple[int | None, ...], *, finite: bool = True) -> Floats:

@@ -14,6 +14,7 @@ import importlib
 import inspect
 import math
 import re
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
@@ -156,7 +157,7 @@ def one_of(
     place of those. parent: of the others.
     """
     found = {section.model_fields["kind"].default: section for section in own}
-    for kind, of in _marked(folder, room):
+    for kind, of in _marked(folder)[room]:
         if kind not in found:
             found[kind] = _importable(_extended(parent, _name(room, kind), of, _kind(room, kind)))
     if gives:
@@ -212,13 +213,15 @@ def _definition(of: str) -> Definition:
     return cast(Definition, ast.parse(_source(of)).body[0])
 
 
-def _marked(folder: str, room: str) -> Iterator[tuple[str, str]]:
-    """Kind, and module and name, of what is marked as parts of a room in the modules of a folder."""
+@cache
+def _marked(folder: str) -> dict[str, list[tuple[str, str]]]:
+    """By room: kind, and module and name, of what is marked as its parts in the modules of a folder."""
+    found = defaultdict[str, list[tuple[str, str]]](list)
     for file in sorted((_ROOT / folder).glob("*.py")):
         module = ".".join(("vedette", *file.relative_to(_ROOT).with_suffix("").parts))
-        for kind, at, name in _MARK.findall(_text(file)):
-            if at == room:
-                yield kind, f"{module}:{name}"
+        for kind, room, name in _MARK.findall(_text(file)):
+            found[room].append((kind, f"{module}:{name}"))
+    return found
 
 
 def _summary(of: str) -> str:

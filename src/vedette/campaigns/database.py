@@ -1,0 +1,193 @@
+"""The SQLite file of a results folder: its tables, who may write it, how it is read, what is said where SQLite raises.
+
+A rollback journal, not a write-ahead log: see docs/decisions/0004-results-store.md.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from vedette.campaigns.rows import Entry, verified
+from vedette.errors import InputError
+from vedette.reading import said
+from vedette.text import printable, shown
+
+DATABASE, LOCK = "campaign.sqlite", "campaign.lock"
+
+WAIT = 60.0  # s, for a reader or writer of the same file; each holds it for milliseconds
+_AT_ONCE = 256  # rows that are asked for together
+TABLES = (
+    "CREATE TABLE campaign (contents TEXT NOT NULL)",
+    "CREATE TABLE runs (cell TEXT NOT NULL, run INTEGER NOT NULL, session INTEGER NOT NULL, "
+    "payload BLOB NOT NULL, payload_sha256 TEXT NOT NULL, metrics BLOB NOT NULL, metrics_sha256 TEXT NOT NULL, "
+    "timings BLOB NOT NULL, timings_sha256 TEXT NOT NULL, PRIMARY KEY (cell, run))",
+    "CREATE TABLE failures (cell TEXT NOT NULL, run INTEGER NOT NULL, session INTEGER NOT NULL, "
+    "message TEXT NOT NULL, PRIMARY KEY (cell, run))",
+)
+ALTERED = "expected the run as it was written; it is cut short or altered"
+COLUMNS = "cell, run, session, payload, payload_sha256, metrics, metrics_sha256, timings, timings_sha256"
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """A run that could not be finished, in which session (counted from 1), and why: where it stopped."""
+
+    cell: str
+    run: int
+    session: int
+    message: str
+
+
+class Reader:
+    """Reads the file of one folder, also while a writer adds to it; opened anew for every question."""
+
+    def __init__(self, folder: Path) -> None:
+        self._path = folder / DATABASE
+
+    def __str__(self) -> str:
+        return str(self._path)
+
+    def check(self, contents: str) -> None:
+        """`InputError` unless the file is whole so far and of the campaign whose manifest has that checksum."""
+        check_contents(self._path, self._ask("SELECT contents FROM campaign"), contents)
+
+    def finished(self) -> list[tuple[str, int]]:
+        """Cell and number of every run in the file, sorted."""
+        return checked_keys(self._path, self._ask("SELECT cell, run FROM runs ORDER BY cell, run"))
+
+    def failures(self) -> list[Failure]:
+        """The runs that were tried and could not be finished, sorted."""
+        rows = self._ask("SELECT cell, run, session, message FROM failures ORDER BY cell, run")
+        checked_keys(self._path, [row[:2] for row in rows])
+        for _, _, session, message in rows:
+            if not isinstance(session, int) or not isinstance(message, str):
+                raise InputError(f"{self._path}: expected why a run failed; got {shown(message)}")
+        return [Failure(*row) for row in rows]
+
+    def rows(self) -> Iterator[tuple[Any, ...]]:
+        """Every run as it is kept, by cell and number. `InputError` at the first one that is damaged."""
+        with explained(self._path), closing(_opened(self._path)) as database:
+            for row in database.execute(f"SELECT {COLUMNS} FROM runs ORDER BY cell, run"):
+                if verified(row) is None:
+                    raise InputError(f"{self._path}: {place_of(*map(printable, map(str, row[:2])))}{ALTERED}")
+                yield row
+
+    def entry(self, cell: str, run: int) -> Entry:
+        """A finished run, its checksums verified. `InputError` where there is none, or its row is damaged."""
+        (entry,) = self.entries(cell, [run])
+        return entry
+
+    def entries(self, cell: str, runs: Sequence[int]) -> Iterator[Entry]:
+        """Finished runs of a cell, a few hundred read at a time; raises as `entry`."""
+        for start in range(0, len(runs), _AT_ONCE):
+            few = runs[start : start + _AT_ONCE]
+            question = f"SELECT {COLUMNS} FROM runs WHERE cell = ? AND run IN ({', '.join('?' * len(few))})"
+            found = {row[1]: row for row in self._ask(question, (cell, *few), place_of(cell, few[0]))}
+            for run in few:
+                if run not in found:
+                    raise InputError(f"{self._path}: {place_of(cell, run)}expected a finished run; it is not there yet")
+                entry = verified(found[run])
+                if entry is None:
+                    raise InputError(f"{self._path}: {place_of(cell, run)}{ALTERED}")
+                yield entry
+
+    def _ask(self, question: str, values: Sequence[Any] = (), where: str = "") -> list[Any]:
+        with explained(self._path, where):
+            try:
+                return _answer(self._path, question, values)
+            except sqlite3.OperationalError as error:
+                if _code(error) != sqlite3.SQLITE_READONLY_ROLLBACK:
+                    raise
+            # A writer was killed in the middle of a run: what it left half done is first taken back.
+            _answer(self._path, question, values, mode="rw")
+            return _answer(self._path, question, values)
+
+
+def _answer(path: Path, question: str, values: Sequence[Any], mode: str = "ro") -> list[Any]:
+    with closing(_opened(path, mode)) as database:
+        check_tables(path, database)
+        return database.execute(question, values).fetchall()
+
+
+def _opened(path: Path, mode: str = "ro") -> sqlite3.Connection:
+    database = sqlite3.connect(f"{path.resolve().as_uri()}?mode={mode}", timeout=WAIT, uri=True)
+    database.text_factory = _text  # so that one damaged row does not hide behind all that are asked for with it
+    return database
+
+
+def _text(content: bytes) -> str:
+    return content.decode(errors="replace")
+
+
+def check_tables(path: Path, database: sqlite3.Connection) -> None:
+    """`InputError` unless the tables are those of a campaign, with nothing that acts or answers in their place."""
+    rows = database.execute("SELECT sql FROM sqlite_master WHERE name NOT LIKE 'sqlite~_%' ESCAPE '~'")
+    if sorted(str(sql) for (sql,) in rows) != sorted(TABLES):
+        raise InputError(f"{path}: expected the tables of a campaign; the file is cut short or altered")
+
+
+def checked_keys(path: Path, rows: Sequence[tuple[Any, Any]]) -> list[tuple[str, int]]:
+    """Cells and numbers of runs, if that is what they are."""
+    for cell, run in rows:
+        if not isinstance(cell, str) or not isinstance(run, int):
+            raise InputError(f"{path}: expected the name and number of a run; got {shown(cell)} and {shown(run)}")
+    return list(rows)
+
+
+def lock_of(folder: Path) -> sqlite3.Connection:
+    """An open transaction on a file beside: SQLite's own locks, which the system ends with the process."""
+    path = folder / LOCK
+    lock = sqlite3.connect(path, timeout=0.0, isolation_level=None, check_same_thread=False)
+    try:
+        lock.execute("BEGIN EXCLUSIVE")
+    except (sqlite3.Error, UnicodeDecodeError) as error:
+        lock.close()
+        if _code(error) == sqlite3.SQLITE_BUSY:
+            raise InputError(f"{folder}: expected to write alone; another process is writing this campaign") from None
+        why = f"{path.name}: {printable(said(error))}"
+        raise InputError(f"{folder}: expected a folder that can be written; {why}") from error
+    return lock
+
+
+def check_contents(path: Path, found: Sequence[tuple[str]], contents: str) -> None:
+    """`InputError` unless what the file says of its campaign is the manifest's checksum alone."""
+    if list(found) != [(contents,)]:
+        raise InputError(
+            f"{path}: expected the runs of the manifest beside it; they are another campaign's, or the manifest was "
+            "altered"
+        )
+
+
+def place_of(cell: str, run: int | str) -> str:
+    """What messages about a run begin with."""
+    return f"cell {cell}, run {run}: "
+
+
+@contextmanager
+def explained(path: Path, where: str = "") -> Iterator[None]:
+    """What SQLite raises, as errors of this library that name the file."""
+    try:
+        yield
+    except (sqlite3.DatabaseError, UnicodeDecodeError) as error:  # the latter of words of the file in a message
+        raise InputError(f"{path}: {where}{_advice(path, error)} ({printable(said(error))})") from error
+
+
+def _advice(path: Path, error: Exception) -> str:
+    primary = _code(error) & 0xFF
+    if primary in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR):
+        return "expected room on the disk and a disk that works; what was finished before is kept: make room, go on"
+    if primary in (sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_PERM):
+        return "expected a file that can be opened" if path.exists() else "expected the runs of a campaign; got no file"
+    if primary == sqlite3.SQLITE_BUSY:
+        return f"expected a file that is free within {WAIT:g} s; it stayed in use"
+    return "expected the runs of a campaign as they were written; the file is cut short or altered"
+
+
+def _code(error: Exception) -> int:
+    """SQLite's extended code of an error; -1 for what Python's own layer raised."""
+    return int(getattr(error, "sqlite_errorcode", -1))
