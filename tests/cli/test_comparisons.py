@@ -17,9 +17,9 @@ ODD = "\N{CJK UNIFIED IDEOGRAPH-6F22}\N{CJK UNIFIED IDEOGRAPH-5B57} [bold]:smile
 
 def comparison_of(num_runs: int) -> Comparison:
     found = compare({name: [make_record(name, run) for run in range(num_runs)] for name in ("jdm", "idm", "random")})
-    ospa = found.ospa.copy()
-    ospa[2] = ospa[0]  # all tied
-    return replace(found, strategies=("jdm", LONG, ODD), ospa=np.ascontiguousarray(ospa))
+    first, second, third = found.ensembles
+    tied = (first, second, replace(third, ospa=first.ospa))
+    return replace(found, strategies=("jdm", LONG, ODD), ensembles=tied)
 
 
 @pytest.mark.parametrize("width", [60, 80, 100, 160])
@@ -50,8 +50,11 @@ def test_one_run_claims_nothing(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_many_decisions_are_counted_and_not_all_printed(capsys: pytest.CaptureFixture[str]) -> None:
     found = comparison_of(2)
-    choices = tuple(tuple(run[:1] * 9 for run in runs) for runs in found.choices)
-    print_comparison(replace(found, decision_times=np.arange(9.0), choices=choices))
+    often = [
+        replace(each, decision_times=np.arange(9.0), choices=tuple(run[:1] * 9 for run in each.choices))
+        for each in found.ensembles
+    ]
+    print_comparison(replace(found, ensembles=tuple(often)))
     printed = capsys.readouterr().out
     assert printed.count("jdm at ") == 6
     assert "jdm: and at 3 other times\n" in printed

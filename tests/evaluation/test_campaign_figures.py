@@ -61,14 +61,14 @@ def test_roses_have_areas_in_proportion_to_shares(comparison: Comparison) -> Non
     roses = panels(roses_figure(comparison))
     assert len(roses) == 9
     assert [axes.get_title() for axes in roses[:3]] == [f"{time:g} s" for time in comparison.decision_times]
-    first = [dict(run[0][0])["heading_deg"] for run in comparison.choices[0]]
+    first = [dict(run[0][0])["heading_deg"] for run in comparison.ensembles[0].choices]
     bars = roses[0].containers[0]
     areas = sorted(bar.get_height() ** 2 for bar in bars)
     np.testing.assert_allclose(areas, sorted(np.unique(np.array(first) % 360, return_counts=True)[1] / 6))
 
 
 def test_roses_need_decisions(comparison: Comparison) -> None:
-    still = replace(comparison, choices=(((),) * 6,) * 3)
+    still = replace(comparison, ensembles=tuple(replace(each, choices=((),) * 6) for each in comparison.ensembles))
     with pytest.raises(InputError, match="expected decisions; got none"):
         roses_figure(still)
 

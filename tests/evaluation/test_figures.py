@@ -188,7 +188,7 @@ def test_differences_are_drawn_from_the_first_decision_on_with_their_intervals(
     spread = [comparison.curve(name) for name in comparison.strategies]
     assert above.get_ylim()[1] >= max((curve.mean + curve.standard_error)[shown].max() for curve in spread)
     with pytest.raises(InputError, match="comparison: expected two strategies and runs or more; got 3 and 1"):
-        differences_figure(replace(comparison, ospa=comparison.ospa[:, :1]))
+        differences_figure(compare({name: [make_record(name)] for name in comparison.strategies}))
 
 
 def test_the_style_is_there_for_figures_of_ones_own() -> None:
@@ -248,9 +248,11 @@ def test_any_name_can_be_drawn_without_a_warning(
 
 
 def test_curves_that_are_one_share_a_line_with_dashes_of_each_colour(comparison: Comparison) -> None:
-    ospa = comparison.ospa.copy()
-    ospa[1, :, :20] = ospa[0, :, :20]
-    (axes,) = ospa_figure(replace(comparison, ospa=ospa)).axes
+    first, second, *others = comparison.ensembles
+    ospa = second.ospa.copy()
+    ospa[:, :20] = first.ospa[:, :20]
+    shared_start = (first, replace(second, ospa=ospa), *others)
+    (axes,) = ospa_figure(replace(comparison, ensembles=shared_start)).axes
     jdm, idm, random = (np.asarray(line.get_ydata()) for line in axes.lines[:3])
     np.testing.assert_array_equal(np.isnan(jdm), np.arange(len(jdm)) < 19)
     np.testing.assert_array_equal(np.isnan(idm), np.isnan(jdm))

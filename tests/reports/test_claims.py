@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from evaluation.synthetic import make_record
 from vedette.evaluation import Comparison
+from vedette.evaluation.ensembles import ensemble_of
 from vedette.evaluation.health import percent
 from vedette.reports.claims import all_pairs, claim, claims
 
@@ -13,9 +15,14 @@ from vedette.reports.claims import all_pairs, claim, claims
 def comparison_of(*errors: list[float]) -> Comparison:
     """Strategies a, b, ... on one scan, with the given OSPA in each run."""
     names = tuple("abcde"[: len(errors)])
-    totals = np.array(errors, np.float64)[:, :, np.newaxis, np.newaxis]
-    ospa = np.concatenate([totals, totals, np.zeros_like(totals)], axis=3)
-    return Comparison("synthetic", names, np.array([1.0]), np.empty(0), ospa, 0.0, 2.0, ((),) * len(names))
+    scan = make_record("fixed", num_scans=1).outline()
+    ensembles = [
+        ensemble_of(
+            (replace(scan, run=run, ospa=np.array([[total, total, 0.0]])), None) for run, total in enumerate(of)
+        )
+        for of in errors
+    ]
+    return Comparison(names, tuple(ensembles), 0.0, 2.0)
 
 
 def test_a_clear_difference_is_claimed_with_its_interval_and_share() -> None:

@@ -39,14 +39,12 @@ class GroupComparison:
         settings: axis and value, of the axes that all of them share.
         cells: in the order of the comparison's strategies.
         labels: values of the compared axis as text: the names of the comparison's strategies.
-        ensembles: of each cell, the runs that are finished in every cell.
-        comparison: over these runs, and the scans that the scenario counts.
+        comparison: over the runs that are finished in every cell, and the scans that the scenario counts.
     """
 
     settings: dict[str, Any]
     cells: tuple[Cell, ...]
     labels: tuple[str, ...]
-    ensembles: tuple[Ensemble, ...]
     comparison: Comparison
 
 
@@ -172,10 +170,9 @@ class CampaignResults(Speaking):
             return None
         axis = self.campaign.compare
         labels = tuple(str(cell.settings[axis]) for cell in cells)
-        ensembles = tuple(self.ensemble(cell.name, common) for cell in cells)
+        ensembles = {label: self.ensemble(cell.name, common) for label, cell in zip(labels, cells, strict=True)}
         settings = {name: value for name, value in cells[0].settings.items() if name != axis}
-        comparison = scored(cells[0].scenario, dict(zip(labels, ensembles, strict=True)))
-        return GroupComparison(settings, cells, labels, ensembles, comparison)
+        return GroupComparison(settings, cells, labels, scored(cells[0].scenario, ensembles))
 
     def _outlined(self, entry: Entry) -> tuple[Outline, RunMetrics]:
         if entry.metrics and not self._own:

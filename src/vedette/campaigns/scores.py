@@ -46,7 +46,7 @@ class StrategyScore:
 def score_strategies(group: GroupComparison) -> tuple[StrategyScore, ...]:
     """The strategies of a group, over the runs that it has in common, in its order; the first is the reference."""
     comparison, scores = group.comparison, []
-    for label, ensemble in zip(group.labels, group.ensembles, strict=True):
+    for label, ensemble in zip(group.labels, comparison.ensembles, strict=True):
         total, decisions = comparison.summary(label), ensemble.seconds.get("planning", ())
         known = TRACKED_OF_ALL in comparison.measures
         scores.append(

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vedette.errors import InputError
 from vedette.evaluation.ensembles import PARTS, Choice, Ensemble, choice_of, ensemble_of
@@ -30,26 +28,16 @@ class Comparison(Speaking):
     A `part` is "total", "localisation" or "cardinality", of OSPA, or the name of a measure.
 
     Attributes:
-        scenario: name of the scenario.
         strategies: their names, the one to compare the others with first.
-        times: (num_scans,) s.
-        decision_times: (num_decisions,) s, of all strategies together.
-        ospa: (num_strategies, num_runs, num_scans, 3) total, localisation and cardinality parts, in `unit`.
+        ensembles: of each strategy its runs; the n-th runs of all share their random numbers.
         since, until: scans after `since` (s) and up to `until` (s) count in the mean over time.
-        choices: for each strategy, for each run, what each of its decisions chose.
-        measures: by the name of its column, each measure that all runs have: (num_runs, num_scans) of every strategy.
         unit: of OSPA: "m", or none ("") where it compares whole states.
     """
 
-    scenario: str
     strategies: tuple[str, ...]
-    times: Floats
-    decision_times: Floats
-    ospa: Floats
+    ensembles: tuple[Ensemble, ...]
     since: float
     until: float
-    choices: tuple[tuple[tuple[Choice, ...], ...], ...]
-    measures: Mapping[str, tuple[NDArray[Any], ...]] = field(default_factory=dict)
     unit: str = "m"
 
     def _summary(self) -> str:
@@ -61,9 +49,30 @@ class Comparison(Speaking):
         return "mean OSPA: " + "; ".join(means + ([f"{more} more"] if more else []))
 
     @property
+    def scenario(self) -> str:
+        """Name of the scenario."""
+        return self.ensembles[0].scenario
+
+    @property
     def num_runs(self) -> int:
         """Number of runs of each strategy."""
-        return int(self.ospa.shape[1])
+        return self.ensembles[0].num_runs
+
+    @property
+    def times(self) -> Floats:
+        """(num_scans,) s."""
+        return self.ensembles[0].times
+
+    @property
+    def decision_times(self) -> Floats:
+        """(num_decisions,) s, of all strategies together."""
+        return np.unique(np.concatenate([ensemble.decision_times for ensemble in self.ensembles]))
+
+    @property
+    def measures(self) -> tuple[str, ...]:
+        """Names of the measures that all runs have."""
+        first, *others = (ensemble.measures for ensemble in self.ensembles)
+        return tuple(name for name in first if all(name in other for other in others))
 
     @property
     def counted(self) -> Bools:
@@ -96,21 +105,19 @@ class Comparison(Speaking):
 
     def decision_shares(self, strategy: str, decision: int) -> dict[Choice, float]:
         """Share of the runs in which each combination of actions was chosen; the most frequent first."""
-        chosen = Counter(run[decision] for run in self.choices[self._index(strategy)] if decision < len(run))
+        chosen = Counter(run[decision] for run in self._ensemble(strategy).choices if decision < len(run))
         return {choice: count / self.num_runs for choice, count in chosen.most_common()}
 
     def values(self, strategy: str, part: str = "total") -> Floats:
         """(num_runs, num_scans) of a strategy."""
-        if part in PARTS:
-            return np.asarray(self.ospa[self._index(strategy), :, :, PARTS.index(part)])
-        if part not in self.measures:
+        if part not in (*PARTS, *self.measures):
             raise InputError(f"part: expected one of {', '.join((*PARTS, *self.measures))}; got {part!r}")
-        return np.asarray(self.measures[part][self._index(strategy)], np.float64)
+        return self._ensemble(strategy).values(part)
 
-    def _index(self, strategy: str) -> int:
+    def _ensemble(self, strategy: str) -> Ensemble:
         if strategy not in self.strategies:
             raise InputError(f"strategy: expected one of {', '.join(self.strategies)}; got {strategy!r}")
-        return self.strategies.index(strategy)
+        return self.ensembles[self.strategies.index(strategy)]
 
 
 def compare(
@@ -150,28 +157,14 @@ def compare_ensembles(
     strategies, reference = tuple(ensembles), next(iter(ensembles.values()))
     for name, ensemble in ensembles.items():
         _check_paired(name, ensemble, strategies[0], reference)
-    decision_times = np.unique(np.concatenate([ensemble.decision_times for ensemble in ensembles.values()]))
-    times = reference.times
-    if since is None:
-        decided = len(decision_times) > 0 and decision_times[0] < times[-1]
-        since = float(decision_times[0]) if decided else -np.inf
-    if not ((times > since) & (times <= until)).any():
-        raise InputError(
-            f"since: expected scans after it and up to until, of {times[0]} to {times[-1]} s; got {since} to {until}"
-        )
-    common = [name for name in reference.measures if all(name in each.measures for each in ensembles.values())]
-    return Comparison(
-        scenario=reference.scenario,
-        strategies=strategies,
-        times=times,
-        decision_times=decision_times,
-        ospa=np.array([ensemble.ospa for ensemble in ensembles.values()]),
-        since=since,
-        until=until,
-        choices=tuple(ensemble.choices for ensemble in ensembles.values()),
-        measures={name: tuple(ensemble.measures[name] for ensemble in ensembles.values()) for name in common},
-        unit=unit,
-    )
+    compared = Comparison(strategies, tuple(ensembles.values()), -np.inf if since is None else since, until, unit)
+    times, decided = compared.times, compared.decision_times
+    if since is None and len(decided) and decided[0] < times[-1]:
+        compared = replace(compared, since=float(decided[0]))
+    if not compared.counted.any():
+        window = f"{times[0]} to {times[-1]} s; got {compared.since} to {until}"
+        raise InputError(f"since: expected scans after it and up to until, of {window}")
+    return compared
 
 
 def scored(scenario: Scenario, ensembles: Mapping[str, Ensemble]) -> Comparison:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -111,22 +111,13 @@ def _group(results: CampaignResults, cells: tuple[Cell, ...], name: str, title: 
     strategies = []
     for cell in present:
         label, record = labels[cell.name], partial(results.record, cell.name)
-        strategies.append(_strategy(cell, label, len(finished[cell.name]), ensembles[label], comparison, record))
+        counted = _counted(ensembles[label], comparison)
+        strategies.append(Strategy(cell, label, len(finished[cell.name]), ensembles[label], counted, record))
     return Group(name, title, tuple(strategies), missing, comparison, reason)
 
 
-def _strategy(
-    cell: Cell,
-    label: str,
-    num_finished: int,
-    ensemble: Ensemble,
-    comparison: Comparison | None,
-    record: Callable[[int], RunRecord],
-) -> Strategy:
-    if comparison is None:
-        return Strategy(cell, label, num_finished, ensemble, np.ones(len(ensemble.times), bool), record)
-    own = comparison.ospa[comparison.strategies.index(label)]  # the same numbers: of many runs, much memory
-    return Strategy(cell, label, num_finished, replace(ensemble, ospa=own), comparison.counted, record)
+def _counted(ensemble: Ensemble, comparison: Comparison | None) -> Bools:
+    return np.ones(len(ensemble.times), bool) if comparison is None else comparison.counted
 
 
 def group_of_run(record: RunRecord, scenario: Scenario) -> Group:
@@ -147,7 +138,7 @@ def group_of_run(record: RunRecord, scenario: Scenario) -> Group:
             comparison = scored(scenario, {record.planner: ensemble})
         except InputError as error:  # such as a run that stopped before the scans that count
             reason = str(error)
-    strategy = _strategy(cell, record.planner, 1, ensemble, comparison, lambda _: record)
+    strategy = Strategy(cell, record.planner, 1, ensemble, _counted(ensemble, comparison), lambda _: record)
     return Group("run", record.scenario, (strategy,), (), comparison, "" if comparison is not None else reason)
 
 

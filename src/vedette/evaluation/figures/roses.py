@@ -46,7 +46,7 @@ def roses_figure(comparison: Comparison, scene: Scene | None = None) -> Figure:
 
     Raises `InputError` where no strategy made a decision, or no sensor had a choice.
     """
-    rows = [index for index, runs in enumerate(comparison.choices) if any(runs)]
+    rows = [index for index, each in enumerate(comparison.ensembles) if any(each.choices)]
     if not rows:
         raise InputError("comparison: expected decisions; got none")
     columns = shown_decisions(len(comparison.decision_times))
@@ -65,7 +65,7 @@ def roses_figure(comparison: Comparison, scene: Scene | None = None) -> Figure:
     for row, index in enumerate(rows):
         for column, decision in enumerate(columns):
             panel = panels[row, column]
-            runs = [run[decision] for run in comparison.choices[index] if decision < len(run)]
+            runs = [run[decision] for run in comparison.ensembles[index].choices if decision < len(run)]
             chosen = [tuple(choice[sensor] for sensor in movers) for choice in runs]
             if together:
                 chosen = [(each,) for choice in chosen for each in choice]
@@ -92,7 +92,7 @@ def _movers(comparison: Comparison) -> list[int]:
 
 
 def _all_choices(comparison: Comparison) -> list[Choice]:
-    return [choice for runs in comparison.choices for run in runs for choice in run]
+    return [choice for each in comparison.ensembles for run in each.choices for choice in run]
 
 
 def _headings(chosen: list[Choice]) -> Ints:
