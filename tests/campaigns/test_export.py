@@ -8,11 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray
+from pyarrow import parquet
 
 from campaigns.filled import NUM_RUNS, fill, make_campaign, make_run
+from vedette.campaigns import results as reading
 from vedette.campaigns.export import FORMATS, export_csv, export_netcdf, export_tables
 from vedette.campaigns.results import open_results
-from vedette.campaigns.tables import tables_of_runs
+from vedette.campaigns.tables import in_schema, joined_tables, schema_of, tables_of_runs
 from vedette.errors import InputError
 from vedette.text import spreadsheet_text
 
@@ -157,6 +159,35 @@ def test_cells_of_other_dimensions_share_a_table(results):
     assert tables["truth"]["state_4"][:num].null_count == num
     np.testing.assert_array_equal(tables["truth"]["state_4"][num:], wider.states[:, 4])
     assert tables["decisions"]["num_others"].to_pylist() == [None, None, None, 2, None, None]
+
+
+def test_tables_written_part_by_part_are_those_of_all_runs_at_once(results, tables, tmp_path, monkeypatch):
+    """Also where a part lacks a table (random control weighs no actions), or a column."""
+    (tmp_path / "whole").mkdir()
+    whole = export_csv(results, tmp_path / "whole")
+    monkeypatch.setattr(reading, "_TOGETHER", 1)
+    assert len(list(results.table_parts())) == 10
+    for path, in_parts in zip(export_tables(results, tmp_path / "parquet"), results.tables().values(), strict=True):
+        written = parquet.read_table(path)
+        assert written.schema.equals(tables[path.stem].schema, check_metadata=True)
+        assert written.to_pylist() == in_parts.to_pylist() == tables[path.stem].to_pylist()
+    for mine, theirs in zip(whole, export_csv(results, tmp_path / "parts"), strict=True):
+        assert mine.read_bytes() == theirs.read_bytes()
+
+
+def test_what_a_part_lacks_is_null(results):
+    first, second = results.run("jdm-rate-5.0", 0), results.run("random-rate-5.0", 0)
+    counts = replace(second.record.decisions[0].plan, counts={"samples": 1, "others": 2})
+    decisions = (replace(second.record.decisions[0], plan=counts), *second.record.decisions[1:])
+    runs = [first, replace(second, record=replace(second.record, decisions=decisions))]
+    whole = tables_of_runs(results.campaign, runs)
+    parts = joined_tables(tables_of_runs(results.campaign, [run]) for run in runs)
+    schema = schema_of(tables_of_runs(results.campaign, [run])["decisions"].schema for run in runs)
+    assert schema.names == whole["decisions"].column_names
+    for name, table in whole.items():
+        assert parts[name].to_pylist() == table.to_pylist()
+    alone = in_schema(tables_of_runs(results.campaign, runs[:1])["decisions"], schema)
+    assert alone["num_others"].to_pylist() == [None, None, None]
 
 
 def test_decisions_that_were_explained_have_tables_of_their_own(results):

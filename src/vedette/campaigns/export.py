@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import io
-from collections.abc import Callable
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import pyarrow as pa
 
 from vedette.campaigns.results import CampaignResults
-from vedette.campaigns.tables import tables_of_record
+from vedette.campaigns.tables import in_schema, schema_of, tables_of_record
 from vedette.errors import InputError
 from vedette.files import write_whole
 from vedette.simulation.records import RunRecord
@@ -27,13 +27,15 @@ def export_tables(results: CampaignResults | RunRecord, folder: Path | str) -> t
 
     Raises `InputError` where the files cannot be written.
     """
+    return _write_tables(results, Path(folder), ".parquet", _write_parquet)
 
+
+def _write_parquet(tables: Iterator[pa.Table], schema: pa.Schema, file: BinaryIO) -> None:
     from pyarrow import parquet
 
-    def write(table: Any, file: BinaryIO) -> None:
-        parquet.write_table(table, file, compression="zstd")
-
-    return _write_tables(results, Path(folder), ".parquet", write)
+    with parquet.ParquetWriter(file, schema, compression="zstd") as writer:
+        for table in tables:
+            writer.write_table(table)
 
 
 def export_csv(results: CampaignResults | RunRecord, folder: Path | str) -> tuple[Path, ...]:
@@ -44,14 +46,19 @@ def export_csv(results: CampaignResults | RunRecord, folder: Path | str) -> tupl
     return _write_tables(results, Path(folder), ".csv", _write_csv)
 
 
-def _write_csv(table: pa.Table, file: BinaryIO) -> None:
+def _write_csv(tables: Iterator[pa.Table], schema: pa.Schema, file: BinaryIO) -> None:
     from pyarrow import csv
 
-    for place, column in enumerate(table.columns):
-        if pa.types.is_string(column.type):
-            texts = [None if text is None else spreadsheet_text(text) for text in column.to_pylist()]
-            table = table.set_column(place, table.field(place), pa.array(texts, pa.string()))
-    csv.write_csv(table.rename_columns([spreadsheet_text(name) for name in table.column_names]), file)
+    names = [spreadsheet_text(name) for name in schema.names]
+    with csv.CSVWriter(file, pa.schema(zip(names, schema.types, strict=True))) as writer:
+        for table in tables:
+            writer.write_table(pa.table([_spreadsheet_column(column) for column in table.columns], names))
+
+
+def _spreadsheet_column(column: pa.ChunkedArray) -> pa.ChunkedArray | pa.Array:
+    if not pa.types.is_string(column.type):
+        return column
+    return pa.array([None if text is None else spreadsheet_text(text) for text in column.to_pylist()], pa.string())
 
 
 def export_netcdf(results: CampaignResults | RunRecord, folder: Path | str) -> tuple[Path, ...]:
@@ -62,7 +69,7 @@ def export_netcdf(results: CampaignResults | RunRecord, folder: Path | str) -> t
     if isinstance(results, RunRecord):
         raise InputError("netcdf: expected the results of a campaign, over cells and runs; got a single run")
     content = bytes(results.dataset().to_netcdf(engine="scipy"))
-    return (_write(Path(folder) / NETCDF, content),)
+    return (_write(Path(folder) / NETCDF, lambda file: file.write(content)),)
 
 
 FORMATS: dict[str, Callable[[CampaignResults | RunRecord, Path], tuple[Path, ...]]] = {
@@ -73,21 +80,45 @@ FORMATS: dict[str, Callable[[CampaignResults | RunRecord, Path], tuple[Path, ...
 
 
 def _write_tables(
-    results: CampaignResults | RunRecord, folder: Path, ending: str, write: Callable[[Any, BinaryIO], None]
+    results: CampaignResults | RunRecord,
+    folder: Path,
+    ending: str,
+    write: Callable[[Iterator[pa.Table], pa.Schema, BinaryIO], None],
 ) -> tuple[Path, ...]:
-    files = []
-    tables = tables_of_record(results) if isinstance(results, RunRecord) else results.tables()
-    for name, table in tables.items():
-        content = io.BytesIO()
-        write(table, content)
-        files.append(_write(folder / f"{name}{ending}", content.getvalue()))
-    return tuple(files)
+    """Write each table, of which no more is held than a few hundred runs: until all columns are known, parts wait in
+    files of their own."""
+    parts = [tables_of_record(results)] if isinstance(results, RunRecord) else results.table_parts()
+    waiting: dict[str, dict[Path, pa.Schema]] = {}
+    with tempfile.TemporaryDirectory() as place:
+        for number, part in enumerate(parts):
+            for name, table in part.items():
+                path = _put(table, Path(place) / f"{name}-{number}.arrow")
+                waiting.setdefault(name, {})[path] = table.schema
+        return tuple(_join(of, folder / f"{name}{ending}", write) for name, of in waiting.items())
 
 
-def _write(path: Path, content: bytes) -> Path:
+def _put(table: pa.Table, path: Path) -> Path:
+    packing = pa.ipc.IpcWriteOptions(compression="zstd")
+    try:
+        with pa.ipc.new_file(str(path), table.schema, options=packing) as file:
+            file.write_table(table)
+    except OSError as error:
+        raise InputError(f"{path.parent}: expected room for files until all tables are written; {error}") from error
+    return path
+
+
+def _join(
+    parts: Mapping[Path, pa.Schema], target: Path, write: Callable[[Iterator[pa.Table], pa.Schema, BinaryIO], None]
+) -> Path:
+    schema = schema_of(parts.values())
+    tables = (in_schema(pa.ipc.open_file(str(path)).read_all(), schema) for path in parts)
+    return _write(target, lambda file: write(tables, schema, file))
+
+
+def _write(path: Path, write: Callable[[BinaryIO], object]) -> Path:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(path, lambda file: file.write(content))
+        write_whole(path, write)
     except OSError as error:
         raise InputError(f"{path}: expected a file that can be written; {error}") from error
     return path

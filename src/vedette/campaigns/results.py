@@ -6,6 +6,7 @@ import operator
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, SupportsIndex
 
@@ -16,7 +17,7 @@ from vedette.campaigns.dataset import dataset_of_scans
 from vedette.campaigns.gathering import gathered
 from vedette.campaigns.manifest import campaign_of, contents_checksum, read_manifest
 from vedette.campaigns.rows import Entry
-from vedette.campaigns.tables import FinishedRun, tables_of_runs
+from vedette.campaigns.tables import FinishedRun, joined_tables, tables_of_runs
 from vedette.errors import InputError
 from vedette.evaluation.comparison import Comparison, scored
 from vedette.evaluation.ensembles import Ensemble
@@ -29,6 +30,8 @@ from vedette.text import counted, elided, shown
 if TYPE_CHECKING:
     import pyarrow
     import xarray
+
+_TOGETHER = 500  # runs in a part of the tables
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,11 +105,9 @@ class CampaignResults(Speaking):
 
     def runs(self) -> Iterator[FinishedRun]:
         """Every finished run, cells in the order of the campaign, each with its runs in order."""
-        finished = self._finished()
         for cell in self.campaign.cells:
-            for name, run in finished:
-                if name == cell.name:
-                    yield self.run(name, run)
+            for entry in self._reader.entries(cell.name, self.finished(cell.name)):
+                yield self._decoded(entry)
 
     def record(self, cell: str, run: SupportsIndex) -> RunRecord:
         """The record of a finished run."""
@@ -144,14 +145,24 @@ class CampaignResults(Speaking):
         For pandas `.to_pandas()`, for polars `polars.from_arrow`; DuckDB queries them as they are. See
         `vedette.campaigns.tables`. None where no run is finished.
         """
-        return tables_of_runs(self.campaign, self.runs())
+        return joined_tables(self.table_parts())
+
+    def table_parts(self) -> Iterator[dict[str, pyarrow.Table]]:
+        """The same a few hundred runs at a time, in order, for results that no memory holds.
+
+        Every part has the columns of its own runs: `vedette.campaigns.tables.schema_of` is of all.
+        """
+        runs = self.runs()
+        while few := list(islice(runs, _TOGETHER)):
+            yield tables_of_runs(self.campaign, few)
 
     def dataset(self) -> xarray.Dataset:
         """Measures at each scan as arrays over cell, run and step; see `vedette.campaigns.dataset`.
 
         Raises `InputError` where xarray is not installed.
         """
-        return dataset_of_scans(self.campaign, self.tables().get("scans"))
+        scans = joined_tables({"scans": part["scans"]} for part in self.table_parts())
+        return dataset_of_scans(self.campaign, scans.get("scans"))
 
     def _finished(self) -> list[tuple[str, int]]:
         """Cell and number of every finished run, sorted; `InputError` for one that the campaign does not have."""
