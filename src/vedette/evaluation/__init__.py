@@ -4,6 +4,7 @@ Figures are in `vedette.evaluation.figures`.
 """
 
 from vedette.evaluation.comparison import Comparison, choices_of, compare
+from vedette.evaluation.ensembles import Ensemble
 from vedette.evaluation.metrics import (
     AverageNees,
     Continuity,
@@ -40,6 +41,7 @@ __all__ = [
     "AverageNees",
     "Comparison",
     "Continuity",
+    "Ensemble",
     "GospaResult",
     "GospaSeries",
     "Matching",
