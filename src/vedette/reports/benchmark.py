@@ -9,7 +9,7 @@ from vedette.campaigns.standings import SceneTable, header, row
 from vedette.reports.tables import Table
 from vedette.reports.writing import make_room, render, write_page
 
-_NOTE = "All on the same runs; 95 %: interval over them, of skewed differences by bootstrap. A lost run counts as the cutoff."
+_NOTE = "All on the same runs; 95 %: interval, of skewed differences by bootstrap. A lost run counts as the cutoff."
 
 
 def write_benchmark(tables: Sequence[SceneTable], facts: Mapping[str, str], path: Path) -> None:
