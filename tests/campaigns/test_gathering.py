@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
+from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from campaigns.filled import fill, make_campaign
 from evaluation.synthetic import ACTIONS, make_record
 from vedette.campaigns import gathering, open_results
 from vedette.errors import InputError
+from vedette.evaluation import ensembles
 from vedette.evaluation.ensembles import Ensemble, ensemble_of, joined
 from vedette.evaluation.health import added, health_sums
 from vedette.evaluation.rewards import RewardSums
@@ -154,6 +156,23 @@ def test_rewards_add_up_whatever_the_parts() -> None:
             np.testing.assert_allclose(mine.mean, theirs.mean, rtol=1e-13)
             np.testing.assert_allclose(mine.standard_error, theirs.standard_error, rtol=1e-11)
         np.testing.assert_allclose(parts.shares, whole.shares)
+
+
+def test_no_more_rewards_are_held_than_memory_has_room_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    outlines = [make_record("jdm", run).outline() for run in range(5)]
+    whole = ensemble_of((each, None) for each in outlines)
+    monkeypatch.setattr(ensembles, "_MOST_REWARDS", 2 * 3 * 169)  # two runs of three decisions
+    held: list[int] = []
+
+    def noted(parts: Sequence[Ensemble]) -> Ensemble:
+        held.extend(each.num_runs for each in parts)
+        return joined(parts)
+
+    monkeypatch.setattr(ensembles, "joined", noted)
+    parts = ensemble_of((each, None) for each in outlines)
+    assert held == [2, 2, 1]
+    np.testing.assert_array_equal(parts.ospa, whole.ospa)
+    np.testing.assert_allclose(parts.rewards[1].mean().tables[0].mean, whole.rewards[1].mean().tables[0].mean)
 
 
 def test_rewards_of_parts_are_over_turns_where_headings_differ() -> None:

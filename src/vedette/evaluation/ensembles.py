@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import islice
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -25,7 +24,8 @@ PARTS = ("total", "localisation", "cardinality")
 # What was chosen at one decision, one row a sensor.
 Choice: TypeAlias = tuple[Row, ...]
 
-TOGETHER = 512  # runs that are held as they come
+# Runs that are held as they come, and entries of their tables of rewards.
+TOGETHER, _MOST_REWARDS = 512, 2**22
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -91,7 +91,7 @@ def ensemble_of(runs: Iterable[tuple[Outline, RunMetrics | None]]) -> Ensemble:
 
     Raises `InputError` for no run, and for runs of other scenarios or scan times than the first.
     """
-    return joined([_of_few(few) for few in _batches(iter(runs))])
+    return joined([_of_few(few) for few in _batches(runs)])
 
 
 def joined(parts: Sequence[Ensemble]) -> Ensemble:
@@ -127,8 +127,15 @@ def choice_of(plan: Plan) -> Choice:
     return tuple(rounded(own.columns, row) for own, row in zip(plan.actions, plan.chosen_actions, strict=True))
 
 
-def _batches(runs: Iterator[tuple[Outline, RunMetrics | None]]) -> Iterator[list[tuple[Outline, RunMetrics | None]]]:
-    while few := list(islice(runs, TOGETHER)):
+def _batches(runs: Iterable[tuple[Outline, RunMetrics | None]]) -> Iterator[list[tuple[Outline, RunMetrics | None]]]:
+    few, room = list[tuple[Outline, RunMetrics | None]](), _MOST_REWARDS
+    for run in runs:
+        few.append(run)
+        room -= sum(table.mean.size for decision in run[0].decisions for table in decision.plan.tables)
+        if len(few) == TOGETHER or room <= 0:
+            yield few
+            few, room = [], _MOST_REWARDS
+    if few:
         yield few
 
 
