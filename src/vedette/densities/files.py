@@ -99,6 +99,3 @@ def _build(kind: str, arrays: Mapping[str, Any]) -> Density:
     num = len(own) - len(fields(container)) + 1
     made: Density = container(TrackTable(*own[:num]), *own[num:]) if num > 1 else container(*own)
     return made
-
-
-__all__ = ["FORMAT_NAME", "FORMAT_VERSION", "load_density", "save_density"]

@@ -128,5 +128,3 @@ def _parquet(table: Mapping[str, Sequence[Any]]) -> bytes:
 
 _MAKERS = {".csv": _csv, ".parquet": _parquet, ".geojson": geojson, ".czml": czml, ".mcap": mcap}
 ENDINGS = tuple(_MAKERS)
-
-__all__ = ["ENDINGS", "table_of_run", "track_table", "utc_text", "write_tracks"]

@@ -138,15 +138,3 @@ def check_marginals(value: Any) -> None:
     if not isinstance(value, OfMarginals):
         expected = "Ranked, BeliefPropagation, Marginals or another with to_kernel()"
         raise InputError(f"assignment: expected {expected}; got {type(value).__name__}")
-
-
-__all__ = [
-    "Assignment",
-    "BeliefPropagation",
-    "Gibbs",
-    "Marginals",
-    "OfChoices",
-    "OfMarginals",
-    "Ranked",
-    "check_marginals",
-]

@@ -138,6 +138,3 @@ def _cut(file: BinaryIO) -> None:
     if end < size:
         file.truncate(end)
     file.seek(end)
-
-
-__all__ = ["Keeping"]

@@ -73,6 +73,3 @@ def _places(message: Any) -> list[tuple[float | None, float | None]]:
 
 def _date(stamp: float) -> datetime:
     return datetime.fromtimestamp(0, UTC) + timedelta(seconds=stamp)
-
-
-__all__ = ["BAG_ENDINGS", "read_bag"]

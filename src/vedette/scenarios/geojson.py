@@ -130,6 +130,3 @@ def _in_metres(ring: Any, origin: Origin, name: str) -> Ring:
         raise InputError(f"{describe(name)}: corners that are no degrees of longitude and latitude")
     corners: Ring = origin.to_plane([lon for lon, _ in degrees[:-1]], [lat for _, lat in degrees[:-1]]).tolist()
     return corners
-
-
-__all__ = ["geometries", "listed", "with_zones"]
