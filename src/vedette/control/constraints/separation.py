@@ -8,12 +8,12 @@ import numpy as np
 
 from vedette.control.constraints.protocol import Situation
 from vedette.kernels.base.types import Bools, Floats
-from vedette.models.fields import Positive, check_fields, part
+from vedette.models.fields import Checked, Positive, part
 
 
 @part("separation", "constraint")
 @dataclass(frozen=True, slots=True)
-class Separation:
+class Separation(Checked):
     """Any two platforms keep a least distance.
 
     At the times of the horizon, and between two of them, where both are taken to go straight and evenly from one
@@ -28,9 +28,6 @@ class Separation:
 
     distance: Positive
     timeless = True
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     @property
     def name(self) -> str:
