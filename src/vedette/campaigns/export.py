@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -12,7 +12,7 @@ import pyarrow as pa
 from vedette.campaigns.results import CampaignResults
 from vedette.campaigns.tables import tables_of_record
 from vedette.errors import InputError
-from vedette.files import write_whole
+from vedette.files import write_file
 from vedette.simulation.records import RunRecord
 from vedette.text import spreadsheet_text
 
@@ -62,7 +62,8 @@ def export_netcdf(results: CampaignResults | RunRecord, folder: Path | str) -> t
     if isinstance(results, RunRecord):
         raise InputError("netcdf: expected the results of a campaign, over cells and runs; got a single run")
     content = bytes(results.dataset().to_netcdf(engine="scipy"))
-    return (_write(Path(folder) / NETCDF, content),)
+    write_file(file := Path(folder) / NETCDF, lambda stream: stream.write(content), make_folder=True)
+    return (file,)
 
 
 FORMATS: dict[str, Callable[[CampaignResults | RunRecord, Path], tuple[Path, ...]]] = {
@@ -75,19 +76,9 @@ FORMATS: dict[str, Callable[[CampaignResults | RunRecord, Path], tuple[Path, ...
 def _write_tables(
     results: CampaignResults | RunRecord, folder: Path, ending: str, write: Callable[[Any, BinaryIO], None]
 ) -> tuple[Path, ...]:
-    files = []
+    files: list[Path] = []
     tables = tables_of_record(results) if isinstance(results, RunRecord) else results.tables()
     for name, table in tables.items():
-        content = io.BytesIO()
-        write(table, content)
-        files.append(_write(folder / f"{name}{ending}", content.getvalue()))
+        files.append(folder / f"{name}{ending}")
+        write_file(files[-1], partial(write, table), make_folder=True)
     return tuple(files)
-
-
-def _write(path: Path, content: bytes) -> Path:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(path, lambda file: file.write(content))
-    except OSError as error:
-        raise InputError(f"{path}: expected a file that can be written; {error}") from error
-    return path
