@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -27,17 +28,9 @@ class Separation(Checked):
     """
 
     distance: Positive
+    name: ClassVar[str] = "separation"
+    needs_beliefs: ClassVar[bool] = False
     timeless = True
-
-    @property
-    def name(self) -> str:
-        """Separation."""
-        return "separation"
-
-    @property
-    def needs_beliefs(self) -> bool:
-        """No."""
-        return False
 
     @property
     def reach(self) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -36,16 +37,8 @@ class VoidProbability(Alone, Checked):
 
     radius: Positive
     probability: Probability
-
-    @property
-    def name(self) -> str:
-        """Void probability."""
-        return "void_probability"
-
-    @property
-    def needs_beliefs(self) -> bool:
-        """Yes."""
-        return True
+    name: ClassVar[str] = "void_probability"
+    needs_beliefs: ClassVar[bool] = True
 
     def violations(self, situation: Situation) -> tuple[Floats, ...]:
         """By how much the void probability is less than `probability`, the sum over the times."""
