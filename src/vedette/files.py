@@ -9,6 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import BinaryIO
 
+from vedette.errors import InputError
+
 
 def write_whole(target: Path, write: Callable[[BinaryIO], object]) -> None:
     """Let `write` fill a new file beside `target`, make it durable, and put it in the place of `target`.
@@ -27,6 +29,16 @@ def write_whole(target: Path, write: Callable[[BinaryIO], object]) -> None:
         with contextlib.suppress(OSError):
             temporary.unlink()
         raise
+
+
+def write_file(target: Path, write: Callable[[BinaryIO], object], *, make_folder: bool = False) -> None:
+    """The same, on request with the folder made. Raises `InputError` where that cannot be done."""
+    try:
+        if make_folder:
+            target.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(target, write)
+    except OSError as error:
+        raise InputError(f"{target}: expected a file that can be written; {error}") from error
 
 
 def sync_folder(folder: Path) -> None:

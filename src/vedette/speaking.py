@@ -87,6 +87,3 @@ def _cell(value: Any) -> str:
 
 def _html_row(tag: str, cells: Any) -> str:
     return "<tr>" + "".join(f"<{tag}>{escape(elided(cell))}</{tag}>" for cell in cells) + "</tr>"
-
-
-__all__ = ["Speaking", "Tabled", "in_short"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, wait
@@ -13,6 +14,12 @@ _PIECE_TIME = 0.1
 # Naming the types of its bundles costs a call of a kernel up to half a millisecond: few pieces, the first of one item.
 _GROWTH = 8
 _WAIT_TIME = 0.2
+
+
+def processors() -> int:
+    """Processors that this process may use."""
+    affinity = getattr(os, "sched_getaffinity", None)
+    return len(affinity(0)) if affinity else os.cpu_count() or 1
 
 
 def run_chunks(work: Callable[[int, int], None], num_items: int, num_threads: int, *, first_piece: int = 1) -> None:

@@ -13,7 +13,7 @@ from reports.test_single import data_of, tracked
 from vedette.campaigns.results import CampaignResults
 from vedette.errors import InputError
 from vedette.evaluation.figures import video
-from vedette.evaluation.track_table import utc_text
+from vedette.evaluation.track_formats import utc_text
 from vedette.reports import write_demo, write_report, write_run_report
 
 PROGRAM = chromium()

@@ -120,8 +120,11 @@ def _opened(path: Path, mode: str = "ro") -> sqlite3.Connection:
     return database
 
 
-def _text(content: bytes) -> str:
-    return content.decode(errors="replace")
+def _text(content: bytes) -> str | bytes:
+    try:
+        return content.decode()
+    except UnicodeDecodeError:  # refused where a text is expected
+        return content
 
 
 def check_tables(path: Path, database: sqlite3.Connection) -> None:

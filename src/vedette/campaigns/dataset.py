@@ -42,8 +42,9 @@ def dataset_of_scans(campaign: Campaign, scans: pa.Table | None) -> xarray.Datas
     times = np.full((len(cells), num_scans), np.nan)
     times[of_cells, steps - 1] = table["time_s"].to_numpy()  # the same in every run of a cell
     del values["time_s"]
+    units = {name: {"units": unit} if (unit := unit_of(name)) else {} for name in values}
     return xarray.Dataset(
-        {name: (("cell", "run", "step"), array, _attributes(name)) for name, array in values.items()},
+        {name: (("cell", "run", "step"), array, units[name]) for name, array in values.items()},
         coords={
             "cell": cells,
             "run": np.arange(campaign.num_runs),
@@ -59,8 +60,3 @@ def _values(campaign: Campaign, axis: str) -> list[Any]:
     """The axis by cell; truths as text, as NetCDF has none."""
     values = [setting_of(campaign, cell, axis) for cell in campaign.cells]
     return [str(value) if isinstance(value, bool) else value for value in values]
-
-
-def _attributes(name: str) -> dict[str, str]:
-    unit = unit_of(name)
-    return {"units": unit} if unit else {}

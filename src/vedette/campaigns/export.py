@@ -12,7 +12,7 @@ import pyarrow as pa
 from vedette.campaigns.results import CampaignResults
 from vedette.campaigns.tables import in_schema, schema_of, tables_of_record
 from vedette.errors import InputError
-from vedette.files import write_whole
+from vedette.files import write_file
 from vedette.simulation.records import RunRecord
 from vedette.text import spreadsheet_text
 
@@ -69,7 +69,8 @@ def export_netcdf(results: CampaignResults | RunRecord, folder: Path | str) -> t
     if isinstance(results, RunRecord):
         raise InputError("netcdf: expected the results of a campaign, over cells and runs; got a single run")
     content = bytes(results.dataset().to_netcdf(engine="scipy"))
-    return (_write(Path(folder) / NETCDF, lambda file: file.write(content)),)
+    write_file(file := Path(folder) / NETCDF, lambda stream: stream.write(content), make_folder=True)
+    return (file,)
 
 
 FORMATS: dict[str, Callable[[CampaignResults | RunRecord, Path], tuple[Path, ...]]] = {
@@ -112,13 +113,5 @@ def _join(
 ) -> Path:
     schema = schema_of(parts.values())
     tables = (in_schema(pa.ipc.open_file(str(path)).read_all(), schema) for path in parts)
-    return _write(target, lambda file: write(tables, schema, file))
-
-
-def _write(path: Path, write: Callable[[BinaryIO], object]) -> Path:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(path, write)
-    except OSError as error:
-        raise InputError(f"{path}: expected a file that can be written; {error}") from error
-    return path
+    write_file(target, lambda file: write(tables, schema, file), make_folder=True)
+    return target

@@ -17,7 +17,7 @@ from vedette.campaigns.cells import Campaign, Cell, safe_name
 from vedette.campaigns.shards import WHOLE, parse_shard
 from vedette.campaigns.spec import CampaignSpec, spec_from_data
 from vedette.errors import InputError
-from vedette.files import write_whole
+from vedette.files import write_file
 from vedette.reading import parse_json, read_file, said, unreadable
 from vedette.scenarios import Scenario
 from vedette.scenarios.sections import ScenarioModel
@@ -138,10 +138,7 @@ def read_manifest(folder: Path, check: VersionCheck = check_version) -> dict[str
 def write_manifest(folder: Path, manifest: Mapping[str, Any]) -> None:
     """Put the manifest in place, whole or not at all. Raises `InputError` where it cannot be written."""
     content = json.dumps(manifest, indent=1).encode() + b"\n"
-    try:
-        write_whole(folder / MANIFEST, lambda file: file.write(content))
-    except OSError as error:
-        raise InputError(f"{folder / MANIFEST}: expected a file that can be written; {error}") from error
+    write_file(folder / MANIFEST, lambda file: file.write(content))
 
 
 def contents_checksum(manifest: Mapping[str, Any]) -> str:

@@ -25,7 +25,7 @@ from vedette.campaigns.manifest import (
 from vedette.campaigns.results import CampaignResults, open_results
 from vedette.campaigns.running import TABLES
 from vedette.campaigns.shards import Shard, owner, parse_shard
-from vedette.campaigns.store import check_place
+from vedette.campaigns.store import make_folder
 from vedette.errors import InputError
 from vedette.kernels.base.types import Ints
 
@@ -147,11 +147,7 @@ def _joined(place: Path, manifest: dict[str, Any], whole: dict[str, Any]) -> dic
 
 def _fill(target: Path, whole: dict[str, Any], shares: Sequence[_Share]) -> int:
     """Take the runs in; returns how many are new."""
-    try:
-        check_place(target)
-        target.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{target}: expected a place for a results folder; {error}") from error
+    make_folder(target)
     started = (target / MANIFEST).exists()
     writer = Writer(target)
     try:

@@ -6,7 +6,7 @@ import csv
 import hashlib
 import io
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -79,50 +79,47 @@ def scene_table(scene: Scene, folder: Path) -> SceneTable | None:
     found = [each for each in sorted(place.iterdir()) if each.is_dir()] if place.is_dir() else []
     opened = [open_results(each) for each in sorted(found, key=lambda each: (each.name != OWN, each.name))]
     tried = [each for results in opened for each in _tried(scene, results)]
-    if not tried or tried[0].label != scene.beside[0] or not tried[0].ospa:
+    if not tried or tried[0][0].label != scene.beside[0]:
         return None
-    first = tried[0].ospa
+    first = tried[0][1]
     scenario = opened[0].campaign.cells[0].scenario
     model = scenario.model.model_copy(update={"planners": {}, "metrics": {}})
     text = dump_scenario(model, folder=scenario.folder)
-    standings = tuple(filter(None, (_standing(each, first, each is tried[0]) for each in tried)))
+    others = [replace(own, difference=_difference(ospa, first)) for own, ospa in tried[1:]]
+    standings = (tried[0][0], *others)
     return SceneTable(scene, scenario.model.ospa.unit, hashlib.sha256(text.encode()).hexdigest(), standings)
 
 
-@dataclass(frozen=True, slots=True)
-class _Tried:
-    label: str
-    is_own: bool
-    ospa: dict[int, float]  # by run, lost ones at the cutoff
-    lost: tuple[str, ...]
-    cardinality: Floats
-    nees: Floats
-    seconds: Floats
-    counts: dict[str, Floats]
-
-
-def _tried(scene: Scene, results: CampaignResults) -> Iterator[_Tried]:
+def _tried(scene: Scene, results: CampaignResults) -> Iterator[tuple[Standing, dict[int, float]]]:
+    """The strategies that have runs, not yet compared with another; and their OSPA by run, lost ones at the cutoff."""
     for cell in results.campaign.cells:
         label = str(cell.settings["planner" if scene.role == "planner" else "variant"])
         lost = {each.run: each.message for each in results.failures() if each.cell == cell.name}
         ospa = dict.fromkeys(lost, float(cell.scenario.model.ospa.cutoff))
         ensemble = results.ensemble(cell.name) if results.finished(cell.name) else None
-        cardinality = nees = np.empty(0)
+        cardinality = nees = seconds = np.empty(0)
         if ensemble is not None:
             comparison = scored(cell.scenario, {label: ensemble})
             ospa |= dict(zip(ensemble.runs.tolist(), comparison.run_means(label).tolist(), strict=True))
             cardinality = comparison.run_means(label, "cardinality_error")
             nees = comparison.run_means(label, "position_nees_mean") / 2.0
-        yield _Tried(
+            nees, seconds = nees[~np.isnan(nees)], _spent(scene, ensemble)
+        if not ospa:
+            continue
+        standing = Standing(
             label,
             results.folder.name == OWN,
-            ospa,
-            tuple(lost[run] for run in sorted(lost)),
-            cardinality,
-            nees[~np.isnan(nees)],
-            np.empty(0) if ensemble is None else _spent(scene, ensemble),
-            {name: np.asarray(() if ensemble is None else ensemble.counts.get(name, ())) for name in COUNTED},
+            len(ospa),
+            len(lost),
+            summarise([ospa[run] for run in sorted(ospa)]),
+            None,
+            _mean(cardinality),
+            summarise(nees) if len(nees) and nees.mean() > _SAYS_NOTHING else None,
+            float(np.median(seconds)) if len(seconds) else np.nan,
+            {name: _mean(np.asarray(() if ensemble is None else ensemble.counts.get(name, ()))) for name in COUNTED},
+            lost[min(lost)] if lost else "",
         )
+        yield standing, ospa
 
 
 def _spent(scene: Scene, ensemble: Ensemble) -> Floats:
@@ -132,26 +129,12 @@ def _spent(scene: Scene, ensemble: Ensemble) -> Floats:
     return np.add(ensemble.seconds["filter"], ensemble.seconds["fusion"], dtype=np.float64)
 
 
-def _standing(tried: _Tried, first: Mapping[int, float], is_first: bool) -> Standing | None:
-    if not tried.ospa:
+def _difference(ospa: Mapping[int, float], first: Mapping[int, float]) -> Summary | None:
+    """Of a strategy to the first, over the runs that both have; None without any."""
+    common = sorted(ospa.keys() & first.keys())
+    if not common:
         return None
-    common = sorted(tried.ospa.keys() & first.keys())
-    more = None
-    if common and not is_first:
-        more = paired_difference([tried.ospa[run] for run in common], [first[run] for run in common]).summary
-    return Standing(
-        tried.label,
-        tried.is_own,
-        len(tried.ospa),
-        len(tried.lost),
-        summarise([tried.ospa[run] for run in sorted(tried.ospa)]),
-        more,
-        _mean(tried.cardinality),
-        summarise(tried.nees) if len(tried.nees) and tried.nees.mean() > _SAYS_NOTHING else None,
-        float(np.median(tried.seconds)) if len(tried.seconds) else np.nan,
-        {name: _mean(values) for name, values in tried.counts.items()},
-        tried.lost[0] if tried.lost else "",
-    )
+    return paired_difference([ospa[run] for run in common], [first[run] for run in common]).summary
 
 
 def _mean(values: Floats) -> float:

@@ -53,11 +53,7 @@ class Store(Writer):
         """
         target = Path(folder)
         fresh = new_manifest(campaign)
-        try:
-            check_place(target)
-            target.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(f"{target}: expected a place for a results folder; {error}") from error
+        make_folder(target)
         if (target / MANIFEST).exists():  # before the lock, which is a file of its own
             check_same(target, read_manifest(target), fresh)
         return cls(target, campaign, fresh)
@@ -127,7 +123,16 @@ class Store(Writer):
         self.close()
 
 
-def check_place(folder: Path) -> None:
+def make_folder(folder: Path) -> None:
+    """Make a results folder, or leave one as it is. Raises `InputError` where something else is there, or no place."""
+    try:
+        _check_place(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder}: expected a place for a results folder; {error}") from error
+
+
+def _check_place(folder: Path) -> None:
     """`InputError` unless the folder is new, empty but for what a killed start leaves, or has a manifest."""
     if not folder.exists() or (folder / MANIFEST).exists():
         return

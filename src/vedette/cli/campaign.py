@@ -15,10 +15,11 @@ from vedette.cli.errors import named_options, usage_error
 from vedette.cli.options import Trust, Workers
 from vedette.cli.output import complain, console, note, publish, say
 from vedette.cli.results import print_failures
-from vedette.cli.running import Approval, compile_if_cold, interruptible, processors
+from vedette.cli.running import Approval, compile_if_cold, interruptible
 from vedette.extras import need
 from vedette.processes import load_ahead
 from vedette.text import counted
+from vedette.threads import processors
 
 if TYPE_CHECKING:
     from vedette.campaigns import Campaign, Failed, Outcome

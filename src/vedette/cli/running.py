@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -216,9 +215,3 @@ def _draw_run(record: RunRecord, scenario: Scenario, folder: Path) -> None:
     for decision in record.decisions:
         if decision.plan.tables and any(len(actions) > 1 for actions in decision.plan.actions):
             save_figure(reward_figure(decision.plan, scene=scene), folder / f"rewards-{decision.time:g}s")
-
-
-def processors() -> int:
-    """Processors that this process may use."""
-    affinity = getattr(os, "sched_getaffinity", None)
-    return len(affinity(0)) if affinity else os.cpu_count() or 1

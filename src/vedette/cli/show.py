@@ -60,18 +60,14 @@ def show(
 
 
 def _print_tables(scenario: Scenario) -> None:
+    from vedette.scenarios.summary import facts
+
     console = new_console()
     console.print(scenario.name, style="bold")
     console.print(scenario.model.description)
-    for table in (_facts(scenario), _sensors(scenario), _sensing(scenario), _targets(scenario)):
+    for table in (_grid(facts(scenario.model)), _sensors(scenario), _sensing(scenario), _targets(scenario)):
         console.print()
         console.print(table)
-
-
-def _facts(scenario: Scenario) -> Table:
-    from vedette.scenarios.summary import facts
-
-    return _grid(facts(scenario.model))
 
 
 def _grid(rows: Iterable[tuple[str, str]]) -> Table:

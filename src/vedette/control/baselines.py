@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -57,17 +57,13 @@ class RandomPlanner:
     sensors: tuple[MobileSensor, ...]
     settings: PlanningSettings = field(default_factory=PlanningSettings)
     constraints: tuple[Constraint, ...] = ()
+    name: ClassVar[str] = "random"
 
     def __post_init__(self) -> None:
         check_steering(self)
         asking = [own.name for own in self.constraints if own.needs_beliefs]
         if asking and not all(labels_targets(sensor.filter) for sensor in self.sensors):
             raise reject("constraints", "none that asks where targets will be, as filters have no labels", asking[0])
-
-    @property
-    def name(self) -> str:
-        """The strategy "random"."""
-        return "random"
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """Drawn from `rng`; the beliefs are not looked at, but by constraints."""
@@ -95,17 +91,13 @@ class FixedPlanner:
     """
 
     actions: tuple[Actions, ...]
+    name: ClassVar[str] = "fixed"
 
     def __post_init__(self) -> None:
         expected = "one action of each sensor, such as Actions.of(heading_deg=30.0)"
         given = sequence("actions", self.actions, expected)
         if not given or not all(isinstance(own, Actions) and len(own) == 1 for own in given):
             raise reject("actions", expected, self.actions)
-
-    @property
-    def name(self) -> str:
-        """The strategy "fixed"."""
-        return "fixed"
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """The set actions, whatever is believed."""

@@ -201,12 +201,12 @@ def _wrapped(line: str) -> list[str]:
     return textwrap.wrap(line, _WIDTH, subsequent_indent="  ") if len(line) > _WIDTH else [line]
 
 
-def with_error(value: float, error: float | None) -> str:
+def with_error(value: float, error: float | None, sign: str = "+-") -> str:
     """`1.234 +- 0.05`."""
-    return f"{value:.4g}" + ("" if error is None else f" +- {error:.2g}")
+    return f"{value:.4g}" + ("" if error is None else f" {sign} {error:.2g}")
 
 
-def _number(value: float, scale: float) -> str:
+def number_text(value: float, scale: float) -> str:
     """Four digits; 0 for what is rounding beside the scale."""
     return "0" if abs(value) <= _SAME * abs(scale) else f"{value:.4g}"
 
@@ -214,7 +214,7 @@ def _number(value: float, scale: float) -> str:
 def _of_choice(found: Explanation) -> list[str]:
     if found.reward is None:
         return [f"{found.planner}: {'; '.join(found.chosen)}"]
-    start = "" if found.baseline is None else f"; {_number(found.baseline, found.reward)} without any scan"
+    start = "" if found.baseline is None else f"; {number_text(found.baseline, found.reward)} without any scan"
     lines = [f"{found.planner}: reward {with_error(found.reward, found.standard_error)}{start}"]
     bound = "" if found.bound is None else f"; {found.bound}"
     lines.append(f"{counted(found.evaluations, 'choice')} evaluated{bound}")
@@ -243,7 +243,7 @@ def _of_targets(found: Explanation) -> list[str]:
     scale = float(np.abs(gains.total).max(initial=0.0))
     for which, name in rows:
         total, existence, localisation = (
-            _number(float(part[which].sum()), scale) for part in (gains.total, gains.existence, gains.localisation)
+            number_text(float(part[which].sum()), scale) for part in (gains.total, gains.existence, gains.localisation)
         )
         lines.append(f"{name:18s}{total:>12s}{existence:>14s}{localisation:>15s}")
     if found.of_undetected:

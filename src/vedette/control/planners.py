@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
@@ -44,6 +45,7 @@ class JointPlanner:
     search: JointSearch = field(default_factory=AutomaticSearch)
     constraints: tuple[Constraint, ...] = ()
     notes: tuple[str, ...] = ()
+    name: ClassVar[str] = "jdm"
 
     def __post_init__(self) -> None:
         check_steering(self)
@@ -56,11 +58,6 @@ class JointPlanner:
         if stay_glmbs(self.sensors, self.fusion, self.settings, self.reward):
             expected = f"filters of LMBs, or of products of GLMBs, or settings.max_glmb_targets of 0, for {purpose}"
             raise reject("sensors", expected, "filters of GLMBs")
-
-    @property
-    def name(self) -> str:
-        """The strategy "jdm"."""
-        return "jdm"
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """The joint action of largest mean reward that the search finds; of equal ones the first in printed order.
@@ -104,15 +101,11 @@ class IndependentPlanner:
     reward: AnyReward = field(default_factory=ExpectedLossReward)
     constraints: tuple[Constraint, ...] = ()
     notes: tuple[str, ...] = ()
+    name: ClassVar[str] = "idm"
 
     def __post_init__(self) -> None:
         check_steering(self)
         check_valuing(self.fusion, self.reward, self.notes)
-
-    @property
-    def name(self) -> str:
-        """The strategy "idm"."""
-        return "idm"
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """Each sensor's action of largest mean reward; arguments, ties and errors as `JointPlanner.plan`."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -56,14 +56,10 @@ class ProgramPlanner:
     start_seconds: float = 60.0
     _program: Program | None = field(init=False, default=None, repr=False)
     _step: int = field(init=False, default=0, repr=False)
+    name: ClassVar[str] = "program"
 
     def __post_init__(self) -> None:
         check_steering(self)
-
-    @property
-    def name(self) -> str:
-        """The strategy "program"."""
-        return "program"
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """What the program answers.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
@@ -28,6 +27,7 @@ from vedette.models.fields import (
 )
 from vedette.platforms import Platform
 from vedette.platforms.base import check_platform
+from vedette.threads import processors
 
 Belief: TypeAlias = GLMB | LMB  # that is planned on
 IDEAL_MODES = {"ideal": IDEAL, "expected": EXPECTED, "sampled": SAMPLED}
@@ -121,10 +121,7 @@ class PlanningSettings:
 
     def threads(self) -> int:
         """Number of threads to use."""
-        if self.num_threads:
-            return self.num_threads
-        affinity = getattr(os, "sched_getaffinity", None)
-        return len(affinity(0)) if affinity else os.cpu_count() or 1
+        return self.num_threads or processors()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

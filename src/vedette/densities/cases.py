@@ -148,6 +148,3 @@ def lmb_cases(own: LabelledCases) -> LabelledCases:
     run_chunks(work, own.num_cases, own.num_threads)
     known = [tuple(label) for label in labels.tolist()]
     return LabelledCases.of_lmbs(known, logits, means, covs, num_samples=own.num_samples, num_threads=own.num_threads)
-
-
-__all__ = ["LabelledCases", "Place", "lmb_cases"]

@@ -125,6 +125,3 @@ def _held(array: NDArray[Any]) -> NDArray[Any]:
         view = np.array(array, order="C").view()
     view.setflags(False)  # type: ignore[call-arg]  # by name, or as an attribute, it takes three times as long
     return view
-
-
-__all__ = ["Container", "MultiTarget", "for_kernel", "kernel_arrays", "unchecked"]

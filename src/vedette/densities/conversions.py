@@ -195,18 +195,3 @@ def lmb_on_label_sets(lmb: LMB, sets: Sequence[Sequence[tuple[int, ...]]]) -> GL
     offsets = np.cumsum([0, *(len(hyp) for hyp in hyps)])
     members = np.array([track for hyp in hyps for track in hyp], np.int64)
     return unchecked(GLMB, lmb.tracks, offsets, members, log_weights)
-
-
-__all__ = [
-    "DEFAULT_LOG_MIN_WEIGHT",
-    "DEFAULT_MERGE_DISTANCE",
-    "as_glmb",
-    "as_lmb",
-    "collapsed",
-    "lmb_on_label_sets",
-    "marginalise",
-    "marginalised_factors",
-    "names_settled",
-    "reduced_lmb",
-    "settled_lmb",
-]

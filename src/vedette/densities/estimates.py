@@ -263,15 +263,3 @@ def track_histories(estimates: Sequence[Estimate], times: Floats) -> tuple[Track
             )
         )
     return tuple(histories)
-
-
-__all__ = [
-    "Estimate",
-    "TrackHistory",
-    "at_peaks",
-    "best_estimate",
-    "map_estimate",
-    "marginal_estimate",
-    "track_histories",
-    "unlabelled_estimate",
-]

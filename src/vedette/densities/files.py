@@ -18,7 +18,7 @@ from vedette.densities.multi_bernoulli import MultiBernoulli
 from vedette.densities.tracks import TrackTable
 from vedette.densities.unlabelled import IidCluster, Poisson
 from vedette.errors import InputError, VedetteError
-from vedette.files import write_whole
+from vedette.files import write_file
 from vedette.reading import read_arrays, read_file, said, unreadable
 from vedette.text import shown
 
@@ -47,11 +47,7 @@ def save_density(path: str | os.PathLike[str], density: Density) -> None:
         raise InputError(f"density: expected a multi-target density; got {type(density).__name__}")
     arrays: dict[str, Any] = {"format": FORMAT_NAME, "version": FORMAT_VERSION, "kind": kind}
     arrays |= {name: array for name in _names(type(density)) if (array := attrgetter(name)(density)) is not None}
-    target = Path(path)
-    try:
-        write_whole(target, lambda file: np.savez(file, **arrays))
-    except OSError as fault:
-        raise InputError(f"{target}: expected a file that can be written; {fault}") from fault
+    write_file(Path(path), lambda file: np.savez(file, **arrays))
 
 
 def load_density(path: str | os.PathLike[str]) -> Density:
@@ -99,6 +95,3 @@ def _build(kind: str, arrays: Mapping[str, Any]) -> Density:
     num = len(own) - len(fields(container)) + 1
     made: Density = container(TrackTable(*own[:num]), *own[num:]) if num > 1 else container(*own)
     return made
-
-
-__all__ = ["FORMAT_NAME", "FORMAT_VERSION", "load_density", "save_density"]

@@ -163,6 +163,3 @@ def _check_indices(field: str, indices: Ints, num_tracks: int) -> None:
     if faulty.any():
         place = int(np.flatnonzero(faulty)[0])
         raise InputError(f"{field}[{place}]: expected an index into {num_tracks} tracks; got {indices[place]}")
-
-
-__all__ = ["GLMB", "Hypotheses"]

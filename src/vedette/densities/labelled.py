@@ -270,6 +270,3 @@ def poisson_binomial(existence_logit: Floats) -> Floats:
     """Distribution of the number of independent targets that exist."""
     chances = np.stack([expit(-existence_logit), expit(existence_logit)], axis=1)
     return convolved(chances.ravel(), 2 * np.arange(len(chances) + 1))
-
-
-__all__ = ["LABELLED", "LMB", "Labelled", "poisson_binomial"]

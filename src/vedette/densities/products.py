@@ -194,6 +194,3 @@ def _find_members(cases: LabelledCases, target: LabelledCases, places: Ints, ref
         found += [versions.get(label, []) for label in labels]
     flat = np.array([m for own in found for m in own], np.int64)
     return Places(np.array(members, np.int64), offsets_of([len(own) for own in found]), flat, own_sets, references)
-
-
-__all__ = ["PowerProducts", "Share", "check_exponents", "lay_out_products"]

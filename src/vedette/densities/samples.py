@@ -162,14 +162,3 @@ def _draw_gaussians(means: Floats, covs: Floats, components: Ints, rng: np.rando
         raise NumericalError("covs: expected positive definite covariances to sample from; got another") from None
     noise = rng.standard_normal((len(components), means.shape[1]))
     return np.asarray(means[components] + np.einsum("nij,nj->ni", factors[which], noise))
-
-
-__all__ = [
-    "MultiTargetSamples",
-    "sample_glmb",
-    "sample_iid_cluster",
-    "sample_labelled",
-    "sample_lmb",
-    "sample_multi_bernoulli",
-    "sample_poisson",
-]

@@ -99,6 +99,3 @@ def _shared_out(levels: list[tuple[Floats, Ints, Ints]], number: int) -> Ints:
         both = np.stack([first, counts - first], axis=1).ravel()
         counts = both[: len(before) - 1]
     return counts
-
-
-__all__ = ["cardinality_distribution", "existence_probabilities", "heaviest_tracks", "labelled"]

@@ -113,6 +113,3 @@ def state_columns(means: Floats, covs: Floats) -> dict[str, list[float]]:
 def _place(state: Floats) -> str:
     told = [f"{x:.1f}" if abs(x) < _LARGE else f"{x:.3g}" for x in state[:2].tolist()]
     return f"({', '.join(told)})"
-
-
-__all__ = ["Hypothesis", "Target", "Targets", "indices_or_none", "state_columns"]

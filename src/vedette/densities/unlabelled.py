@@ -212,6 +212,3 @@ class IidCluster(Unlabelled):
         checks.check_mixtures("", offsets, self.log_weights, self.means, self.covs, len(offsets) - 1, error)
         if num == 0 and np.any(self.log_cardinality[1:] > -np.inf):
             raise error("log_weights: expected the density of a target, as there may be some; got no component")
-
-
-__all__ = ["IidCluster", "Poisson", "Unlabelled"]

@@ -201,6 +201,3 @@ def reference_unit_volume(density: Labelled | Poisson) -> float:
         raise InputError("density: expected one that expects a target; got an expected number of 0")
     mean_cov = np.einsum("k,kij->ij", weights / total, covs)
     return float(math.exp(0.5 * (density.state_dim * math.log(4.0 * math.pi) + np.linalg.slogdet(mean_cov)[1])))
-
-
-__all__ = ["power_integral", "power_integrals", "reference_unit_volume", "renyi"]

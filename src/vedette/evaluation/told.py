@@ -36,6 +36,3 @@ def told_by(record: RunRecord, scenario: Scenario) -> Told:
     if model.targets.kind == "recorded":
         names = tuple(str(track.name) for track in model.targets.source(model, scenario.folder).tracks)
     return Told(start, is_utc, names)
-
-
-__all__ = ["Told", "told_by"]

@@ -137,6 +137,3 @@ def utc_text(time: float) -> str:
 def _most_common(names: Sequence[str | None]) -> str | None:
     found = [name for name in names if name is not None]
     return max(sorted(set(found)), key=found.count) if found else None
-
-
-__all__ = ["czml", "geojson", "mcap", "utc_text"]

@@ -16,7 +16,7 @@ from vedette.evaluation.metrics.matching import match_run
 from vedette.evaluation.told import told_by
 from vedette.evaluation.track_formats import czml, geojson, mcap, utc_text
 from vedette.extras import need
-from vedette.files import write_whole
+from vedette.files import write_file
 from vedette.recorded import Origin
 from vedette.scenarios import Scenario
 from vedette.simulation.records import RunRecord
@@ -93,11 +93,7 @@ def write_tracks(path: Path, table: Mapping[str, Sequence[Any]]) -> None:
     if ending not in ENDINGS:
         raise InputError(f"{path}: expected a file that ends with {', '.join(ENDINGS)}; got {ending or 'none'}")
     content = _MAKERS[ending](table)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(path, lambda file: file.write(content))
-    except OSError as error:
-        raise InputError(f"{path}: expected a file that can be written; {error}") from error
+    write_file(path, lambda file: file.write(content), make_folder=True)
 
 
 def _name(target: int | None, names: Sequence[str]) -> str | None:
@@ -128,5 +124,3 @@ def _parquet(table: Mapping[str, Sequence[Any]]) -> bytes:
 
 _MAKERS = {".csv": _csv, ".parquet": _parquet, ".geojson": geojson, ".czml": czml, ".mcap": mcap}
 ENDINGS = tuple(_MAKERS)
-
-__all__ = ["ENDINGS", "table_of_run", "track_table", "utc_text", "write_tracks"]

@@ -12,7 +12,7 @@ from vedette.kernels.association.marginals import Association
 from vedette.kernels.association.propagation import propagate_beliefs
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import params_vector
-from vedette.models.fields import Count, NonNegative, check_fields, part
+from vedette.models.fields import Checked, Count, NonNegative, part
 from vedette.models.functions import ModelFunction, model_function, require_kind
 from vedette.models.probe import probe_marginals
 
@@ -41,7 +41,7 @@ class Ranked:
 
 @part("gibbs", "assignment")
 @dataclass(frozen=True, slots=True)
-class Gibbs:
+class Gibbs(Checked):
     """Joint choices drawn by a Gibbs sampler (Vo, Vo, Hoang 2017, Algorithm 1), for scenes too busy to rank.
 
     Attributes:
@@ -53,9 +53,6 @@ class Gibbs:
 
     num_samples: Count = 1000
     finds: ClassVar[str] = "choices"
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,7 +99,7 @@ def belief_propagation(offsets: Ints, columns: Ints, log_weights: Floats, params
 
 @part("belief_propagation", "assignment")
 @dataclass(frozen=True, slots=True)
-class BeliefPropagation:
+class BeliefPropagation(Checked):
     """Association marginals by loopy belief propagation (Williams and Lau 2014), for an LMB.
 
     Its cost grows with the number of options, however many tracks contend. Exact where the tracks and measurements that
@@ -121,9 +118,6 @@ class BeliefPropagation:
     tolerance: NonNegative = 1e-6
     finds: ClassVar[str] = "marginals"
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-
     def to_kernel(self) -> Association:
         """The same, as kernels take it."""
         return Association(belief_propagation, np.array([float(self.max_sweeps), float(self.tolerance)]))
@@ -138,15 +132,3 @@ def check_marginals(value: Any) -> None:
     if not isinstance(value, OfMarginals):
         expected = "Ranked, BeliefPropagation, Marginals or another with to_kernel()"
         raise InputError(f"assignment: expected {expected}; got {type(value).__name__}")
-
-
-__all__ = [
-    "Assignment",
-    "BeliefPropagation",
-    "Gibbs",
-    "Marginals",
-    "OfChoices",
-    "OfMarginals",
-    "Ranked",
-    "check_marginals",
-]

@@ -18,7 +18,8 @@ from vedette.filters.limits import Limits
 from vedette.filters.multi_sensor import InTurn, MultiSensorFilter
 from vedette.filters.protocols import FilterInfo
 from vedette.kernels.base.types import Bools, FactoredGlmb, Ints
-from vedette.kernels.steps.factored import FactoredReport, Factoring, step_factored
+from vedette.kernels.steps.factor_updates import Factoring
+from vedette.kernels.steps.factored import FactoredReport, step_factored
 from vedette.kernels.steps.in_view import in_view
 from vedette.models.arguments import dimension, non_negative
 from vedette.models.fields import Count, L1Error

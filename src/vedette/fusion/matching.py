@@ -204,6 +204,3 @@ class Matched:
     def lay_out(self, cases: Sequence[LabelledCases], prediction: GLMB | LMB) -> None:
         """None: which labels match differs from case to case. Of matched beliefs, ask the rule."""
         return None
-
-
-__all__ = ["GATE_PROBABILITY", "LIKELY", "OWN_LABELS", "Matched", "common_names", "match_labels", "relabelled"]

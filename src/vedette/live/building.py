@@ -62,6 +62,3 @@ def live_of(
         ahead=ahead,
         seed=seed,
     )
-
-
-__all__ = ["live_of"]

@@ -85,7 +85,8 @@ class Keeping:
         if self._snapshot is None or self.state.num_lines == self._saved_lines:
             return
         try:
-            save_snapshot(self._snapshot, {"of": self._of, **_parts(self.state)})
+            parts = {field.name: getattr(self.state, field.name) for field in fields(self.state)}
+            save_snapshot(self._snapshot, {"of": self._of, **parts})
             self._saved_lines = self.state.num_lines
         except InputError as error:
             self._tell(f"no snapshot: {error}")
@@ -96,10 +97,6 @@ class Keeping:
         self.save()
         if self._record is not None:
             self._record.close()
-
-
-def _parts(state: LiveState) -> dict[str, Any]:
-    return {field.name: getattr(state, field.name) for field in fields(state)}
 
 
 def _state_of(parts: dict[str, Any], path: Path, of: str) -> LiveState:
@@ -138,6 +135,3 @@ def _cut(file: BinaryIO) -> None:
     if end < size:
         file.truncate(end)
     file.seek(end)
-
-
-__all__ = ["Keeping"]

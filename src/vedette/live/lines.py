@@ -61,6 +61,3 @@ async def lines_of(source: Any) -> AsyncIterator[bytes]:
             yield line
     for line in splitter.rest():
         yield line
-
-
-__all__ = ["CHUNK", "LineSplitter", "lines_of"]

@@ -13,7 +13,7 @@ import numpy as np
 from vedette.control import Planner
 from vedette.densities import Estimator
 from vedette.errors import VedetteError
-from vedette.evaluation.track_table import utc_text
+from vedette.evaluation.track_formats import utc_text
 from vedette.live.messages import Message, read_message
 from vedette.models.arguments import reject
 from vedette.recorded import Conventions, Origin, Site
@@ -228,6 +228,3 @@ def _finite(value: Any) -> Any:
     if isinstance(value, list):
         return [_finite(each) for each in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-__all__ = ["Answer", "Live", "LiveState", "encoded"]

@@ -142,6 +142,3 @@ def _pose(given: Any, field: str, site: Site) -> tuple[dict[str, float], list[fl
 
 def _is_number(value: Any) -> bool:
     return not isinstance(value, str) and is_number(value)
-
-
-__all__ = ["MOST_BYTES", "MOST_MEASUREMENTS", "Message", "read_message"]

@@ -196,6 +196,3 @@ async def _refuse(writer: asyncio.StreamWriter, text: str) -> None:
 def taken(error: OSError) -> InputError:
     """What is said of an address that cannot be had."""
     return InputError(f"--listen: expected an address that is free; {error.strerror or error}")
-
-
-__all__ = ["Client", "Exchange", "TcpServer", "check_address", "is_loopback"]

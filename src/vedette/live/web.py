@@ -189,6 +189,3 @@ def _name(socket: ServerConnection) -> str:
 def _token(request: Request, query: str) -> str | None:
     kind, _, given = request.headers.get("Authorization", "").partition(" ")
     return given if kind == "Bearer" else parse_qs(query).get("token", [None])[0]
-
-
-__all__ = ["Screen", "WebServer"]

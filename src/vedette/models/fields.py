@@ -1,7 +1,7 @@
 """What the numbers of a part may be: types that say it once, for its constructor and for the scenario file.
 
-`num_restarts: Natural = 2` in a dataclass is a field that its constructor checks by `check_fields`, and that the
-section of the same part in a scenario reads and describes (`vedette.scenarios.sections.derived`).
+`num_restarts: Natural = 2` in a dataclass is a field that its constructor checks (`Checked`), and that the section of
+the same part in a scenario reads and describes (`vedette.scenarios.sections.derived`).
 """
 
 from __future__ import annotations
@@ -111,6 +111,15 @@ def check_fields(made: Any, prefix: str = "") -> None:
         value = getattr(made, name)
         if value is not None or not optional:
             check(field, value)
+
+
+class Checked:
+    """A dataclass whose constructor holds its fields against their types (`check_fields`)."""
+
+    __slots__ = ()
+
+    def __post_init__(self) -> None:
+        check_fields(self)
 
 
 @cache

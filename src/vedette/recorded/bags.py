@@ -40,9 +40,9 @@ def read_bag(file: Path, *, reports: bool) -> tuple[dict[str, list[Any]], list[i
         raise InputError(f"{file}: expected a ROS 2 bag; it cannot be read: {type(error).__name__}: {said}") from error
     if not rows:
         raise InputError(f"{file}: expected messages {' or '.join(kinds)}; got none")
-    dates = min(row[1] for row in rows) > _FIRST_DATE
+    dates, epoch = min(row[1] for row in rows) > _FIRST_DATE, datetime.fromtimestamp(0, UTC)
     columns: dict[str, list[Any]] = {
-        "time": [_date(row[1]) if dates else row[1] for row in rows],
+        "time": [epoch + timedelta(seconds=row[1]) if dates else row[1] for row in rows],
         "id" if reports else "sensor": [row[2] for row in rows],
         "longitude" if reports else "x": [row[3][0] for row in rows],
         "latitude" if reports else "y": [row[3][1] for row in rows],
@@ -69,10 +69,3 @@ def _places(message: Any) -> list[tuple[float | None, float | None]]:
     if message.__msgtype__ == _POINT:
         return [(message.point.x, message.point.y)]
     return [(pose.position.x, pose.position.y) for pose in message.poses] or [(None, None)]
-
-
-def _date(stamp: float) -> datetime:
-    return datetime.fromtimestamp(0, UTC) + timedelta(seconds=stamp)
-
-
-__all__ = ["BAG_ENDINGS", "read_bag"]

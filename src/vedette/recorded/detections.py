@@ -108,6 +108,3 @@ def elements_of(detection: Any, quantities: Sequence[str | None], model: Any, pl
         place_of = quantities.index("bearing")
         elements[place_of] = math.remainder(elements[place_of] + float(np.ravel(rotation)[-1]), 2.0 * math.pi)
     return tuple(element for quantity, element in zip(quantities, elements, strict=True) if quantity is not None)
-
-
-__all__ = ["table_of_detections"]

@@ -52,6 +52,3 @@ def _are_there(table: Table, names: Iterable[str], rows: list[int]) -> bool:
 def _is_there(table: Table, name: str, row: int) -> bool:
     cell: Any = table.columns[name][row]
     return not is_empty(cell) and str(cell).strip().lower() not in _NOTHING
-
-
-__all__ = ["is_opensky", "of_opensky"]

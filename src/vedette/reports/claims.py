@@ -69,7 +69,8 @@ def _claim(pair: tuple[str, str], paired: PairedDifference, p_value: float, numb
     sentence = _SENTENCES[verdict](*names, paired, unit)
     sentence = sentence[0].upper() + sentence[1:]
     if number > 1 and verdict != "unknown":
-        sentence = f"{sentence[:-1]} (p {_probability(p_value)} among {number} comparisons)."
+        told = "< 0.001" if p_value < 0.001 else f"= {p_value:.2g}"
+        sentence = f"{sentence[:-1]} (p {told} among {number} comparisons)."
     mean, low, high = (float(each) for each in (paired.summary.mean, paired.summary.low, paired.summary.high))
     share = "unknown" if verdict == "unknown" else percent(paired.share_won)
     interval = "" if verdict == "unknown" else f" ({low:+.2f} to {high:+.2f})"
@@ -82,10 +83,6 @@ def _verdict(paired: PairedDifference, p_value: float) -> Verdict:
     if p_value > 1.0 - CONFIDENCE:
         return "untold"
     return "better" if float(paired.summary.mean) > 0.0 else "worse"
-
-
-def _probability(value: float) -> str:
-    return "< 0.001" if value < 0.001 else f"= {value:.2g}"
 
 
 def _better(first: str, second: str, paired: PairedDifference, unit: str) -> str:

@@ -31,7 +31,7 @@ from vedette.kernels.base.types import Floats
 from vedette.reports.groups import Group, Strategy, axis_label, axis_unit, describe_settings
 from vedette.reports.tables import nees_over_runs, stage_seconds
 from vedette.simulation.records import RunRecord
-from vedette.text import elided
+from vedette.text import counted, elided
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,17 +143,14 @@ def _reward_drawings(group: Group) -> Iterator[Drawing]:
     for strategy in group.strategies:
         figure = _rewards(strategy)
         if figure is not None:
+            runs = counted(strategy.ensemble.num_runs, "run")
             caption = (
-                f"Rewards that {strategy.name} decided on, averaged over {_runs(strategy.ensemble.num_runs)}. The area "
-                "of a mark is the share of the runs that chose the action; joint rewards of more than two sensors are "
-                "the largest over the others. Sensors without a choice are left out; of more than six, those with the "
-                "most at stake are drawn."
+                f"Rewards that {strategy.name} decided on, averaged over {runs}. The area of a mark is the share of "
+                "the runs that chose the action; joint rewards of more than two sensors are the largest over the "
+                "others. Sensors without a choice are left out; of more than six, those with the most at stake are "
+                "drawn."
             )
             yield Drawing(f"rewards-{strategy.cell.name}", f"Rewards, {strategy.name}", caption, figure)
-
-
-def _runs(number: int) -> str:
-    return "1 run" if number == 1 else f"{number} runs"
 
 
 def _rewards(strategy: Strategy) -> Figure | None:

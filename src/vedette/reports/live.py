@@ -192,6 +192,3 @@ class LiveScreen:
         """s of each sensor since its latest scan, by the clock of the scans; None before its first."""
         newest = state.timeline.newest or 0.0
         return [None if math.isinf(last) else round(newest - last, 3) for last in state.latest]
-
-
-__all__ = ["LiveScreen", "Remembering"]

@@ -83,7 +83,8 @@ def versions_table(manifest: Mapping[str, Any]) -> Table:
     """
     columns: list[tuple[list[str], dict[str, str]]] = []
     for session in manifest.get("sessions", ()):
-        facts = _facts(session)
+        parts = {**session.get("versions", {}), **session.get("machine", {})}
+        facts = {name: str(value) for name, value in parts.items()}
         if not columns or columns[-1][1] != facts:
             columns.append(([], facts))
         columns[-1][0].append(str(session.get("started", "")))
@@ -92,11 +93,6 @@ def versions_table(manifest: Mapping[str, Any]) -> Table:
     rows += [(name, *(facts.get(name, "\N{EN DASH}") for _, facts in columns)) for name in names]
     caption = f"Made {manifest.get('created', '')}; digest of specification and scenarios {manifest.get('digest', '')}."
     return Table(caption, ("", *_headings([len(starts) for starts, _ in columns])), tuple(rows), is_words=True)
-
-
-def _facts(session: Mapping[str, Any]) -> dict[str, str]:
-    parts = {**session.get("versions", {}), **session.get("machine", {})}
-    return {name: str(value) for name, value in parts.items()}
 
 
 def _span(starts: list[str]) -> str:

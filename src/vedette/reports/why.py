@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from vedette.control.explanation import Explanation, RunnerUp, TargetGains
+from vedette.control.explanation import Explanation, RunnerUp, TargetGains, number_text, with_error
 from vedette.control.plan import Plan
 from vedette.evaluation.actions import rounded, row_words
 from vedette.text import counted
@@ -36,8 +36,8 @@ def why_data(plan: Plan, names: Sequence[str] = ()) -> dict[str, Any] | None:
 
 
 def _facts(plan: Plan, why: Explanation, reward: float, names: Sequence[str]) -> list[tuple[str, str]]:
-    start = "" if why.baseline is None else f"; {_text(why.baseline, reward)} without any scan"
-    facts = [("Reward", f"{_with_error(reward, why.standard_error)}{start}")]
+    start = "" if why.baseline is None else f"; {number_text(why.baseline, reward)} without any scan"
+    facts = [("Reward", f"{with_error(reward, why.standard_error, '±')}{start}")]
     if why.runner_up is not None:
         facts.append(("Second best", f"{_margin(why.runner_up, reward)}: {_others(plan, why.runner_up, names)}"))
     facts.append(("Evaluated", counted(why.evaluations, "choice")))
@@ -55,7 +55,7 @@ def _margin(runner_up: RunnerUp, reward: float) -> str:
         return "as good"
     ratio = runner_up.in_standard_errors
     apart = "" if ratio is None or math.isinf(ratio) else f", {ratio:.2g} standard errors"
-    return f"less by {_with_error(runner_up.margin, runner_up.standard_error)}{apart}"
+    return f"less by {with_error(runner_up.margin, runner_up.standard_error, '±')}{apart}"
 
 
 def _others(plan: Plan, runner_up: RunnerUp, names: Sequence[str]) -> str:
@@ -89,14 +89,6 @@ def _sensors(plan: Plan, why: Explanation) -> list[tuple[int, str, float, float]
             zip(plan.actions, plan.chosen, why.of_sensors.tolist(), why.without.tolist(), strict=True)
         )
     ]
-
-
-def _with_error(value: float, error: float | None) -> str:
-    return f"{value:.4g}" + ("" if error is None else f" ± {error:.2g}")
-
-
-def _text(value: float, scale: float) -> str:
-    return "0" if abs(value) <= _SAME * abs(scale) else f"{value:.4g}"
 
 
 def _number(value: float, least: float = 0.0) -> float:

@@ -189,7 +189,7 @@ def calibrated_text(scenario: Scenario, sensors: FilePath, calibration: Calibrat
     said = dict(read_yaml(read_text(sensors, "file about sensors", MOST_BYTES), str(sensors)).data)
     biases = [sensor.bias.model_dump(exclude_defaults=True) for sensor in scenario.model.sensors]
     parameters = [each.parameter for each in calibration.found]
-    values = [_rounded(each.value) for each in calibration.found]
+    values = [float(f"{each.value:.7g}") for each in calibration.found]  # digits far beyond what is known
     for each, value in zip(calibration.found, values, strict=True):
         if each.parameter.kind == "bias" and not each.why:
             biases[each.parameter.sensor][each.parameter.name] = value
@@ -202,8 +202,3 @@ def calibrated_text(scenario: Scenario, sensors: FilePath, calibration: Calibrat
         for own, section, bias in zip(said["sensors"], sections, biases, strict=True)
     ]
     return dump_data(said, None if folder.resolve() == sensors.parent.resolve() else sensors.parent)
-
-
-def _rounded(value: float) -> float:
-    """To seven digits, far beyond what is known."""
-    return float(f"{value:.7g}")

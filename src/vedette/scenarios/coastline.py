@@ -133,6 +133,3 @@ def coastline_cautions(model: ScenarioModel, folder: FilePath) -> Iterator[tuple
     if model.coastline is not None and not coastline(model, folder):
         meant = "are longitudes and latitudes exchanged?"
         yield ("coastline",), f"coastline: nothing of it is near region and sensors, and none is drawn ({meant})"
-
-
-__all__ = ["coastline", "coastline_cautions", "coastline_findings"]

@@ -51,11 +51,8 @@ def with_zones(data: Mapping[str, Any], folder: FilePath) -> tuple[Mapping[str, 
 def _names_file(constraint: Any) -> bool:
     if not isinstance(constraint, Mapping) or constraint.get("kind") != "keep_out":
         return False
-    return constraint.get("geojson") is not None and not {"region", "polygon"} & set(_given(constraint))
-
-
-def _given(section: Mapping[str, Any]) -> Iterator[str]:
-    return (key for key, value in section.items() if value is not None)
+    given = {key for key, value in constraint.items() if value is not None}
+    return "geojson" in given and not {"region", "polygon"} & given
 
 
 def _origin(data: Mapping[str, Any]) -> Origin:
@@ -130,6 +127,3 @@ def _in_metres(ring: Any, origin: Origin, name: str) -> Ring:
         raise InputError(f"{describe(name)}: corners that are no degrees of longitude and latitude")
     corners: Ring = origin.to_plane([lon for lon, _ in degrees[:-1]], [lat for _, lat in degrees[:-1]]).tolist()
     return corners
-
-
-__all__ = ["geometries", "listed", "with_zones"]

@@ -78,7 +78,7 @@ def facts(model: ScenarioModel) -> list[tuple[str, str]]:
         *(() if model.network is None else (("network", settings(model.network)),)),
         *(() if model.undetected is None else (("not yet found", _undetected(model.undetected)),)),
         ("estimate", settings(model.estimator)),
-        ("decisions", _decisions(model.decision_steps)),
+        ("decisions", f"after {_steps(model.decision_steps)}" if model.decision_steps else "none"),
         ("horizon", f"{counted(model.horizon[0], 'step')} of {model.horizon[1]:g} s"),
         ("reward", f"{settings(control.reward)}, {_samples(control)}"),
         ("search", settings(control.search)),
@@ -156,10 +156,6 @@ def _fusion(section: AnyFusion) -> str:
     if section.matching == "assignment":
         words.append("labels matched by assignment")
     return ", ".join([*words, "feedback" if section.feedback else "no feedback"])
-
-
-def _decisions(steps: Sequence[int]) -> str:
-    return f"after {_steps(steps)}" if steps else "none"
 
 
 def _steps(steps: Literal["every"] | Sequence[int]) -> str:

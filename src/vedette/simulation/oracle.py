@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -93,6 +93,7 @@ class OraclePlanner:
     constraints: tuple[Constraint, ...] = ()
     estimate: Estimator = best_estimate
     truth: Truth | None = None
+    name: ClassVar[str] = "oracle"
 
     def __post_init__(self) -> None:
         check_steering(self)
@@ -100,11 +101,6 @@ class OraclePlanner:
         dimension("depth", self.depth)
         dimension("beam_width", self.beam_width)
         instance("search", self.search, JointSearch)
-
-    @property
-    def name(self) -> str:
-        """The strategy "oracle"."""
-        return "oracle"
 
     def told(self, truth: Truth) -> OraclePlanner:
         """The same for the targets of a run."""

@@ -158,6 +158,3 @@ def _covs(states: Sequence[Any], dim: int) -> Floats:
         if cov.shape != (dim, dim):
             raise reject("births.covar", f"{dim} by {dim}, as the transition model's state is", list(cov.shape))
     return np.array(covs)
-
-
-__all__ = ["Births", "Converted", "convert"]

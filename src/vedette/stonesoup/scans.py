@@ -132,6 +132,3 @@ def truth_of(
     made = Truth(seconds, offsets, ids, table)
     made.validate()
     return made
-
-
-__all__ = ["Scans", "ScansOf", "truth_of"]

@@ -129,6 +129,3 @@ class Delayed(AroundTracker):
                 if delay is None or by <= delay.window:
                     found.append(_Coming(now + by, SensorScan(s, now, scan, poses[s])))
         return found
-
-
-__all__ = ["Delay", "Delayed"]

@@ -259,7 +259,9 @@ class LateScans:
             try:
                 state, info = self.tracker.step(state, measured, poses, time, rngs=self._streams(state.step + 1))
             except InputError as error:
-                raise (_named(error, came[time]) if time in came else error) from None
+                if time not in came:
+                    raise
+                raise InputError(f"{', '.join(map(name_of, came[time].values()))}: {error}") from None
             made.append(Instant(time, due[time], poses, state, info))
         return tuple(made)
 
@@ -299,11 +301,6 @@ def own_scan(scan: SensorScan, num_sensors: int) -> SensorScan:
 def name_of(scan: SensorScan) -> str:
     """As errors call it."""
     return f"scan of sensor {scan.sensor} at {scan.time:g} s"
-
-
-def _named(error: InputError, came: dict[int, SensorScan]) -> InputError:
-    """What a tracker refused, with the scans that had just come."""
-    return InputError(f"{', '.join(map(name_of, came.values()))}: {error}")
 
 
 def _place(timeline: Timeline, time: float) -> int:

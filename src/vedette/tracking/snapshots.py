@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from vedette.errors import InputError, VedetteError
-from vedette.files import write_whole
+from vedette.files import write_file
 from vedette.models.arguments import reject
 from vedette.reading import parse_json, read_arrays, read_file, said, unreadable
 from vedette.text import shown
@@ -48,11 +48,7 @@ def save_snapshot(path: str | os.PathLike[str], parts: Mapping[str, Any]) -> Non
     text = json.dumps({"format": FORMAT_NAME, "version": FORMAT_VERSION, "root": root, "nodes": writing.nodes})
     arrays = {"structure": np.frombuffer(text.encode(), np.uint8)}
     arrays |= {f"array{i}": array for i, array in enumerate(writing.arrays)}
-    target = Path(path)
-    try:
-        write_whole(target, lambda file: np.savez(file, **arrays))  # type: ignore[arg-type]
-    except OSError as fault:
-        raise InputError(f"{target}: expected a file that can be written; {fault}") from fault
+    write_file(Path(path), lambda file: np.savez(file, **arrays))  # type: ignore[arg-type]
 
 
 def load_snapshot(path: str | os.PathLike[str]) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -106,7 +106,7 @@ def pairs_allowed(constraints: Sequence[Constraint], situation: Situation) -> di
     gaps = _least_distances(situation)
     found: dict[tuple[int, int], Bools] = {}
     for constraint in constraints:
-        for first, second in _near(gaps, reach_of(constraint)):
+        for first, second in np.argwhere(np.triu(gaps < reach_of(constraint), 1)).tolist():
             answer = constraint.pairs(situation, first, second)
             if answer is not None:
                 shape = (len(situation.courses[first]), len(situation.courses[second]))
@@ -114,11 +114,6 @@ def pairs_allowed(constraints: Sequence[Constraint], situation: Situation) -> di
                 if not table.all():
                     found[first, second] = table
     return dict(sorted(found.items()))
-
-
-def _near(gaps: Floats, reach: float) -> Iterator[tuple[int, int]]:
-    """Pairs of sensors that may come nearer to each other than `reach`."""
-    return iter([(first, second) for first, second in np.argwhere(np.triu(gaps < reach, 1)).tolist()])
 
 
 def _least_distances(situation: Situation) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -26,21 +26,13 @@ class StayInside(Alone):
     """
 
     region: Region
+    name: ClassVar[str] = "stay_inside"
+    needs_beliefs: ClassVar[bool] = False
     timeless = True
 
     def __post_init__(self) -> None:
         if not isinstance(self.region, Region):
             raise reject("region", "a Region", self.region)
-
-    @property
-    def name(self) -> str:
-        """Stay inside."""
-        return "stay_inside"
-
-    @property
-    def needs_beliefs(self) -> bool:
-        """No."""
-        return False
 
     def violations(self, situation: Situation) -> tuple[Floats, ...]:
         """m from it, the mean over the times. Between two places in a rectangle the straight way is in it, too."""
@@ -69,6 +61,8 @@ class KeepOut(Alone):
     holes: tuple[Floats, ...] = ()
     timeless = True
     _edges: tuple[Floats, Floats] = field(init=False, repr=False)  # (num_edges, 2) where each begins and ends
+    name: ClassVar[str] = "keep_out"
+    needs_beliefs: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         corners = _polygon("area", self.area.corners if isinstance(self.area, Region) else self.area)
@@ -80,16 +74,6 @@ class KeepOut(Alone):
         rings = (corners, *holes)
         ends = np.concatenate([np.roll(ring, -1, axis=0) for ring in rings])
         object.__setattr__(self, "_edges", (np.concatenate(rings), ends))
-
-    @property
-    def name(self) -> str:
-        """Keep out."""
-        return "keep_out"
-
-    @property
-    def needs_beliefs(self) -> bool:
-        """No."""
-        return False
 
     def violations(self, situation: Situation) -> tuple[Floats, ...]:
         """m inside it, the mean over the way's corners; next to nothing where it is only crossed between two."""

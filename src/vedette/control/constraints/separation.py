@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from vedette.control.constraints.protocol import Situation
 from vedette.kernels.base.types import Bools, Floats
-from vedette.models.fields import Positive, check_fields, part
+from vedette.models.fields import Checked, Positive, part
 
 
 @part("separation", "constraint")
 @dataclass(frozen=True, slots=True)
-class Separation:
+class Separation(Checked):
     """Any two platforms keep a least distance.
 
     At the times of the horizon, and between two of them, where both are taken to go straight and evenly from one
@@ -27,20 +28,9 @@ class Separation:
     """
 
     distance: Positive
+    name: ClassVar[str] = "separation"
+    needs_beliefs: ClassVar[bool] = False
     timeless = True
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-
-    @property
-    def name(self) -> str:
-        """Separation."""
-        return "separation"
-
-    @property
-    def needs_beliefs(self) -> bool:
-        """No."""
-        return False
 
     @property
     def reach(self) -> float:

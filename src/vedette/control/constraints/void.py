@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from vedette.densities import Labelled, TrackTable
 from vedette.densities.labelled import LABELLED
 from vedette.kernels.base.types import FactoredGlmb, Floats, Ints
 from vedette.models.arguments import float_array, positive, reject
-from vedette.models.fields import Positive, Probability, check_fields, part
+from vedette.models.fields import Checked, Positive, Probability, part
 
 # Entries of the tables that a GLMB's hypotheses take at a time.
 _BLOCK = 1 << 21
@@ -20,7 +21,7 @@ _BLOCK = 1 << 21
 
 @part("void_probability", "constraint")
 @dataclass(frozen=True, slots=True)
-class VoidProbability(Alone):
+class VoidProbability(Alone, Checked):
     """Around every sensor no target is near, with a least probability at each time of the horizon (Beard et al.).
 
     M. Beard, B.-T. Vo, B.-N. Vo and S. Arulampalam, Void probabilities and Cauchy-Schwarz divergence for generalized
@@ -36,19 +37,8 @@ class VoidProbability(Alone):
 
     radius: Positive
     probability: Probability
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-
-    @property
-    def name(self) -> str:
-        """Void probability."""
-        return "void_probability"
-
-    @property
-    def needs_beliefs(self) -> bool:
-        """Yes."""
-        return True
+    name: ClassVar[str] = "void_probability"
+    needs_beliefs: ClassVar[bool] = True
 
     def violations(self, situation: Situation) -> tuple[Floats, ...]:
         """By how much the void probability is less than `probability`, the sum over the times."""

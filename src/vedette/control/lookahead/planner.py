@@ -7,7 +7,7 @@ import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -93,6 +93,7 @@ class HorizonPlanner:
     discount: float | None = 0.25
     constraints: tuple[Constraint, ...] = ()
     notes: tuple[str, ...] = ()
+    name: ClassVar[str] = "lookahead"
 
     def __post_init__(self) -> None:
         check_steering(self)
@@ -112,11 +113,6 @@ class HorizonPlanner:
             if steps > MOST_STEPS:
                 raise reject("period", f"at most {MOST_STEPS} times the horizon_period", self.period)
         check_sums("sequences of decisions", len(self.sensors), self.fusion, self.settings, self.reward)
-
-    @property
-    def name(self) -> str:
-        """The strategy "lookahead"."""
-        return "lookahead"
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """The first actions of the best joint sequence that was found; of equal ones the first in printed order.

@@ -14,7 +14,7 @@ import numpy as np
 
 from vedette.kernels.base.types import Floats
 from vedette.kernels.gaussian.linalg import cholesky, log_det_from_factor, solve_lower
-from vedette.models.fields import Positive, Probability, check_fields, part
+from vedette.models.fields import Checked, Positive, Probability, part
 from vedette.models.functions import ModelFunction, model_function
 
 # A probability below this is taken as this in a quotient.
@@ -76,7 +76,7 @@ class CardinalityVarianceReward(_OneSum):
 
 @part("expected_gospa", "reward")
 @dataclass(frozen=True, slots=True)
-class ExpectedGospaReward(_OneSum):
+class ExpectedGospaReward(_OneSum, Checked):
     """Less the mean squared GOSPA (alpha = 2, p = 2) that is to be expected of the best estimate after the update.
 
     Label by label a target is reported where that costs less:
@@ -92,9 +92,6 @@ class ExpectedGospaReward(_OneSum):
     cutoff: Positive = 100.0
     words: ClassVar[str] = "minus squared GOSPA, m²"
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-
     @property
     def function(self) -> ModelFunction:
         """See `vedette.control.rewards.labels`."""
@@ -108,7 +105,7 @@ class ExpectedGospaReward(_OneSum):
 
 @part("peecs", "reward")
 @dataclass(frozen=True, slots=True)
-class PeecsReward:
+class PeecsReward(Checked):
     """Less the posterior expected error of cardinality and states (Gostar, Hoseinnezhad, Bab-Hadiashar 2013, 2015).
 
     share * 4 / n * sum r (1 - r) + (1 - share) * sum r min(tr P / c^2, 1) / sum r over n labels: the variance of the
@@ -127,9 +124,6 @@ class PeecsReward:
     cutoff: Positive = 100.0
     num_terms: ClassVar[int] = 4
     words: ClassVar[str] = "minus PEECS"
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     @property
     def function(self) -> ModelFunction:

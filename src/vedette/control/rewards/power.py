@@ -12,7 +12,7 @@ from vedette.densities import GLMB, LMB
 from vedette.divergence import cauchy_schwarz, renyi
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import real, reject
-from vedette.models.fields import Positive, check_fields, part
+from vedette.models.fields import Checked, Positive, part
 
 
 @part("cauchy_schwarz", "reward")
@@ -95,7 +95,7 @@ class RenyiReward:
 
 @part("expected_loss", "reward")
 @dataclass(frozen=True, slots=True)
-class ExpectedLossReward:
+class ExpectedLossReward(Checked):
     """Less the error to be expected of the targets' positions; in closed form, without samples.
 
     Cut off where a target counts as lost:
@@ -128,6 +128,3 @@ class ExpectedLossReward:
     cutoff: Positive = 100.0
     order: Positive = 1.0
     words: ClassVar[str] = "minus expected loss"
-
-    def __post_init__(self) -> None:
-        check_fields(self)

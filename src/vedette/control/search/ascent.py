@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vedette.control.search.problem import Joint, JointProblem, Known, best_of_all
-from vedette.models.fields import Count, Repeats, check_fields, part
+from vedette.models.fields import Checked, Count, Repeats, part
 
 # Beyond so many sensors, every joint action is more than a decision has time for.
 _MAX_SENSORS = 3
@@ -22,7 +22,7 @@ _NUM_RESTARTS, _LEAST_GAP, _FIRST_TRIES = 2, 0.01, 1000
 
 @part("coordinate_ascent", "search")
 @dataclass(frozen=True, slots=True)
-class CoordinateAscent:
+class CoordinateAscent(Checked):
     """One sensor at a time, the others held, until no sensor alone can do better; for many sensors.
 
     The first ascent starts at the independent decision, so that its end is never worse than that. The end is a local
@@ -39,9 +39,6 @@ class CoordinateAscent:
     """
 
     num_restarts: Repeats = 2
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
         """The best of all ascents; of equal ones that were evaluated the first in printed order."""
@@ -80,7 +77,7 @@ def _ascend(known: Known, start: Joint) -> Joint:
 
 @part("automatic", "search")
 @dataclass(frozen=True, slots=True)
-class AutomaticSearch:
+class AutomaticSearch(Checked):
     """Every joint action of up to three sensors; coordinate ascent with restarts for more.
 
     Two restarts, or up to 1000 over the number of all sensors' courses where the problem has a bound that leaves more
@@ -94,9 +91,6 @@ class AutomaticSearch:
     """
 
     max_joint_actions: Count = 1_000_000
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
         """As the search that it is."""

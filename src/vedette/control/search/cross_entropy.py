@@ -10,7 +10,7 @@ import numpy as np
 from vedette.control.constraints import Mask
 from vedette.control.search.problem import JointProblem, Known
 from vedette.kernels.base.types import Floats, Ints
-from vedette.models.fields import Chance, Count, Portion, check_fields, part
+from vedette.models.fields import Chance, Checked, Count, Portion, part
 
 # A distribution in which every sensor has an action of this probability has nothing more to find.
 _DEGENERATE = 0.99
@@ -18,7 +18,7 @@ _DEGENERATE = 0.99
 
 @part("cross_entropy", "search")
 @dataclass(frozen=True, slots=True)
-class CrossEntropy:
+class CrossEntropy(Checked):
     """Cross-entropy method: joint actions are drawn, each sensor's action by probabilities of its own, and these are
     drawn to how often the best joint actions of the round have each action (Rubinstein 1999).
 
@@ -44,9 +44,6 @@ class CrossEntropy:
     smoothing: Portion = 0.7
     max_rounds: Count = 50
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
         """The best of all that were drawn; of equal ones the first in printed order."""
         known = Known(problem)
@@ -58,7 +55,8 @@ class CrossEntropy:
             num_known = len(known.values)
             order = np.argsort(-known.rewards(drawn), kind="stable")
             elite = np.array([drawn[i] for i in order[:num_elite].tolist()])
-            probabilities += self.smoothing * (_shares(elite, probabilities.shape[1]) - probabilities)
+            shares = (elite[:, :, np.newaxis] == np.arange(probabilities.shape[1])).mean(axis=0)
+            probabilities += self.smoothing * (shares - probabilities)
             is_settled = len(known.values) == num_known or (probabilities.max(axis=1) >= _DEGENERATE).all()
             if is_settled or known.is_late():
                 break
@@ -89,8 +87,3 @@ def _draw(mask: Mask | None, probabilities: Floats, num: int, rng: np.random.Gen
         drawn = np.minimum(rng.random(num) * ends[:, -1], np.nextafter(ends[:, -1], 0.0))
         at[:, s] = (drawn[:, np.newaxis] >= ends).sum(axis=1)
     return at
-
-
-def _shares(joint_actions: Ints, num_courses: int) -> Floats:
-    """(num_sensors, num_courses) how often each action is in joint actions (num, num_sensors)."""
-    return np.asarray((joint_actions[:, :, np.newaxis] == np.arange(num_courses)).mean(axis=0))

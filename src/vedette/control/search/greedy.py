@@ -12,12 +12,12 @@ import numpy as np
 from vedette.control.search.problem import Joint, JointProblem, Known, first_best
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
-from vedette.models.fields import check_fields, part
+from vedette.models.fields import Checked, part
 
 
 @part("sequential_greedy", "search")
 @dataclass(frozen=True, slots=True)
-class SequentialGreedy:
+class SequentialGreedy(Checked):
     """Sensors are decided one after the other, each by the reward of those decided, while the others do not scan.
 
     Of a reward that is monotone and submodular in the scans that are made, the joint action found has at least half of
@@ -38,9 +38,6 @@ class SequentialGreedy:
     """
 
     order: Literal["printed", "best_first"] = "printed"
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
         """The joint action that is decided so; nothing is drawn.

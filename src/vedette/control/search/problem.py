@@ -12,7 +12,7 @@ import numpy as np
 from vedette.control.constraints import Mask, opened, repaired
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
-from vedette.models.fields import Count, check_fields, part
+from vedette.models.fields import Checked, Count, part
 
 # Rewards nearer than this, relative to the best or to 1, are equal: rounding tells them apart, not what they are worth.
 _TIE = 1e-9
@@ -152,7 +152,7 @@ class Known:
 
 @part("exhaustive", "search")
 @dataclass(frozen=True, slots=True)
-class ExhaustiveSearch:
+class ExhaustiveSearch(Checked):
     """Every joint action (paper, Algorithm 2): the best there is, and the oracle for all other searches.
 
     With a mask only the joint actions that it allows are formed; if there is none, the mask is opened first
@@ -166,9 +166,6 @@ class ExhaustiveSearch:
     """
 
     max_joint_actions: Count = 1_000_000
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
         """The best of all; nothing is drawn. Raises `InputError` for more joint actions than `max_joint_actions`."""

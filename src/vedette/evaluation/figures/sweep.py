@@ -54,7 +54,7 @@ def sweep_figure(curves: Sequence[SweepCurve], label: str, unit: str = "m") -> F
     figure = new_figure(2.4)
     axes = figure.subplots()
     values = np.unique(np.concatenate([curve.values for curve in curves]))
-    logarithmic = _spans_decades(values)
+    logarithmic = bool(len(values) > 2 and values[0] > 0.0 and values[-1] / values[0] >= 20.0)
     names = short_labels([curve.name for curve in curves])
     for index, (name, curve) in enumerate(zip(names, curves, strict=True)):
         order = np.argsort(curve.values)
@@ -74,10 +74,6 @@ def sweep_figure(curves: Sequence[SweepCurve], label: str, unit: str = "m") -> F
     _, labels = axes.get_legend_handles_labels()
     figure.legend(loc="outside upper center", ncols=legend_columns(labels))
     return figure
-
-
-def _spans_decades(values: Floats) -> bool:
-    return bool(len(values) > 2 and values[0] > 0.0 and values[-1] / values[0] >= 20.0)
 
 
 def _beside(at: Floats, offset: float, values: Floats, logarithmic: bool) -> Floats:

@@ -127,11 +127,6 @@ def ospa2_of_run(truth: Truth, estimates: Sequence[Estimate], *, cutoff: float, 
     return ospa2(TrackSet.of_estimates(estimates), TrackSet.of_truth(truth), cutoff=cutoff, order=order, window=window)
 
 
-def track_distances(first: TrackSet, second: TrackSet, cutoff: float) -> Floats:
-    """(num_first, num_second) time-averaged cut-off distances between tracks; of two that never exist, 0."""
-    return _averages(*_costs(first, second, cutoff))
-
-
 def _costs(first: TrackSet, second: TrackSet, cutoff: float) -> tuple[Floats, Bools]:
     """(num_first, num_second, num_scans) cut-off distances, 0 where neither exists, and whether either does."""
     either = first.alive[:, None] | second.alive[None]

@@ -82,14 +82,3 @@ def widest_parent(parents: Parents) -> int:
     for parent in range(len(parents.log_weights)):
         most = max(most, parents.offsets[parent + 1] - parents.offsets[parent])
     return most
-
-
-__all__ = [
-    "Children",
-    "Parents",
-    "append_child",
-    "grown_children",
-    "is_full",
-    "make_children",
-    "widest_parent",
-]

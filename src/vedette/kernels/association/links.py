@@ -151,6 +151,3 @@ def linked_factors(options: Options, row_offsets: Ints, sizes: Ints, least: floa
     for factor in range(num_factors):
         leaders[factor] = root_of(leaders, factor)
     return leaders
-
-
-__all__ = ["linked_factors"]

@@ -176,6 +176,3 @@ def settled_names(glmb: Glmb, factor_offsets: Ints, track_offsets: Ints, label_o
         if high - low > 1:
             _name_factor(glmb, factor_offsets[factor], factor_offsets[factor + 1], low, high, label_of, distance, names)
     return names
-
-
-__all__ = ["settled_names"]

@@ -151,6 +151,3 @@ def near_measurements(rows: Rows, scan: Floats, angular: Bools, gate: float) -> 
         _sort(found, offsets[row], filled)
         offsets[row + 1] = filled
     return Near(offsets, found)
-
-
-__all__ = ["Near", "all_measurements", "near_measurements"]

@@ -59,6 +59,3 @@ def product_of(first: Parents, second: Parents, max_hypotheses: int) -> Parents:
         _merge_rows(rows, offsets[h], middle, filled)
         offsets[h + 1], sorted_weights[h] = filled, log_weights[order[h]]
     return Parents(offsets, rows, sorted_weights)
-
-
-__all__ = ["product_of"]

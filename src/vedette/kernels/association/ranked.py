@@ -234,6 +234,3 @@ def add_missing_groups(
         for i in range(len(rows)):
             children.options[start + i] = work.row_option[i]
     return True
-
-
-__all__ = ["add_missing_groups", "rank_children", "run_search"]

@@ -231,12 +231,3 @@ def compile_model_function(function: Callable[..., Any], kind: str) -> Any:
     except _dispatchers().NumbaError as error:
         raise TypeError(f"{kind} function {function.__name__!r} cannot be compiled: {error}") from error
     return model
-
-
-__all__ = [
-    "JIT_ENABLED",
-    "SIGNATURES",
-    "ModelFunction",
-    "compile_model_function",
-    "kernel",
-]

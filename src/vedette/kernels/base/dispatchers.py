@@ -12,7 +12,7 @@ from typing import Any
 from numba import types
 from numba.core import cgutils
 from numba.core.compiler_lock import global_compiler_lock
-from numba.core.errors import NumbaError
+from numba.core.errors import NumbaError as NumbaError
 from numba.core.imputils import lower_constant
 from numba.core.registry import CPUDispatcher
 from numba.core.sigutils import normalize_signature
@@ -187,6 +187,3 @@ def _named_model_function(context: Any, builder: Any, kind: Any, value: ModelFun
     for field, address in (("c_addr", value.c_address), ("jit_addr", value.jit_address), ("py_addr", id(value))):
         setattr(struct, field, context.add_dynamic_addr(builder, address, info=str(kind)))
     return struct._getvalue()
-
-
-__all__ = ["ModelDispatcher", "NumbaError", "PartKernel", "WholeKernel", "addresses_of", "naming", "shape_of"]

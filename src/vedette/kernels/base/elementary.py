@@ -153,6 +153,3 @@ def directions(y: Floats, x: Floats, out: Floats) -> None:
         angle = 2.0 * _HALF_PI_HIGH - (angle - 2.0 * _HALF_PI_LOW) if x[s] < 0.0 else angle
         angle = angle if large > 0.0 else 0.0
         out[s] = -angle if y[s] < 0.0 else angle
-
-
-__all__ = ["LARGEST_EXPONENT", "Bits", "directions", "exponentials", "logs", "logs_of_one_and", "make_bits"]

@@ -145,6 +145,3 @@ def made_as(kind: type, codegen: Any) -> Iterator[None]:
             yield
         finally:
             codegen._library_class = before
-
-
-__all__ = ["PartLibrary", "WholeLibrary", "made_as"]

@@ -50,6 +50,3 @@ def returned_without_python() -> Iterator[None]:
         yield
     finally:
         _boxers.functions.update(before)
-
-
-__all__ = ["NAMED", "returned_without_python"]

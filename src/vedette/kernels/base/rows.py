@@ -27,6 +27,3 @@ def numbers_of_rows(function: Any, states: Floats, at: Any, params: Floats) -> F
     for i in range(len(states)):
         numbers[i] = function(states[i], at, params)
     return numbers
-
-
-__all__ = ["fill_rows", "numbers_of_rows"]

@@ -167,6 +167,3 @@ def near_pairs(means: Floats, covs: Floats, other_means: Floats, other_covs: Flo
             squares[filled], log_dets[filled] = squared, log_det
             filled += 1
     return NearPairs(firsts[:filled], seconds[:filled], squares[:filled], log_dets[:filled])
-
-
-__all__ = ["NearPairs", "l1_bound", "near_pairs", "pair_distances"]

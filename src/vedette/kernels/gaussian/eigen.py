@@ -77,6 +77,3 @@ def clip_negative(matrix: Floats, rotated: Floats, vectors: Floats) -> None:
                 total += vectors[i, k] * max(rotated[k, k], 0.0) * vectors[j, k]
             matrix[i, j] = total
             matrix[j, i] = total
-
-
-__all__ = ["clip_negative", "diagonalise"]

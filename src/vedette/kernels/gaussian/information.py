@@ -142,6 +142,3 @@ def to_moments(row: Floats, reference: Floats, mean: Floats, cov: Floats, factor
         mean[i] += reference[i]
     inverse_from_factor(factor, cov)
     return True
-
-
-__all__ = ["log_integral", "log_value", "row_size", "to_information", "to_moments"]

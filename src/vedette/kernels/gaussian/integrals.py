@@ -109,6 +109,3 @@ def logs_of_one_and_integrals(integrals: Integrals, out: Floats) -> None:
     logs_of_one_and(exponents, integrals.bits, integrals.more_bits)
     for s in range(len(out)):
         out[s] += exponents[s]
-
-
-__all__ = ["Integrals", "integrate_rows", "logs_of_one_and_integrals", "make_integrals"]

@@ -265,15 +265,3 @@ def heaviest_of_runs(log_weights: Floats, offsets: Ints, chosen: Ints) -> Ints:
                 best = c
         heaviest[i] = best
     return heaviest
-
-
-__all__ = [
-    "MixtureCaps",
-    "copy_component",
-    "descending_order",
-    "heaviest_of_runs",
-    "match_components",
-    "moment_match",
-    "reduce_mixture",
-    "require_gaussians",
-]

@@ -125,6 +125,3 @@ def pooled_tracks(
         log_weights, means, covs = log_weights[:used].copy(), means[:used].copy(), covs[:used].copy()
     require_gaussians(means, covs)
     return Tracks(labels, offsets, log_weights, means, covs)
-
-
-__all__ = ["Moments", "add_to_pool", "moments_of", "pooled_tracks"]

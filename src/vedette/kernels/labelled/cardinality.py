@@ -71,6 +71,3 @@ def best_of_pairs(values: Floats, offsets: Ints) -> tuple[Floats, Ints, Ints]:
             end += high - low - 1
         ends[p + 1] = end
     return sums[:end].copy(), ends, taken[:end].copy()
-
-
-__all__ = ["best_of_pairs", "convolved"]

@@ -64,6 +64,3 @@ def glmb_cases_to_lmb(
                 out.logits[case, i] = lmb.existence_logit[found]
                 copy_component(lmb.tracks.means, lmb.tracks.covs, found, out.means[case], out.covs[case], i)
                 found += 1
-
-
-__all__ = ["LmbCases", "glmb_cases_to_lmb"]

@@ -198,6 +198,3 @@ def factored_to_glmb(density: FactoredGlmb, label_of: Ints, num_labels: int, max
         hyp_offsets[h + 1] = end
     discarded = _normalise_kept(hyp_log_weights, complete)
     return Glmb(density.tracks, hyp_offsets, hyp_tracks[:end].copy(), hyp_log_weights), discarded
-
-
-__all__ = ["factored_to_glmb", "factors_to_lmb", "glmb_to_lmb", "marginalise", "marginalise_sets"]

@@ -175,6 +175,3 @@ def stored(store: FactorStore) -> FactoredGlmb:
         store.hyp_log_weights[: filled[_HYPS]].copy(),
         store.factor_offsets[: filled[_FACTORS] + 1].copy(),
     )
-
-
-__all__ = ["FactorStore", "append_part", "append_single", "make_store", "next_component", "stored", "with_room"]

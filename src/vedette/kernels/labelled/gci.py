@@ -195,6 +195,3 @@ def fuse_tracks(
         log_overlaps[item] = normalise_logs(log_weights[low:high])
     require_gaussians(means, covs)
     return offsets, log_weights, means, covs, log_overlaps
-
-
-__all__ = ["fuse_tracks"]

@@ -23,6 +23,3 @@ def group_log_sums(values: Floats, group_of: Ints, num_groups: int) -> Floats:
         if peaks[group] > -math.inf:
             peaks[group] += math.log(totals[group])
     return peaks
-
-
-__all__ = ["group_log_sums"]

@@ -174,6 +174,3 @@ def log_lmbs(tracks: Tracks, logits: Floats, split: int, log_unit_volume: float,
         elif not common:
             result[0] += log_probabilities(logits[i])[1]
     return result
-
-
-__all__ = ["log_glmbs", "log_lmbs", "log_probabilities", "log_tracks"]

@@ -103,6 +103,3 @@ def increasing_labels(glmb: Glmb) -> Ints:
         unique[place, 0], unique[place, 1] = step, index
         count += 1
     return unique[:count].copy()
-
-
-__all__ = ["group_by_label_set", "group_members", "increasing_labels", "label_place"]

@@ -255,6 +255,3 @@ def _is_nothing(said: _Said) -> bool:
             if said.gains[0, i, j] != 0.0:
                 return False
     return True
-
-
-__all__ = ["update_in_parallel"]

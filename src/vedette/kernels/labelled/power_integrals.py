@@ -327,6 +327,3 @@ def power_table(laid: Laid, first_cases: Ints, actions: Ints, terms: Terms, firs
         for s in range(num_sensors):
             chosen[s] = first_cases[s] + actions[joint, s] * num_samples
         _power_integrals(laid, chosen, terms, work, out[joint])
-
-
-__all__ = ["Laid", "Places", "SensorCases", "Terms", "power_table", "write_rows"]

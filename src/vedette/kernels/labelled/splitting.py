@@ -249,6 +249,3 @@ def independent_parts(choices: Choices, max_error: float, max_labels: int, min_e
         if error <= enough:
             break
     return part_of, error
-
-
-__all__ = ["Choices", "choices_of", "group_choices", "independent_parts"]

@@ -30,6 +30,3 @@ def stack_glmbs(glmbs: Sequence[Glmb]) -> Glmb:
     starts = np.cumsum([0, *(len(table.labels) for table in tracks[:-1])])
     shifted = np.concatenate(members) + np.repeat(starts, [*map(len, members)])
     return Glmb(stack_tracks(tracks), join_offsets(offsets), shifted, np.concatenate(log_weights))
-
-
-__all__ = ["join_offsets", "stack_glmbs", "stack_tracks"]

@@ -98,6 +98,3 @@ def smallest_sums(costs: Floats, offsets: Ints, max_sums: int) -> tuple[Ints, In
             size += 1
             _sift_up(heap, sums, size)
     return lists, places, previous, order, listed == total < 1 << 31
-
-
-__all__ = ["smallest_sums"]

@@ -197,6 +197,3 @@ def _merged_tracks(
             filled += 1
     offsets, pool = group_members(number[leader], num_leaders)
     return number, pooled_tracks(tracks, labels, offsets, pool, weights[pool], caps)
-
-
-__all__ = ["merge_versions"]

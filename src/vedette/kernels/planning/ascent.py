@@ -190,6 +190,3 @@ def ascend(
         settled = settled + 1 if chosen == present else 1
         sensor = (sensor + 1) % num_sensors
     return at.chosen, reward, Trace(evaluations[: line + 1], best[: line + 1])
-
-
-__all__ = ["Allowed", "Ascent", "Cells", "Trace", "ascend"]

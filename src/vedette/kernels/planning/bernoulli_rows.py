@@ -65,6 +65,3 @@ def unscale(rows: Floats) -> None:
             scale = 1.0 / power
             for k in range(rows.shape[0] - 2):
                 rows[k, sample] *= scale
-
-
-__all__ = ["ALL_BUT_CERTAIN", "LEAST_MISS", "Table", "bernoulli_size", "log_miss", "unscale"]

@@ -199,6 +199,3 @@ def losses_at_least(table: Table, valuation: Valuation, choices: Choices, out: F
         seen = min(max(trace, 0.0) ** valuation.params[1], valuation.own[label, 0])
         weight, detected = valuation.params[2] / (1.0 + math.exp(-prior[last - 2])), -math.expm1(missed)
         out[label] = -weight * (detected * seen + (1.0 - detected) * valuation.own[label, 0])
-
-
-__all__ = ["Choices", "best_of_labels", "losses_at_least"]

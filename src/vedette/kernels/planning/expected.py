@@ -135,6 +135,3 @@ def fill_expected_changes(
                 for j in range(i + 1):
                     row[at] = information[i, j] - bases[label, at]
                     at += 1
-
-
-__all__ = ["fill_expected_changes"]

@@ -191,6 +191,3 @@ def value_label(valuation: Valuation, label: int, work: ValueWork, out: Floats) 
         if not powers[sample] > 0.0:
             for e in range(valuation.num):
                 out[e, sample] = 0.0  # nobody who counts knows the label
-
-
-__all__ = ["EXPECTED_LOSS", "FUNCTION", "POWER_INTEGRALS", "Valuation", "ValueWork", "make_value_work", "value_label"]

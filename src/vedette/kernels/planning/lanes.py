@@ -295,6 +295,3 @@ def expect_lanes(sensor: Sensor, forms: Forms, pose: Floats, num: int, lanes: La
         for s in range(num):
             if not 1e-290 < work.volume[s] < 1e290:
                 _expect_alone(sensor, pose, s, lanes, work)
-
-
-__all__ = ["LaneWork", "Lanes", "expect_lanes", "make_lane_work", "make_lanes", "predict_lanes"]

@@ -34,6 +34,3 @@ def prob_explained(belief: Lmb, scan: ScanInput, sensor: Sensor, truncation: Tru
     for j in range(len(odds)):
         odds[j] = odds[j] / (1.0 + odds[j]) if odds[j] < math.inf else 1.0
     return odds
-
-
-__all__ = ["prob_explained"]

@@ -227,6 +227,3 @@ def log_weight_bound(group: Group, children: Children, caps: SearchCaps, cut: bo
     # What rounding leaves of nothing is nothing.
     left += before if before > 1e-12 * of_parents else 0.0
     return min(group.log_bound, best + math.log(in_all + left))
-
-
-__all__ = ["Factors", "Group", "factors_of", "gathered_group", "is_single", "log_weight_bound", "weigh_singles"]

@@ -102,6 +102,3 @@ def step_factored(
         sums[DROPPED],
         most_labels,
     )
-
-
-__all__ = ["FactoredReport", "Factoring", "step_factored"]

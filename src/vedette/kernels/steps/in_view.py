@@ -140,6 +140,3 @@ def put_back(prior: Lmb, marks: Bools, updated: Lmb, caps: MixtureCaps, settled:
 @inlined
 def _same_label(labels: Ints, i: int, others: Ints, j: int) -> bool:
     return bool(labels[i, 0] == others[j, 0] and labels[i, 1] == others[j, 1])
-
-
-__all__ = ["in_view", "marked", "put_back"]

@@ -118,6 +118,3 @@ def match_rows(
             _moments(count, rows, mixture, means[k], covs[k], 4)
         else:
             _moments(count, rows, mixture, means[k], covs[k], means.shape[1])
-
-
-__all__ = ["Mixture", "make_mixture", "match_rows"]

@@ -148,6 +148,3 @@ def _points_of(section: Section) -> Iterator[tuple[Path, Sequence[tuple[float, f
         yield ("mean",), [section.mean[:2]]  # type: ignore[list-item]
     elif isinstance(section, ScriptedTarget):
         yield ("state",), [section.state[:2]]  # type: ignore[list-item]
-
-
-__all__ = ["OriginSection", "in_metres", "is_place", "misplaced"]

@@ -111,6 +111,3 @@ def _content(section: RecordingSection, world: ScenarioModel, folder: Path) -> I
         section.build(world, folder)
     except InputError as error:
         yield ("recording",), "scans that can be read", str(error)
-
-
-__all__ = ["RecordingSection", "recording_findings", "sites_of"]
