@@ -314,6 +314,10 @@ def test_what_cannot_be_is_told(arguments: dict[str, Any], message: str) -> None
 
 def test_wrong_actions_and_steps_are_told() -> None:
     env = ScenarioEnv(scene("lmb"))
+    with pytest.raises(InputError, match="step: expected a reset first, as there is no run"):
+        env.step([0, 0])
+    with pytest.raises(InputError, match="options: expected run alone; got runn"):
+        env.reset(seed=1, options={"run": 2, "runn": 3})
     env.reset(seed=1)
     for actions in ([13, 0], [0], [-1, 0]):
         with pytest.raises(InputError, match=r"actions: expected 2 indices below \[13, 13\]; got"):
@@ -328,6 +332,10 @@ def test_wrong_actions_and_steps_are_told() -> None:
     alone.reset(seed=1)
     with pytest.raises(InputError, match="reward: expected ospa or a function, as the belief has no labels"):
         alone.step(0)
+    worded = ScenarioEnv(scene("lmb"), reward=lambda moments, truth: "much")  # type: ignore[arg-type,return-value]
+    worded.reset(seed=1)
+    with pytest.raises(InputError, match="reward: expected a function that returns a number; got much"):
+        worded.step([0, 0])
     agents = ScenarioParallelEnv(scene("lmb"))
     agents.reset(seed=1)
     with pytest.raises(InputError, match="actions: expected one of each of sensor_1, sensor_2; got"):

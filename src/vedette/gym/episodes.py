@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeAlias
 
@@ -95,11 +95,16 @@ class Episodes:
         self.built = self._drawn(0, 0)
         self.layout = self.built.layout
 
-    def start(self, seed: int | None, run: int | None) -> None:
-        """Turn to a run: that of a seed and number; by default run 0 of a seed, and the next of the seed before.
+    def start(self, seed: int | None, options: Mapping[str, Any] | None) -> None:
+        """Turn to a run: that of a seed and number (`run` of the options); by default run 0 of a seed, and the next of
+        the seed before.
 
         Where none was ever given a seed is drawn.
         """
+        given = {} if options is None else dict(options)
+        run = given.pop("run", None)
+        if given:
+            raise reject("options", "run alone", ", ".join(map(str, given)))
         first = seed is not None or self._seed is None
         if seed is None:
             seed = int(np.random.default_rng().integers(2**31)) if self._seed is None else self._seed
@@ -115,8 +120,10 @@ class Episodes:
 
     def decide(self, actions: ArrayLike) -> None:
         """Send the sensors where a policy says, and go on to the next decision, or to the end."""
-        if self.is_over:
-            raise InputError("step: expected a reset first, as the run is over")
+        if self._seed is None or self.is_over:
+            raise InputError(
+                f"step: expected a reset first, as {'there is no run' if self._seed is None else 'the run is over'}"
+            )
         chosen, self.num_moved = self.built.observer.chosen(self.outlook, actions)
         with told_elsewhere():
             plan = plan_of("policy", self.outlook, chosen)
@@ -146,7 +153,11 @@ class Episodes:
         moments, cutoff = self._moments, self.built.scenario.model.ospa.cutoff
         truth = self.world.truth.between(moments[0].step - 1, moments[-1].step)
         if callable(self._reward):
-            return float(self._reward(moments, truth))
+            reward = self._reward(moments, truth)
+            try:
+                return float(reward)
+            except (TypeError, ValueError):
+                raise reject("reward", "a function that returns a number", reward) from None
         if self._reward == "ospa":
             return -float(self.built.score(truth, [moment.estimate for moment in moments])[:, 0].mean())
         return -float(np.mean([expected_loss(moment.state.fused, cutoff) for moment in moments]))
