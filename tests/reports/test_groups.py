@@ -54,3 +54,23 @@ def test_groups_are_named_by_what_sets_them_apart(tmp_path: Path) -> None:
     ]
     assert sweeps[2].figure.axes[0].get_xlabel() == "Noise sigma range (m)"
     assert {drawing.name for drawing in group_drawings(groups[0])} >= {"ospa", "distributions", "cost", "consistency"}
+
+
+@pytest.mark.parametrize(
+    ("axis", "values", "names"),
+    [("time.num_steps", [4, 6], ["4", "6"]), ("time.step_period", [1.0, 0.5], ["1", "0.5"])],
+)
+def test_strategies_with_other_scan_times_are_not_compared_and_drawn_each_over_its_own(
+    axis: str, values: list[float], names: list[str], tmp_path: Path
+) -> None:
+    few = {"time.num_steps": 4, "control.decision_steps": [2], "ospa.from_step": 3, "ospa.to_step": 4}
+    few.pop(axis, None)
+    spec = {"planners": ["still"], "compare": axis, "grid": {axis: values}, "set": few, "runs": 1}
+    (group,) = gather(results_of(tmp_path / "results", campaign_of(**spec)))
+    assert group.comparison is None
+    assert "its runs have others" in group.reason
+    drawn = [each for each in group_drawings(group) if each.name.startswith("consistency")]
+    assert [each.title.split()[-1] for each in drawn] == names
+    for strategy, drawing in zip(group.strategies, drawn, strict=True):
+        lines = drawing.figure.axes[0].get_lines()
+        assert lines[0].get_xdata().tolist() == strategy.ensemble.times.tolist()

@@ -63,7 +63,7 @@ def group_drawings(group: Group) -> Iterator[Drawing]:
     yield from _reward_drawings(group)
     yield from _tracks_drawings(group)
     if any(each.ensemble.measures for each in group.strategies):
-        yield _consistency_drawing(group.strategies)
+        yield from _consistency_drawings(group.strategies)
     spent = {each.label: stage_seconds(each) for each in group.strategies}
     if any(spent.values()):
         caption = (
@@ -171,14 +171,20 @@ def typical_records(group: Group) -> tuple[tuple[Strategy, RunRecord], ...]:
     return tuple(found)
 
 
-def _consistency_drawing(strategies: Sequence[Strategy]) -> Drawing:
+def _consistency_drawings(strategies: Sequence[Strategy]) -> Iterator[Drawing]:
+    """One of all strategies; where they have not the same scan times, one of each."""
     times = strategies[0].ensemble.times
-    averages = {each.label: nees_over_runs(each, 2) for each in strategies}
     caption = (
         "Normalised squared error of the estimated positions, averaged over the runs; 1 where covariances are right. "
         "Band: where 95 % of the averages of a consistent filter lie."
     )
-    return Drawing("consistency", "Consistency", caption, consistency_figure(times, averages))
+    if all(np.array_equal(each.ensemble.times, times) for each in strategies):
+        averages = {each.label: nees_over_runs(each, 2) for each in strategies}
+        yield Drawing("consistency", "Consistency", caption, consistency_figure(times, averages))
+        return
+    for each in strategies:
+        figure = consistency_figure(each.ensemble.times, {each.label: nees_over_runs(each, 2)})
+        yield Drawing(f"consistency-{each.cell.name}", f"Consistency, {each.name}", caption, figure)
 
 
 def sweep_drawings(campaign: Campaign, errors: Mapping[str, Floats]) -> Iterator[Drawing]:
