@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import sqlite3
+import subprocess
+import sys
 from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
@@ -14,7 +17,7 @@ import pytest
 from campaigns.filled import fill, make_campaign
 from evaluation.synthetic import ACTIONS, make_record
 from vedette.campaigns import gathering, open_results
-from vedette.errors import InputError
+from vedette.errors import InputError, VedetteError
 from vedette.evaluation import ensembles
 from vedette.evaluation.ensembles import Ensemble, ensemble_of, joined
 from vedette.evaluation.health import added, health_sums
@@ -103,6 +106,26 @@ def test_a_damaged_run_is_named_whoever_reads_it(folder: Path, tmp_path: Path, n
     database.close()
     with pytest.raises(InputError, match=rf"campaign\.sqlite: cell {CELL}, run 6: expected the run as it was written"):
         open_results(damaged, num_workers=num_workers).ensemble(CELL)
+
+
+@pytest.mark.usefixtures("small_parts")
+def test_readers_of_a_script_without_a_guarded_main_say_so(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(multiprocessing.current_process(), "_inheriting", True, raising=False)
+    with pytest.raises(VedetteError, match='needs `if __name__ == "__main__":` around the call'):
+        open_results(folder, num_workers=2).ensemble(CELL)
+
+
+@pytest.mark.usefixtures("small_parts")
+def test_a_reader_that_dies_is_told(folder: Path, tmp_path: Path) -> None:
+    script = tmp_path / "unguarded.py"
+    script.write_text(
+        "from vedette.campaigns import gathering, open_results\n"
+        f"gathering._A_PART = 4\nopen_results({str(folder)!r}, num_workers=2).ensemble({CELL!r})\n"
+    )
+    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 1
+    assert "a script that reads with workers needs" in done.stderr
+    assert "one has died: for want of memory, or, in a script of your own" in done.stderr
 
 
 def test_no_run_and_runs_that_are_not_there_are_refused(folder: Path) -> None:

@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import current_process
 from typing import TYPE_CHECKING
 
 from vedette.errors import VedetteError
@@ -33,6 +34,8 @@ def gathered(results: CampaignResults, cell: str, runs: Sequence[int], num_worke
 def _by_processes(
     results: CampaignResults, cell: str, parts: Sequence[Sequence[int]], number: int
 ) -> Iterator[Ensemble]:
+    if getattr(current_process(), "_inheriting", False):  # a reader that runs the main module, which starts readers
+        raise VedetteError('a script that reads with workers needs `if __name__ == "__main__":` around the call')
     load_ahead()
     pool = ProcessPoolExecutor(number, context(), initializer=_begin, initargs=(results, cell))
     try:
@@ -41,7 +44,10 @@ def _by_processes(
         let_go_of_results(pool)
         yield from found
     except BrokenProcessPool as error:
-        raise VedetteError("workers: expected processes that read runs; one has died, for want of memory?") from error
+        raise VedetteError(
+            "workers: expected processes that read runs; one has died: for want of memory, or, in a script of your "
+            'own, as the call that reads is not under `if __name__ == "__main__":`'
+        ) from error
     finally:
         pool.shutdown(cancel_futures=True)
 
