@@ -65,6 +65,25 @@ def test_children_are_started_deaf_to_interrupts_and_with_one_thread(monkeypatch
     assert os.environ["MKL_NUM_THREADS"] == "3"
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are not forks of a server there")
+def test_ctrl_c_while_forks_of_a_server_start_is_not_lost() -> None:
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # what is started in the background ignores it
+    reached = []
+
+    def start() -> None:
+        with as_children(of_server=True):
+            signal.raise_signal(signal.SIGINT)
+            reached.append("the end")
+
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            start()
+        assert reached == ["the end"]
+        assert signal.getsignal(signal.SIGINT) == signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
 def test_children_may_be_started_by_any_thread() -> None:
     found: list[str] = []
 

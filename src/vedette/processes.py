@@ -12,6 +12,7 @@ from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing.context import BaseContext
 from pathlib import Path
+from typing import Any
 
 # Elsewhere a fork of a process that has loaded half of the system's libraries is not safe, or there is none.
 _METHOD = "forkserver" if sys.platform == "linux" else "spawn"
@@ -52,14 +53,22 @@ def load_ahead(*more: str) -> None:
 
 
 @contextmanager
-def as_children() -> Iterator[None]:
+def as_children(*, of_server: bool = False) -> Iterator[None]:
     """Processes started inside inherit that Ctrl-C is not for them, and that linear algebra has one thread.
 
     The main process stops them.
+
+    Args:
+        of_server: they are of `context`, after `load_ahead`. Where that has a process of which they are forks, that one
+            is deaf to Ctrl-C already; it may take a second to load, and Ctrl-C waits for it instead of being lost.
     """
     ours = {name: "1" for name in _THREADS if name not in os.environ}
     in_main = threading.current_thread() is threading.main_thread()
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN) if in_main else None
+    before = signal.getsignal(signal.SIGINT)
+    came: list[tuple[Any, ...]] = []
+    waits = of_server and _METHOD == "forkserver" and callable(before)
+    if in_main:
+        signal.signal(signal.SIGINT, (lambda *of: came.append(of)) if waits else signal.SIG_IGN)
     os.environ.update(ours)
     try:
         yield
@@ -68,6 +77,8 @@ def as_children() -> Iterator[None]:
             os.environ.pop(name, None)
         if in_main:
             signal.signal(signal.SIGINT, before)
+        if came and callable(before):
+            before(*came[-1])
 
 
 def let_go_of_results(pool: ProcessPoolExecutor) -> None:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import current_process
+from multiprocessing import active_children, current_process
 from typing import TYPE_CHECKING
 
 from vedette.errors import VedetteError
@@ -37,9 +38,10 @@ def _by_processes(
     if getattr(current_process(), "_inheriting", False):  # a reader that runs the main module, which starts readers
         raise VedetteError('a script that reads with workers needs `if __name__ == "__main__":` around the call')
     load_ahead()
+    others = set(active_children())
     pool = ProcessPoolExecutor(number, context(), initializer=_begin, initargs=(results, cell))
     try:
-        with as_children():
+        with as_children(of_server=True):
             found = pool.map(_read, parts)
         let_go_of_results(pool)
         yield from found
@@ -48,6 +50,10 @@ def _by_processes(
             "workers: expected processes that read runs; one has died: for want of memory, or, in a script of your "
             'own, as the call that reads is not under `if __name__ == "__main__":`'
         ) from error
+    except BaseException:  # Ctrl-C, or a damaged run: what the others read is of no use, and may take seconds
+        for reader in set(active_children()) - others:
+            reader.kill()
+        raise
     finally:
         pool.shutdown(cancel_futures=True)
 
@@ -60,6 +66,7 @@ _whose: list[tuple[CampaignResults, str]] = []  # of this process, if it is one 
 
 
 def _begin(results: CampaignResults, cell: str) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server may be another's, which does not
     end_with_parent()
     _whose.append((results, cell))
 

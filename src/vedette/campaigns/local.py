@@ -77,7 +77,7 @@ class _Worker:
         others = set(active_children())
         try:
             load_ahead()
-            with as_children():
+            with as_children(of_server=True):
                 begun = pool.submit(os.getpid)
         except OSError as error:
             raise VedetteError(
