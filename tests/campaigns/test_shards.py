@@ -161,6 +161,7 @@ def test_shares_of_another_campaign_are_refused(changes: dict[str, object], told
     with pytest.raises(InputError, match="other: expected a folder of this campaign") as error:
         merge([tmp_path / "one", tmp_path / "other"], tmp_path / "merged")
     assert told in str(error.value)
+    assert f"(here: {tmp_path / 'one'} and those" in str(error.value)
     assert not (tmp_path / "merged").exists()
 
 

@@ -124,7 +124,10 @@ def _read(places: Sequence[Path]) -> tuple[dict[str, Any], list[_Share]]:
         manifest = {"shard": None, **read_manifest(place)}
         shard = parse_shard(manifest.pop("shard") or "1/1")
         shares.append(_Share(place, shard, tuple(manifest["sessions"]), contents_checksum(manifest)))
-        whole = _joined(place, manifest, whole) if whole else manifest
+        try:
+            whole = _joined(place, manifest, whole) if whole else manifest
+        except InputError as error:
+            raise InputError(f"{error} (here: {places[0]} and those that agree with it)") from error
     return whole, shares
 
 
