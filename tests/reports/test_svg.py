@@ -2,9 +2,11 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ET
+from importlib import resources
 
 from matplotlib.figure import Figure
 
+from vedette.evaluation.figures.style import SENSOR_COLOURS
 from vedette.reports.svg import inline_svg
 
 TEXT = '<b> & id="x" #222222 0.00123'
@@ -57,3 +59,14 @@ def test_elided_names_have_the_full_one_as_title() -> None:
     svg = str(inline_svg(drawing(), "one", "", {TEXT: "<full> name"}))
     assert "<title>&lt;full&gt; name</title>" in svg
     ET.fromstring(_with_names(svg))
+
+
+def test_every_colour_of_a_sensor_has_a_shade_in_the_dark() -> None:
+    css = (resources.files("vedette.reports") / "page" / "report.css").read_text(encoding="utf-8")
+    light, dark = css.split("prefers-color-scheme: dark", 1)
+    for place, colour in enumerate(SENSOR_COLOURS, start=1):
+        assert f"--sensor-{place}: {colour.lower()};" in light
+        assert f"--sensor-{place}: #" in dark
+    figure = Figure()
+    figure.subplots().plot([0.0, 1.0], color=SENSOR_COLOURS[0])
+    assert "stroke: var(--sensor-1)" in inline_svg(figure, "g", "a line")

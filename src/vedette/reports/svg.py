@@ -11,7 +11,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from vedette.evaluation.figures import png_bytes, svg_text
-from vedette.evaluation.figures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILION
+from vedette.evaluation.figures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SENSOR_COLOURS, SKY, VERMILION
 
 # What the page's style sheet gives another shade in the dark.
 _VARIABLES = {
@@ -27,6 +27,7 @@ _VARIABLES = {
     PURPLE: "purple",
     ORANGE: "orange",
     SKY: "sky",
+    **{colour: f"sensor-{place}" for place, colour in enumerate(SENSOR_COLOURS, start=1)},
 }
 _COLOUR = re.compile("|".join(_VARIABLES), re.IGNORECASE)
 _NAMES = {colour.lower(): f"var(--{name})" for colour, name in _VARIABLES.items()}
