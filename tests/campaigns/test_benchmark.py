@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 
 from vedette.campaigns import benchmark, run_campaign
 from vedette.campaigns.benchmark import OWN, Scene, campaign_of, entrant, make_way, scenes
+from vedette.campaigns.manifest import read_manifest
 from vedette.campaigns.standings import benchmark_csv, benchmark_markdown, header, origin, row, scene_table
 from vedette.cli import app
 from vedette.errors import InputError
@@ -66,12 +67,13 @@ def test_an_entrant_is_paired_with_the_first_and_its_counts_are_told(tmp_path: P
     assert mine.counts["rewards"] == 3.0
     assert np.isnan(mine.counts["fusions"])
     assert len(header(table)) == len(row(table, mine))
-    facts = origin([table], [own], 0)
-    assert facts["planner mine"] == own.digest
+    facts = origin([table], 0)
+    digest = read_manifest(tmp_path / "out" / STEERED.name / "mine")["digest"]
+    assert facts["planner mine, paper-a"] == digest
     assert facts["scene paper-a"] == table.digest
     page = benchmark_markdown([table], facts)
     assert f"| mine | {float(mine.ospa.mean):.2f} |" in page
-    assert own.digest in page
+    assert digest in page
     rows = list(csv.DictReader(io.StringIO(benchmark_csv([table]))))
     assert [each["strategy"] for each in rows] == ["nearest", "fixed", "mine"]
     assert float(rows[2]["ospa"]) == float(mine.ospa.mean)

@@ -66,7 +66,7 @@ def test_any_number_of_processes_reads_the_same(folder: Path) -> None:
 @pytest.mark.usefixtures("small_parts")
 def test_it_holds_what_the_records_do(folder: Path) -> None:
     results, wanted = open_results(folder), (1, 3, 4, 6, 7, 9)
-    ensemble = results.ensemble(CELL, wanted)
+    ensemble = results.ensemble(CELL, list(np.array(wanted)))
     runs = [results.run(CELL, run) for run in wanted]
     records = [run.record for run in runs]
     assert ensemble.runs.tolist() == list(wanted)

@@ -316,8 +316,6 @@ def test_wrong_actions_and_steps_are_told() -> None:
     env = ScenarioEnv(scene("lmb"))
     with pytest.raises(InputError, match="step: expected a reset first, as there is no run"):
         env.step([0, 0])
-    with pytest.raises(InputError, match="options: expected run alone; got runn"):
-        env.reset(seed=1, options={"run": 2, "runn": 3})
     env.reset(seed=1)
     for actions in ([13, 0], [0], [-1, 0]):
         with pytest.raises(InputError, match=r"actions: expected 2 indices below \[13, 13\]; got"):

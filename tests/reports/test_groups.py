@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from reports.examples import campaign_of, results_of
@@ -73,4 +74,4 @@ def test_strategies_with_other_scan_times_are_not_compared_and_drawn_each_over_i
     assert [each.title.split()[-1] for each in drawn] == names
     for strategy, drawing in zip(group.strategies, drawn, strict=True):
         lines = drawing.figure.axes[0].get_lines()
-        assert lines[0].get_xdata().tolist() == strategy.ensemble.times.tolist()
+        assert np.asarray(lines[0].get_xdata()).tolist() == strategy.ensemble.times.tolist()

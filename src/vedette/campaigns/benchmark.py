@@ -6,7 +6,6 @@ seed and runs, so that they are paired; entrants, scenes and runs may be added a
 
 from __future__ import annotations
 
-import hashlib
 import re
 import shlex
 import shutil
@@ -93,13 +92,11 @@ class Entrant:
         name: of it, and of its folders.
         role: what it is.
         section: how a scenario names it.
-        digest: SHA-256 of the command or reference and of the files that it names.
     """
 
     name: str
     role: Role
     section: dict[str, Any]
-    digest: str
 
 
 def entrant(role: Role, said: str, *, seconds: float, folder: Path) -> Entrant:
@@ -122,18 +119,11 @@ def entrant(role: Role, said: str, *, seconds: float, folder: Path) -> Entrant:
     if re.fullmatch(r"[\w.]+:[\w.]+|[^:\s]+\.py:[\w.]+", what):
         module, _, attribute = what.rpartition(":")
         place = str((folder / module).resolve()) if module.endswith(".py") else module
-        section: dict[str, Any] = {"kind": "custom", "function": f"{place}:{attribute}"}
-        files = [Path(place)] if module.endswith(".py") else []
-    else:
-        command = shlex.split(what)
-        section = {"kind": "program", "command": command, "folder": str(folder.resolve()), "seconds": seconds}
-        files = [folder / word for word in command if (folder / word).is_file()]
-    digest = hashlib.sha256(what.encode())
-    for file in files:
-        if not file.is_file():
-            raise InputError(f"{role} {name}: expected a file; got {file}")
-        digest.update(file.read_bytes())
-    return Entrant(name, role, section, digest.hexdigest())
+        if module.endswith(".py") and not Path(place).is_file():
+            raise InputError(f"{role} {name}: expected a file; got {place}")
+        return Entrant(name, role, {"kind": "custom", "function": f"{place}:{attribute}"})
+    command = {"command": shlex.split(what), "folder": str(folder.resolve()), "seconds": seconds}
+    return Entrant(name, role, {"kind": "program", **command})
 
 
 def campaign_of(scene: Scene, entrant: Entrant | None, runs: int, seed: int, folder: Path, **how: Any) -> Campaign:

@@ -117,12 +117,12 @@ class CampaignResults(Speaking):
         """The measures of a finished run: as they were kept, or where this version has others, computed anew."""
         return self.run(cell, run).metrics
 
-    def ensemble(self, cell: str, runs: Sequence[int] | None = None) -> Ensemble:
+    def ensemble(self, cell: str, runs: Sequence[SupportsIndex] | None = None) -> Ensemble:
         """What is compared and reported of finished runs of a cell, by their increasing numbers; None: of all.
 
         Raises `InputError` for no run.
         """
-        wanted = self.finished(cell) if runs is None else runs
+        wanted = self.finished(cell) if runs is None else tuple(map(operator.index, runs))
         return gathered(self, cell, wanted, 1 if self._own else self._num_workers)
 
     def outlines(self, cell: str, runs: Sequence[int]) -> Iterator[tuple[Outline, RunMetrics]]:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vedette.campaigns.benchmark import OWN, Entrant, Scene
+from vedette.campaigns.benchmark import OWN, Scene
 from vedette.campaigns.results import CampaignResults, open_results
 from vedette.evaluation import Summary, paired_difference, summarise
 from vedette.evaluation.comparison import scored
@@ -64,12 +64,14 @@ class SceneTable:
         scene: which.
         unit: of OSPA.
         digest: SHA-256 of the scenario without who is entered.
+        entrants: of each folder of an entrant, SHA-256 of its campaign: scene, command and the files that it names.
         standings: of each.
     """
 
     scene: Scene
     unit: str
     digest: str
+    entrants: Mapping[str, str]
     standings: tuple[Standing, ...]
 
 
@@ -87,7 +89,8 @@ def scene_table(scene: Scene, folder: Path) -> SceneTable | None:
     text = dump_scenario(model, folder=scenario.folder)
     others = [replace(own, difference=_difference(ospa, first)) for own, ospa in tried[1:]]
     standings = (tried[0][0], *others)
-    return SceneTable(scene, scenario.model.ospa.unit, hashlib.sha256(text.encode()).hexdigest(), standings)
+    entrants = {each.folder.name: str(each.manifest["digest"]) for each in opened if each.folder.name != OWN}
+    return SceneTable(scene, scenario.model.ospa.unit, hashlib.sha256(text.encode()).hexdigest(), entrants, standings)
 
 
 def _tried(scene: Scene, results: CampaignResults) -> Iterator[tuple[Standing, dict[int, float]]]:
@@ -178,11 +181,13 @@ def _interval(summary: Summary, form: str) -> str:
     return "" if np.isnan(summary.low) else f"{_known(float(summary.low), form)} to {_known(float(summary.high), form)}"
 
 
-def origin(tables: Sequence[SceneTable], entrants: Sequence[Entrant], seed: int) -> dict[str, str]:
-    """What the tables are of: versions, scenarios and entrants with their SHA-256."""
+def origin(tables: Sequence[SceneTable], seed: int) -> dict[str, str]:
+    """What the tables are of: versions, and scenarios and entrants, whenever they were entered, with their SHA-256."""
     found = {"seed": str(seed), **versions()}
-    found |= {f"scene {table.scene.name}": table.digest for table in tables}
-    return found | {f"{each.role} {each.name}": each.digest for each in entrants}
+    for table in tables:
+        found[f"scene {table.scene.name}"] = table.digest
+        found |= {f"{table.scene.role} {name}, {table.scene.name}": digest for name, digest in table.entrants.items()}
+    return found
 
 
 def benchmark_markdown(tables: Sequence[SceneTable], facts: Mapping[str, str]) -> str:

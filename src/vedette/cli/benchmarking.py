@@ -75,7 +75,7 @@ def benchmark(
             make_way(campaign, folder)
             carry_out(campaign, folder, workers)
     tables = [table for scene in scenes().values() if (table := scene_table(scene, out)) is not None]
-    page = _write(tables, entered, seed, out)
+    page = _write(tables, seed, out)
     for table in tables:
         if table.scene in chosen:
             print_standings(table)
@@ -98,12 +98,12 @@ def _chosen(names: str | None, quick: bool, entered: list[Entrant]) -> list[Scen
     return [scene for scene in known.values() if scene.role in roles and (scene.quick or not quick)]
 
 
-def _write(tables: list[SceneTable], entered: list[Entrant], seed: int, out: Path) -> Path:
+def _write(tables: list[SceneTable], seed: int, out: Path) -> Path:
     from vedette.campaigns.standings import benchmark_csv, benchmark_markdown, origin
     from vedette.reports.benchmark import write_benchmark
 
     with interruptible(f"{out} keeps every run; the same command writes the tables"):
-        facts = origin(tables, entered, seed)
+        facts = origin(tables, seed)
         write_text(out / "benchmark.md", benchmark_markdown(tables, facts))
         write_text(out / "benchmark.csv", benchmark_csv(tables))
         write_benchmark(tables, facts, page := out / "benchmark.html")

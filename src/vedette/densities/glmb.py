@@ -109,8 +109,9 @@ class GLMB(Hypotheses):
 
     def to_factors(self) -> kt.FactoredGlmb:
         """The one factor, as kernels take several."""
-        own, tracks_end = self.to_kernel(), np.array([0, self.tracks.num_tracks])
-        return kt.FactoredGlmb(own.tracks, tracks_end, *own[1:], np.array([0, self.num_hyps]))
+        own = self.to_kernel()
+        tracks_end, hyps_end = np.array([0, len(own.tracks.labels)]), np.array([0, len(own.hyp_log_weights)])
+        return kt.FactoredGlmb(own.tracks, tracks_end, *own[1:], hyps_end)
 
     @classmethod
     def from_kernel(cls, glmb: kt.Glmb, sources: Ints | None = None) -> GLMB:

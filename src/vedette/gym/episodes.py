@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeAlias
 
@@ -95,16 +95,11 @@ class Episodes:
         self.built = self._drawn(0, 0)
         self.layout = self.built.layout
 
-    def start(self, seed: int | None, options: Mapping[str, Any] | None) -> None:
-        """Turn to a run: that of a seed and number (`run` of the options); by default run 0 of a seed, and the next of
-        the seed before.
+    def start(self, seed: int | None, run: int | None) -> None:
+        """Turn to a run: that of a seed and number; by default run 0 of a seed, and the next of the seed before.
 
         Where none was ever given a seed is drawn.
         """
-        given = {} if options is None else dict(options)
-        run = given.pop("run", None)
-        if given:
-            raise reject("options", "run alone", ", ".join(map(str, given)))
         first = seed is not None or self._seed is None
         if seed is None:
             seed = int(np.random.default_rng().integers(2**31)) if self._seed is None else self._seed

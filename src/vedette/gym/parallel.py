@@ -73,7 +73,7 @@ class ScenarioParallelEnv(ParallelEnv):  # type: ignore[misc]  # which has no ty
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
         """The first decision of a run; arguments as of `ScenarioEnv.reset`."""
-        self.episodes.start(seed, options)
+        self.episodes.start(seed, (options or {}).get("run"))
         self.agents = self.possible_agents[:]
         return self._observations(), self._all(self.episodes.info)
 

@@ -79,7 +79,7 @@ class ScenarioEnv(gymnasium.Env[dict[str, Any], Any]):
             options: `run`, the number of the run instead.
         """
         super().reset(seed=seed)
-        self.episodes.start(seed, options)
+        self.episodes.start(seed, (options or {}).get("run"))
         return self.episodes.outlook.observation, self.episodes.info()
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
