@@ -25,7 +25,7 @@ PARTS = ("total", "localisation", "cardinality")
 Choice: TypeAlias = tuple[Row, ...]
 
 # Runs that are held as they come, and entries of their tables of rewards.
-TOGETHER, _MOST_REWARDS = 512, 2**22
+TOGETHER, _MOST_REWARDS = 256, 2**22
 
 
 @dataclass(frozen=True, slots=True, repr=False)
