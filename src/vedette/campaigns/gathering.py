@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING
 from vedette.errors import VedetteError
 from vedette.evaluation.ensembles import TOGETHER, Ensemble, ensemble_of, joined
 from vedette.processes import as_children, context, end_with_parent, let_go_of_results, load_ahead
+from vedette.threads import processors
 
 if TYPE_CHECKING:
     from vedette.campaigns.results import CampaignResults
@@ -26,7 +26,7 @@ def gathered(results: CampaignResults, cell: str, runs: Sequence[int], num_worke
     Raises `InputError` for no run, or one that is damaged, and `VedetteError` where a process dies.
     """
     parts = [runs[start : start + _A_PART] for start in range(0, len(runs), _A_PART)]
-    number = min(num_workers or os.cpu_count() or 1, len(parts))
+    number = min(num_workers or processors(), len(parts))
     if number <= 1:
         return joined([_part(results, cell, part) for part in parts])
     return joined(list(_by_processes(results, cell, parts, number)))
