@@ -24,6 +24,7 @@ from vedette.evaluation.health import added, health_sums
 from vedette.evaluation.rewards import RewardSums
 from vedette.platforms import Actions
 from vedette.simulation.records import Decision, Outline, RunRecord
+from waiting import PATIENCE
 
 NUM_RUNS = 10
 CELL = "jdm-rate-5.0"
@@ -122,7 +123,7 @@ def test_a_reader_that_dies_is_told(folder: Path, tmp_path: Path) -> None:
         "from vedette.campaigns import gathering, open_results\n"
         f"gathering._A_PART = 4\nopen_results({str(folder)!r}, num_workers=2).ensemble({CELL!r})\n"
     )
-    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=PATIENCE, check=False)
     assert done.returncode == 1
     assert "a script that reads with workers needs" in done.stderr
     assert "one has died: for want of memory, or, in a script of your own" in done.stderr
