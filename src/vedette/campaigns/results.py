@@ -105,8 +105,11 @@ class CampaignResults(Speaking):
 
     def runs(self) -> Iterator[FinishedRun]:
         """Every finished run, cells in the order of the campaign, each with its runs in order."""
+        finished: dict[str, list[int]] = {}
+        for name, run in self._finished():
+            finished.setdefault(name, []).append(run)
         for cell in self.campaign.cells:
-            for entry in self._reader.entries(cell.name, self.finished(cell.name)):
+            for entry in self._reader.entries(cell.name, finished.get(cell.name, [])):
                 yield self._decoded(entry)
 
     def record(self, cell: str, run: SupportsIndex) -> RunRecord:

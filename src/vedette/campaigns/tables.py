@@ -88,11 +88,7 @@ def schema_of(parts: Iterable[pa.Schema]) -> pa.Schema:
 
 def in_schema(table: pa.Table, schema: pa.Schema) -> pa.Table:
     """The table with the columns of `schema_of`, null where it has none."""
-    columns = [
-        table[field.name].cast(field.type) if field.name in table.column_names else pa.nulls(len(table), field.type)
-        for field in schema
-    ]
-    return pa.table(columns, schema=schema)
+    return pa.concat_tables([schema.empty_table(), table], promote_options="permissive")
 
 
 def joined_tables(parts: Iterable[dict[str, pa.Table]]) -> dict[str, pa.Table]:

@@ -23,6 +23,8 @@ from vedette.text import counted, elided
 PARTS = ("total", "localisation", "cardinality")
 # What was chosen at one decision, one row a sensor.
 Choice: TypeAlias = tuple[Row, ...]
+# A run with its measures, if it has any.
+Measured: TypeAlias = tuple[Outline, RunMetrics | None]
 
 # Runs that are held as they come, and entries of their tables of rewards.
 TOGETHER, _MOST_REWARDS = 256, 2**22
@@ -84,7 +86,7 @@ class Ensemble(Speaking):
         return np.asarray(self.num_targets.astype(np.int64) - self.measures["num_missed"])
 
 
-def ensemble_of(runs: Iterable[tuple[Outline, RunMetrics | None]]) -> Ensemble:
+def ensemble_of(runs: Iterable[Measured]) -> Ensemble:
     """What is compared and reported of some runs, with their measures where they have any.
 
     Runs may come from a stream: no more than a few hundred are held at a time.
@@ -127,8 +129,8 @@ def choice_of(plan: Plan) -> Choice:
     return tuple(rounded(own.columns, row) for own, row in zip(plan.actions, plan.chosen_actions, strict=True))
 
 
-def _batches(runs: Iterable[tuple[Outline, RunMetrics | None]]) -> Iterator[list[tuple[Outline, RunMetrics | None]]]:
-    few, room = list[tuple[Outline, RunMetrics | None]](), _MOST_REWARDS
+def _batches(runs: Iterable[Measured]) -> Iterator[list[Measured]]:
+    few, room = list[Measured](), _MOST_REWARDS
     for run in runs:
         few.append(run)
         room -= sum(table.mean.size for decision in run[0].decisions for table in decision.plan.tables)
@@ -139,7 +141,7 @@ def _batches(runs: Iterable[tuple[Outline, RunMetrics | None]]) -> Iterator[list
         yield few
 
 
-def _of_few(runs: Sequence[tuple[Outline, RunMetrics | None]]) -> Ensemble:
+def _of_few(runs: Sequence[Measured]) -> Ensemble:
     outlines, first = [run for run, _ in runs], runs[0][0]
     for each in outlines[1:]:
         _check_alike(first.scenario, first.times, each.scenario, each.times, each.run)
@@ -159,7 +161,7 @@ def _of_few(runs: Sequence[tuple[Outline, RunMetrics | None]]) -> Ensemble:
         health=health_sums([each.health for each in outlines]),
         rewards=tuple(RewardSums.of(number, made) for number, made in enumerate(decided)),
         seconds={stage: of.astype(np.float32) for stage, of in _by_name(list(map(_seconds, outlines))).items()},
-        counts={name: _in_few_bytes(of) for name, of in _by_name(_counts(outlines)).items()},
+        counts={name: _in_few_bytes(np.array(of, np.int64)) for name, of in _counts(outlines).items()},
     )
 
 
@@ -193,6 +195,9 @@ def _seconds(outline: Outline) -> dict[str, Floats]:
     return {stage: of[decided] if stage == "planning" else of for stage, of in outline.timings.items()}
 
 
-def _counts(outlines: Sequence[Outline]) -> list[dict[str, Ints]]:
-    plans = [decision.plan for each in outlines for decision in each.decisions]
-    return [{name: np.array([number]) for name, number in plan.counts.items()} for plan in plans]
+def _counts(outlines: Sequence[Outline]) -> dict[str, list[int]]:
+    found: dict[str, list[int]] = {}
+    for decision in (decision for each in outlines for decision in each.decisions):
+        for name, number in decision.plan.counts.items():
+            found.setdefault(name, []).append(number)
+    return found
