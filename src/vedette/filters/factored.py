@@ -24,9 +24,9 @@ from vedette.kernels.steps.in_view import in_view
 from vedette.models.arguments import dimension, non_negative
 from vedette.models.fields import Count, L1Error
 
-# Two claims to a measurement make a link where both hold with a probability above this times the error of a split, or
-# above this at all. Weaker links make groups that no list is long enough for.
-_LINK_PER_ERROR, _WEAKEST_LINK = 2.0, 0.02
+# At a measurement, claims are cut while the sum over pairs of their products is at most the error of a split, or this.
+# Finer cuts make groups that no list is long enough for.
+_MOST_CUT = 0.02
 
 # Of the largest factors, how many may take a scan together.
 _FACTORS_TOGETHER = 4
@@ -72,7 +72,7 @@ class _OfFactors(OfKind[FactoredGLMB]):
             num_inexact_clusters=0,
             search_cut=any(bool(report.cut) for report in reports),
             cap_met=is_full or any(bool(report.full) for report in reports),
-            factoring_error=min(2.0, sum(float(report.split_error + 2.0 * report.taken_twice) for report in reports)),
+            factoring_error=min(2.0, sum(float(report.split_error + 4.0 * report.taken_twice) for report in reports)),
             reduction_error=min(2.0, sum(float(report.reduction_error) for report in reports)),
         )
 
@@ -166,5 +166,5 @@ def _check_factoring(max_split_error: Any, max_factor_labels: Any) -> None:
 def _factoring(max_split_error: float, max_factor_labels: int, num_scans: int) -> Factoring:
     """The fields of a filter as kernels take them."""
     error, most = float(max_split_error), int(max_factor_labels)
-    link = min(_LINK_PER_ERROR * error, _WEAKEST_LINK) / num_scans**2
-    return Factoring(error, link, most, _FACTORS_TOGETHER * most)
+    max_cut = min(error, _MOST_CUT) / num_scans**2
+    return Factoring(error, max_cut, most, _FACTORS_TOGETHER * most)

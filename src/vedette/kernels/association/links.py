@@ -1,12 +1,13 @@
-"""Which factors of a belief contend for a measurement so much that a scan must be taken by them together.
+"""Which independent factors take a scan together.
 
-Two factors that may both take a measurement j exclude each other there. If the exclusion is ignored, the joint choices
-of a scan are those of independent factors, Q, some of which let both take j; the true ones are Q given that none does,
-P = Q(. | no measurement is taken twice), and
+Two factors that may both take a measurement j exclude each other there. Taken as independent, with probabilities a of
+taking it, they are wrong by an L1 error in proportion to
 
-    sum |P - Q| = 2 Q(some measurement is taken twice) <= 2 sum_j sum_{a < b} Q_a(j) Q_b(j)
+    the sum over pairs of factors of a_s(j) a_t(j).
 
-over pairs of factors. A link is such a pair; strong links are kept, and the bound of those that were cut is reported.
+For each measurement the weakest claims are cut while this sum over the pairs that are cut stays within a bound; all
+others are linked. What the factors of different groups still claim of one measurement is left to
+`vedette.kernels.association.contention`.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import numpy as np
 
 from vedette.kernels.association.assignment import Options
 from vedette.kernels.association.clusters import root_of
-from vedette.kernels.base.arrays import counted_ints, filled_ints
+from vedette.kernels.base.arrays import counted_ints, filled_ints, group_members
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.linalg import log_sum
@@ -34,11 +35,19 @@ class Claims(NamedTuple):
 
 
 class Contest(NamedTuple):
-    """Who claims a measurement most."""
+    """The two strongest claims to each measurement."""
 
     first: Floats  # (num_measurements,) the strongest claim, 0 for none
     second: Floats  # (num_measurements,) the next one, of another factor
     owner: Ints  # (num_measurements,) factor of the strongest, -1 for none
+
+
+class Links(NamedTuple):
+    """Pairs of factors that take a scan together."""
+
+    ends: Ints  # (num_links,) a factor
+    others: Ints  # (num_links,) the factor with the strongest claim to the measurement
+    strengths: Floats  # (num_links,) product of the two claims
 
 
 @borrowing
@@ -112,11 +121,45 @@ def _strengthen(
                     claims.strengths[at] = max(claims.strengths[at], own / total if total > 0.0 else 1.0)
 
 
+@kernel
+def _links(claims: Claims, contest: Contest, max_cut: float) -> Links:
+    """The pairs of factors to be linked: at each measurement those whose claims are not cut, with the strongest.
+
+    A claim is cut, the weakest first, while the products of the pairs that are cut sum to `max_cut` at most.
+    """
+    num, filled = len(claims.strengths), 0
+    factor_of, products = np.empty(num, np.int64), np.empty(num)
+    ends, others = np.empty(num, np.int64), np.empty(num, np.int64)
+    for factor in range(len(claims.offsets) - 1):
+        for i in range(claims.offsets[factor], claims.offsets[factor + 1]):
+            factor_of[i] = factor
+    offsets, members = group_members(claims.measurements, len(contest.owner))
+    for j in range(len(contest.owner)):
+        own = members[offsets[j] : offsets[j + 1]]
+        if contest.second[j] == 0.0:
+            continue
+        order, stronger, cut = descending_order(claims.strengths[own]), 0.0, 0.0
+        for i in own:
+            stronger += claims.strengths[i]
+        for k in range(len(own) - 1, 0, -1):
+            strength = claims.strengths[own[order[k]]]
+            stronger -= strength
+            cut += strength * stronger
+            if cut > max_cut:
+                for i in range(1, k + 1):
+                    claim = own[order[i]]
+                    ends[filled], others[filled] = factor_of[claim], factor_of[own[order[0]]]
+                    products[filled] = claims.strengths[claim] * contest.first[j]
+                    filled += 1
+                break
+    return Links(ends[:filled], others[:filled], products[:filled])
+
+
 @borrowing
-def _join(order: Ints, ends: Ints, others: Ints, sizes: Ints, most: int, leaders: Ints) -> None:
-    """Join the two factors of each link in turn, unless they would have more than `most` labels together."""
+def _join(links: Links, order: Ints, sizes: Ints, most: int, leaders: Ints) -> None:
+    """Join the two factors of each link, in `order`, unless they would have more than `most` labels together."""
     for link in order:
-        a, b = root_of(leaders, ends[link]), root_of(leaders, others[link])
+        a, b = root_of(leaders, links.ends[link]), root_of(leaders, links.others[link])
         if a != b and sizes[a] + sizes[b] <= most:
             first, last = min(a, b), max(a, b)
             leaders[last] = first
@@ -124,30 +167,21 @@ def _join(order: Ints, ends: Ints, others: Ints, sizes: Ints, most: int, leaders
 
 
 @kernel
-def linked_factors(options: Options, row_offsets: Ints, sizes: Ints, least: float, most: int) -> Ints:
+def linked_factors(options: Options, row_offsets: Ints, sizes: Ints, max_cut: float, most: int) -> Ints:
     """(num_factors,) the first factor of the group that each is taken with.
 
-    row_offsets: (num_factors + 1,) rows of each. sizes: (num_factors,) labels of each, overwritten. least: links of the
-    product of two claims up to this are cut. most: labels of a group; links are made from the strongest on, and
-    left out where they would join more.
+    row_offsets: (num_factors + 1,) rows of each. sizes: (num_factors,) labels of each, overwritten. max_cut: at each
+    measurement, the sum over pairs of the product of their claims up to which claims are cut. most: labels of a group;
+    links are made from the strongest on, and left out where they would join more.
     """
     num_factors, num = len(row_offsets) - 1, options.num_measurements
     leaders, claims = counted_ints(num_factors), _claims(options, row_offsets)
     contest = Contest(np.empty(num), np.empty(num), np.empty(num, np.int64))
     _rank_claims(claims, contest)
-    _strengthen(options, row_offsets, contest, least, filled_ints(num, -1), claims)
+    _strengthen(options, row_offsets, contest, max_cut, filled_ints(num, -1), claims)
     _rank_claims(claims, contest)
-    ends, others = np.empty(len(claims.strengths), np.int64), np.empty(len(claims.strengths), np.int64)
-    strengths, filled = np.empty(len(claims.strengths)), 0
-    for factor in range(num_factors):
-        for i in range(claims.offsets[factor], claims.offsets[factor + 1]):
-            j = claims.measurements[i]
-            # Whoever is linked to anybody at a measurement is linked to the one that claims it most.
-            strength = claims.strengths[i] * contest.first[j]
-            if contest.owner[j] != factor and strength > least:
-                ends[filled], others[filled], strengths[filled] = factor, contest.owner[j], strength
-                filled += 1
-    _join(descending_order(strengths[:filled]), ends, others, sizes, most, leaders)
+    links = _links(claims, contest, max_cut)
+    _join(links, descending_order(links.strengths), sizes, most, leaders)
     for factor in range(num_factors):
         leaders[factor] = root_of(leaders, factor)
     return leaders

@@ -87,7 +87,8 @@ def _log_clutter(sensor: Sensor, scan: Floats, pose: Floats, floor: float, out: 
 
 
 @inlined
-def _sort_row(start: int, stop: int, columns: Ints, log_weights: Floats, entries: Ints) -> None:
+def sort_row(start: int, stop: int, columns: Ints, log_weights: Floats, entries: Ints) -> None:
+    """Order the options of a row, heaviest first."""
     for i in range(start + 1, stop):
         column, weight, entry = columns[i], log_weights[i], entries[i]
         slot = i
@@ -167,7 +168,7 @@ def _fill_options(
                 filled += 1
                 entry += count
         # The ranking search and the assignment start from the heaviest option of a row.
-        _sort_row(start, filled, out.columns, out.log_weights, out.entries)
+        sort_row(start, filled, out.columns, out.log_weights, out.entries)
         out.offsets[row + 1] = filled
 
 

@@ -47,6 +47,23 @@ def grown_ints(array: Ints, needed: int) -> Ints:
     return longer
 
 
+@kernel
+def group_members(group_of: Ints, num_groups: int) -> tuple[Ints, Ints]:
+    """Items of each group, in their order, as (offsets, items). Negative group numbers belong to no group."""
+    offsets = np.zeros(num_groups + 1, np.int64)
+    for group in group_of:
+        if group >= 0:
+            offsets[group + 1] += 1
+    for group in range(num_groups):
+        offsets[group + 1] += offsets[group]
+    items, fill = np.empty(offsets[num_groups], np.int64), offsets[:num_groups].copy()
+    for i in range(len(group_of)):
+        if group_of[i] >= 0:
+            items[fill[group_of[i]]] = i
+            fill[group_of[i]] += 1
+    return offsets, items
+
+
 @inlined
 def hashed(key: int, value: int) -> int:
     """A hash below 2^32 of what `key` is of, and `value`. Products stay below 2^62: overflow warns without JIT."""

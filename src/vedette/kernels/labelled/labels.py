@@ -56,23 +56,6 @@ def group_by_label_set(glmb: Glmb) -> tuple[Ints, Ints]:
 
 
 @kernel
-def group_members(group_of: Ints, num_groups: int) -> tuple[Ints, Ints]:
-    """Items of each group, in their order, as (offsets, items). Negative group numbers belong to no group."""
-    offsets = np.zeros(num_groups + 1, np.int64)
-    for group in group_of:
-        if group >= 0:
-            offsets[group + 1] += 1
-    for group in range(num_groups):
-        offsets[group + 1] += offsets[group]
-    items, fill = np.empty(offsets[num_groups], np.int64), offsets[:num_groups].copy()
-    for i in range(len(group_of)):
-        if group_of[i] >= 0:
-            items[fill[group_of[i]]] = i
-            fill[group_of[i]] += 1
-    return offsets, items
-
-
-@kernel
 def label_place(unique: Ints, count: int, step: int, index: int) -> int:
     """Place of the label (step, index) among the first `count` of `unique`, which are in increasing order."""
     low, high = 0, count

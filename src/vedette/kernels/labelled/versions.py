@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.kernels.base.arrays import counted_ints, filled_ints
+from vedette.kernels.base.arrays import counted_ints, filled_ints, group_members
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Glmb, Ints, Tracks
 from vedette.kernels.gaussian.distances import l1_bound
@@ -19,7 +19,6 @@ from vedette.kernels.gaussian.linalg import cholesky, log_sum, solve_lower
 from vedette.kernels.gaussian.mixtures import MixtureCaps, descending_order
 from vedette.kernels.gaussian.pooling import Moments, moments_of, pooled_tracks
 from vedette.kernels.labelled.groups import group_log_sums
-from vedette.kernels.labelled.labels import group_members
 from vedette.kernels.labelled.splitting import Choices, choices_of, group_choices
 
 

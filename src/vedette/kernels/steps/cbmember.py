@@ -14,11 +14,11 @@ from vedette.kernels.association.assignment import MISSED, Options
 from vedette.kernels.association.options import weighed_options
 from vedette.kernels.association.predicted import Rows, rows_of_scan
 from vedette.kernels.association.truncation import Truncation
+from vedette.kernels.base.arrays import group_members
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Ints, Lmb, Motion, ScanInput, Sensor, Tracks
 from vedette.kernels.gaussian.linalg import log_add
 from vedette.kernels.gaussian.mixtures import MixtureCaps, make_components, require_gaussians
-from vedette.kernels.labelled.labels import group_members
 from vedette.kernels.steps.assembly import write_updated
 from vedette.kernels.steps.lmb import Reduction, append_reduced, labels_to_keep, weigh_by_existence
 

@@ -13,7 +13,7 @@ from vedette.kernels.association.predicted import Rows, taken_rows
 from vedette.kernels.association.products import product_of
 from vedette.kernels.association.search import SearchCaps
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import FactoredGlmb, Ints
+from vedette.kernels.base.types import FactoredGlmb, Floats, Ints
 from vedette.kernels.gaussian.linalg import log_add
 from vedette.kernels.gaussian.mixtures import descending_order
 from vedette.kernels.steps.glmb import log_row_totals, log_total_bound
@@ -91,6 +91,29 @@ def weigh_singles(factors: Factors, rows: Rows) -> None:
         rows.log_absent[row] = log_add(log_absent, log_present + rows.log_absent[row])
         for c in range(rows.offsets[row], rows.offsets[row + 1]):
             rows.log_weights[c] += log_present
+
+
+@kernel
+def groups_of_rows(factors: Factors, leaders: Ints, rows: Rows) -> tuple[Ints, Floats, Ints]:
+    """The group, the probability within its factor, and the number of components of each row.
+
+    A single row is certain: whether its track is there is in its options. leaders: (num_factors,) of each factor.
+    """
+    num, prior = len(rows.log_absent), factors.prior
+    group_of, presence, num_components = np.empty(num, np.int64), np.ones(num), np.empty(num, np.int64)
+    for factor in range(len(leaders)):
+        single = is_single(factors, factor)
+        for row in range(factors.row_offsets[factor], factors.row_offsets[factor + 1]):
+            group_of[row], num_components[row] = leaders[factor], rows.offsets[row + 1] - rows.offsets[row]
+            presence[row] = 1.0 if single else 0.0
+    for factor in range(len(prior.factor_offsets) - 1):
+        if is_single(factors, factor):
+            continue
+        for h in range(prior.factor_offsets[factor], prior.factor_offsets[factor + 1]):
+            weight = math.exp(prior.hyp_log_weights[h])
+            for e in range(prior.hyp_offsets[h], prior.hyp_offsets[h + 1]):
+                presence[prior.hyp_tracks[e]] += weight
+    return group_of, presence, num_components
 
 
 @kernel

@@ -38,7 +38,7 @@ class Factoring(NamedTuple):
     """When factors are taken together, and when they are split."""
 
     max_error: float  # L1 error of one group's split
-    least_link: float  # product of two claims to a measurement, up to which they are taken as independent
+    max_cut: float  # sum over pairs of factors, at each measurement, of the products of claims that are cut
     max_labels: int  # of a factor, after a scan
     max_together: int  # labels of the factors that take a scan together
 

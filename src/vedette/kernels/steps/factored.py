@@ -10,16 +10,17 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from vedette.kernels.association.contention import leave_to_others
 from vedette.kernels.association.links import linked_factors
 from vedette.kernels.association.options import weighed_options
 from vedette.kernels.association.predicted import rows_of_scan
 from vedette.kernels.association.truncation import Truncation
+from vedette.kernels.base.arrays import group_members
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import FactoredGlmb, Motion, ScanInput, Sensor
 from vedette.kernels.gaussian.mixtures import require_gaussians
 from vedette.kernels.labelled.factor_store import make_store, stored
-from vedette.kernels.labelled.labels import group_members
-from vedette.kernels.steps.factor_groups import factors_of, gathered_group, is_single, weigh_singles
+from vedette.kernels.steps.factor_groups import factors_of, gathered_group, groups_of_rows, is_single, weigh_singles
 from vedette.kernels.steps.factor_updates import (
     CUT,
     DROPPED,
@@ -70,7 +71,8 @@ def step_factored(
     weigh_singles(factors, rows)
     options, log_clutter, num_raised = weighed_options(rows, scan, sensor, truncation)
     sizes = factors.num_labels.copy()
-    leaders = linked_factors(options, factors.row_offsets, sizes, factoring.least_link, factoring.max_together)
+    leaders = linked_factors(options, factors.row_offsets, sizes, factoring.max_cut, factoring.max_together)
+    log_twice = leave_to_others(options, *groups_of_rows(factors, leaders, rows))
     offsets, members = group_members(leaders, len(leaders))
     work, most_labels = make_work(rows, options), 0
     store = make_store(len(rows.log_absent), 2 * len(rows.log_weights), rows.means.shape[1])
@@ -90,7 +92,7 @@ def step_factored(
     sums, density = work.sums, stored(store)
     require_gaussians(density.tracks.means, density.tracks.covs)
     return density, FactoredReport(
-        sums[TOTAL],
+        sums[TOTAL] + log_twice,
         sums[KEPT],
         log_clutter,
         num_raised,

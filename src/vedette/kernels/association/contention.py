@@ -1,0 +1,169 @@
+"""What groups of factors that take a scan apart leave each other of the measurements that more than one claims.
+
+To a group, the others are one more source of measurements, beside clutter: if group g takes measurement j with odds
+o_g(j), a row of group h that takes j weighs
+
+    mu_h(j) = 1 / (1 + sum over g != h of o_g(j))
+
+times as much. The odds depend on what is left for the other measurements of a group, so that both are iterated: belief
+propagation over groups and measurements (Williams and Lau 2014). Where groups and measurements make no cycle,
+each group has its exact marginals afterwards; what is lost is that groups exclude each other. With marginals a_g(j), two
+groups that meet at one measurement are then wrong by an L1 error of 4 a_1(j) a_2(j), and more groups by no more than
+this summed over pairs.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.kernels.association.assignment import Options
+from vedette.kernels.association.options import sort_row
+from vedette.kernels.base.arrays import filled_ints, group_members
+from vedette.kernels.base.compile import borrowing, inlined, kernel
+from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.gaussian.linalg import log_sum
+
+_MOST_ROUNDS = 50
+_SETTLED = 1e-6  # change of a message after which it is taken as final
+_LEAST_MISSED = 1e-12  # probability that a group does not take a measurement, so that odds are finite
+
+
+class Meetings(NamedTuple):
+    """Each group at each measurement that it and another group claim."""
+
+    of_option: Ints  # (num_options,) the meeting of an option, -1 where no other group claims its measurement
+    measurements: Ints  # (num_meetings,)
+    messages: Floats  # (num_meetings,) mu
+
+
+@kernel
+def _meetings(options: Options, group_of: Ints) -> Meetings:
+    """Find where groups meet. group_of: (num_rows,)."""
+    num, num_options = options.num_measurements, options.offsets[-1]
+    owner, is_contested = filled_ints(num, -1), filled_ints(num, 0)
+    for row in range(len(group_of)):
+        for option in range(options.offsets[row], options.offsets[row + 1]):
+            j = options.columns[option]
+            if j >= 0:
+                if owner[j] >= 0 and owner[j] != group_of[row]:
+                    is_contested[j] = 1
+                owner[j] = group_of[row]
+    of_option, measurements, filled = filled_ints(num_options, -1), np.empty(num_options, np.int64), 0
+    place, group_at = filled_ints(num, -1), filled_ints(num, -1)
+    offsets, rows = group_members(group_of, len(group_of))
+    for group in range(len(group_of)):
+        for i in range(offsets[group], offsets[group + 1]):
+            for option in range(options.offsets[rows[i]], options.offsets[rows[i] + 1]):
+                j = options.columns[option]
+                if j < 0 or is_contested[j] == 0:
+                    continue
+                if group_at[j] != group:
+                    group_at[j], place[j], measurements[filled] = group, filled, j
+                    filled += 1
+                of_option[option] = place[j]
+    return Meetings(of_option, measurements[:filled].copy(), np.ones(filled))
+
+
+@borrowing
+def _write_odds(options: Options, shares: Floats, presence: Floats, meetings: Meetings, odds: Floats) -> None:
+    """(num_meetings,) the odds that each group takes each measurement, if that were left to it alone.
+
+    shares: (num_options,) of each option in its row. presence: (num_rows,) probability of each row in its factor.
+    """
+    for meeting in range(len(odds)):
+        odds[meeting] = 1.0
+    for row in range(len(presence)):
+        total = 0.0
+        for option in range(options.offsets[row], options.offsets[row + 1]):
+            meeting = meetings.of_option[option]
+            total += shares[option] * (meetings.messages[meeting] if meeting >= 0 else 1.0)
+        for option in range(options.offsets[row], options.offsets[row + 1]):
+            meeting = meetings.of_option[option]
+            if meeting >= 0:
+                others = max(0.0, total - meetings.messages[meeting] * shares[option])
+                odds[meeting] *= 1.0 - presence[row] * shares[option] / (others + shares[option])
+    for meeting in range(len(odds)):
+        missed = max(_LEAST_MISSED, odds[meeting])
+        odds[meeting] = (1.0 - missed) / missed
+
+
+@borrowing
+def _renew(meetings: Meetings, odds: Floats, totals: Floats) -> float:
+    """Write the messages that belong to the odds; the largest change. totals: (num_measurements,) summed odds."""
+    change = 0.0
+    for j in range(len(totals)):
+        totals[j] = 0.0
+    for meeting in range(len(odds)):
+        totals[meetings.measurements[meeting]] += odds[meeting]
+    for meeting in range(len(odds)):
+        others = max(0.0, totals[meetings.measurements[meeting]] - odds[meeting])
+        message = 1.0 / (1.0 + others)
+        change = max(change, abs(message - meetings.messages[meeting]))
+        meetings.messages[meeting] = message
+    return change
+
+
+@inlined
+def _log_counted_twice(meetings: Meetings, totals: Floats) -> float:
+    """Log of what the product of the groups' total weights is too small by (Bethe's approximation, exact on trees).
+
+    That of a measurement with n groups is product of 1 / mu_g over (1 + sum of odds)^(n - 1).
+    """
+    log_weight = 0.0
+    for meeting in range(len(meetings.messages)):
+        total = totals[meetings.measurements[meeting]]
+        log_weight -= math.log(meetings.messages[meeting]) + math.log1p(total)
+    for j in range(len(totals)):
+        log_weight += math.log1p(totals[j]) if totals[j] > 0.0 else 0.0
+    return log_weight
+
+
+@borrowing
+def _weigh(options: Options, num_components: Ints, meetings: Meetings) -> None:
+    """Multiply what options weigh by the messages, and order rows anew, heaviest first."""
+    columns, log_weights, entries = options.columns, options.log_weights, options.entries
+    for row in range(len(num_components)):
+        start, stop = options.offsets[row], options.offsets[row + 1]
+        for option in range(start, stop):
+            meeting = meetings.of_option[option]
+            if meeting < 0:
+                continue
+            shift = math.log(meetings.messages[meeting])
+            log_weights[option] += shift
+            for entry in range(entries[option], entries[option] + num_components[row]):
+                options.component_log_weights[entry] += shift
+        sort_row(start, stop, columns, log_weights, entries)
+
+
+@kernel
+def leave_to_others(options: Options, group_of: Ints, presence: Floats, num_components: Ints) -> float:
+    """Weigh the options of rows by what other groups leave of their measurements.
+
+    Args:
+        options: written; rows stay in order, heaviest option first.
+        group_of: (num_rows,) group of each row.
+        presence: (num_rows,) probability that a row's track is that of its label, in the rows' factors.
+        num_components: (num_rows,) components of each row.
+
+    Returns:
+        The log of the factor by which the product of the groups' total weights is then smaller than that of all.
+    """
+    meetings = _meetings(options, group_of)
+    if len(meetings.messages) == 0:
+        return 0.0
+    shares, odds = np.empty(options.offsets[-1]), np.empty(len(meetings.messages))
+    totals = np.empty(options.num_measurements)
+    for row in range(len(group_of)):
+        start, stop = options.offsets[row], options.offsets[row + 1]
+        log_total = log_sum(options.log_weights[start:stop])
+        for option in range(start, stop):
+            shares[option] = math.exp(options.log_weights[option] - log_total)
+    for _ in range(_MOST_ROUNDS):
+        _write_odds(options, shares, presence, meetings, odds)
+        if _renew(meetings, odds, totals) < _SETTLED:
+            break
+    _weigh(options, num_components, meetings)
+    return _log_counted_twice(meetings, totals)
