@@ -1,98 +1,195 @@
-"""Whether what filters and fusions believe is true: said against found, where the truth is drawn from the very model.
+"""Whether the beliefs of filters are true, on scenes drawn at random.
 
-    python benchmarks/beliefs.py [--detection P ...] [--runs N] [--cases WORD ...] [--errors E ...] [--summary]
-    python benchmarks/beliefs.py --summary --write docs/filters.md
+    python benchmarks/beliefs.py [--scenes N] [--seeds S ...] [--runs N] [--filters NAME ...] [--workers N]
+    python benchmarks/beliefs.py --write docs/filters.md
+    python benchmarks/beliefs.py --scene 3 --bins              # one scene, with a table of bins for each filter
+    python benchmarks/beliefs.py --four-sites --filters all    # a fixed scene, and all filters and fusions
 
-Four sites give birth with probability 0.06 at each of 25 scans; targets live on with 0.95 and are detected with P by
-each position sensor, among 10 false measurements a scan. Each run draws targets from just this, so each of the 100
-labels (step, site) exists or not at each scan, and the number of targets is a draw from its posterior where that is
-right.
+The scenes are numbered from 1, and a number always gives the same scene (`random_scenes.py`). The targets of a run are
+drawn from the model that the filters have, so that an exact filter is calibrated; they and the scans depend on the
+scene, the seed and the run alone. Three kinds of statements are compared with the truth:
 
-Prints of each filter, and of each way to take two sensors' scans or beliefs together, a Markdown table: the labels and
-scans of which an existence between two bounds was said, the mean that was said, and the share that exists with its
-standard error (runs are independent, scans of a run are not). Labels that a belief does not hold are said not to exist.
+- labels: the existence probability of each label that a belief could hold. A label (step, site) exists if the target
+  born at that step and site is alive. In a belief with an intensity of undetected targets (`belief.undetected`), a label
+  that begins with a measurement exists if that was the first measurement of a target that is alive.
+- places: the mean number of targets in each cell of 100 m of the region, undetected ones included.
+- number: the distribution of the number of targets.
 
-Then a table of a line each: the largest difference of said and found over the bins of more than 500, with its standard
-error; the log loss and Brier score of the labels, summed over them, a scan, existences held in 1e-6 to 1 - 1e-6; what
-the ranks of the true number in its posterior distribution (ties broken at random) differ from uniform, as the largest
-distance of the distribution functions, 0 to 1; OSPA (c = 100 m, p = 1); CPU milliseconds a scan. Filters without labels
-have the number alone. And what share exists of what was said, a line each. Equal arguments print equal tables, but for
-the times.
+For labels and places the table gives the largest difference of the believed and the true mean over the bins (of the
+believed value) that hold more than 500 values, with its standard error over runs. The verdict is "pass" where no
+difference of either is above .05, "fail" where one is above it by more than two standard errors, and "unclear" where
+more runs are needed. "Ranks" is the distance of the ranks of the true number in its distribution from uniform, 0 to 1;
+"log score" is the mean of minus the log of the probability of the true number; "rms error" and "bias" are those of the
+mean of the number; OSPA has c = 100 m, p = 1; "ms" is CPU time of a scan. Equal arguments give equal tables, except for
+times.
 """
 
 from __future__ import annotations
 
 import argparse
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 from pages import write_between
+from random_scenes import four_sites, random_scene
+from scenes import Scene
 
-from calibration import BOUNDS, ENOUGH, SEED, Calibration, Case, calibration, cases
+from calibration import ALLOWED, ENOUGH, EXISTENCES, NUMBERS, Bins, Calibration, Case, calibration, cases
 
-
-def bin_table(found: Calibration) -> Iterator[str]:
-    """Said against found."""
-    yield "| said from | to | labels and scans | said | exist |"
-    yield "|---:|---:|---:|---:|---:|"
-    for low, high, (number, said, true, error) in zip(BOUNDS[:-1], BOUNDS[1:], found.bins(), strict=True):
-        if number:
-            yield f"| {low:g} | {high:g} | {number:.0f} | {said:.3f} | {true:.3f} ± {error:.3f} |"
+FILTERS = ("default", "LMB", "delta-GLMB 300")
+VERDICTS = ("pass", "unclear", "fail")
+RUNS_OF_A_SCENE = 100_000  # numbers of runs are unlike in different scenes, so that their targets are
 
 
-def summary_table(told: Sequence[tuple[Case, Calibration]]) -> Iterator[str]:
-    """A line each: the scores."""
-    yield "| beliefs | largest difference | log loss | Brier | ranks | OSPA, m | ms |"
-    yield "|---|---:|---:|---:|---:|---:|---:|"
-    for case, found in told:
-        labels = " | | "
-        if case.labels:
-            worst, error = found.worst
-            labels = f"{worst:.3f} ± {error:.3f} | {found.log_loss:.3f} | {found.brier:.3f}"
-        yield f"| {case.name} | {labels} | {found.rank_deviation:.3f} | {found.ospa:.2f} | {found.milliseconds:.2f} |"
+@dataclass(frozen=True)
+class Task:
+    """A filter on a scene. scene: number of a random scene, or detection probability and sensors of the four sites."""
+
+    scene: int | tuple[float, int]
+    case: Case
+    seeds: tuple[int, ...]
+    runs: int
+
+    @property
+    def made_scene(self) -> Scene:
+        """The scene."""
+        return random_scene(self.scene) if isinstance(self.scene, int) else four_sites(*self.scene)
+
+    def run(self) -> Calibration:
+        """Return its scores."""
+        first = RUNS_OF_A_SCENE * self.scene if isinstance(self.scene, int) else 0
+        return calibration(self.made_scene, self.case, self.seeds, self.runs, first)
 
 
-def shares_table(told: Sequence[tuple[Case, Calibration]]) -> Iterator[str]:
-    """A line each: what share exists of what was said, in brackets where that is too few to judge by."""
-    yield "| beliefs | " + " | ".join(f"{low:g} to {high:g}" for low, high in itertools.pairwise(BOUNDS)) + " |"
-    yield "|---|" + "---:|" * (len(BOUNDS) - 1)
-    for case, found in told:
-        if case.labels:
-            yield f"| {case.name} | " + " | ".join(_share(*row[:3]) for row in found.bins()) + " |"
+Result = tuple[Task, Calibration]
 
 
-def _share(number: float, said: float, true: float) -> str:
+def results(tasks: Sequence[Task], workers: int) -> Iterator[Result]:
+    """Return the scores of each task, in their order."""
+    if workers == 1:
+        yield from ((task, task.run()) for task in tasks)
+        return
+    with ProcessPoolExecutor(workers) as pool:
+        yield from zip(tasks, pool.map(Task.run, tasks), strict=True)
+
+
+def scene_header() -> Iterator[str]:
+    """The head of the table of scenes."""
+    names = ("labels", "places", "ranks", "log score", "rms error", "bias", "OSPA, m", "ms", "verdict")
+    yield f"| scene | filter | {' | '.join(names)} |"
+    yield f"|---|---|{'---:|' * (len(names) - 1)}---|"
+
+
+def scene_row(task: Task, found: Calibration) -> str:
+    """One line of the table of scenes."""
+    number = f"{found.rank_deviation:.3f} | {found.log_score:.3f} | {found.rms_error:.3f} | {found.bias:+.3f}"
+    worst = f"{_worst(found.labels)} | {_worst(found.places)}"
+    times = f"{found.ospa:.2f} | {found.milliseconds:.2f}"
+    return f"| {task.made_scene.name} | {task.case.name} | {worst} | {number} | {times} | {found.verdict} |"
+
+
+def _worst(bins: Bins | None) -> str:
+    if bins is None:
+        return ""
+    difference, error = bins.worst
+    return "" if np.isnan(difference) else f"{difference:.3f} ± {error:.3f}"
+
+
+def by_filter(found: Sequence[Result]) -> dict[str, list[Calibration]]:
+    """The scores of all scenes of each filter."""
+    names = dict.fromkeys(task.case.name for task, _ in found)
+    return {name: [scores for task, scores in found if task.case.name == name] for name in names}
+
+
+def summary_table(found: Sequence[Result]) -> Iterator[str]:
+    """A line for each filter: verdicts, and means over scenes."""
+    yield f"| filter | {' | '.join(VERDICTS)} | log score | rms error | bias | OSPA, m | ms |"
+    yield f"|---|{'---:|' * (len(VERDICTS) + 5)}"
+    for name, scores in by_filter(found).items():
+        counts = " | ".join(str(sum(one.verdict == verdict for one in scores)) for verdict in VERDICTS)
+        columns = [(one.log_score, one.rms_error, one.bias, one.ospa, one.milliseconds) for one in scores]
+        means = "{:.3f} | {:.3f} | {:+.3f} | {:.2f} | {:.2f}".format(*np.mean(columns, axis=0))
+        yield f"| {name} | {counts} | {means} |"
+
+
+def shares_table(found: Sequence[Result], what: str) -> Iterator[str]:
+    """A line for each filter: the true mean of what was believed, by bins, of the runs of all scenes.
+
+    what: "labels" or "places". A bin with too few values to be judged is in brackets.
+    """
+    bounds = EXISTENCES if what == "labels" else NUMBERS
+    yield f"| {what} | " + " | ".join(f"{low:g} to {high:g}" for low, high in itertools.pairwise(bounds)) + " |"
+    yield "|---|" + "---:|" * (len(bounds) - 1)
+    for name, scores in by_filter(found).items():
+        parts = [bins.sums for one in scores if (bins := getattr(one, what)) is not None]
+        if parts:
+            rows = Bins(bounds, np.concatenate(parts)).rows()
+            yield f"| {name} | " + " | ".join(_share(*row[:3]) for row in rows) + " |"
+
+
+def _share(number: float, believed: float, true: float) -> str:
     if not number:
         return ""
-    return f"{true:.3f} of {said:.3f}" if number > ENOUGH else f"({true:.3f} of {said:.3f})"
+    return f"{true:.3f} of {believed:.3f}" if number > ENOUGH else f"({true:.3f} of {believed:.3f})"
+
+
+def bin_table(name: str, bins: Bins) -> Iterator[str]:
+    """Believed and true means of each bin."""
+    yield f"| {name} from | to | values | believed | true |"
+    yield "|---:|---:|---:|---:|---:|"
+    for low, high, (number, believed, true, error) in zip(bins.bounds[:-1], bins.bounds[1:], bins.rows(), strict=True):
+        if number:
+            yield f"| {low:g} | {high:g} | {number:.0f} | {believed:.4f} | {true:.4f} ± {error:.4f} |"
+
+
+def tasks_of(options: argparse.Namespace) -> list[Task]:
+    """All filters that were asked for, on all scenes that they fit."""
+    known = {case.name: case for case in cases(options.errors)}
+    extra = [name for name in known if name.startswith("factored ")]
+    names = list(known) if options.filters == ["all"] else [*options.filters, *extra]
+    if unknown := [name for name in names if name not in known]:
+        raise SystemExit(f"--filters: expected some of {', '.join(known)}, or all; got {unknown[0]}")
+    scenes: Iterable[int | tuple[float, int]] = options.scene or range(1, options.scenes + 1)
+    if options.four_sites:
+        scenes = itertools.product((0.7, 0.95), (1, 2))
+    tasks = [Task(scene, known[name], tuple(options.seeds), options.runs) for scene in scenes for name in names]
+    return [task for task in tasks if task.case.fits(task.made_scene)]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--detection", type=float, nargs="+", default=[0.7, 0.95], help="of each sensor")
-    parser.add_argument("--runs", type=int, default=200)
-    parser.add_argument("--cases", nargs="+", default=[""], help="words in their names; all")
-    parser.add_argument(
-        "--errors", type=float, nargs="*", default=[], help="further split errors of the factored filter"
-    )
-    parser.add_argument("--summary", action="store_true", help="without the tables of each")
-    parser.add_argument("--write", type=Path, metavar="PAGE", help="Markdown page with a place for the tables of all")
+    parser.add_argument("--scenes", type=int, default=20, help="number of random scenes")
+    parser.add_argument("--scene", type=int, nargs="+", help="numbers of random scenes, instead of --scenes")
+    parser.add_argument("--four-sites", action="store_true", help="a fixed scene instead of random ones")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2], help="of targets and scans")
+    parser.add_argument("--runs", type=int, default=20, help="of each scene and seed")
+    parser.add_argument("--filters", nargs="+", default=list(FILTERS), help="names, or all")
+    parser.add_argument("--errors", type=float, nargs="*", default=[], help="more split errors of the default filter")
+    parser.add_argument("--bins", action="store_true", help="a table of bins for each scene and filter")
+    parser.add_argument("--workers", type=int, default=1, help="processes")
+    parser.add_argument("--write", type=Path, metavar="PAGE", help="Markdown page with a place for the tables")
     options = parser.parse_args(arguments)
-    texts = []
-    for detection in options.detection:
-        title = f"P_D {detection:g}, {options.runs} runs, seed {SEED}"
-        print(f"\n## {title}", flush=True)
-        told = []
-        for case in cases(options.errors):
-            if any(word in case.name for word in options.cases):
-                told.append((case, calibration(case, detection, options.runs)))
-                if case.labels and not options.summary:
-                    print("\n".join(["", f"### {case.name}", "", *bin_table(told[-1][1])]), flush=True)
-        texts.append("\n".join([f"{title}:", "", *summary_table(told), "", *shares_table(told)]))
-        print(f"\n{texts[-1]}", flush=True)
+    rows, found = list(scene_header()), []
+    print("\n".join(rows), flush=True)
+    for task, scores in results(tasks_of(options), options.workers):
+        found.append((task, scores))
+        rows.append(scene_row(task, scores))
+        print(rows[-1], flush=True)
+        if options.bins:
+            tables = [bin_table(what, bins) for what in ("labels", "places") if (bins := getattr(scores, what))]
+            print("", *itertools.chain(*((*table, "") for table in tables)), sep="\n", flush=True)
+    seeds = ", ".join(map(str, options.seeds))
+    title = f"{options.runs} runs of each scene and seed, seeds {seeds}; verdicts at a difference of {ALLOWED:g}:"
+    shares = [shares_table(found, what) for what in ("labels", "places")]
+    parts = [[title], rows, summary_table(found), *shares]
+    text = "\n\n".join("\n".join(part) for part in parts)
+    print("", *text.split("\n\n")[2:], sep="\n\n", flush=True)
     if options.write:
-        write_between(options.write, "beliefs.py", "\n\n".join(texts))
+        write_between(options.write, "beliefs.py" + (" --four-sites" if options.four_sites else ""), text)
 
 
 if __name__ == "__main__":

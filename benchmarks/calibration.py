@@ -1,4 +1,4 @@
-"""Said against found: what beliefs say of labels and of their number, where the truth is drawn from the model.
+"""Whether beliefs are true: what they state of labels, places and the number of targets, compared with the truth.
 
 `benchmarks/beliefs.py` prints it.
 """
@@ -7,227 +7,245 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 from compared import Fields, Timed, compared
-from numpy.typing import ArrayLike, NDArray
-from scenes import own, site
+from numpy.typing import NDArray
+from places import expected_in_cells, true_in_cells
+from prior_targets import Names, PriorTargets
+from scenes import Scene
 
-from vedette.densities import Estimate, Estimator, Labelled, cardinality_distribution, existence_probabilities
+from vedette.densities import Labelled, cardinality_distribution
 from vedette.evaluation import ospa_of_run
-from vedette.models import TargetModel
+from vedette.models import CellGrid
+from vedette.plausible import told_elsewhere
+from vedette.scenarios import with_fields
 from vedette.scenarios.build import build_experiment
-from vedette.simulation import Truth, simulate
-from vedette.simulation.truth import moved_states
-
-SEED, NUM_STEPS = 1, 25
-BOUNDS = np.array([0.0, 0.05, 0.2, 0.5, 0.7, 0.9, 0.99, 0.999, 1.0])
-ENOUGH = 500  # in a bin, to judge it
-_NEVER_SURER = 1e-6
+from vedette.simulation import World
 
 Floats = NDArray[np.float64]
 
+EXISTENCES = np.array([0.0, 0.05, 0.2, 0.5, 0.7, 0.9, 0.99, 0.999, 1.0])  # bounds of bins
+NUMBERS = np.array([0.0, 0.01, 0.05, 0.2, 0.5, 0.8, 0.95, 1.05, np.inf])  # of targets in a cell, bounds of bins
+CELL = 100.0  # m, side of a cell
+ENOUGH = 500  # values in a bin, above which it is judged
+ALLOWED = 0.05  # difference of the means of a bin
+NEVER_SURER = 1e-6  # least probability of a number of targets in the log score
+CUTOFF, ORDER = 100.0, 1.0  # of OSPA; m, -
+
 
 @dataclass(frozen=True)
-class PriorTargets:
-    """Targets drawn from the model that the filters have.
+class Bins:
+    """Believed and true values of some runs, summed by bins of the believed value.
 
-    The id of the target of label (step, site) is (step - 1) * num_sites + site.
+    Attributes:
+        bounds: (num_bins + 1,) of the bins.
+        sums: (num_runs, num_bins, 3) number of values, sum of the believed ones, sum of the true ones.
     """
 
-    model: TargetModel
+    bounds: Floats
+    sums: Floats
 
-    def truth(self, times: ArrayLike, *, rng: np.random.Generator) -> Truth:
-        """Births and lives, scan after scan."""
-        scans, birth = np.asarray(times, np.float64), self.model.birth
-        factors = np.linalg.cholesky(birth.covs)
-        ids, states = np.empty(0, np.int64), np.empty((0, birth.state_dim))
-        alive: list[NDArray[np.int64]] = []
-        rows: list[Floats] = []
-        for k in range(len(scans)):
-            if k > 0:
-                dt = float(scans[k] - scans[k - 1])
-                lives = rng.random(len(ids)) < self.model.survival.prob(states, dt)
-                ids, states = ids[lives], states[lives]
-                noise = rng.standard_normal(states.shape)
-                states = moved_states(self.model.motion, states, dt, noise, np.ones(len(ids), np.bool_))
-            born = np.flatnonzero(rng.random(birth.num_sites) < birth.existence)
-            starts = birth.means + (factors @ rng.standard_normal(birth.means.shape)[:, :, None])[:, :, 0]
-            ids = np.concatenate([ids, k * birth.num_sites + born])
-            states = np.concatenate([states, starts[born]])
-            alive.append(ids)
-            rows.append(states)
-        offsets = np.concatenate([[0], np.cumsum([len(own_ids) for own_ids in alive])])
-        return Truth(scans, offsets.astype(np.int64), np.concatenate(alive), np.concatenate(rows))
+    def rows(self) -> Floats:
+        """(num_bins, 4) number of values, mean believed, mean true, standard error of their difference.
 
+        The values of a run depend on each other, and runs do not: the error is that of a mean over runs. NaN in a bin
+        without values.
+        """
+        number, believed, true = self.sums.sum(axis=0).T
+        excess, num_runs = self.sums[:, :, 2] - self.sums[:, :, 1], len(self.sums)
+        spread = np.sqrt(num_runs * excess.var(axis=0, ddof=1)) if num_runs > 1 else np.full(len(number), np.nan)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.column_stack([number, believed / number, true / number, spread / number])
 
-@dataclass
-class Listener:
-    """An estimator that writes down what each density says: existence by label, and the distribution of the number."""
+    def judged(self) -> tuple[Floats, Floats]:
+        """(n,) differences of believed and true means, without sign, of the bins with enough values; their errors."""
+        rows = self.rows()
+        rows = rows[rows[:, 0] > ENOUGH]
+        return np.abs(rows[:, 1] - rows[:, 2]), rows[:, 3]
 
-    estimate: Estimator
-    num_sites: int
-    existence: list[Floats]
-    numbers: list[Floats]
+    @property
+    def worst(self) -> tuple[float, float]:
+        """Largest difference of the bins with enough values, and its standard error; NaN where there is no such bin."""
+        differences, errors = self.judged()
+        if not len(differences):
+            return float("nan"), float("nan")
+        place = int(np.argmax(differences))
+        return float(differences[place]), float(errors[place])
 
-    def __call__(self, density: Any, step: int) -> Estimate:
-        said = np.zeros(NUM_STEPS * self.num_sites)
-        if isinstance(density, Labelled):
-            labels, existence = existence_probabilities(density)
-            said[(labels[:, 0] - 1) * self.num_sites + labels[:, 1]] = existence
-        self.existence.append(said)
-        self.numbers.append(cardinality_distribution(density))
-        return self.estimate(density, step)
+    @property
+    def verdict(self) -> str:
+        """"pass": no difference above `ALLOWED`; "fail": one by more than two standard errors; else "unclear"."""
+        differences, errors = self.judged()
+        if not (differences > ALLOWED).any():
+            return "pass"
+        return "fail" if (differences - 2.0 * errors > ALLOWED).any() else "unclear"
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """What was said and what was found in some runs.
+    """Scores of the beliefs of a filter in the runs of a scene.
 
     Attributes:
-        said, found: (num_runs, num_scans, num_labels) existence said of each label, and whether it exists.
-        ranks: (num_runs, num_scans) of the true number in its posterior, 0 to 1.
-        ospa: m, mean over scans and runs.
-        milliseconds: of CPU a scan.
+        labels: existence probabilities of labels; None of a filter without labels.
+        places: numbers of targets in cells.
+        numbers: (num_runs, num_scans, 4) rank of the true number of targets in its distribution, 0 to 1; log score of
+            the true number; error of the mean; OSPA, m.
+        milliseconds: median CPU time of a scan.
     """
 
-    said: Floats
-    found: NDArray[np.bool_]
-    ranks: Floats
-    ospa: float
+    labels: Bins | None
+    places: Bins
+    numbers: Floats
     milliseconds: float
-
-    @cached_property
-    def possible(self) -> NDArray[np.bool_]:
-        """(num_scans, num_labels) labels that may have been born by then."""
-        num_sites = self.said.shape[2] // NUM_STEPS
-        return np.arange(self.said.shape[2]) // num_sites <= np.arange(NUM_STEPS)[:, None]
-
-    def bins(self) -> Floats:
-        """(num_bins, 4) labels and scans in each bin, mean said, share found, standard error of their difference."""
-        rows = np.full((len(BOUNDS) - 1, 4), np.nan)
-        place = np.clip(np.searchsorted(BOUNDS, self.said, side="right") - 1, 0, len(BOUNDS) - 2)
-        for index, row in enumerate(rows):
-            inside = (place == index) & self.possible
-            row[0] = number = np.count_nonzero(inside)
-            if number:
-                excess = ((self.found - self.said) * inside).sum(axis=(1, 2))
-                row[1:] = (
-                    self.said[inside].mean(),
-                    self.found[inside].mean(),
-                    np.sqrt(len(excess) * excess.var(ddof=1)) / number if len(excess) > 1 else np.nan,
-                )
-        return rows
-
-    @property
-    def worst(self) -> tuple[float, float]:
-        """Largest difference of said and found over the bins that hold enough, and its standard error."""
-        rows = self.bins()
-        rows = rows[rows[:, 0] > ENOUGH]
-        differences = np.abs(rows[:, 1] - rows[:, 2])
-        place = int(np.argmax(differences))
-        return float(differences[place]), float(rows[place, 3])
-
-    @property
-    def log_loss(self) -> float:
-        """Of all labels together, a scan."""
-        held = np.clip(self.said, _NEVER_SURER, 1.0 - _NEVER_SURER)
-        losses = -np.log(np.where(self.found, held, 1.0 - held)) * self.possible
-        return float(losses.sum(axis=2).mean())
-
-    @property
-    def brier(self) -> float:
-        """Of all labels together, a scan."""
-        return float(((self.said - self.found) ** 2).sum(axis=2).mean())
 
     @property
     def rank_deviation(self) -> float:
         """Largest distance of the distribution function of the ranks from that of the uniform distribution."""
-        ranks = np.sort(self.ranks.ravel())
+        ranks = np.sort(self.numbers[:, :, 0].ravel())
         steps = np.arange(len(ranks) + 1) / len(ranks)
         return float(max((steps[1:] - ranks).max(), (ranks - steps[:-1]).max()))
+
+    @property
+    def log_score(self) -> float:
+        """Mean over runs and scans of minus the log of the probability of the true number."""
+        return float(self.numbers[:, :, 1].mean())
+
+    @property
+    def bias(self) -> float:
+        """Mean of the believed mean number less the true number."""
+        return float(self.numbers[:, :, 2].mean())
+
+    @property
+    def rms_error(self) -> float:
+        """Root mean squared error of the mean number."""
+        return float(np.sqrt((self.numbers[:, :, 2] ** 2).mean()))
+
+    @property
+    def ospa(self) -> float:
+        """Mean OSPA in m."""
+        return float(self.numbers[:, :, 3].mean())
+
+    @property
+    def verdict(self) -> str:
+        """The worse one of the verdicts on labels and on places."""
+        verdicts = [bins.verdict for bins in (self.labels, self.places) if bins is not None]
+        return next(verdict for verdict in ("fail", "unclear", "pass") if verdict in verdicts)
 
 
 @dataclass(frozen=True)
 class Case:
-    """A filter, and how the scans or beliefs of several sensors become one."""
+    """A filter, and how it takes several sensors.
+
+    Attributes:
+        name: by which it is asked for.
+        fields: of a scenario.
+        fusion: section of a scenario for scenes of several sensors; None: that of the scene, sequential.
+    """
 
     name: str
     fields: Fields
-    num_sensors: int = 1
     fusion: Fields | None = None
 
     @property
-    def labels(self) -> bool:
-        """Whether its targets have names."""
+    def has_labels(self) -> bool:
+        """Whether its beliefs name targets."""
         return self.fields["filter.kind"] not in ("phd", "cphd", "cb_member")
+
+    def fits(self, scene: Scene) -> bool:
+        """Whether it can be run there: fusion needs several sensors, filters without labels need one."""
+        several = len(scene.scenario(0).model.sensors) > 1
+        return several if self.fusion is not None else self.has_labels or not several
 
 
 def cases(errors: Iterable[float] = ()) -> Iterator[Case]:
-    """Every filter, and every way to take two sensors together."""
+    """Return every filter, and every way to combine two sensors. errors: further split errors of the default."""
     filters = compared(errors)
     del filters["delta-GLMB 1,000"]
     filters["delta-GLMB 300"] = {"filter.kind": "delta_glmb"}
     unlabelled = {"PHD": "phd", "CPHD": "cphd", "CB-MeMBer": "cb_member"}
     filters |= {name: {"filter.kind": kind} for name, kind in unlabelled.items()}
+    filters["default, mean detection"] = {**filters["default"], "filter.detection_at": "mean"}
     for name, fields in filters.items():
         yield Case(name, fields)
-    labelled = {"default": filters["default"], "LMB": filters["LMB"], "delta-GLMB 300": filters["delta-GLMB 300"]}
-    labelled["M-delta-GLMB"] = filters["M-delta-GLMB"]
-    for name, fields in labelled.items():
-        yield Case(f"sequential, {name}", fields, 2, {"kind": "sequential"})
-    yield Case("central, LMB", labelled["LMB"], 2, {"kind": "central"})
-    for name, fields in labelled.items():
+    yield Case("central, LMB", filters["LMB"], {"kind": "central"})
+    for name in ("default", "LMB", "delta-GLMB 300", "M-delta-GLMB"):
         kind = "clmb" if name == "LMB" else "cm_delta_glmb"
-        yield Case(f"{kind}, {name}", fields, 2, {"kind": kind})
+        yield Case(f"{kind}, {name}", filters[name], {"kind": kind})
     for kind, name in (("clmb", "LMB"), ("cm_delta_glmb", "default")):
-        yield Case(f"{kind} with feedback, {name}", labelled[name], 2, {"kind": kind, "feedback": True})
+        yield Case(f"{kind} with feedback, {name}", filters[name], {"kind": kind, "feedback": True})
     for kind, name in (("arithmetic_average", "LMB"), ("arithmetic_average", "default"), ("parallel", "LMB")):
-        yield Case(f"{kind}, {name}", labelled[name], 2, {"kind": kind})
+        yield Case(f"{kind}, {name}", filters[name], {"kind": kind})
 
 
-def calibration(case: Case, detection: float, num_runs: int) -> Calibration:
-    """What a case said and what was so, over runs of seeds that are always the same."""
-    places = [(200.0, 200.0), (-200.0, 200.0), (200.0, -200.0), (-200.0, -200.0)]
-    scene = own(
-        "prior",
-        {
-            "time.num_steps": NUM_STEPS,
-            "motion.sigma_v": 2.0,
-            "survival.probability": 0.95,
-            "birth.sites": [site(place) for place in places],
-            "sensors.*.detection.probability": detection,
-            "sensors.*.clutter.rate": 10.0,
-            **case.fields,
-        },
-        case.num_sensors,
-        case.fusion,
-    )
-    experiment = build_experiment(scene.scenario(0))
+def calibration(scene: Scene, case: Case, seeds: Iterable[int], num_runs: int, first_run: int = 0) -> Calibration:
+    """Run a filter on a scene and score its beliefs.
+
+    Targets and scans depend on the scene, the seed and the number of the run alone, and not on the filter.
+
+    Args:
+        scene: where; its targets are replaced by ones drawn from its model.
+        case: the filter.
+        seeds: of the random numbers.
+        num_runs: number of runs of each seed.
+        first_run: number of the first of them.
+    """
+    fields = case.fields if case.fusion is None else {**case.fields, "fusion": case.fusion}
+    experiment = build_experiment(with_fields(scene.scenario(0), fields))
     targets, timed = PriorTargets(experiment.tracker.targets), Timed(experiment.tracker, [])
-    score, found, ranks, ospa = partial(ospa_of_run, cutoff=100.0, order=1.0), [], [], []
-    listener = Listener(experiment.estimate, len(places), [], [])
-    experiment = replace(experiment, targets=targets, tracker=timed, estimate=listener)
-    for run in range(num_runs):
-        truth, rng = (record := simulate(experiment, None, seed=SEED, run=run, score=score)).truth, _tie_breaks(run)
-        exists = np.zeros((NUM_STEPS, len(places) * NUM_STEPS), np.bool_)
-        exists[np.repeat(np.arange(NUM_STEPS), np.diff(truth.offsets)), truth.ids] = True
-        found.append(exists)
-        said = listener.numbers[-NUM_STEPS:]
-        ranks.append([_rank(p, n, rng) for p, n in zip(said, np.diff(truth.offsets).tolist(), strict=True)])
-        ospa.append(record.ospa[:, 0].mean())
-    existence = np.array(listener.existence).reshape(num_runs, NUM_STEPS, -1)
+    experiment = replace(experiment, targets=targets, tracker=timed)
+    region = scene.scenario(0).model.region.build()
+    grid = CellGrid.covering(region, CELL)
+    scores = [
+        _Scores(grid, World(experiment, seed=seed, run=run, moving=False), np.random.default_rng([seed, run])).scored()
+        for seed in seeds
+        for run in range(first_run, first_run + num_runs)
+    ]
+    labels, places, numbers = (np.array(part) for part in zip(*scores, strict=True))
     milliseconds = 1e3 * float(np.median(timed.seconds))
-    return Calibration(existence, np.array(found), np.array(ranks), float(np.mean(ospa)), milliseconds)
+    of_labels = Bins(EXISTENCES, labels) if case.has_labels else None
+    return Calibration(of_labels, Bins(NUMBERS, places), numbers, milliseconds)
 
 
-def _tie_breaks(run: int) -> np.random.Generator:
-    return np.random.default_rng([SEED, run])
+@dataclass
+class _Scores:
+    """The scores of one run. rng: breaks ties of ranks."""
+
+    grid: CellGrid
+    world: World
+    rng: np.random.Generator
+
+    def scored(self) -> tuple[Floats, Floats, Floats]:
+        """Run to the end; return `Bins.sums` of labels and places, and `Calibration.numbers`, of this run."""
+        world, truth = self.world, self.world.truth
+        names = Names(world.experiment.tracker.targets.birth)
+        labels, places = np.zeros((len(EXISTENCES) - 1, 3)), np.zeros((len(NUMBERS) - 1, 3))
+        numbers, estimates = np.zeros((truth.num_scans, 4)), []
+        with told_elsewhere():
+            while not world.is_over:
+                moment = world.step()
+                ids, states = truth.at(moment.step - 1)
+                belief = moment.state.fused
+                names.take(moment.step, moment.scans)
+                if isinstance(belief, Labelled):
+                    labels += binned(EXISTENCES, *names.label_scores(belief, ids))
+                expected, true = expected_in_cells(belief, self.grid), true_in_cells(states, self.grid)
+                places += binned(NUMBERS, expected, true)
+                numbers[moment.step - 1, :3] = self._number_scores(cardinality_distribution(belief), len(ids))
+                estimates.append(moment.estimate)
+        numbers[:, 3] = ospa_of_run(truth, estimates, cutoff=CUTOFF, order=ORDER)[:, 0]
+        return labels, places, numbers
+
+    def _number_scores(self, chances: Floats, number: int) -> tuple[float, float, float]:
+        """Rank of the true number in a distribution, uniform if that is right; log score; error of the mean."""
+        below, at = float(chances[:number].sum()), float(chances[number : number + 1].sum())
+        mean = float(chances @ np.arange(len(chances)))
+        return below + at * self.rng.random(), -float(np.log(max(at, NEVER_SURER))), mean - number
 
 
-def _rank(chances: Floats, number: int, rng: np.random.Generator) -> float:
-    """Where the true number stands in its distribution: uniform if that is right."""
-    below, at = chances[:number].sum(), chances[number : number + 1].sum()
-    return float(below + at * rng.random())
+def binned(bounds: Floats, believed: Floats, true: Floats) -> Floats:
+    """Return the (num_bins, 3) number of values in each bin, and the sums of the believed and of the true ones."""
+    num = len(bounds) - 1
+    place = np.clip(np.searchsorted(bounds, believed, side="right") - 1, 0, num - 1)
+    return np.column_stack([np.bincount(place, part, num) for part in (np.ones(len(place)), believed, true)])
