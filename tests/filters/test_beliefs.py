@@ -1,96 +1,245 @@
-"""Whether beliefs are true, and what is told of it (`benchmarks/beliefs.py`)."""
+"""Whether beliefs are true, and how that is measured (`benchmarks/beliefs.py`)."""
 
 from __future__ import annotations
 
+from dataclasses import asdict, replace
+
 import numpy as np
 import pytest
+from places import expected_in_cells, gaussians_in_cells, true_in_cells, undetected_in_cells
+from prior_targets import Names, PriorTargets
+from random_scenes import four_sites, random_scene
+from scenes import own, site
+from scipy.stats import multivariate_normal
 
-from calibration import ENOUGH, NUM_STEPS, Calibration, PriorTargets, calibration, cases
-from vedette.models import BirthModel, TargetModel, constant_survival, constant_velocity
+from beliefs import main
+from calibration import ENOUGH, EXISTENCES, NUMBERS, Bins, Calibration, Case, binned, calibration, cases
+from vedette.densities import LMB, IidCluster, MultiBernoulli, Poisson, UndetectedIntensity, existence_probabilities
+from vedette.filters import Limits
+from vedette.models import BirthModel, CellGrid, Region, TargetModel, constant_survival, constant_velocity
+from vedette.scenarios import with_fields
+from vedette.scenarios.build import build_experiment
+from vedette.simulation import CLUTTER, Scan, World
 
-NUM_SITES = 2
+CASES = {case.name: case for case in cases()}
+UNLIMITED = {name: min(value, 10**9) for name, value in asdict(Limits.none()).items() if name != "max_position_std"}
+EXACT = Case(
+    "exact", {"filter.kind": "delta_glmb"} | {f"filter.limits.{name}": value for name, value in UNLIMITED.items()}
+)
+GRID = CellGrid(Region(-500.0, 500.0, -400.0, 400.0), 5, 4)
+COV = np.diag([100.0, 100.0, 4.0, 4.0])
 
 
-def told(said, found, ranks=None) -> Calibration:
-    """Of (num_runs,) existence of label (1, 0), the same at all scans, and whether it exists."""
-    num = len(said)
-    shape = (num, NUM_STEPS, NUM_STEPS * NUM_SITES)
-    of_all, of_found = np.zeros(shape), np.zeros(shape, np.bool_)
-    of_all[:, :, 0], of_found[:, :, 0] = np.array(said)[:, None], np.array(found)[:, None]
-    return Calibration(of_all, of_found, np.zeros((num, NUM_STEPS)) if ranks is None else ranks, 0.0, 0.0)
+def label_bins(believed, found, values_a_run) -> Bins:
+    """Of (num_runs,) existences, each believed so many times in its run, and whether their targets exist."""
+    sums = [values_a_run * binned(EXISTENCES, np.array([p]), np.array([t])) for p, t in zip(believed, found)]
+    return Bins(EXISTENCES, np.array(sums))
 
 
-def test_bins_hold_what_was_said_and_what_was_found() -> None:
-    known = told([0.6] * 40 + [0.95] * 30, [True] * 10 + [False] * 30 + [True] * 30)
-    rows = known.bins()
-    # By hand: 0.4 too little in ten runs and 0.6 too much in thirty, 25 scans each; runs are what is independent.
+def test_bins_hold_believed_and_true_means() -> None:
+    bins = label_bins([0.6] * 40 + [0.95] * 30, [1.0] * 10 + [0.0] * 30 + [1.0] * 30, 25)
+    rows = bins.rows()
+    # By hand: 0.4 too little in ten runs and 0.6 too much in thirty, 25 values each; the runs are independent.
     excess = 25.0 * np.array([0.4] * 10 + [-0.6] * 30 + [0.0] * 30)
     error = np.sqrt(70.0 * excess.var(ddof=1)) / 1000.0
     np.testing.assert_allclose(rows[3], [1000, 0.6, 0.25, error])
     np.testing.assert_allclose(rows[5, :3], [750, 0.95, 1.0])
-    # All labels that may have been born by then: two at the first scan, fifty at the last, less those above.
-    np.testing.assert_allclose(rows[0, :3], [70 * (2 * 325 - 25), 0.0, 0.0], atol=0.0)
-    assert known.worst == pytest.approx((0.35, error))
+    assert np.isnan(rows[0, 1:3]).all()
+    assert bins.worst == pytest.approx((0.35, error))
+    assert bins.verdict == "fail"
 
 
-def test_too_few_are_not_judged() -> None:
-    num = ENOUGH // NUM_STEPS
-    assert told([0.6] * num, [False] * num).worst[0] == 0.0
-    assert told([0.6] * (num + 1), [False] * (num + 1)).worst[0] == pytest.approx(0.6)
+def test_bins_of_few_values_are_not_judged() -> None:
+    few = label_bins([0.6] * 20, [0.0] * 20, ENOUGH // 20)
+    assert np.isnan(few.worst[0])
+    assert few.verdict == "pass"
+    assert label_bins([0.6] * 20, [0.0] * 20, ENOUGH // 20 + 1).verdict == "fail"
+    assert label_bins([0.6] * 20, [1.0, 0.0] * 10, 100).verdict == "unclear"
 
 
-def test_scores_are_sums_over_labels_a_scan() -> None:
-    known = told([0.6, 0.6, 0.6, 1.0], [True, True, False, False])
-    other_labels = -(2 * 325 / NUM_STEPS - 1) * np.log1p(-1e-6)
-    expected = -(2.0 * np.log(0.6) + np.log(0.4) + np.log(1e-6)) / 4.0
-    assert known.log_loss == pytest.approx(expected + other_labels)
-    assert known.brier == pytest.approx((2.0 * 0.16 + 0.36 + 1.0) / 4.0)
-
-
-def test_ranks_are_held_against_the_uniform_distribution() -> None:
-    even = (np.arange(4.0 * NUM_STEPS) + 0.5) / (4.0 * NUM_STEPS)
-    assert told([0.5] * 4, [True] * 4, even.reshape(4, -1)).rank_deviation == pytest.approx(0.005)
-    assert told([0.5] * 4, [True] * 4, np.full((4, NUM_STEPS), 0.7)).rank_deviation == pytest.approx(0.7)
+def test_ranks_are_compared_with_the_uniform_distribution() -> None:
+    places = Bins(NUMBERS, np.zeros((4, len(NUMBERS) - 1, 3)))
+    numbers = np.zeros((4, 25, 4))
+    numbers[:, :, 0] = ((np.arange(100.0) + 0.5) / 100.0).reshape(4, 25)
+    even = Calibration(None, places, numbers, 0.0)
+    assert even.rank_deviation == pytest.approx(0.005)
+    assert replace(even, numbers=np.full((4, 25, 4), 0.7)).rank_deviation == pytest.approx(0.7)
 
 
 def test_the_truth_is_drawn_from_the_model() -> None:
-    means, cov = np.array([[0.0, 0.0, 0.0, 0.0], [1e4, 0.0, 0.0, 0.0]]), np.diag([25.0, 25.0, 4.0, 4.0])
-    birth = BirthModel(np.array([0.1, 0.4]), means, np.stack([cov, cov]))
-    model = TargetModel(constant_velocity(2.0), constant_survival(0.8), birth)
+    means = np.array([[0.0, 0.0, 0.0, 0.0], [1e4, 0.0, 0.0, 0.0]])
+    birth = BirthModel(np.array([0.1, 0.4]), means, np.stack([COV, COV]), period=2.0)
+    model = TargetModel(constant_velocity(2.0), constant_survival(0.8, period=0.5), birth)
     targets, rng = PriorTargets(model), np.random.default_rng(3)
     born, lived, starts, moves = [], [], [], []
     for _ in range(400):
-        truth = targets.truth(np.arange(1.0, 6.0), rng=rng)
+        truth = targets.truth(np.arange(10.0, 12.5, 0.5), rng=rng)
         truth.validate()
         for scan in range(5):
             ids, states = truth.at(scan)
-            new = ids // NUM_SITES == scan
-            born.append(np.bincount(ids[new] % NUM_SITES, minlength=NUM_SITES))
-            starts.append(states[new] - birth.means[ids[new] % NUM_SITES])
+            new = ids // 2 == scan
+            born.append((scan == 0, *np.bincount(ids[new] % 2, minlength=2)))
+            starts.append(states[new] - means[ids[new] % 2])
             if scan:
                 before, states_before = truth.at(scan - 1)
                 assert np.isin(ids[~new], before).all()
                 lived.append(np.isin(before, ids))
-                moves.append(states[~new] - model.motion.propagate(states_before[np.isin(before, ids)], 1.0))
-    np.testing.assert_allclose(np.mean(born, axis=0), birth.existence, atol=0.03)
+                moves.append(states[~new] - model.motion.propagate(states_before[np.isin(before, ids)], 0.5))
+    first, *counts = np.array(born).T
+    for count, chance in zip(counts, birth.existence, strict=True):
+        assert count[first == 1].mean() == pytest.approx(1.0 - (1.0 - chance) ** 0.5, abs=0.06)  # one second
+        assert count[first == 0].mean() == pytest.approx(1.0 - (1.0 - chance) ** 0.25, abs=0.03)
     assert np.concatenate(lived).mean() == pytest.approx(0.8, abs=0.03)
-    np.testing.assert_allclose(np.concatenate(starts).std(axis=0), [5.0, 5.0, 2.0, 2.0], rtol=0.1)
-    noise = model.motion.noise_covs(np.zeros((1, 4)), 1.0)[0]
-    np.testing.assert_allclose(np.cov(np.concatenate(moves).T), noise, atol=0.4)
+    np.testing.assert_allclose(np.concatenate(starts).std(axis=0), [10.0, 10.0, 2.0, 2.0], rtol=0.1)
+    noise = model.motion.noise_covs(np.zeros((1, 4)), 0.5)[0]
+    np.testing.assert_allclose(np.cov(np.concatenate(moves).T), noise, atol=0.1)
 
 
-@pytest.mark.slow
-def test_every_case_can_be_asked() -> None:
-    for case in cases():
-        found = calibration(case, 0.9, 1)
-        assert np.isfinite(found.bins()[0, :3]).all()
-        assert ((found.ranks >= 0.0) & (found.ranks <= 1.0 + 1e-9)).all()
-        assert bool(found.said.any()) == case.labels
+class Undetected(LMB):
+    """A belief with an intensity of undetected targets."""
+
+    __slots__ = ()
+    undetected = Poisson.empty(4)
 
 
-@pytest.mark.parametrize("detection", [0.7, 0.95])
-def test_labels_exist_as_often_as_the_default_filter_says(detection: float) -> None:
-    [default] = (case for case in cases() if case.name == "default")
-    number, said, found, _ = calibration(default, detection, 200).bins().T
-    differences = np.abs(said - found)[number > ENOUGH]
-    assert (differences < 0.05).all(), f"said and found differ by {differences.round(3)}"
+def belief_of(kind: type[LMB], existence: dict[tuple[int, int], float]) -> LMB:
+    num = len(existence)
+    made = kind.from_bernoullis(list(existence), list(existence.values()), np.zeros((num, 4)), np.tile(COV, (num, 1, 1)))
+    return made
+
+
+def two_sites(steps: list[int] | None = None) -> BirthModel:
+    return BirthModel(np.full(2, 0.1), np.zeros((2, 4)), np.tile(COV, (2, 1, 1)), steps)
+
+
+def scan_of(*origins: int) -> Scan:
+    return Scan(np.zeros((len(origins), 2)), np.array(origins, np.int64))
+
+
+def test_labels_of_sites_are_the_targets_born_there() -> None:
+    names = Names(two_sites(steps=[1, 3]))
+    for step in (1, 2, 3):
+        names.take(step, (scan_of(),))
+    # Four labels are possible; of the targets (1, 0), (1, 1) and (3, 1), the second is dead and the last not in it.
+    believed, found = names.label_scores(belief_of(LMB, {(1, 0): 0.7, (1, 1): 0.2}), np.array([0, 5]))
+    np.testing.assert_allclose(believed, [0.7, 0.2, 0.0, 0.0])
+    np.testing.assert_allclose(found, [1.0, 0.0, 1.0, 0.0])
+
+
+def test_first_detections_are_labels_of_measurements() -> None:
+    names = Names(two_sites())
+    names.take(1, (scan_of(CLUTTER, 1), None, scan_of(1, 0)))  # first of targets 1 and 0: rows 1 and 3
+    names.take(2, (scan_of(0, 2), None, scan_of(CLUTTER)))
+    labels = {(1, 3): 0.9, (1, 4): 0.1, (1, 5): 0.8, (2, 3): 0.6}
+    believed, found = names.label_scores(belief_of(Undetected, labels), np.array([0, 1, 2]))
+    np.testing.assert_allclose(believed, [0.9, 0.1, 0.8, 0.6, 0.0, 0.0, 0.0])  # seven measurements
+    np.testing.assert_allclose(found, [1.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+    # Target 0 is dead, and the one of (2, 3) has not been kept.
+    del labels[(2, 3)]
+    _, found = names.label_scores(belief_of(Undetected, labels), np.array([1, 2]))
+    np.testing.assert_allclose(found, [1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    # A target that the belief names by its site is not named by its first detection.
+    _, found = names.label_scores(belief_of(Undetected, {(1, 1): 0.5, (1, 3): 0.5}), np.array([1]))
+    np.testing.assert_allclose(found, [1.0, 0.0, *[0.0] * 6])
+
+
+def test_the_mass_of_gaussians_in_cells_is_that_of_the_normal_distribution() -> None:
+    covs = np.array([[[90.0**2, s * 0.9 * 9000.0], [s * 0.9 * 9000.0, 100.0**2]] for s in (1.0, -1.0, 0.0)])
+    means, weights = np.array([[30.0, -50.0], [-200.0, 120.0], [480.0, 0.0]]), np.array([0.5, 2.0, 1.0])
+    x, y = np.linspace(-500.0, 500.0, 6), np.linspace(-400.0, 400.0, 5)
+    expected = np.zeros((4, 5))
+    for weight, mean, cov in zip(weights, means, covs, strict=True):
+        below = multivariate_normal(mean, cov).cdf(np.stack(np.meshgrid(x, y), axis=-1))
+        expected += weight * np.diff(np.diff(below, axis=0), axis=1)
+    states = np.hstack([means, np.zeros((3, 2))])
+    whole = np.tile(COV, (3, 1, 1))
+    whole[:, :2, :2] = covs
+    np.testing.assert_allclose(gaussians_in_cells(weights, states, whole, GRID), expected.ravel(), atol=2e-3)
+
+
+def test_numbers_in_cells_are_those_of_any_density() -> None:
+    means, covs = np.array([[-400.0, -300.0, 0.0, 0.0], [0.0, 100.0, 0.0, 0.0]]), np.stack([COV, COV])
+    found = {
+        "LMB": LMB.from_bernoullis([[1, 0], [1, 1]], [0.5, 0.25], means, covs),
+        "multi-Bernoulli": MultiBernoulli.from_gaussians([0.5, 0.25], means, covs),
+        "Poisson": Poisson.from_gaussians([0.5, 0.25], means, covs),
+        "cluster": IidCluster.from_gaussians([0.25, 0.75], [2.0 / 3.0, 1.0 / 3.0], means, covs),
+    }
+    for density in found.values():
+        numbers = expected_in_cells(density, GRID).reshape(4, 5)
+        assert numbers[0, 0] == pytest.approx(0.5)
+        assert numbers[2, 2] == pytest.approx(0.25)
+        assert numbers.sum() == pytest.approx(0.75)
+    states = np.array([[-400.0, -300.0], [0.0, 100.0], [0.0, 101.0], [600.0, 0.0]])
+    np.testing.assert_array_equal(np.flatnonzero(true_in_cells(states, GRID)), [0, 12])
+    assert true_in_cells(states, GRID).sum() == 3.0
+
+
+def test_undetected_targets_are_spread_over_cells() -> None:
+    own_cells = CellGrid(Region(-500.0, 500.0, -400.0, 600.0), 2, 2)  # 500 m by 500 m
+    numbers = undetected_in_cells(UndetectedIntensity(own_cells, [1.0, 0.0, 0.0, 3.0]), GRID).reshape(4, 5)
+    np.testing.assert_allclose(numbers[0], [0.16, 0.16, 0.08, 0.0, 0.0])
+    np.testing.assert_allclose(numbers[3], [0.0, 0.0, 0.24, 0.48, 0.48])
+    np.testing.assert_allclose(numbers[2], [0.08, 0.08, 0.04 + 0.12, 0.24, 0.24])
+    gaussian = Poisson.from_gaussians([0.3], [[0.0, 100.0, 0.0, 0.0]], [COV])
+    assert undetected_in_cells(gaussian, GRID)[12] == pytest.approx(0.3)
+
+
+def test_scenes_are_drawn_by_number() -> None:
+    models = [random_scene(number).scenario(0).model for number in range(1, 41)]
+    assert [random_scene(number).scenario(0).model for number in (7, 40)] == [models[6], models[39]]
+    sensors = [sensor for model in models for sensor in model.sensors]
+    assert {len(model.sensors) for model in models} == {1, 2, 3}
+    assert {sensor.measurement.kind for sensor in sensors} == {"position", "bearing_range"}
+    assert {sensor.detection.kind for sensor in sensors} == {"constant", "limited_range", "limited_sector"}
+    assert all(0.4 <= sensor.detection.probability <= 0.98 for sensor in sensors)
+    assert all(1.0 <= sensor.clutter.rate <= 60.0 for sensor in sensors)
+    existences = [born.existence for model in models for born in model.birth.sites]
+    assert min(existences) >= 0.003
+    assert max(existences) <= 0.2
+    assert {1.0, 0.05} <= {model.time.step_period for model in models}
+    assert {None, 1.0} == {model.birth.period for model in models}
+
+
+def test_one_site_and_one_scan_have_the_posterior_in_closed_form() -> None:
+    r, detection, clutter, std = 0.4, 0.6, 20.0, 30.0
+    fields = {"time.num_steps": 1, "birth.sites": [site((20.0, 30.0), std, r)]}
+    fields |= {"sensors.*.detection.probability": detection, "sensors.*.clutter.rate": clutter}
+    scene = own("one site", fields)
+    experiment = build_experiment(with_fields(scene.scenario(0), EXACT.fields))
+    experiment = replace(experiment, targets=PriorTargets(experiment.tracker.targets))
+    predicted = multivariate_normal([20.0, 30.0], (std**2 + 10.0**2) * np.eye(2))
+    for run in range(20):
+        moment = World(experiment, seed=1, run=run).step()
+        ratios = detection * predicted.pdf(moment.measurements[0]) / (clutter / 1e6)
+        odds = r / (1.0 - r) * (1.0 - detection + np.sum(ratios))
+        labels, existence = existence_probabilities(moment.state.fused)
+        assert labels.tolist() == [[1, 0]]
+        assert existence[0] == pytest.approx(odds / (1.0 + odds), rel=1e-6)
+    assert_calibrated(calibration(scene, EXACT, [1], 1500), allowed=0.0, errors=4.0)
+
+
+@pytest.mark.parametrize(("num_steps", "runs"), [(2, 600), pytest.param(3, 1000, marks=pytest.mark.slow)])
+def test_the_exact_filter_is_calibrated(num_steps: int, runs: int) -> None:
+    fields = {
+        "time": {"num_steps": num_steps, "step_period": 0.5, "start": 1.0},
+        "survival.probability": 0.8,
+        "birth.sites": [site((0.0, 0.0), 20.0, 0.3), site((25.0, 0.0), 20.0, 0.2)],
+        "birth.period": 1.0,
+        "sensors.*.detection.probability": 0.6,
+        "sensors.*.clutter.rate": 0.5,
+    }
+    found = calibration(own("two sites", fields), EXACT, [1], runs)
+    assert_calibrated(found, allowed=0.0, errors=4.0)
+    assert abs(found.bias) < 4.0 * found.rms_error / np.sqrt(runs)
+    assert found.rank_deviation < 0.04
+
+
+def assert_calibrated(found: Calibration, allowed: float, errors: float) -> None:
+    """No mean of a bin is wrong by more than `allowed` and a number of standard errors, but for rounding."""
+    for bins in (found.labels, found.places):
+        if bins is not None:
+            number, believed, true, error = bins.rows()[bins.rows()[:, 0] > ENOUGH].T
+            # A bin where no run has a target has an error of 0; one more target would not have been surprising.
+            excess = np.abs(believed - true) - errors * np.maximum(error, 1.0 / number)
+            assert (excess <= allowed).all(), f"believed {believed.round(3)}, true {true.round(3)}"
