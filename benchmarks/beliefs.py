@@ -10,8 +10,8 @@ drawn from the model that the filters have, so that an exact filter is calibrate
 scene, the seed and the run alone. Three kinds of statements are compared with the truth:
 
 - labels: the existence probability of each label that a belief could hold. A label (step, site) exists if the target
-  born at that step and site is alive. In a belief with an intensity of undetected targets (`belief.undetected`), a label
-  that begins with a measurement exists if that was the first measurement of a target that is alive.
+  born at that step and site is alive. In a belief with an intensity of undetected targets (`belief.undetected`), a
+  label that begins with a measurement exists if that was the first measurement of a target that is alive.
 - places: the mean number of targets in each cell of 100 m of the region, undetected ones included.
 - number: the distribution of the number of targets.
 

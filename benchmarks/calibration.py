@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from compared import Fields, Timed, compared
@@ -76,7 +75,7 @@ class Bins:
 
     @property
     def verdict(self) -> str:
-        """"pass": no difference above `ALLOWED`; "fail": one by more than two standard errors; else "unclear"."""
+        """The word "pass": no difference above `ALLOWED`; "fail": one by two standard errors; else "unclear"."""
         differences, errors = self.judged()
         if not (differences > ALLOWED).any():
             return "pass"

@@ -124,7 +124,7 @@ class Names:
         if getattr(belief, "undetected", None) is None:
             others, missed = self.num_site_labels - len(labels), living.difference(held)
         else:
-            others = self.num_rows - np.count_nonzero(~by_site)
+            others = self.num_rows - int(np.count_nonzero(~by_site))
             exists = [e and (s or t not in self.by_site) for e, s, t in zip(exists, by_site, held, strict=True)]
             missed = (living & self.detected).difference(held, self.by_site)
         found = np.zeros(len(labels) + others)

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
+from beliefs import main
 from places import expected_in_cells, gaussians_in_cells, true_in_cells, undetected_in_cells
 from prior_targets import Names, PriorTargets
 from random_scenes import four_sites, random_scene
 from scenes import own, site
 from scipy.stats import multivariate_normal
 
-from beliefs import main
 from calibration import ENOUGH, EXISTENCES, NUMBERS, Bins, Calibration, Case, binned, calibration, cases
 from vedette.densities import LMB, IidCluster, MultiBernoulli, Poisson, UndetectedIntensity, existence_probabilities
 from vedette.filters import Limits
@@ -27,13 +28,14 @@ EXACT = Case(
     "exact", {"filter.kind": "delta_glmb"} | {f"filter.limits.{name}": value for name, value in UNLIMITED.items()}
 )
 GRID = CellGrid(Region(-500.0, 500.0, -400.0, 400.0), 5, 4)
+NUM_DRAWS = 800
 COV = np.diag([100.0, 100.0, 4.0, 4.0])
 
 
 def label_bins(believed, found, values_a_run) -> Bins:
     """Of (num_runs,) existences, each believed so many times in its run, and whether their targets exist."""
-    sums = [values_a_run * binned(EXISTENCES, np.array([p]), np.array([t])) for p, t in zip(believed, found)]
-    return Bins(EXISTENCES, np.array(sums))
+    values = np.column_stack([believed, found])
+    return Bins(EXISTENCES, values_a_run * np.array([binned(EXISTENCES, *row[:, None]) for row in values]))
 
 
 def test_bins_hold_believed_and_true_means() -> None:
@@ -103,13 +105,12 @@ class Undetected(LMB):
 
 
 def belief_of(kind: type[LMB], existence: dict[tuple[int, int], float]) -> LMB:
-    num = len(existence)
-    made = kind.from_bernoullis(list(existence), list(existence.values()), np.zeros((num, 4)), np.tile(COV, (num, 1, 1)))
-    return made
+    means, covs = np.zeros((len(existence), 4)), np.tile(COV, (len(existence), 1, 1))
+    return kind.from_bernoullis(list(existence), list(existence.values()), means, covs)
 
 
-def two_sites(steps: list[int] | None = None) -> BirthModel:
-    return BirthModel(np.full(2, 0.1), np.zeros((2, 4)), np.tile(COV, (2, 1, 1)), steps)
+def two_sites(*steps: int) -> BirthModel:
+    return BirthModel(np.full(2, 0.1), np.zeros((2, 4)), np.tile(COV, (2, 1, 1)), frozenset(steps) or None)
 
 
 def scan_of(*origins: int) -> Scan:
@@ -117,7 +118,7 @@ def scan_of(*origins: int) -> Scan:
 
 
 def test_labels_of_sites_are_the_targets_born_there() -> None:
-    names = Names(two_sites(steps=[1, 3]))
+    names = Names(two_sites(1, 3))
     for step in (1, 2, 3):
         names.take(step, (scan_of(),))
     # Four labels are possible; of the targets (1, 0), (1, 1) and (3, 1), the second is dead and the last not in it.
@@ -177,7 +178,7 @@ def test_numbers_in_cells_are_those_of_any_density() -> None:
 
 def test_undetected_targets_are_spread_over_cells() -> None:
     own_cells = CellGrid(Region(-500.0, 500.0, -400.0, 600.0), 2, 2)  # 500 m by 500 m
-    numbers = undetected_in_cells(UndetectedIntensity(own_cells, [1.0, 0.0, 0.0, 3.0]), GRID).reshape(4, 5)
+    numbers = undetected_in_cells(UndetectedIntensity(own_cells, np.array([1.0, 0.0, 0.0, 3.0])), GRID).reshape(4, 5)
     np.testing.assert_allclose(numbers[0], [0.16, 0.16, 0.08, 0.0, 0.0])
     np.testing.assert_allclose(numbers[3], [0.0, 0.0, 0.24, 0.48, 0.48])
     np.testing.assert_allclose(numbers[2], [0.08, 0.08, 0.04 + 0.12, 0.24, 0.24])
@@ -216,7 +217,7 @@ def test_one_site_and_one_scan_have_the_posterior_in_closed_form() -> None:
         labels, existence = existence_probabilities(moment.state.fused)
         assert labels.tolist() == [[1, 0]]
         assert existence[0] == pytest.approx(odds / (1.0 + odds), rel=1e-6)
-    assert_calibrated(calibration(scene, EXACT, [1], 1500), allowed=0.0, errors=4.0)
+    assert_calibrated(calibration(scene, EXACT, [1], NUM_DRAWS), allowed=0.0, errors=4.0)
 
 
 @pytest.mark.parametrize(("num_steps", "runs"), [(2, 600), pytest.param(3, 1000, marks=pytest.mark.slow)])
@@ -235,6 +236,43 @@ def test_the_exact_filter_is_calibrated(num_steps: int, runs: int) -> None:
     assert found.rank_deviation < 0.04
 
 
+def first_detections(scans: Sequence[Scan], r: float, detection: float, intensity: float) -> list[float]:
+    """Posterior that each measurement of two sensors is a target's first; prior std 30 m, noise 10 m."""
+    alone = multivariate_normal([0.0, 0.0], 1000.0 * np.eye(2))
+    both = multivariate_normal(np.zeros(4), np.kron([[1000.0, 900.0], [900.0, 1000.0]], np.eye(2)))
+    first, second = (detection * alone.pdf(scan.measurements.reshape(-1, 2)) / intensity for scan in scans)
+    first, second = np.atleast_1d(first), np.atleast_1d(second)
+    pairs = np.array([[np.concatenate([a, b]) for b in scans[1].measurements] for a in scans[0].measurements])
+    joint = np.zeros((len(first), len(second)))
+    if joint.size:
+        joint[:] = (detection / intensity) ** 2 * both.pdf(pairs).reshape(joint.shape)
+    missed = 1.0 - detection
+    weights = r * np.concatenate([first * missed + joint.sum(axis=1), second * missed])
+    return list(weights / (1.0 - r + r * missed**2 + weights.sum()))
+
+
+def test_first_detections_of_two_sensors_exist_as_often_as_their_posterior_says() -> None:
+    r, detection, clutter = 0.5, 0.6, 12.0
+    fields = {"time.num_steps": 1, "birth.sites": [site((0.0, 0.0), 30.0, r)]}
+    fields |= {"sensors.*.detection.probability": detection, "sensors.*.clutter.rate": clutter}
+    experiment = build_experiment(own("one site", fields, 2, {"kind": "sequential"}).scenario(0))
+    experiment = replace(experiment, targets=PriorTargets(experiment.tracker.targets))
+    sums, num_first = [], 0
+    for run in range(NUM_DRAWS):
+        world = World(experiment, seed=1, run=run)
+        scans = [scan for scan in world.step().scans if scan is not None]
+        names = Names(experiment.tracker.targets.birth)
+        names.take(1, scans)
+        existence = first_detections(scans, r, detection, clutter / 1e6)
+        belief = belief_of(Undetected, {(1, 1 + row): chance for row, chance in enumerate(existence)})
+        sums.append(binned(EXISTENCES, *names.label_scores(belief, world.truth.at(0)[0])))
+        num_first += len(names.first)
+    assert num_first / NUM_DRAWS == pytest.approx(r * (1.0 - (1.0 - detection) ** 2), abs=0.05)
+    number, believed, true, error = Bins(EXISTENCES, np.array(sums)).rows().T
+    assert (number[[0, 2, 3, 4]] > 100).all()
+    assert (np.abs(believed - true)[number > 100] < 4.0 * error[number > 100]).all()
+
+
 def assert_calibrated(found: Calibration, allowed: float, errors: float) -> None:
     """No mean of a bin is wrong by more than `allowed` and a number of standard errors, but for rounding."""
     for bins in (found.labels, found.places):
@@ -243,3 +281,37 @@ def assert_calibrated(found: Calibration, allowed: float, errors: float) -> None
             # A bin where no run has a target has an error of 0; one more target would not have been surprising.
             excess = np.abs(believed - true) - errors * np.maximum(error, 1.0 / number)
             assert (excess <= allowed).all(), f"believed {believed.round(3)}, true {true.round(3)}"
+
+
+def test_a_table_is_written_into_a_page(tmp_path, capsys) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("before\n<!-- from benchmarks/beliefs.py -->\n<!-- to here -->\nafter\n", encoding="utf-8")
+    main(["--scene", "6", "--seeds", "1", "--runs", "1", "--filters", "LMB", "CPHD", "--bins", "--write", str(page)])
+    text, printed = page.read_text(encoding="utf-8"), capsys.readouterr().out
+    rows = [line for line in text.splitlines() if line.startswith("| 6: overlapping, 10/s, 1 sensor | ")]
+    assert [row.split(" | ")[1] for row in rows] == ["LMB", "CPHD"]
+    assert all(row in printed for row in rows)
+    assert "| LMB | " in text
+    assert text.endswith("<!-- to here -->\nafter\n")
+    with pytest.raises(SystemExit, match=r"expected some of default, LMB, .*; got glmb"):
+        main(["--filters", "glmb"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("num_sensors", [1, 2])
+def test_every_case_can_be_asked(num_sensors: int) -> None:
+    scene = four_sites(0.9, num_sensors)
+    for case in CASES.values():
+        if case.fits(scene):
+            found = calibration(scene, case, [1], 1)
+            assert (found.labels is not None) == case.has_labels
+            assert ((found.numbers[:, :, 0] >= 0.0) & (found.numbers[:, :, 0] <= 1.0 + 1e-9)).all()
+            assert np.isfinite(found.numbers).all()
+
+
+def test_beliefs_that_are_grossly_untrue_fail() -> None:
+    hasty = Case("hasty", {"filter.kind": "delta_glmb", "filter.limits.max_hypotheses": 3})
+    found = calibration(four_sites(0.7), hasty, [1], 40)
+    assert found.verdict == "fail"
+    with pytest.raises(AssertionError, match="believed"):
+        assert_calibrated(found, allowed=0.05, errors=3.0)
