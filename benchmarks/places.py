@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from vedette.densities import IidCluster, MultiBernoulli, Poisson, UndetectedIntensity
+from vedette.densities import IidCluster, MultiBernoulli, Poisson, UndetectedTargets
 from vedette.densities.labelled import Labelled
 from vedette.models import CellGrid
 
@@ -86,10 +86,11 @@ def uncorrelated_parts(weights: Floats, means: Floats, covs: Floats) -> tuple[Fl
 def undetected_in_cells(intensity: Any, grid: CellGrid) -> Floats:
     """Return the (num_cells,) mean number of undetected targets in each cell.
 
-    intensity: cells of a grid (`UndetectedIntensity`), or Gaussian components (`log_weights`, `means`, `covs`).
+    intensity: `UndetectedTargets`, or the cells of a grid (`UndetectedIntensity`).
     """
-    if not isinstance(intensity, UndetectedIntensity):
-        return gaussians_in_cells(np.exp(intensity.log_weights), intensity.means, intensity.covs, grid)
+    if isinstance(intensity, UndetectedTargets):
+        found = gaussians_in_cells(*weighted_gaussians(intensity.intensity), grid)
+        return found if intensity.cells is None else found + undetected_in_cells(intensity.cells, grid)
     along_y, along_x = (_overlaps(own, cut) for own, cut in zip(edges(intensity.grid), edges(grid), strict=True))
     return np.asarray(along_y.T @ intensity.table @ along_x).ravel()
 

@@ -138,6 +138,10 @@ def components(belief: Any) -> tuple[Any, Any, Any]:
 def arrays(belief: Any) -> list[Any]:
     """All that a belief holds."""
     tracks = getattr(belief, "tracks", None)
-    names = [name for name in type(belief).__match_args__ if name != "tracks"]
+    names = [name for name in type(belief).__match_args__ if name not in ("tracks", "undetected")]
     own = [] if tracks is None else [getattr(tracks, name) for name in type(tracks).__match_args__]
+    undetected = getattr(belief, "undetected", None)
+    if undetected is not None:
+        own += [*undetected.intensity.to_kernel(), np.array(undetected.next_label)]
+        own += [] if undetected.cells is None else [undetected.cells.expected]
     return [array for array in (*own, *(getattr(belief, name) for name in names)) if array is not None]

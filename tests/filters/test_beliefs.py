@@ -15,7 +15,15 @@ from scenes import own, site
 from scipy.stats import multivariate_normal
 
 from calibration import ENOUGH, EXISTENCES, NUMBERS, Bins, Calibration, Case, binned, calibration, cases
-from vedette.densities import LMB, IidCluster, MultiBernoulli, Poisson, UndetectedIntensity, existence_probabilities
+from vedette.densities import (
+    LMB,
+    IidCluster,
+    MultiBernoulli,
+    Poisson,
+    UndetectedIntensity,
+    UndetectedTargets,
+    existence_probabilities,
+)
 from vedette.filters import Limits
 from vedette.models import BirthModel, CellGrid, Region, TargetModel, constant_survival, constant_velocity
 from vedette.scenarios import with_fields
@@ -182,7 +190,7 @@ def test_undetected_targets_are_spread_over_cells() -> None:
     np.testing.assert_allclose(numbers[0], [0.16, 0.16, 0.08, 0.0, 0.0])
     np.testing.assert_allclose(numbers[3], [0.0, 0.0, 0.24, 0.48, 0.48])
     np.testing.assert_allclose(numbers[2], [0.08, 0.08, 0.04 + 0.12, 0.24, 0.24])
-    gaussian = Poisson.from_gaussians([0.3], [[0.0, 100.0, 0.0, 0.0]], [COV])
+    gaussian = UndetectedTargets(Poisson.from_gaussians([0.3], [[0.0, 100.0, 0.0, 0.0]], [COV]), (0, 0))
     assert undetected_in_cells(gaussian, GRID)[12] == pytest.approx(0.3)
 
 
@@ -238,7 +246,7 @@ def test_the_exact_filter_is_calibrated(num_steps: int, runs: int) -> None:
 
 @pytest.mark.parametrize("number", [1, 3, 5])
 def test_beliefs_of_the_default_filter_are_not_grossly_untrue(number: int) -> None:
-    found = calibration(random_scene(number), CASES["default"], [1, 2], 4)
+    found = calibration(random_scene(number), CASES["default"], [1, 2], 15)
     assert_calibrated(found, allowed=0.05, errors=3.0)
     assert found.rank_deviation < 0.25
     assert abs(found.bias) < 0.5

@@ -70,7 +70,7 @@ def test_births_are_in_the_librarys_state_order() -> None:
         ("mean: [0.0, 0.0, 0.0, 0.0], std: [5.0, 5.0, 2.0, 2.0]", "mean: [1, 2, 3, 4], std: [5, 6, 7, 8]"),
     )
     model = parse_scenario(text)
-    birth = model.birth.build(model.motion)
+    birth = model.birth.build(model.motion, model.region)
     np.testing.assert_array_equal(birth.means, [[1, 3, 2, 4]])
     np.testing.assert_array_equal(birth.covs, [np.diag([25.0, 49.0, 36.0, 64.0])])
     assert birth.steps == frozenset({1, 5})
@@ -81,7 +81,7 @@ def test_a_covariance_of_births_is_reordered_both_ways() -> None:
     model = scenario(
         ("sigma_v: 1.0", "sigma_v: 1.0, state_order: interleaved"), ("std: [5.0, 5.0, 2.0, 2.0]", rows)
     ).model
-    cov = model.birth.build(model.motion).covs[0]
+    cov = model.birth.build(model.motion, model.region).covs[0]
     np.testing.assert_array_equal(cov, [[4, 0, 1, 0], [0, 16, 0, 2], [1, 0, 9, 0], [0, 2, 0, 25]])
 
 

@@ -76,7 +76,7 @@ def _extent(scenario: Scenario, truth: Truth) -> tuple[Floats, Floats]:
 
 def _draw_births(axes: Axes, scenario: Scenario, scale: float) -> None:
     """A cross at each site, and the ellipse of two standard deviations."""
-    birth = scenario.model.birth.build(scenario.model.motion)
+    birth = scenario.model.birth.build(scenario.model.motion, scenario.model.region)
     for mean, cov in zip(birth.means[:, :2], birth.covs[:, :2, :2], strict=True):
         variances, axes_of = np.linalg.eigh(cov)
         width, height = 4.0 * np.sqrt(variances) * scale

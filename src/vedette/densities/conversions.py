@@ -98,6 +98,7 @@ def _marginalised_glmbs(density: FactoredGLMB, caps: MixtureCaps) -> FactoredGLM
         np.arange(len(tracks)),
         marginal.hyp_log_weights[order],
         factor_offsets,
+        None,
     )
 
 

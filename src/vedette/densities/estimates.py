@@ -109,14 +109,14 @@ class Estimator(Protocol):
 
 
 def map_estimate(density: Labelled) -> Estimate:
-    """The most probable number of targets, then the most probable targets of that number (paper, Algorithm 1).
+    """The most probable number of targets with labels, then the most probable ones of that number (paper, Algorithm 1).
 
     GLMB: the heaviest hypothesis of that cardinality. LMB: that many labels of highest existence. Product of GLMBs: the
     heaviest hypothesis of that cardinality among all products of one of each factor. Ties: the smaller number; the
     earlier hypothesis; the smaller label. A track that is a mixture is estimated by its heaviest component,
     as the mean of two rival components may lie where the target cannot be.
     """
-    number = int(np.argmax(cardinality_distribution(labelled(density))))
+    number = int(np.argmax(labelled(density).cardinality_of_labels()))
     if isinstance(density, LMB):
         chosen = np.sort(np.argsort(-density.existence_logit, kind="stable")[:number])
         return _peaks(density.tracks, chosen, density.existence[chosen])

@@ -13,12 +13,14 @@ from vedette.densities.containers import kernel_arrays, unchecked
 from vedette.densities.glmb import GLMB, Hypotheses
 from vedette.densities.labelled import LMB, Labelled
 from vedette.densities.tracks import TrackTable
+from vedette.densities.undetected import UndetectedTargets
 from vedette.errors import InputError, VedetteError
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.labelled.cardinality import convolved
 from vedette.kernels.labelled.labels import group_by_label_set
 from vedette.kernels.labelled.stacking import join_offsets, stack_glmbs
+from vedette.models.arguments import instance
 from vedette.text import counted
 
 _FACTORS = kernel_arrays("track_offsets", "hyp_offsets", "hyp_tracks", "hyp_log_weights", "factor_offsets")
@@ -39,6 +41,7 @@ class FactoredGLMB(Hypotheses):
         hyp_tracks: indices into `tracks`, in increasing label order within a hypothesis.
         hyp_log_weights: (num_hyps,) log weights, normalised within each factor.
         factor_offsets: (num_factors + 1,) hypotheses of factor `f` are `factor_offsets[f]:factor_offsets[f + 1]`.
+        undetected: targets without a label, independent of all others; None: there are none.
 
     The arrays are copied, checked once, here, and read-only from then on.
 
@@ -52,6 +55,7 @@ class FactoredGLMB(Hypotheses):
     hyp_tracks: Ints
     hyp_log_weights: Floats
     factor_offsets: Ints
+    undetected: UndetectedTargets | None = None
     is_product: ClassVar[Literal[True]] = True
 
     @property
@@ -60,7 +64,8 @@ class FactoredGLMB(Hypotheses):
         return len(self.factor_offsets) - 1
 
     def _parts(self) -> str:
-        return f"{Hypotheses._parts(self)}, {counted(self.num_factors, 'factor')}"
+        rest = "" if self.undetected is None else f", undetected targets: {self.undetected.in_short()}"
+        return f"{Hypotheses._parts(self)}, {counted(self.num_factors, 'factor')}{rest}"
 
     @property
     def is_bernoulli(self) -> Bools:
@@ -82,6 +87,11 @@ class FactoredGLMB(Hypotheses):
         return len(sets_of_factors(self.as_hypotheses(), self.factor_of)[1]) == self.num_hyps
 
     def cardinality(self) -> Floats:
+        """Probabilities of 0, 1, ... targets, with and without labels."""
+        labels = self.cardinality_of_labels()
+        return labels if self.undetected is None else np.convolve(labels, self.undetected.cardinality())
+
+    def cardinality_of_labels(self) -> Floats:
         """Probabilities of as many targets as the largest hypotheses of all factors have together, and of fewer."""
         sizes, offsets = np.diff(self.hyp_offsets), self.size_offsets()
         chances = np.bincount(offsets[self.factor_of] + sizes, np.exp(self.hyp_log_weights), minlength=offsets[-1])
@@ -127,13 +137,15 @@ class FactoredGLMB(Hypotheses):
     @classmethod
     def from_kernel(cls, density: kt.FactoredGlmb) -> FactoredGLMB:
         """The arrays of a bundle as they are; a kernel's own need no check."""
-        return unchecked(cls, TrackTable.from_kernel(density.tracks), *density[1:])
+        return unchecked(cls, TrackTable.from_kernel(density.tracks), *density[1:], None)
 
     @classmethod
     def empty(cls, state_dim: int) -> FactoredGLMB:
         """The density that is certain of no target: no factor."""
         zero, none = np.zeros(1, np.int64), np.empty(0, np.int64)
-        return unchecked(cls, TrackTable.empty(state_dim), zero, zero.copy(), none, np.empty(0), np.zeros(1, np.int64))
+        return unchecked(
+            cls, TrackTable.empty(state_dim), zero, zero.copy(), none, np.empty(0), np.zeros(1, np.int64), None
+        )
 
     @classmethod
     def from_factors(cls, factors: Sequence[GLMB], state_dim: int) -> FactoredGLMB:
@@ -150,7 +162,7 @@ class FactoredGLMB(Hypotheses):
     @classmethod
     def of(cls, density: Labelled) -> FactoredGLMB:
         """The same density: a GLMB as one factor, an LMB as one a label (that it is absent, then that it is there)."""
-        return density if isinstance(density, cls) else unchecked(cls, density.tracks, *density.to_factors()[1:])
+        return density if isinstance(density, cls) else unchecked(cls, density.tracks, *density.to_factors()[1:], None)
 
     @classmethod
     def from_glmb(cls, glmb: GLMB) -> FactoredGLMB:
@@ -178,11 +190,14 @@ class FactoredGLMB(Hypotheses):
             join_offsets([part.track_offsets for part in parts]),
             *stack[1:],
             join_offsets([part.factor_offsets for part in parts]),
+            None,
         )
         made._validate_labels()
         return made
 
     def _validate_form(self, error: type[VedetteError]) -> None:
+        if self.undetected is not None:
+            instance("undetected", self.undetected, UndetectedTargets)
         checks.check_array("hyp_log_weights", self.hyp_log_weights, np.float64, (None,))
         checks.check_array("hyp_tracks", self.hyp_tracks, np.int64, (None,))
         checks.check_array("factor_offsets", self.factor_offsets, np.int64, (None,))

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import fields
 from operator import attrgetter
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 
@@ -16,9 +16,11 @@ from vedette.densities.glmb import GLMB
 from vedette.densities.labelled import LMB, Labelled
 from vedette.densities.multi_bernoulli import MultiBernoulli
 from vedette.densities.tracks import TrackTable
+from vedette.densities.undetected import UndetectedIntensity, UndetectedTargets
 from vedette.densities.unlabelled import IidCluster, Poisson
 from vedette.errors import InputError, VedetteError
 from vedette.files import write_file
+from vedette.models import CellGrid, Region
 from vedette.reading import read_arrays, read_file, said, unreadable
 from vedette.text import shown
 
@@ -34,6 +36,7 @@ _KINDS: dict[str, type[Density]] = {
     "iid_cluster": IidCluster,
     "multi_bernoulli": MultiBernoulli,
 }
+_UNDETECTED = "undetected"
 _OPTIONAL = {f"tracks.{field.name}" for field in fields(TrackTable) if field.default is None}
 
 
@@ -47,6 +50,8 @@ def save_density(path: str | os.PathLike[str], density: Density) -> None:
         raise InputError(f"density: expected a multi-target density; got {type(density).__name__}")
     arrays: dict[str, Any] = {"format": FORMAT_NAME, "version": FORMAT_VERSION, "kind": kind}
     arrays |= {name: array for name in _names(type(density)) if (array := attrgetter(name)(density)) is not None}
+    if isinstance(density, FactoredGLMB) and density.undetected is not None:
+        arrays |= _arrays_of_undetected(density.undetected)
     write_file(Path(path), lambda file: np.savez(file, **arrays))
 
 
@@ -86,12 +91,35 @@ def _kind_of(source: Path, arrays: Mapping[str, Any]) -> str:
 def _names(container: type[Any]) -> list[str]:
     """Of a container's arrays in a file, in the order of its fields, those of its track table first."""
     of_tracks = [f"tracks.{field.name}" for field in fields(TrackTable)] if issubclass(container, Labelled) else []
-    return of_tracks + [field.name for field in fields(container) if field.name != "tracks"]
+    return of_tracks + [field.name for field in fields(container) if field.name not in ("tracks", "undetected")]
 
 
 def _build(kind: str, arrays: Mapping[str, Any]) -> Density:
     container: Any = _KINDS[kind]
     own: list[Any] = [arrays.get(name) if name in _OPTIONAL else arrays[name] for name in _names(container)]
-    num = len(own) - len(fields(container)) + 1
-    made: Density = container(TrackTable(*own[:num]), *own[num:]) if num > 1 else container(*own)
-    return made
+    if not issubclass(container, Labelled):
+        return cast(Density, container(*own))
+    num = len(fields(TrackTable))
+    undetected = {} if f"{_UNDETECTED}.next_label" not in arrays else {"undetected": _undetected_of(arrays)}
+    return cast(Density, container(TrackTable(*own[:num]), *own[num:], **undetected))
+
+
+def _arrays_of_undetected(undetected: UndetectedTargets) -> dict[str, Any]:
+    parts = {name: getattr(undetected.intensity, name) for name in _names(Poisson)}
+    parts["next_label"] = np.array(undetected.next_label)
+    if undetected.cells is not None:
+        grid = undetected.cells.grid
+        parts |= {"expected": undetected.cells.expected, "region": grid.region.bounds}
+        parts["cells"] = np.array([grid.columns, grid.rows])
+    return {f"{_UNDETECTED}.{name}": part for name, part in parts.items()}
+
+
+def _undetected_of(arrays: Mapping[str, Any]) -> UndetectedTargets:
+    own = {name.removeprefix(f"{_UNDETECTED}."): part for name, part in arrays.items() if _UNDETECTED in name}
+    cells = None
+    if "cells" in own:
+        x_min, x_max, y_min, y_max = own["region"].tolist()
+        grid = CellGrid(Region(x_min, x_max, y_min, y_max), *own["cells"].tolist())
+        cells = UndetectedIntensity(grid, own["expected"])
+    step, index = own["next_label"].tolist()
+    return UndetectedTargets(Poisson(*(own[name] for name in _names(Poisson))), (step, index), cells)

@@ -70,6 +70,7 @@ def take_factors(density: FactoredGLMB, places: Ints) -> FactoredGLMB:
         density.hyp_tracks[entries] + members,
         density.hyp_log_weights[hyps],
         factor_offsets,
+        None,
     )
 
 

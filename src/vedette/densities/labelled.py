@@ -62,6 +62,10 @@ class Labelled(MultiTarget):
     def track_existence(self) -> Floats:
         """(num_tracks,) probability that there is a target and that it has this track."""
 
+    def cardinality_of_labels(self) -> Floats:
+        """Probabilities of 0, 1, ... targets with labels."""
+        return self.cardinality()
+
     @abstractmethod
     def label_existence(self) -> tuple[Ints, Floats]:
         """See `vedette.densities.existence_probabilities`."""

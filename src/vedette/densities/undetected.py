@@ -1,4 +1,4 @@
-"""Poisson intensity of the targets that no sensor has found yet, on a grid."""
+"""Poisson densities of the targets that no sensor has detected: beside the labels of a belief, and on a grid."""
 
 from __future__ import annotations
 
@@ -7,11 +7,56 @@ from dataclasses import dataclass
 import numpy as np
 
 from vedette.densities import checks
+from vedette.densities.unlabelled import Poisson, poisson_numbers
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.models import CellGrid, Region
-from vedette.models.arguments import non_negative, reject
+from vedette.models.arguments import instance, non_negative, reject
 from vedette.speaking import Speaking
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class UndetectedTargets(Speaking):
+    """Poisson density of the targets that were never detected, and the label of the next first detection.
+
+    Attributes:
+        intensity: expected number of undetected targets by state, of those from birth sites and of dropped labels.
+        next_label: birth step and index of the label that the next measurement may begin.
+        cells: expected number of those that appeared anywhere in a region, by place; None: there are none.
+
+    Raises:
+        InputError: a part of another kind, or no label.
+    """
+
+    intensity: Poisson
+    next_label: tuple[int, int]
+    cells: UndetectedIntensity | None = None
+
+    def __post_init__(self) -> None:
+        instance("UndetectedTargets.intensity", self.intensity, Poisson)
+        label = tuple(self.next_label)
+        if len(label) != 2 or not all(isinstance(number, int) for number in label):
+            raise reject("UndetectedTargets.next_label", "two whole numbers, birth step and index", self.next_label)
+        object.__setattr__(self, "next_label", label)
+        if self.cells is not None:
+            instance("UndetectedTargets.cells", self.cells, UndetectedIntensity)
+
+    def _summary(self) -> str:
+        return f"{self.expected_number:.4g} expected"
+
+    @property
+    def expected_number(self) -> float:
+        """Mean number of undetected targets."""
+        return self.intensity.expected_number + (0.0 if self.cells is None else self.cells.total)
+
+    def cardinality(self) -> Floats:
+        """Probabilities of 0, 1, ... undetected targets, up to a number beyond which less than 1e-20 remains."""
+        return poisson_numbers(self.expected_number)
+
+    @classmethod
+    def none(cls, state_dim: int) -> UndetectedTargets:
+        """No target, before the first scan."""
+        return cls(Poisson.empty(state_dim), (0, 0))
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

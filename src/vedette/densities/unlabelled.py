@@ -90,13 +90,7 @@ class Poisson(Unlabelled):
 
     def cardinality(self) -> Floats:
         """Probabilities of 0, 1, ... targets, up to a number beyond which less than 1e-20 remains."""
-        from scipy.special import gammaln
-
-        mean = self.expected_number
-        if not mean > 0.0:
-            return np.ones(1)
-        numbers = np.arange(math.ceil(mean + 12.0 * math.sqrt(mean)) + 41)
-        return np.asarray(np.exp(numbers * math.log(mean) - mean - gammaln(numbers + 1.0)))
+        return poisson_numbers(self.expected_number)
 
     def to_kernel(self) -> kt.Mixture:
         """The same arrays as the bundle that kernels take."""
@@ -130,6 +124,16 @@ class Poisson(Unlabelled):
         positive definite.
         """
         checks.check_components("", self.log_weights, self.means, self.covs, error)
+
+
+def poisson_numbers(mean: float) -> Floats:
+    """Poisson probabilities of 0, 1, ..., up to a number beyond which less than 1e-20 remains."""
+    from scipy.special import gammaln
+
+    if not mean > 0.0:
+        return np.ones(1)
+    numbers = np.arange(math.ceil(mean + 12.0 * math.sqrt(mean)) + 41)
+    return np.asarray(np.exp(numbers * math.log(mean) - mean - gammaln(numbers + 1.0)))
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -4,7 +4,7 @@ from typing import TypeAlias
 
 from vedette.densities import IidCluster, Labelled, MultiBernoulli, Poisson
 from vedette.filters.assignment import Assignment, BeliefPropagation, Gibbs, Marginals, Ranked
-from vedette.filters.factored import FactoredGlmbFilter, SequentialFactoredFilter
+from vedette.filters.factored import FactoredGlmbFilter, SequentialFactoredFilter, with_labelled_births
 from vedette.filters.glmb import DeltaGlmbFilter, MultiSensorGlmbFilter
 from vedette.filters.limits import Limits
 from vedette.filters.lmb import LmbFilter, SequentialLmbFilter
@@ -37,4 +37,5 @@ __all__ = [
     "TwoStepFilter",
     "labels_targets",
     "shared_targets",
+    "with_labelled_births",
 ]

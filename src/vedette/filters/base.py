@@ -16,7 +16,7 @@ from vedette.filters.inputs import births_for, blame_model, check_belief, check_
 from vedette.filters.limits import Limits
 from vedette.filters.protocols import FilterInfo
 from vedette.kernels.association.truncation import Truncation
-from vedette.kernels.base.types import Floats, Ints, Motion, ScanInput, Sensor
+from vedette.kernels.base.types import Floats, Ints, Lmb, Motion, ScanInput, Sensor
 from vedette.models import (
     SensorModel,
     TargetModel,
@@ -38,11 +38,13 @@ class SensorStep(NamedTuple):
     """One sensor's scan, as it meets a belief.
 
     inputs: as kernels take them; the motion is None of a scan of the belief's own time. limits: caps and thresholds.
+    sensor: that took the scan.
     num_scans: of that time, which go into one belief. rng: None where nothing is drawn.
     """
 
     inputs: StepInputs
     limits: Limits
+    sensor: SensorModel
     num_scans: int = 1
     rng: np.random.Generator | None = None
 
@@ -62,8 +64,19 @@ NO_SCAN = np.empty((0, 2))
 NO_POSE = np.zeros(3)
 
 
+class WithBirths:
+    """A filter whose labels may begin at birth sites."""
+
+    __slots__ = ()
+    targets: TargetModel
+
+    def _births(self, dt: float, step: Any, prior: Labelled | None, births: LMB | None) -> Lmb:
+        """The labels that begin within the `dt` seconds before a step, whatever is detected; see `births_for`."""
+        return births_for(self.targets.birth, dt, step, prior, births)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class SingleSensorFilter:
+class SingleSensorFilter(WithBirths):
     """The parts of a filter of one sensor.
 
     Attributes:
@@ -94,8 +107,7 @@ class SingleSensorFilter:
         the targets' model.
         """
         targets, sensor, period = self.targets, self.sensor, positive("dt", dt)
-        birth = births_for(targets.birth, period, step, prior, births)
-        given = ScanInput(birth, scan, pose_vector("pose", pose), period)
+        given = ScanInput(self._births(period, step, prior, births), scan, pose_vector("pose", pose), period)
         motion = kernel_motion(targets.motion, targets.survival)
         return given, motion, sensor.to_kernel(), self.limits.truncation(sensor.meas_dim)
 
@@ -113,17 +125,20 @@ class SingleSensorFilter:
         return given, None, self.sensor.to_kernel(), self.limits.truncation(self.sensor.meas_dim)
 
 
-class OfKind(ABC, Generic[BeliefT]):
+class OfKind(WithBirths, ABC, Generic[BeliefT]):
     """What filters of one kind of labelled belief have in common, whatever the number of their sensors."""
 
     __slots__ = ()
     kind: ClassVar[type[Any]]  # of the belief: a `GLMB`, an `LMB` or a `FactoredGLMB`
-    targets: TargetModel
 
     def initial(self) -> BeliefT:
         """The belief before the first scan: no target."""
         empty: BeliefT = self.kind.empty(self.targets.state_dim)
         return empty
+
+    def _before_scan(self, prior: BeliefT, dt: float, step: Any, births: LMB | None) -> Any:
+        """What `_stepped` takes of the prior. dt: seconds since; step: of the scan; None: of an update apart."""
+        return prior.to_kernel()
 
     @abstractmethod
     def _check(self, posterior: Any, report: Any, place: str) -> float:
@@ -179,7 +194,8 @@ class LabelledFilter(SingleSensorFilter, OfKind[BeliefT]):
         measurements, repeats = check_scan(scan, self.sensor)
         prior = check_belief(belief, self.kind, self.targets.state_dim)
         inputs = self._inputs_after(dt, measurements, pose, step, prior, births)
-        return self._taken(prior, inputs, rng, [repeats], f"step {step}: ")
+        before = self._before_scan(prior, inputs[0].dt, step, births)
+        return self._taken(before, inputs, rng, [repeats], f"step {step}: ")
 
     def predict(
         self, belief: Labelled, dt: float, step: int, *, births: LMB | None = None
@@ -190,7 +206,7 @@ class LabelledFilter(SingleSensorFilter, OfKind[BeliefT]):
         """
         prior, blind = check_belief(belief, self.kind, self.targets.state_dim), self._blind()
         inputs = blind._inputs_after(dt, NO_SCAN, NO_POSE, step, prior, births)
-        return blind._taken(prior, inputs, None, [], f"step {step}: ")
+        return blind._taken(blind._before_scan(prior, inputs[0].dt, step, births), inputs, None, [], f"step {step}: ")
 
     def update(self, belief: Labelled, scan: Any, pose: Any, *, rng: np.random.Generator) -> tuple[BeliefT, FilterInfo]:
         """The belief after a scan of its own time; nobody moves, dies or is born. Arguments and errors as of `step`."""
@@ -198,18 +214,18 @@ class LabelledFilter(SingleSensorFilter, OfKind[BeliefT]):
         measurements, repeats = check_scan(scan, self.sensor)
         prior = check_belief(belief, self.kind, self.targets.state_dim)
         inputs = self._update_inputs(measurements, pose)
-        return self._taken(prior, inputs, rng, [repeats], "")
+        return self._taken(self._before_scan(prior, 0.0, None, None), inputs, rng, [repeats], "")
 
     def _taken(
         self,
-        prior: BeliefT,
+        prior: Any,
         inputs: StepInputs,
         rng: np.random.Generator | None,
         repeats: Sequence[Ints],
         place: str,
     ) -> tuple[BeliefT, FilterInfo]:
         try:
-            posterior, report = self._stepped(prior.to_kernel(), SensorStep(inputs, self.limits, rng=rng))
+            posterior, report = self._stepped(prior, SensorStep(inputs, self.limits, self.sensor, rng=rng))
         except Exception as error:
             blame_model(error)
             raise

@@ -5,31 +5,49 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from vedette.densities import FactoredGLMB
+from vedette.densities import LMB, FactoredGLMB, Labelled, UndetectedTargets
 from vedette.densities.checks import offsets_of
 from vedette.densities.label_sets import take_factors
 from vedette.errors import InputError, NumericalError
 from vedette.filters.base import LabelledFilter, OfKind, SensorStep, blind_sensor
+from vedette.filters.inputs import nobody
 from vedette.filters.limits import Limits
 from vedette.filters.multi_sensor import InTurn, MultiSensorFilter
 from vedette.filters.protocols import FilterInfo
-from vedette.kernels.base.types import Bools, FactoredGlmb, Ints
+from vedette.filters.undetected import (
+    appearing,
+    named_at,
+    no_undetected,
+    predicted_undetected,
+    seen_by,
+    split_births,
+    undetected_after,
+)
+from vedette.kernels.base.types import Bools, FactoredGlmb, Ints, Lmb
 from vedette.kernels.steps.factor_updates import Factoring
 from vedette.kernels.steps.factored import FactoredReport, step_factored
 from vedette.kernels.steps.in_view import in_view
-from vedette.models.arguments import dimension, non_negative
+from vedette.models.arguments import dimension, non_negative, one_of
 from vedette.models.fields import Count, L1Error
 
-# At a measurement, claims are cut while the sum over pairs of their products is at most the error of a split, or this.
-# Finer cuts make groups that no list is long enough for.
-_MOST_CUT = 0.02
+# At a measurement, claims are cut while the sum over pairs of their products is at most this times the error of a
+# split, or this. Finer cuts make groups that no list is long enough for.
+_CUT_PER_ERROR, _MOST_CUT = 5.0, 0.05
 
 # Of the largest factors, how many may take a scan together.
 _FACTORS_TOGETHER = 4
+
+
+class _Before(NamedTuple):
+    """What a scan finds: the density of the labels, and the undetected targets with what they were taken as."""
+
+    density: FactoredGlmb
+    undetected: UndetectedTargets | None  # None where births are labelled
+    error: float = 0.0  # L1, of taking births at sites as Poisson
 
 
 class _OfFactors(OfKind[FactoredGLMB]):
@@ -40,12 +58,52 @@ class _OfFactors(OfKind[FactoredGLMB]):
     limits: Limits
     max_split_error: float
     max_factor_labels: int
+    births: Literal["poisson", "labelled"]
 
-    def _stepped(self, prior: FactoredGlmb, step: SensorStep) -> tuple[FactoredGlmb, FactoredReport]:
+    @property
+    def starts_tracks(self) -> bool:
+        """Whether births from measurements are its own: those of a region, with undetected targets as an intensity."""
+        return self.births == "poisson" and appearing(self.targets.birth) is not None
+
+    def initial(self) -> FactoredGLMB:
+        """The belief before the first scan: no target."""
+        empty = FactoredGLMB.empty(self.targets.state_dim)
+        return empty if self.births == "labelled" else empty.with_fields(undetected=self._none())
+
+    def _none(self) -> UndetectedTargets:
+        return UndetectedTargets.none(self.targets.state_dim)
+
+    def _births(self, dt: float, step: Any, prior: Labelled | None, births: LMB | None) -> Lmb:
+        born = OfKind._births(self, dt, step, prior, births)
+        return born if self.births == "labelled" or births is not None else split_births(born)[0]
+
+    def _before_scan(self, prior: FactoredGLMB, dt: float, step: Any, births: LMB | None) -> _Before:
+        if self.births == "labelled":
+            return _Before(prior.to_kernel(), None)
+        undetected, error = self._none() if prior.undetected is None else prior.undetected, 0.0
+        if dt > 0.0:
+            born = nobody(self.targets.state_dim)
+            if births is None:
+                born = split_births(OfKind._births(self, dt, step, None, None))[1]
+            undetected, error = predicted_undetected(undetected, self.targets, born, dt, self.limits)
+        if step is not None:
+            undetected = named_at(undetected, step, self.targets.birth.num_sites)
+        return _Before(prior.to_kernel(), undetected, error)
+
+    def _stepped(self, prior: _Before, step: SensorStep) -> tuple[_Before, FactoredReport]:
+        scan, _, sensor, _ = step.inputs
         factoring = _factoring(self.max_split_error, self.max_factor_labels, step.num_scans)
-        return step_factored(prior, *step.inputs, step.limits.reduction(), factoring)
+        birth, at = self.targets.birth, (scan.measurements, scan.pose)
+        seen = no_undetected(self.targets.state_dim)
+        if prior.undetected is not None:
+            seen = seen_by(prior.undetected, prior.error, birth, step.sensor, *at)
+        density, missed, report = step_factored(prior.density, seen, *step.inputs, step.limits.reduction(), factoring)
+        if prior.undetected is None:
+            return prior._replace(density=density), report
+        undetected, log_missed = undetected_after(prior.undetected, missed, birth, sensor, *at)
+        return _Before(density, undetected, prior.error), report._replace(log_total=report.log_total + log_missed)
 
-    def _check(self, posterior: FactoredGlmb, report: FactoredReport, place: str) -> float:
+    def _check(self, posterior: Any, report: FactoredReport, place: str) -> float:
         if report.log_total > -math.inf:
             return report.log_total
         if report.cut:
@@ -53,26 +111,25 @@ class _OfFactors(OfKind[FactoredGLMB]):
         raise NumericalError(f"{place}no hypothesis has positive weight; do the models forbid this scan?")
 
     def _concluded(
-        self,
-        posterior: FactoredGlmb,
-        reports: Sequence[FactoredReport],
-        *,
-        log_likelihood: float,
-        repeats: Sequence[Ints],
+        self, posterior: _Before, reports: Sequence[FactoredReport], *, log_likelihood: float, repeats: Sequence[Ints]
     ) -> tuple[FactoredGLMB, FilterInfo]:
-        found, dropped, is_full = self.limits.without_excess(FactoredGLMB.from_kernel(posterior))
-        return found, FilterInfo(
+        found, dropped, is_full = self.limits.without_excess(FactoredGLMB.from_kernel(posterior.density))
+        # Labels that kernels drop become undetected targets, where these are an intensity.
+        lost = "dropped_existence" if posterior.undetected is None else "left_out"
+        dropped += sum(float(getattr(report, lost)) for report in reports)
+        factoring = posterior.error + sum(float(report.split_error + 4.0 * report.taken_twice) for report in reports)
+        return found.with_fields(undetected=posterior.undetected), FilterInfo(
             log_likelihood=log_likelihood,
             num_hypotheses=found.num_hyps,
             num_tracks=found.tracks.num_tracks,
             discarded_weight_bound=max(0.0, -math.expm1(sum(report.log_kept for report in reports))),
-            dropped_existence=sum(float(report.dropped_existence) for report in reports) + dropped,
+            dropped_existence=dropped,
             num_clutter_raised=sum(int(report.num_raised) for report in reports),
             num_duplicates=sum(map(len, repeats)),
             num_inexact_clusters=0,
             search_cut=any(bool(report.cut) for report in reports),
             cap_met=is_full or any(bool(report.full) for report in reports),
-            factoring_error=min(2.0, sum(float(report.split_error + 4.0 * report.taken_twice) for report in reports)),
+            factoring_error=min(2.0, factoring),
             reduction_error=min(2.0, sum(float(report.reduction_error) for report in reports)),
         )
 
@@ -96,14 +153,18 @@ class FactoredGlmbFilter(_OfFactors, LabelledFilter[FactoredGLMB]):
         limits: caps and thresholds; those on hypotheses hold for each factor.
         max_split_error: of a factored_glmb: L1 error, of densities that each integrate to 1, up to which labels that
             contended are taken as independent again, and versions of a label as one; 2: always, as an LMB; 0: where
-            they are. Two factors are taken together where both take a measurement with a probability above twice this,
-            or above .02, if they were independent; see `scans_together`.
+            they are. At each measurement the weakest claims of factors are cut while the sum over pairs of their
+            products is at most five times this, and at most .05; see `scans_together`.
         max_factor_labels: of a factored_glmb: most labels of a factor, and a quarter of those that take a scan
             together; where more contend, links are made from the strongest on and left out where they would join more.
             What all this leaves out is in `FilterInfo.factoring_error`.
         scans_together: scans of one time that go into one belief, of this sensor and others, as by `ParallelUpdate`.
             What a weak link that is cut leaves out counts with each of them: so for S scans links are cut S^2 times
             later.
+        births: of a factored_glmb: poisson: targets that were never detected are a Poisson intensity, and a label
+            begins with a first detection, except at sites with an existence of .15 or more; labelled: a label begins at
+            each birth site at each scan. Filters whose beliefs are fused by label have labelled births, whatever this
+            says.
 
     Raises:
         InputError: a part of another kind, or a field out of range.
@@ -112,16 +173,17 @@ class FactoredGlmbFilter(_OfFactors, LabelledFilter[FactoredGLMB]):
     max_split_error: L1Error = 0.01
     max_factor_labels: Count = 20
     scans_together: int = 1
+    births: Literal["poisson", "labelled"] = "poisson"
 
     def __post_init__(self) -> None:
         LabelledFilter.__post_init__(self)  # slots replace the class that super() looks for
-        _check_factoring(self.max_split_error, self.max_factor_labels)
+        _check_factoring(self.max_split_error, self.max_factor_labels, self.births)
         dimension("scans_together", self.scans_together)
 
     def _blind(self) -> FactoredGlmbFilter:
         return replace(self, sensor=blind_sensor(), limits=self.limits.keeping_labels())
 
-    def _stepped(self, prior: FactoredGlmb, step: SensorStep) -> tuple[FactoredGlmb, FactoredReport]:
+    def _stepped(self, prior: _Before, step: SensorStep) -> tuple[_Before, FactoredReport]:
         return _OfFactors._stepped(self, prior, step._replace(num_scans=self.scans_together))
 
 
@@ -138,33 +200,47 @@ class SequentialFactoredFilter(_OfFactors, InTurn[FactoredGLMB]):
 
     max_split_error: float = 0.01
     max_factor_labels: int = 20
+    births: Literal["poisson", "labelled"] = "poisson"
 
     def __post_init__(self) -> None:
         MultiSensorFilter.__post_init__(self)  # slots replace the class that super() looks for
-        _check_factoring(self.max_split_error, self.max_factor_labels)
+        _check_factoring(self.max_split_error, self.max_factor_labels, self.births)
 
     def _updated_in_view(
-        self, prior: FactoredGlmb, settled: Bools, step: SensorStep
-    ) -> tuple[FactoredGlmb, FactoredReport, Bools]:
+        self, prior: _Before, settled: Bools, step: SensorStep
+    ) -> tuple[_Before, FactoredReport, Bools]:
         """As `_stepped`, of the factors that the scan may say anything of; the others come first, as they were."""
         scan, _, sensor, truncation = step.inputs
-        density, marks = FactoredGLMB.from_kernel(prior), in_view(prior.tracks, scan, sensor, truncation)
-        seen = np.diff(offsets_of(marks.astype(np.int64))[prior.track_offsets]) > 0
+        density, marks = (
+            FactoredGLMB.from_kernel(prior.density),
+            in_view(prior.density.tracks, scan, sensor, truncation),
+        )
+        seen = np.diff(offsets_of(marks.astype(np.int64))[density.track_offsets]) > 0
         near, far = (take_factors(density, np.flatnonzero(places)) for places in (seen, ~seen))
-        posterior, report = self._stepped(near.to_kernel(), step)
-        both = [far, FactoredGLMB.from_kernel(posterior)]
-        return FactoredGLMB.product(both, density.state_dim).to_kernel(), report, settled
+        posterior, report = self._stepped(prior._replace(density=near.to_kernel()), step)
+        both = [far, FactoredGLMB.from_kernel(posterior.density)]
+        joined = FactoredGLMB.product(both, density.state_dim).to_kernel()
+        return posterior._replace(density=joined), report, settled
 
 
-def _check_factoring(max_split_error: Any, max_factor_labels: Any) -> None:
+def _check_factoring(max_split_error: Any, max_factor_labels: Any, births: Any) -> None:
     """`InputError` for a field out of its range."""
     if non_negative("max_split_error", max_split_error) > 2.0:
         raise InputError(f"max_split_error: expected at most 2; got {max_split_error!r}")
     dimension("max_factor_labels", max_factor_labels)
+    one_of("births", births, ("poisson", "labelled"))
 
 
 def _factoring(max_split_error: float, max_factor_labels: int, num_scans: int) -> Factoring:
     """The fields of a filter as kernels take them."""
     error, most = float(max_split_error), int(max_factor_labels)
-    max_cut = min(error, _MOST_CUT) / num_scans**2
+    max_cut = min(_CUT_PER_ERROR * error, _MOST_CUT) / num_scans**2
     return Factoring(error, max_cut, most, _FACTORS_TOGETHER * most)
+
+
+def with_labelled_births(local: Any) -> Any:
+    """The filter with a label at each birth site, for beliefs that are fused by label; any other filter as it is.
+
+    Two sensors' first detections of one target would be two labels.
+    """
+    return replace(local, births="labelled") if isinstance(local, _OfFactors) else local  # type: ignore[type-var]

@@ -12,7 +12,7 @@ import numpy as np
 from vedette.densities import LMB, Labelled
 from vedette.errors import InputError
 from vedette.filters.base import NO_POSE, NO_SCAN, BeliefT, OfKind, SensorStep, blind_sensor
-from vedette.filters.inputs import births_for, check_belief, check_scan, model_errors, no_time, nobody
+from vedette.filters.inputs import check_belief, check_scan, model_errors, no_time, nobody
 from vedette.filters.limits import Limits
 from vedette.filters.protocols import FilterInfo
 from vedette.kernels.base.types import Bools, Floats, Ints, Lmb, Motion, ScanInput
@@ -110,20 +110,19 @@ class MultiSensorFilter(OfKind[BeliefT]):
         taken = self._checked_scans(scans, poses, rng)
         prior = check_belief(belief, self.kind, self.targets.state_dim)
         if no_time(dt):
-            return self._updated(prior, nobody(self.targets.state_dim), taken, 0.0, f"step {step}")
+            before = self._before_scan(prior, 0.0, step, births)
+            return self._updated(before, nobody(self.targets.state_dim), taken, 0.0, f"step {step}")
         period = positive("dt", dt)
-        born = births_for(self.targets.birth, period, step, prior, births)
-        return self._updated(prior, born, taken, period, f"step {step}")
+        born = self._births(period, step, prior, births)
+        return self._updated(self._before_scan(prior, period, step, births), born, taken, period, f"step {step}")
 
     def _motion(self, dt: float) -> Motion | None:
         """As kernels take it; None of scans of the belief's own time."""
         return kernel_motion(self.targets.motion, self.targets.survival) if dt > 0.0 else None
 
     @abstractmethod
-    def _updated(
-        self, prior: BeliefT, born: Lmb, taken: SensorScans, dt: float, place: str
-    ) -> tuple[BeliefT, FilterInfo]:
-        """The prediction of the prior, with those who may be born, after all scans. place: of errors."""
+    def _updated(self, prior: Any, born: Lmb, taken: SensorScans, dt: float, place: str) -> tuple[BeliefT, FilterInfo]:
+        """The prediction of the prior (as of `_before_scan`) with the births, after all scans. place: of errors."""
 
     def _checked_scans(self, scans: Any, poses: Any, rng: Any) -> SensorScans:
         """What each sensor that scanned saw and from where.
@@ -155,17 +154,15 @@ class InTurn(MultiSensorFilter[BeliefT]):
     Attributes and errors: as `MultiSensorFilter`.
     """
 
-    def _updated(
-        self, prior: BeliefT, born: Lmb, taken: SensorScans, dt: float, place: str
-    ) -> tuple[BeliefT, FilterInfo]:
-        motion, posterior = self._motion(dt), prior.to_kernel()
+    def _updated(self, prior: Any, born: Lmb, taken: SensorScans, dt: float, place: str) -> tuple[BeliefT, FilterInfo]:
+        motion, posterior = self._motion(dt), prior
         keeping, settled = self.limits.keeping_labels(), np.zeros(0, np.bool_)
         reports, log_total, last = list[Any](), 0.0, len(taken.names) - 1
         given = zip(taken.names, taken.sensors, taken.inputs_in_turn(born, dt), strict=True)
         for s, (name, sensor, scan) in enumerate(given):
             limits = self.limits if s == last else keeping
             own = sensor.to_kernel(), limits.truncation(sensor.meas_dim)
-            step = SensorStep((scan, motion if s == 0 else None, *own), limits, len(taken.names))
+            step = SensorStep((scan, motion if s == 0 else None, *own), limits, sensor, len(taken.names))
             with model_errors():
                 if s in (0, last):  # by the last one every label is told whether it stays
                     posterior, report = self._stepped(posterior, step)

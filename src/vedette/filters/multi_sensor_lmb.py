@@ -38,9 +38,9 @@ class MultiSensorLmbFilter(OfLmb, MultiSensorFilter[LMB]):
     Attributes and errors: as `MultiSensorGlmbFilter`.
     """
 
-    def _updated(self, prior: LMB, born: Lmb, taken: SensorScans, dt: float, place: str) -> tuple[LMB, FilterInfo]:
+    def _updated(self, prior: Lmb, born: Lmb, taken: SensorScans, dt: float, place: str) -> tuple[LMB, FilterInfo]:
         limits, num_columns, reports = self.limits, 0, []
-        motion, before = self._motion(dt), prior.to_kernel()
+        motion, before = self._motion(dt), prior
         reduction = limits.reduction()
         with model_errors():
             inputs = taken.inputs(born, dt)

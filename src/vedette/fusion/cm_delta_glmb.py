@@ -189,6 +189,7 @@ def _heaviest(
         np.arange(len(members)),
         relative - log_kept[groups[kept]],
         factor_offsets,
+        None,
     )
     log_cut = group_log_sums(log_weights[cut] - peaks[groups[cut]], groups[cut], num)
     return fused, np.asarray(expit(log_cut - log_kept))

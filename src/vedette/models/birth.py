@@ -8,20 +8,25 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import float_array, no_gaussians, positive, positive_definite, real, reject
+from vedette.models.arguments import float_array, instance, no_gaussians, positive, positive_definite, real, reject
+from vedette.models.region import Region
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasurementBirth:
-    """Targets born where something was measured that no track explains (Reuter, Vo, Vo, Dietmayer 2014, section IV-C).
+    """Targets that may appear anywhere, and start a track where they are measured.
 
-    A measurement that came of no track with probability u may be a target with existence
-    min(max_existence, expected u / sum of all u) at the next scan, at rest where it was measured.
+    With a `region`, filters whose undetected targets are a Poisson intensity hold them as one: targets appear anywhere
+    in the region alike, and a measurement is the first detection of one with the odds of that intensity, the
+    probability of detection there and the clutter. Elsewhere a measurement that no track explains, with probability u,
+    starts a label at the next scan with existence min(max_existence, expected u / sum of all u), at rest where it was
+    measured (Reuter, Vo, Vo, Dietmayer 2014, section IV-C).
 
     Attributes:
-        expected: expected number of such births a scan, or within the `period` of the births.
-        max_existence: the most that any of them may have, in (0, 1).
-        std: (state_dim,) standard deviation of the state of a birth.
+        expected: expected number of targets that appear between two scans, or within the `period` of the births.
+        max_existence: largest existence of a label that starts at the next scan, in (0, 1).
+        std: (state_dim,) standard deviation of the state of a new label; of the position about twice that of the noise.
+        region: where targets appear; None: anywhere that is measured.
 
     Raises:
         InputError: names the field, what was expected and what came.
@@ -30,8 +35,11 @@ class MeasurementBirth:
     expected: float
     max_existence: float
     std: Floats
+    region: Region | None = None
 
     def __post_init__(self) -> None:
+        if self.region is not None:
+            instance("MeasurementBirth.region", self.region, Region)
         object.__setattr__(self, "expected", positive("MeasurementBirth.expected", self.expected))
         if not 0.0 < real("MeasurementBirth.max_existence", self.max_existence) < 1.0:
             raise reject("MeasurementBirth.max_existence", "a probability above 0 and below 1", self.max_existence)

@@ -90,7 +90,9 @@ def build_sensors(scenario: Scenario) -> tuple[MobileSensor, ...]:
     model, folder = scenario.model, scenario.folder
     method, region = model.filter.gaussian_method, model.region.build()
     targets = TargetModel(
-        model.motion.build(folder, method=method), model.survival.build(folder), model.birth.build(model.motion)
+        model.motion.build(folder, method=method),
+        model.survival.build(folder),
+        model.birth.build(model.motion, model.region),
     )
     found = []
     for sensor in model.sensors:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -46,6 +47,11 @@ def check_measured_births(birth: BirthModel, sensors: Sequence[SensorModel]) -> 
         if birth.from_measurements is not None and sensor.measurement.places is None:
             expected = "a measurement with `places`, as targets are born of measurements"
             raise reject(f"sensors[{s}].measurement", expected, "one without")
+
+
+def births_of_tracker(birth: BirthModel, local: Any) -> BirthModel:
+    """The births without those from measurements where a filter has these itself (`starts_tracks`)."""
+    return replace(birth, from_measurements=None) if getattr(local, "starts_tracks", False) else birth
 
 
 def births_due(birth: BirthModel, step: int, dt: float, measured: LMB | None) -> LMB | None:

@@ -11,10 +11,16 @@ import numpy as np
 from vedette.densities import LMB
 from vedette.filters import FilterInfo
 from vedette.kernels.base.types import Floats
-from vedette.models import SensorModel, TargetModel
+from vedette.models import BirthModel, SensorModel, TargetModel
 from vedette.models.arguments import reject
 from vedette.tracking.base import Stages, State, TrackerInfo, bytes_of_scan, check_step
-from vedette.tracking.births import births_due, births_from_scans, births_waiting, check_measured_births
+from vedette.tracking.births import (
+    births_due,
+    births_from_scans,
+    births_of_tracker,
+    births_waiting,
+    check_measured_births,
+)
 
 
 @runtime_checkable
@@ -73,6 +79,11 @@ class OfAllScans:
         """What each sensor sees."""
         return tuple(self.filter.sensors)
 
+    @property
+    def birth(self) -> BirthModel:
+        """The births that the tracker adds to those of the filter."""
+        return births_of_tracker(self.targets.birth, self.filter)
+
     def _filtered(
         self,
         belief: Any,
@@ -84,7 +95,7 @@ class OfAllScans:
         rng: np.random.Generator,
     ) -> tuple[Any, FilterInfo]:
         """The belief after a step. measured: who may be born of measurements, as of `births_due`."""
-        due = births_due(self.targets.birth, step, dt, measured)
+        due = births_due(self.birth, step, dt, measured)
         births = {} if due is None else {"births": due}
         return self.filter.step(belief, scans, poses, dt, step, rng=rng, **births)
 
@@ -112,9 +123,9 @@ class Central(OfAllScans):
         stages, step = Stages(), state.step + 1
         with stages.timing("filter"):
             belief, info = self._filtered(state.fused, state.memory, scans, at, dt, step, rngs[0])
-            measured = births_from_scans(self.targets.birth, belief, self.sensors, scans, at, step + 1)
+            measured = births_from_scans(self.birth, belief, self.sensors, scans, at, step + 1)
             if dt == 0.0:
-                measured = births_waiting(self.targets.birth, state.memory, measured)
+                measured = births_waiting(self.birth, state.memory, measured)
         sent = tuple(bytes_of_scan(scan, pose) for scan, pose in zip(scans, at, strict=True))
         return self._state(belief, step, float(time), measured), TrackerInfo((info,), None, stages.seconds, sent)
 

@@ -71,7 +71,7 @@ class Distributed(LocalFilters):
     ) -> tuple[State, TrackerInfo]:
         """Filter each sensor's scan, then fuse; see `Tracker.step`."""
         at, dt = check_step(state, scans, poses, time, rngs, len(self.filters))
-        step, stages, num, birth = state.step + 1, Stages(), len(self.filters), self.targets.birth
+        step, stages, num, birth = state.step + 1, Stages(), len(self.filters), self.birth
         births: Sequence[LMB | None] = (None,) * num
         if birth.from_measurements is not None:
             births = [births_due(birth, step, dt, own) for own in state.memory or births]
@@ -130,7 +130,7 @@ class Distributed(LocalFilters):
 
     def _measured(self, local: Sequence[Any], scans: Sequence[Any], poses: Floats, step: int) -> tuple[LMB | None, ...]:
         """For each sensor, who may be born at `step`: the same for all where they share a belief."""
-        birth, sensors = self.targets.birth, self.sensors
+        birth, sensors = self.birth, self.sensors
         if self.feedback or len(local) == 1:
             return (births_from_scans(birth, local[0], sensors, scans, poses, step),) * len(local)
         return tuple(

@@ -10,12 +10,20 @@ import numpy as np
 
 from vedette.densities import LMB, FactoredGLMB, Labelled
 from vedette.errors import InputError
-from vedette.filters import FactoredGlmbFilter, Filter, FilterInfo, LmbFilter, TwoStepFilter, shared_targets
+from vedette.filters import (
+    FactoredGlmbFilter,
+    Filter,
+    FilterInfo,
+    LmbFilter,
+    TwoStepFilter,
+    shared_targets,
+    with_labelled_births,
+)
 from vedette.filters.base import NO_POSE, NO_SCAN, SingleSensorFilter, blind_sensor
 from vedette.fusion import ValidBeliefs
-from vedette.models import SensorModel, TargetModel
+from vedette.models import BirthModel, SensorModel, TargetModel
 from vedette.models.arguments import reject, sequence
-from vedette.tracking.births import check_measured_births
+from vedette.tracking.births import births_of_tracker, check_measured_births
 
 _BORN = "targets are born of measurements"
 
@@ -25,7 +33,8 @@ class LocalFilters:
     """What the trackers share that keep a filter at each sensor.
 
     Attributes:
-        filters: one a sensor; all hold the same targets.
+        filters: one a sensor; all hold the same targets. Several have labelled births, whatever they were given with:
+            two sensors' first detections of one target would be two labels.
         targets: as all sensors know them.
         sensors: what each sensor sees.
 
@@ -46,6 +55,8 @@ class LocalFilters:
         for s, local in enumerate(self.filters):
             if not isinstance(local, Filter):
                 raise reject(f"filters[{s}]", "a Filter, with targets, sensor, initial() and step()", local)
+        if len(self.filters) > 1:
+            object.__setattr__(self, "filters", tuple(map(with_labelled_births, self.filters)))
         object.__setattr__(self, "targets", shared_targets(self.filters))
         object.__setattr__(self, "sensors", tuple(local.sensor for local in self.filters))
         object.__setattr__(self, "_are_own", all(isinstance(local, SingleSensorFilter) for local in self.filters))
@@ -54,6 +65,11 @@ class LocalFilters:
         for s in range(len(self.filters)):
             if birth.from_measurements is not None:
                 self._two_step(s, _BORN)
+
+    @property
+    def birth(self) -> BirthModel:
+        """The births that the tracker adds to those of the filters."""
+        return births_of_tracker(self.targets.birth, self.filters[0])
 
     def _stepped(
         self,

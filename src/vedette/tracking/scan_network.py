@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vedette.densities import LMB
-from vedette.filters import FilterInfo
+from vedette.filters import FilterInfo, with_labelled_births
 from vedette.fusion import Fusion, Views
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import reject
@@ -57,7 +57,8 @@ class ScanNetwork(OfAllScans):
     things (as two groups that have met again), they merge their beliefs first, unless messages are delayed.
 
     Attributes:
-        filter: of all sensors' scans; a scan that was not heard is None to it.
+        filter: of all sensors' scans; a scan that was not heard is None to it. Its births are labelled, as sensors that
+            know different scans would name first detections differently.
         network: who hears whom.
         merging: fusion of beliefs of different pasts; all its weights are replaced by equal ones. It also makes the one
             belief that is reported where sensors believe different things.
@@ -71,6 +72,7 @@ class ScanNetwork(OfAllScans):
 
     def __post_init__(self) -> None:
         OfAllScans.__post_init__(self)  # slots replace the class that super() looks for
+        object.__setattr__(self, "filter", with_labelled_births(self.filter))
         if not isinstance(self.network, Network) or self.network.consensus_rounds is not None:
             raise reject("network", "a Network without consensus, as scans are no averages", self.network)
 

@@ -7,9 +7,9 @@ o_g(j), a row of group h that takes j weighs
 
 times as much. The odds depend on what is left for the other measurements of a group, so that both are iterated: belief
 propagation over groups and measurements (Williams and Lau 2014). Where groups and measurements make no cycle,
-each group has its exact marginals afterwards; what is lost is that groups exclude each other. With marginals a_g(j), two
-groups that meet at one measurement are then wrong by an L1 error of 4 a_1(j) a_2(j), and more groups by no more than
-this summed over pairs.
+each group has its exact marginals afterwards; what is lost is that groups exclude each other. With marginals a_g(j),
+two groups that meet at one measurement are then wrong by an L1 error of 4 a_1(j) a_2(j), and more groups by no more
+than this summed over pairs.
 """
 
 from __future__ import annotations
@@ -122,10 +122,10 @@ def _log_counted_twice(meetings: Meetings, totals: Floats) -> float:
 
 
 @borrowing
-def _weigh(options: Options, num_components: Ints, meetings: Meetings) -> None:
+def _weigh(options: Options, components: Ints, meetings: Meetings) -> None:
     """Multiply what options weigh by the messages, and order rows anew, heaviest first."""
     columns, log_weights, entries = options.columns, options.log_weights, options.entries
-    for row in range(len(num_components)):
+    for row in range(len(components) - 1):
         start, stop = options.offsets[row], options.offsets[row + 1]
         for option in range(start, stop):
             meeting = meetings.of_option[option]
@@ -133,20 +133,20 @@ def _weigh(options: Options, num_components: Ints, meetings: Meetings) -> None:
                 continue
             shift = math.log(meetings.messages[meeting])
             log_weights[option] += shift
-            for entry in range(entries[option], entries[option] + num_components[row]):
+            for entry in range(entries[option], entries[option] + components[row + 1] - components[row]):
                 options.component_log_weights[entry] += shift
         sort_row(start, stop, columns, log_weights, entries)
 
 
 @kernel
-def leave_to_others(options: Options, group_of: Ints, presence: Floats, num_components: Ints) -> float:
+def leave_to_others(options: Options, group_of: Ints, presence: Floats, components: Ints) -> float:
     """Weigh the options of rows by what other groups leave of their measurements.
 
     Args:
         options: written; rows stay in order, heaviest option first.
         group_of: (num_rows,) group of each row.
         presence: (num_rows,) probability that a row's track is that of its label, in the rows' factors.
-        num_components: (num_rows,) components of each row.
+        components: (num_rows + 1,) offsets of the components of each row.
 
     Returns:
         The log of the factor by which the product of the groups' total weights is then smaller than that of all.
@@ -165,5 +165,5 @@ def leave_to_others(options: Options, group_of: Ints, presence: Floats, num_comp
         _write_odds(options, shares, presence, meetings, odds)
         if _renew(meetings, odds, totals) < _SETTLED:
             break
-    _weigh(options, num_components, meetings)
+    _weigh(options, components, meetings)
     return _log_counted_twice(meetings, totals)

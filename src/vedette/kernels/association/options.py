@@ -189,7 +189,15 @@ def weigh_options(
 @kernel
 def weighed_options(rows: Rows, scan: ScanInput, sensor: Sensor, caps: Truncation) -> tuple[Options, float, int]:
     """As `weigh_options`, into arrays made for it."""
+    return weighed_options_at(rows, scan, sensor, caps, np.empty(len(scan.measurements)))
+
+
+@kernel
+def weighed_options_at(
+    rows: Rows, scan: ScanInput, sensor: Sensor, caps: Truncation, log_clutter: Floats
+) -> tuple[Options, float, int]:
+    """As `weighed_options`; log_clutter: (num_measurements,) written as of `weigh_options`."""
     num, near = len(scan.measurements), near_measurements(rows, scan.measurements, sensor.angular, caps.gate)
     options = _room_for(rows, near, num, len(sensor.angular))
-    log_clutter, num_raised = weigh_options(rows, near, scan, sensor, caps, np.empty(num), options)
-    return options, log_clutter, num_raised
+    log_total, num_raised = weigh_options(rows, near, scan, sensor, caps, log_clutter, options)
+    return options, log_total, num_raised

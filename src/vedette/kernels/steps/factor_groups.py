@@ -23,7 +23,7 @@ _MOST_LOG = 600.0
 
 
 class Factors(NamedTuple):
-    """The factors of a scan: those of the prior, then every birth site as one of its own."""
+    """The factors of a scan: those of the prior, then every label that may begin as one of its own."""
 
     prior: FactoredGlmb
     row_offsets: Ints  # (num_factors + 1,) rows of each
@@ -48,7 +48,7 @@ def is_single(factors: Factors, factor: int) -> bool:
 
 @kernel
 def factors_of(prior: FactoredGlmb, num_births: int) -> Factors:
-    """The factors of a scan, with their rows in the order of `rows_of_scan`."""
+    """The factors of a scan, with their rows in the order of `rows_of_scan`, then candidates. num_births: of both."""
     num_prior = len(prior.factor_offsets) - 1
     row_offsets, num_labels = np.zeros(num_prior + num_births + 1, np.int64), np.empty(num_prior + num_births, np.int64)
     for factor in range(num_prior):
@@ -74,11 +74,10 @@ def _count_labels(labels: Ints, first: int, last: int) -> int:
 
 
 @borrowing
-def weigh_singles(factors: Factors, rows: Rows) -> None:
+def weigh_singles(prior: FactoredGlmb, rows: Rows) -> None:
     """Make the rows of single tracks, predicted as if certain, uncertain by the hypotheses of their factors."""
-    prior = factors.prior
     for factor in range(len(prior.factor_offsets) - 1):
-        if not is_single(factors, factor):
+        if prior.track_offsets[factor + 1] - prior.track_offsets[factor] != 1:
             continue
         log_absent, log_present = -math.inf, -math.inf
         for h in range(prior.factor_offsets[factor], prior.factor_offsets[factor + 1]):
@@ -86,7 +85,7 @@ def weigh_singles(factors: Factors, rows: Rows) -> None:
                 log_present = log_add(log_present, prior.hyp_log_weights[h])
             else:
                 log_absent = log_add(log_absent, prior.hyp_log_weights[h])
-        row = factors.row_offsets[factor]
+        row = prior.track_offsets[factor]
         # Absent: never there, or there and died.
         rows.log_absent[row] = log_add(log_absent, log_present + rows.log_absent[row])
         for c in range(rows.offsets[row], rows.offsets[row + 1]):
@@ -94,26 +93,29 @@ def weigh_singles(factors: Factors, rows: Rows) -> None:
 
 
 @kernel
-def groups_of_rows(factors: Factors, leaders: Ints, rows: Rows) -> tuple[Ints, Floats, Ints]:
-    """The group, the probability within its factor, and the number of components of each row.
-
-    A single row is certain: whether its track is there is in its options. leaders: (num_factors,) of each factor.
-    """
-    num, prior = len(rows.log_absent), factors.prior
-    group_of, presence, num_components = np.empty(num, np.int64), np.ones(num), np.empty(num, np.int64)
-    for factor in range(len(leaders)):
-        single = is_single(factors, factor)
-        for row in range(factors.row_offsets[factor], factors.row_offsets[factor + 1]):
-            group_of[row], num_components[row] = leaders[factor], rows.offsets[row + 1] - rows.offsets[row]
-            presence[row] = 1.0 if single else 0.0
+def presence_of_rows(factors: Factors, num_rows: int) -> Floats:
+    """(num_rows,) probability of each row in its factor; 1 of a single row, whose options say whether it is there."""
+    prior, presence = factors.prior, np.ones(num_rows)
     for factor in range(len(prior.factor_offsets) - 1):
         if is_single(factors, factor):
             continue
+        for row in range(factors.row_offsets[factor], factors.row_offsets[factor + 1]):
+            presence[row] = 0.0
         for h in range(prior.factor_offsets[factor], prior.factor_offsets[factor + 1]):
             weight = math.exp(prior.hyp_log_weights[h])
             for e in range(prior.hyp_offsets[h], prior.hyp_offsets[h + 1]):
                 presence[prior.hyp_tracks[e]] += weight
-    return group_of, presence, num_components
+    return presence
+
+
+@kernel
+def groups_of_rows(factors: Factors, leaders: Ints) -> Ints:
+    """(num_rows,) the group of each row. leaders: (num_factors,) of each factor."""
+    group_of = np.empty(factors.row_offsets[len(leaders)], np.int64)
+    for factor in range(len(leaders)):
+        for row in range(factors.row_offsets[factor], factors.row_offsets[factor + 1]):
+            group_of[row] = leaders[factor]
+    return group_of
 
 
 @kernel

@@ -17,7 +17,7 @@ from vedette.kernels.base.compile import borrowing, kernel
 from vedette.kernels.base.types import Floats, Glmb, Ints, Mixture
 from vedette.kernels.gaussian.distances import reduction_bound
 from vedette.kernels.gaussian.linalg import log_add, log_sum
-from vedette.kernels.gaussian.mixtures import copy_component
+from vedette.kernels.gaussian.mixtures import MixtureCaps, copy_component, make_components, moment_match
 from vedette.kernels.labelled.factor_store import FactorStore, append_part, append_single, next_component, with_room
 from vedette.kernels.labelled.splitting import Choices, choices_of, independent_parts
 from vedette.kernels.labelled.versions import merge_versions
@@ -29,6 +29,9 @@ from vedette.kernels.steps.lmb import Reduction, append_reduced, write_mixture
 # Places in the sums of a scan; what each is says `FactoredReport`.
 TOTAL, KEPT, TWICE, SPLIT, DROPPED, CUT, FULL, REDUCED = range(8)
 _NUM_SUMS = 8
+
+# A component of a label alone is dropped where it holds less of an existing target than this times the least share.
+_WORTH = 10.0
 
 # What rounding leaves between the logs of equal weights.
 _ROUNDING = 1e-12
@@ -52,6 +55,8 @@ class Work(NamedTuple):
     columns: Ints  # (num_measurements,) -1 between groups
     claimed: Floats  # (num_measurements,) expected number of groups that take each
     sums: Floats  # (_NUM_SUMS,)
+    faint: Mixture  # one Gaussian of each label that is dropped, weighed by its existence
+    num_faint: Ints  # (1,) how many there are
 
 
 @kernel
@@ -67,22 +72,40 @@ def make_work(rows: Rows, options: Options) -> Work:
         filled_ints(options.num_measurements, -1),
         np.zeros(options.num_measurements),
         np.zeros(_NUM_SUMS),
+        make_components(len(rows.log_absent), dim),
+        np.zeros(1, np.int64),
     )
 
 
 @kernel
+def found_faint(work: Work) -> Mixture:
+    """The labels that were dropped, as an intensity."""
+    faint, num = work.faint, work.num_faint[0]
+    return Mixture(faint.log_weights[:num], faint.means[:num], faint.covs[:num])
+
+
+@kernel
 def _append_mixture(
-    store: FactorStore, label: Ints, wide: Mixture, width: int, logit: float, reduction: Reduction, sums: Floats
+    store: FactorStore, label: Ints, wide: Mixture, width: int, logit: float, reduction: Reduction, work: Work
 ) -> FactorStore:
     """Enter a label as a factor of its own, unless it is too improbable."""
     existence = 1.0 / (1.0 + math.exp(-logit))
     if logit < reduction.min_existence_logit:
-        sums[DROPPED] += existence
+        work.sums[DROPPED] += existence
+        if existence > 0.0:
+            k, faint = work.num_faint[0], work.faint
+            faint.log_weights[k] = math.log(existence)
+            moment_match(wide.log_weights[:width], wide.means[:width], wide.covs[:width], faint.means[k], faint.covs[k])
+            work.num_faint[0] += 1
         return store
     store = with_room(store, 1, width, 2, 1)
     start = next_component(store)
-    end = append_reduced(wide, width, reduction.mixture, store.components, start)
-    sums[REDUCED] += existence * reduction_bound(wide, width, store.components, start, end)
+    caps = reduction.mixture
+    # Of a label that hardly exists few components are worth their time.
+    log_least = min(0.0, caps.log_min_weight + math.log(_WORTH / existence))
+    caps = MixtureCaps(log_least, caps.merge_distance, caps.max_components)
+    end = append_reduced(wide, width, caps, store.components, start)
+    work.sums[REDUCED] += existence * reduction_bound(wide, width, store.components, start, end)
     append_single(store, label[0], label[1], end, logit)
     return store
 
@@ -109,7 +132,7 @@ def update_alone(
             work.sums[TWICE] += work.claimed[column] * claim
             work.claimed[column] += claim
     width = write_mixture(row, rows, options, marginals, work.wide)
-    return _append_mixture(store, rows.labels[row], work.wide, width, present - absent, reduction, work.sums)
+    return _append_mixture(store, rows.labels[row], work.wide, width, present - absent, reduction, work)
 
 
 @borrowing
@@ -152,7 +175,7 @@ def update_group(group: Group, truncation: Truncation, work: Work) -> Glmb:
 
 @kernel
 def _append_label(
-    store: FactorStore, glmb: Glmb, choices: Choices, label: int, reduction: Reduction, sums: Floats
+    store: FactorStore, glmb: Glmb, choices: Choices, label: int, reduction: Reduction, work: Work
 ) -> FactorStore:
     """Enter the marginal of one label: the mixture of its versions."""
     tracks, absent = glmb.tracks, -math.inf
@@ -174,26 +197,24 @@ def _append_label(
             wide.log_weights[width] = log_versions[track] + tracks.log_weights[c]
             copy_component(tracks.means, tracks.covs, c, wide.means, wide.covs, width)
             width += 1
-    return _append_mixture(store, choices.labels[label], wide, width, log_sum(log_versions) - absent, reduction, sums)
+    return _append_mixture(store, choices.labels[label], wide, width, log_sum(log_versions) - absent, reduction, work)
 
 
 @kernel
-def append_parts(
-    store: FactorStore, glmb: Glmb, factoring: Factoring, reduction: Reduction, sums: Floats
-) -> FactorStore:
+def append_parts(store: FactorStore, glmb: Glmb, factoring: Factoring, reduction: Reduction, work: Work) -> FactorStore:
     """Split the posterior of a group and enter its parts."""
     glmb, merging_error = merge_versions(glmb, reduction.mixture, factoring.max_error)
     choices = choices_of(glmb)
     min_existence = 1.0 / (1.0 + math.exp(-reduction.min_existence_logit))
     part_of, error = independent_parts(choices, factoring.max_error, factoring.max_labels, min_existence)
-    sums[SPLIT] += error
-    sums[REDUCED] += merging_error
+    work.sums[SPLIT] += error
+    work.sums[REDUCED] += merging_error
     for part in range(len(part_of)):
         size = 0
         for k in range(len(part_of)):
             size += 1 if part_of[k] == part else 0
         if size == 1:
-            store = _append_label(store, glmb, choices, part, reduction, sums)
+            store = _append_label(store, glmb, choices, part, reduction, work)
         elif size > 1:
             store = append_part(store, glmb, choices, part_of, part)
     return store

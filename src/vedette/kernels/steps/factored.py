@@ -10,17 +10,34 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from vedette.kernels.association.contention import leave_to_others
+from vedette.kernels.association.first_detections import (
+    Undetected,
+    candidates_of,
+    missed_intensity,
+    seen_intensity,
+    with_candidates,
+)
 from vedette.kernels.association.links import linked_factors
-from vedette.kernels.association.options import weighed_options
+from vedette.kernels.association.options import weighed_options_at
 from vedette.kernels.association.predicted import rows_of_scan
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.arrays import group_members
 from vedette.kernels.base.compile import kernel
-from vedette.kernels.base.types import FactoredGlmb, Motion, ScanInput, Sensor
+from vedette.kernels.base.types import FactoredGlmb, Mixture, Motion, ScanInput, Sensor
+from vedette.kernels.gaussian.intensities import stacked_mixtures
 from vedette.kernels.gaussian.mixtures import require_gaussians
 from vedette.kernels.labelled.factor_store import make_store, stored
-from vedette.kernels.steps.factor_groups import factors_of, gathered_group, groups_of_rows, is_single, weigh_singles
+from vedette.kernels.steps.factor_groups import (
+    factors_of,
+    gathered_group,
+    groups_of_rows,
+    is_single,
+    presence_of_rows,
+    weigh_singles,
+)
 from vedette.kernels.steps.factor_updates import (
     CUT,
     DROPPED,
@@ -32,6 +49,7 @@ from vedette.kernels.steps.factor_updates import (
     TWICE,
     Factoring,
     append_parts,
+    found_faint,
     make_work,
     update_alone,
     update_group,
@@ -52,27 +70,38 @@ class FactoredReport(NamedTuple):
     split_error: float  # summed L1 error of the splits
     reduction_error: float  # summed L1 bound of what merging versions and reducing mixtures changed
     dropped_existence: float  # summed existence of dropped labels
+    left_out: float  # expected number of targets among first detections that are no candidates
     most_labels: int  # of a group
 
 
 @kernel
 def step_factored(
     prior: FactoredGlmb,
+    undetected: Undetected,
     scan: ScanInput,
     motion: Motion | None,
     sensor: Sensor,
     truncation: Truncation,
     reduction: Reduction,
     factoring: Factoring,
-) -> tuple[FactoredGlmb, FactoredReport]:
-    """One scan: weigh, link, update and split. motion: None of a scan of the prior's own time, which has no births."""
+) -> tuple[FactoredGlmb, Mixture, FactoredReport]:
+    """One scan: weigh, link, update and split; and the intensity of the targets that stay undetected.
+
+    undetected: at the time of the scan. motion: None of a scan of the prior's own time, which has no births.
+    """
     rows = rows_of_scan(prior.tracks, scan, motion, sensor)
+    weigh_singles(prior, rows)
+    log_levels = np.empty(len(scan.measurements))
+    options, log_clutter, num_raised = weighed_options_at(rows, scan, sensor, truncation, log_levels)
+    seen = seen_intensity(stacked_mixtures(undetected.intensity, undetected.local), scan, sensor)
+    new = candidates_of(seen, scan, sensor, log_levels, truncation.gate, reduction.min_existence_logit, undetected)
+    if len(new.rows.log_absent) > 0:
+        rows, options = with_candidates(rows, options, new)
     factors = factors_of(prior, len(rows.log_absent) - len(prior.tracks.labels))
-    weigh_singles(factors, rows)
-    options, log_clutter, num_raised = weighed_options(rows, scan, sensor, truncation)
+    presence = presence_of_rows(factors, len(rows.log_absent))
     sizes = factors.num_labels.copy()
     leaders = linked_factors(options, factors.row_offsets, sizes, factoring.max_cut, factoring.max_together)
-    log_twice = leave_to_others(options, *groups_of_rows(factors, leaders, rows))
+    log_twice = leave_to_others(options, groups_of_rows(factors, leaders), presence, rows.offsets)
     offsets, members = group_members(leaders, len(leaders))
     work, most_labels = make_work(rows, options), 0
     store = make_store(len(rows.log_absent), 2 * len(rows.log_weights), rows.means.shape[1])
@@ -88,19 +117,25 @@ def step_factored(
         group = gathered_group(factors, together, rows, options, most, work.place, work.columns)
         posterior = update_group(group, truncation, work)
         if len(posterior.hyp_log_weights) > 0:
-            store = append_parts(store, posterior, factoring, reduction, work.sums)
+            store = append_parts(store, posterior, factoring, reduction, work)
     sums, density = work.sums, stored(store)
     require_gaussians(density.tracks.means, density.tracks.covs)
-    return density, FactoredReport(
-        sums[TOTAL] + log_twice,
-        sums[KEPT],
-        log_clutter,
-        num_raised,
-        sums[CUT] > 0.0,
-        sums[FULL] > 0.0,
-        min(sums[TWICE], 1.0),
-        sums[SPLIT],
-        sums[REDUCED],
-        sums[DROPPED],
-        most_labels,
+    missed, log_missed = missed_intensity(seen, len(undetected.intensity.log_weights))
+    return (
+        density,
+        stacked_mixtures(missed, found_faint(work)),
+        FactoredReport(
+            sums[TOTAL] + log_twice + log_missed + new.log_left_out,
+            sums[KEPT],
+            log_clutter,
+            num_raised,
+            sums[CUT] > 0.0,
+            sums[FULL] > 0.0,
+            min(sums[TWICE], 1.0),
+            sums[SPLIT],
+            sums[REDUCED],
+            sums[DROPPED],
+            new.left_out,
+            most_labels,
+        ),
     )

@@ -12,7 +12,7 @@ from pydantic import Field
 from vedette.covariances import SMALLEST_VARIANCE
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import Chance, Positive, Reals, Section, Steps, check
-from vedette.scenarios.sections.world import Motion, grouped_order
+from vedette.scenarios.sections.world import Motion, RegionSection, grouped_order
 
 if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
     from vedette.kernels.base.types import Floats
@@ -102,8 +102,8 @@ class Birth(Section):
                 yield ("steps", i), "each step once", f"{step} again"
             seen.add(step)
 
-    def build(self, motion: Motion) -> BirthModel:
-        """The births, shared by all sensors."""
+    def build(self, motion: Motion, region: RegionSection) -> BirthModel:
+        """The births, shared by all sensors. region: in which those from measurements appear."""
         from vedette.models import BirthModel, MeasurementBirth
 
         order, dim, num = grouped_order(motion), motion.state_dim, len(self.sites)
@@ -115,6 +115,8 @@ class Birth(Section):
             None if self.steps == "every" else frozenset(self.steps),
             None
             if measured is None
-            else MeasurementBirth(measured.expected, measured.max_existence, np.array(measured.std)[order]),
+            else MeasurementBirth(
+                measured.expected, measured.max_existence, np.array(measured.std)[order], region.build()
+            ),
             self.period,
         )

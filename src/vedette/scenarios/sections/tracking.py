@@ -58,7 +58,7 @@ class _Sensing(Section):
     )
 
 
-@derived("vedette.filters.factored:FactoredGlmbFilter", only=("max_split_error", "max_factor_labels"))
+@derived("vedette.filters.factored:FactoredGlmbFilter", only=("max_split_error", "max_factor_labels", "births"))
 class Filter(_Sensing, Derived):
     """The filter that every sensor runs on its own scans."""
 

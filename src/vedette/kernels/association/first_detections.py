@@ -1,0 +1,260 @@
+"""First detections: each measurement may be the first of a target that was not detected before.
+
+Undetected targets are a Poisson intensity D, and clutter another with intensity kappa. A measurement z is then the
+first detection of one with the odds
+
+    rho / kappa,   rho = integral of P_D(x) g(z | x) D(x) dx,
+
+against clutter, and its density is P_D g(z | .) D / rho (Williams 2015, eq. 36-38). In the rows of a scan it is a
+candidate label with two options, absent or detected as that measurement, and none of being missed.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.kernels.association.assignment import ABSENT, Options
+from vedette.kernels.association.near import near_measurements
+from vedette.kernels.association.options import sort_row
+from vedette.kernels.association.predicted import Rows, expect_rows, log_or_minus_inf, make_rows
+from vedette.kernels.base.arrays import group_members, grown_floats, grown_ints
+from vedette.kernels.base.compile import borrowing, kernel
+from vedette.kernels.base.types import Bools, Floats, Ints, Mixture, ScanInput, Sensor
+from vedette.kernels.gaussian.innovation import copy_innovation, whiten
+from vedette.kernels.gaussian.linalg import log_add
+from vedette.kernels.gaussian.mixtures import copy_component, make_components
+from vedette.kernels.gaussian.scratch import make_scratch
+
+_LEAST_SHARE = math.log(1e-5)  # of a candidate's density, below which a component of the intensity is not in it
+
+
+class Undetected(NamedTuple):
+    """The intensity of undetected targets at the time of a scan, and the name of the first of those that it detects.
+
+    Where targets may appear anywhere, `local` has the intensity about each measurement as one Gaussian, wide beside the
+    noise; it serves that measurement alone.
+    """
+
+    intensity: Mixture
+    local: Mixture  # (num_measurements,) components, or none
+    step: int  # of the labels
+    first_index: int  # of the label of the scan's first measurement
+    error: float  # L1 error of taking births at sites as Poisson
+
+
+class Candidates(NamedTuple):
+    """The labels that a scan may begin."""
+
+    rows: Rows
+    options: Options
+    log_left_out: float  # log of the factor of the total weight that candidates below the least odds would have made
+    left_out: float  # their expected number, if no track took their measurements
+
+
+class _Pairs(NamedTuple):
+    """Components of the intensity with the measurements in their gates."""
+
+    components: Ints  # (num_pairs,)
+    measurements: Ints  # (num_pairs,)
+    log_odds: Floats  # (num_pairs,)
+
+
+@kernel
+def seen_intensity(intensity: Mixture, scan: ScanInput, sensor: Sensor) -> Rows:
+    """The components of an intensity as rows of one component each, never absent, with what they expect of the scan."""
+    num, state_dim, meas_dim = len(intensity.log_weights), intensity.means.shape[1], len(sensor.angular)
+    rows = make_rows(num, num, state_dim, meas_dim)
+    for c in range(num):
+        rows.labels[c, 0], rows.labels[c, 1] = 0, 0
+        rows.offsets[c + 1], rows.log_absent[c], rows.log_weights[c] = c + 1, -math.inf, intensity.log_weights[c]
+        copy_component(intensity.means, intensity.covs, c, rows.means, rows.covs, c)
+    expect_rows(sensor, scan.pose, rows, make_scratch(state_dim, meas_dim))
+    return rows
+
+
+@kernel
+def missed_intensity(seen: Rows, num: int) -> tuple[Mixture, float]:
+    """The intensity of the targets that the scan did not detect, and the log probability that it detected none.
+
+    num: components that are of the intensity. The log probability is minus the integral of P_D D, as the number of
+    detections is Poisson.
+    """
+    state_dim = seen.means.shape[1]
+    out, expected = make_components(num, state_dim), 0.0
+    for c in range(num):
+        detected = seen.innovation.prob_detection[c]
+        expected += math.exp(seen.log_weights[c]) * detected
+        out.log_weights[c] = seen.log_weights[c] + log_or_minus_inf(1.0 - detected)
+        copy_component(seen.means, seen.covs, c, out.means, out.covs, c)
+    return out, -expected
+
+
+@kernel
+def _gated_pairs(seen: Rows, num_local: int, scan: Floats, log_clutter: Floats, angular: Bools, gate: float) -> _Pairs:
+    near = near_measurements(seen, scan, angular, gate)
+    num, filled, whitened = near.offsets[len(near.offsets) - 1], 0, np.empty(scan.shape[1])
+    components, measurements, log_odds = np.empty(num, np.int64), np.empty(num, np.int64), np.empty(num)
+    for c in range(len(seen.log_absent)):
+        log_detected = seen.log_weights[c] + log_or_minus_inf(seen.innovation.prob_detection[c])
+        if log_detected == -math.inf:
+            continue
+        for at in range(near.offsets[c], near.offsets[c + 1]):
+            j, own = near.measurements[at], c - (len(seen.log_absent) - num_local)
+            if own >= 0 and j != own:
+                continue
+            distance = whiten(seen.innovation, c, scan[j], angular, gate, whitened)
+            if distance <= gate:
+                components[filled], measurements[filled] = c, j
+                log_odds[filled] = log_detected + seen.innovation.log_norm[c] - 0.5 * distance - log_clutter[j]
+                filled += 1
+    return _Pairs(components[:filled], measurements[:filled], log_odds[:filled])
+
+
+class _Chosen(NamedTuple):
+    """The measurements that are candidates, and how the pairs are grouped by measurement."""
+
+    measurements: Ints  # (num_candidates,)
+    num_pairs: int  # of all candidates
+    offsets: Ints  # (num_measurements + 1,) into the next
+    pairs: Ints  # (num_pairs,) of each measurement
+    log_odds: Floats  # (num_measurements,) log rho / kappa
+
+
+@kernel
+def _chosen(pairs: _Pairs, num_measurements: int, least_logit: float) -> tuple[_Chosen, float, float]:
+    """The candidates, and `log_left_out` and `left_out` of `Candidates`."""
+    offsets, members = group_members(pairs.measurements, num_measurements)
+    log_odds, kept = np.full(num_measurements, -math.inf), np.empty(num_measurements, np.int64)
+    num_kept, num_pairs, log_left_out, left_out = 0, 0, 0.0, 0.0
+    for j in range(num_measurements):
+        for i in range(offsets[j], offsets[j + 1]):
+            log_odds[j] = log_add(log_odds[j], pairs.log_odds[members[i]])
+        if log_odds[j] >= least_logit and log_odds[j] > -math.inf:
+            kept[num_kept] = j
+            num_kept += 1
+            num_pairs += offsets[j + 1] - offsets[j]
+        elif log_odds[j] > -math.inf:
+            log_left_out += log_add(0.0, log_odds[j])
+            left_out += 1.0 / (1.0 + math.exp(-log_odds[j]))
+    return _Chosen(kept[:num_kept], num_pairs, offsets, members, log_odds), log_left_out, left_out
+
+
+@kernel
+def candidates_of(
+    seen: Rows, scan: ScanInput, sensor: Sensor, log_clutter: Floats, gate: float, least_logit: float, label: Undetected
+) -> Candidates:
+    """The candidate labels of a scan, in the order of its measurements.
+
+    Args:
+        seen: the intensity and what there is about each measurement, as of `seen_intensity`.
+        scan: whose measurements are asked about.
+        sensor: that took it.
+        log_clutter: (num_measurements,) log clutter intensity at each measurement.
+        gate: squared Mahalanobis distance beyond which a component does not explain a measurement.
+        least_logit: log odds rho / kappa below which a candidate is left out.
+        label: by which candidates are named.
+    """
+    pairs = _gated_pairs(seen, len(label.local.log_weights), scan.measurements, log_clutter, sensor.angular, gate)
+    chosen, log_left_out, left_out = _chosen(pairs, len(scan.measurements), least_logit)
+    num, meas_dim = len(chosen.measurements), len(sensor.angular)
+    rows = make_rows(num, chosen.num_pairs, seen.means.shape[1], meas_dim)
+    options = Options(
+        np.zeros(num + 1, np.int64),
+        np.empty(2 * num, np.int64),
+        np.empty(2 * num),
+        np.empty(2 * num, np.int64),
+        np.empty(chosen.num_pairs),
+        np.empty((chosen.num_pairs, meas_dim)),
+        len(scan.measurements),
+    )
+    for row in range(num):
+        j = chosen.measurements[row]
+        rows.labels[row, 0], rows.labels[row, 1], rows.log_absent[row] = label.step, label.first_index + j, 0.0
+        _write_candidate(row, j, seen, pairs, chosen, scan.measurements[j], sensor.angular, gate, rows, options)
+    return Candidates(rows, options, log_left_out, left_out)
+
+
+@borrowing
+def _write_candidate(
+    row: int,
+    j: int,
+    seen: Rows,
+    pairs: _Pairs,
+    chosen: _Chosen,
+    measurement: Floats,
+    angular: Bools,
+    gate: float,
+    rows: Rows,
+    options: Options,
+) -> None:
+    """Write the components and the two options of a candidate."""
+    filled = rows.offsets[row]
+    options.columns[2 * row], options.log_weights[2 * row], options.entries[2 * row] = ABSENT, 0.0, -1
+    options.columns[2 * row + 1], options.log_weights[2 * row + 1] = j, chosen.log_odds[j]
+    options.entries[2 * row + 1] = filled
+    for i in range(chosen.offsets[j], chosen.offsets[j + 1]):
+        c, own = pairs.components[chosen.pairs[i]], pairs.log_odds[chosen.pairs[i]]
+        if own - chosen.log_odds[j] < _LEAST_SHARE:
+            continue
+        rows.log_weights[filled] = seen.log_weights[c]
+        copy_component(seen.means, seen.covs, c, rows.means, rows.covs, filled)
+        copy_innovation(seen.innovation, c, rows.innovation, filled)
+        whiten(seen.innovation, c, measurement, angular, gate, options.whitened[filled])
+        options.component_log_weights[filled] = own
+        filled += 1
+    rows.offsets[row + 1] = filled
+    options.offsets[row + 1] = 2 * row + 2
+    sort_row(2 * row, 2 * row + 2, options.columns, options.log_weights, options.entries)
+
+
+@kernel
+def with_candidates(rows: Rows, options: Options, new: Candidates) -> tuple[Rows, Options]:
+    """The rows and options of tracks, followed by those of candidates."""
+    num_rows, num_new = len(rows.log_absent), len(new.rows.log_absent)
+    num, num_components = rows.offsets[num_rows], rows.offsets[num_rows] + new.rows.offsets[num_new]
+    meas_dim, state_dim = rows.innovation.whitened_cross.shape[1:]
+    out = make_rows(num_rows + num_new, num_components, state_dim, meas_dim)
+    _copy_rows(rows, out, 0, 0)
+    _copy_rows(new.rows, out, num_rows, num)
+    num_options, num_entries = options.offsets[num_rows], len(options.component_log_weights)
+    end_options, end_entries = num_options + new.options.offsets[num_new], num_entries + new.rows.offsets[num_new]
+    offsets = np.zeros(num_rows + num_new + 1, np.int64)
+    columns, entries = grown_ints(options.columns, end_options), grown_ints(options.entries, end_options)
+    log_weights = grown_floats(options.log_weights, end_options)
+    component_log_weights = grown_floats(options.component_log_weights, end_entries)
+    whitened = np.empty((len(component_log_weights), meas_dim))
+    for entry in range(num_entries):
+        for a in range(meas_dim):
+            whitened[entry, a] = options.whitened[entry, a]
+    for row in range(num_rows):
+        offsets[row + 1] = options.offsets[row + 1]
+    for row in range(num_new):
+        offsets[num_rows + row + 1] = num_options + new.options.offsets[row + 1]
+    for option in range(new.options.offsets[num_new]):
+        columns[num_options + option] = new.options.columns[option]
+        log_weights[num_options + option] = new.options.log_weights[option]
+        entry = new.options.entries[option]
+        entries[num_options + option] = num_entries + entry if entry >= 0 else -1
+    for entry in range(new.rows.offsets[num_new]):
+        component_log_weights[num_entries + entry] = new.options.component_log_weights[entry]
+        for a in range(meas_dim):
+            whitened[num_entries + entry, a] = new.options.whitened[entry, a]
+    return out, Options(
+        offsets, columns, log_weights, entries, component_log_weights, whitened, options.num_measurements
+    )
+
+
+@kernel
+def _copy_rows(source: Rows, out: Rows, first: int, start: int) -> None:
+    """Write rows from row `first` and component `start` on."""
+    for row in range(len(source.log_absent)):
+        out.labels[first + row, 0], out.labels[first + row, 1] = source.labels[row, 0], source.labels[row, 1]
+        out.log_absent[first + row] = source.log_absent[row]
+        out.offsets[first + row + 1] = start + source.offsets[row + 1]
+    for c in range(source.offsets[len(source.log_absent)]):
+        out.log_weights[start + c] = source.log_weights[c]
+        copy_component(source.means, source.covs, c, out.means, out.covs, start + c)
+        copy_innovation(source.innovation, c, out.innovation, start + c)
