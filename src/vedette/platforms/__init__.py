@@ -2,6 +2,7 @@
 
 from vedette.platforms.base import Actions, Options, Platform, options_at
 from vedette.platforms.camera import Carried, Pointing
+from vedette.platforms.compass import Compass, PlaneCompass
 from vedette.platforms.courses import PAPER_HEADINGS_DEG, Courses
 from vedette.platforms.fleet import Fleet
 from vedette.platforms.sequences import Sequences
@@ -11,9 +12,11 @@ __all__ = [
     "PAPER_HEADINGS_DEG",
     "Actions",
     "Carried",
+    "Compass",
     "Courses",
     "Fleet",
     "Options",
+    "PlaneCompass",
     "Platform",
     "Pointing",
     "Sequences",

@@ -24,7 +24,7 @@ class Reports:
         times: (n,) s; of ISO 8601 times, seconds since 1970 UTC.
         tracks: (n,) index into `names`.
         positions: (n, 2) m.
-        velocities: (n, 2) m/s, or None where the record has none.
+        velocities: (n, 2) m/s along x and y of the plane, or None where the record has none.
         names: the record's own name of each target.
         origin_deg: longitude and latitude of (0, 0) where the record was geographic, else None.
         bounds_deg: its least and greatest longitude and latitude where it was geographic, else None.
@@ -50,6 +50,8 @@ def parse_reports(
 ) -> Reports:
     """Reports out of a table with columns time, id and x, y or longitude, latitude; vx, vy where there are any.
 
+    Of a geographic record `vx` and `vy` are to true east and north at the place of each report.
+
     Args:
         table: see `read_table`; state vectors of OpenSky are known by their columns where `columns` names none.
         columns: names in the table where they differ: {"time": "Time", "id": "MMSI", ...}. Naming a longitude and
@@ -71,7 +73,7 @@ def parse_reports(
         raise InputError(f"{table.source}: expected at least one report; got none")
     speed_columns = [given.get(name, name) for name in ("vx", "vy")]
     has_velocity = any(name in given for name in ("vx", "vy")) or all(name in table.columns for name in speed_columns)
-    velocities = _pair(table, speed_columns) if has_velocity else None
+    velocities = _velocities(table, given, speed_columns, origin) if has_velocity else None
     names, tracks = np.unique(labels, return_inverse=True)
     order = np.lexsort((times, tracks))  # of equal ones, the order of the file
     again = (np.diff(times[order], prepend=-np.inf) < _SAME_TIME) & (np.diff(tracks[order], prepend=-1) == 0)
@@ -85,6 +87,17 @@ def parse_reports(
 def _pair(table: Table, names: Sequence[str]) -> Floats:
     """(n, 2) of two columns, in m or m/s."""
     return np.stack([table.numbers(name, FARTHEST) for name in names], axis=1)
+
+
+def _velocities(
+    table: Table, given: Mapping[str, str], names: Sequence[str], origin: tuple[float, float] | None
+) -> Floats:
+    """(n, 2) along x and y of the plane, m/s."""
+    found = _pair(table, names)
+    if origin is None:
+        return found
+    degrees = (table.numbers(given.get(name, name), np.inf) for name in ("longitude", "latitude"))
+    return np.asarray(np.einsum("nij,nj->ni", Origin(*origin).axes(*degrees), found))
 
 
 def _positions(

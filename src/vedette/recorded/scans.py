@@ -12,11 +12,11 @@ from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import reject
 from vedette.models.bias import NO_BIAS
+from vedette.platforms.compass import PlaneCompass
 from vedette.recorded.conventions import ANGLES, MOST, OTHER_NAMES, QUANTITIES, Conventions
 from vedette.recorded.geography import PLANE_REACH, Origin
 from vedette.recorded.instants import (
     COMPONENTS,
-    Bearings,
     Look,
     RecordedScans,
     Site,
@@ -65,6 +65,7 @@ class _Rows:
 
     def __init__(self, table: Table, sites: Sequence[Site], conventions: Conventions, origin: Origin | None) -> None:
         self.table, self.sites, self.conventions, self.origin = table, sites, conventions, origin
+        self.compass = origin or PlaneCompass()
         self.bearings = tuple(conventions.bearings or ("north" if site.compass else table.bearings) for site in sites)
         self._columns: dict[str, tuple[str, float]] = {}
         for quantity, units in QUANTITIES.items():
@@ -154,7 +155,8 @@ class _Rows:
             names = ", ".join(shown(site.name) for site in self.sites)
             raise self.table.fault(i, self._sensor, f"a sensor among {names}, or its number from 1")
         s = self._numbers[label]
-        return _Row(self._seconds(i), s, self._measured(i, s), self._pose(i, s))
+        time, pose = self._seconds(i), self._pose(i, s)
+        return _Row(time, s, self._measured(i, s, pose), pose)
 
     def _seconds(self, i: int) -> float:
         """The time of a row, all as dates or all as numbers."""
@@ -168,7 +170,7 @@ class _Rows:
             raise self.table.fault(i, self._time, wanted)
         return time
 
-    def _value(self, i: int, quantity: str, bearings: Bearings | None = None) -> float:
+    def _value(self, i: int, quantity: str) -> float:
         name, unit = self._columns[quantity]
         try:
             value = unit * number(self.table.columns[name][i])
@@ -180,11 +182,13 @@ class _Rows:
         if abs(value) > most * (1.0 + 1e-9) or (quantity == "range" and value < 0.0):
             limits = f"from {0 if quantity == 'range' else -most / unit:g} to {most / unit:g}"
             raise self.table.fault(i, name, f"a number {limits}")
-        if quantity in ("bearing", "own_heading"):
-            return float(turned(value, bearings))
         return value
 
-    def _measured(self, i: int, s: int) -> tuple[float, ...] | None:
+    def _angle(self, i: int, quantity: str, s: int, place: Sequence[float]) -> float:
+        """A bearing or heading of a sensor at a place, as an angle of the plane."""
+        return float(turned(self._value(i, quantity), self.bearings[s], self.compass, place))
+
+    def _measured(self, i: int, s: int, pose: Sequence[float]) -> tuple[float, ...] | None:
         """As filters take it; None of a scan that found nothing."""
         site = self.sites[s]
         quantities: tuple[str, ...] = COMPONENTS[site.kind]
@@ -195,7 +199,10 @@ class _Rows:
             return None
         if quantities[0] == "lon":
             return self._plane(i, *quantities)
-        return tuple(self._value(i, quantity, self.bearings[s]) for quantity in quantities)
+        return tuple(
+            self._angle(i, quantity, s, pose) if quantity == "bearing" else self._value(i, quantity)
+            for quantity in quantities
+        )
 
     def _pose(self, i: int, s: int) -> tuple[float, ...]:
         """Where the sensor was, as far as the row says."""
@@ -206,7 +213,7 @@ class _Rows:
         elif {"own_x", "own_y"} <= set(self._columns):
             place = self._value(i, "own_x"), self._value(i, "own_y")
         has_heading = "own_heading" in self._columns
-        heading = self._value(i, "own_heading", self.bearings[s]) if has_heading else site.pose[2]
+        heading = self._angle(i, "own_heading", s, place) if has_heading else site.pose[2]
         return (*place, heading, *site.pose[3:])
 
     def _plane(self, i: int, lon: str, lat: str) -> tuple[float, ...]:

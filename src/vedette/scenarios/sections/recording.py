@@ -87,8 +87,9 @@ def sites_of(world: ScenarioModel) -> list[Site]:
     """The sensors of a recording."""
     from vedette.recorded import Site
 
+    north = world.north()
     return [
-        Site(name, sensor.measurement.kind, sensor.pose, sensor.bias.build(), sensor.compass)
+        Site(name, sensor.measurement.kind, sensor.pose, sensor.bias.build(), sensor.compass, north)
         for name, sensor in zip(world.sensor_names, world.sensors, strict=True)
     ]
 

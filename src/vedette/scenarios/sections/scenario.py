@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, field_validator
 
@@ -32,6 +32,9 @@ from vedette.scenarios.sections.world import (
     Survival,
     Time,
 )
+
+if TYPE_CHECKING:  # with it come the models, which a check does without
+    from vedette.platforms.compass import Compass
 
 # Of a horizon that is as long as it is to the next decision.
 _MOST_STEPS = 100
@@ -147,6 +150,17 @@ class ScenarioModel(Section):
     def sensor_names(self) -> tuple[str, ...]:
         """Name of each sensor; `sensor 1`, `sensor 2`, ... where none is given."""
         return tuple(sensor.name or f"sensor {number}" for number, sensor in enumerate(self.sensors, 1))
+
+    @property
+    def by_compass(self) -> bool:
+        """Whether directions come in and go out as courses, clockwise from true north, as on a chart."""
+        return self.origin is not None or any(sensor.compass for sensor in self.sensors)
+
+    def north(self) -> Compass:
+        """Where true north is: at an origin's place on the Earth, else along y."""
+        from vedette.platforms.compass import PlaneCompass
+
+        return PlaneCompass() if self.origin is None else self.origin.build()
 
     @property
     def decision_steps(self) -> tuple[int, ...]:
