@@ -57,6 +57,9 @@ def test_azimuths_and_distances_are_those_of_geodesics(reach: float, degrees: fl
         assert abs(math.remainder(plane - math.atan2(dy, dx), 2.0 * math.pi)) < math.radians(degrees)
         assert abs(math.hypot(dx, dy) - distance) < metres
         assert float(origin.azimuth(plane, place)) == pytest.approx(azimuth, abs=1e-12)
+        # At a place of the plane, and at one in degrees.
+        east, north = origin.axes([here[0]], [here[1]])[0] @ [math.sin(azimuth), math.cos(azimuth)]
+        assert abs(math.remainder(math.atan2(north, east) - plane, 2.0 * math.pi)) < 1e-9
 
 
 @pytest.mark.parametrize("latitude", [50.7, -50.7, 0.0, 78.0])

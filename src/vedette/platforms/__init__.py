@@ -1,6 +1,7 @@
 """What a sensor may do, as rows of named numbers, and the poses that follow."""
 
 from vedette.platforms.base import Actions, Options, Platform, options_at
+from vedette.platforms.by_compass import ByCompass
 from vedette.platforms.camera import Carried, Pointing
 from vedette.platforms.compass import Compass, PlaneCompass
 from vedette.platforms.courses import PAPER_HEADINGS_DEG, Courses
@@ -11,6 +12,7 @@ from vedette.platforms.steps import Steps, Still, Waypoints
 __all__ = [
     "PAPER_HEADINGS_DEG",
     "Actions",
+    "ByCompass",
     "Carried",
     "Compass",
     "Courses",

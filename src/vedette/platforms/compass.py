@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from vedette.kernels.base.types import Floats
 
 
+@runtime_checkable
 class Compass(Protocol):
     """Where true north is, at a place of the plane."""
 
@@ -53,3 +54,9 @@ def wrapped(angles: ArrayLike) -> Floats:
 def course_deg(compass: Compass, angle: ArrayLike, place: ArrayLike) -> Floats:
     """Return courses, degrees in [0, 360) clockwise from true north at `place`, of angles of the plane, rad."""
     return np.asarray(np.degrees(compass.azimuth(angle, place)) % 360.0)
+
+
+def courses_of(compass: Compass, states: Floats) -> Floats:
+    """Return (num, 2) course, deg in [0, 360), and speed, m/s, of states [px, py, vx, vy, ...] of targets."""
+    courses = [course_deg(compass, math.atan2(state[3], state[2]), state) for state in states.tolist()]
+    return np.column_stack([np.array(courses).reshape(-1), np.hypot(states[:, 2], states[:, 3])])

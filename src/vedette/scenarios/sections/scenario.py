@@ -15,6 +15,7 @@ from vedette.scenarios.sections.base import Name, Section, attempt, check
 from vedette.scenarios.sections.birth import Birth
 from vedette.scenarios.sections.checks import CHECKS, step_of_time
 from vedette.scenarios.sections.control import Control
+from vedette.scenarios.sections.courses import from_east
 from vedette.scenarios.sections.derived import of_kind
 from vedette.scenarios.sections.fusion import AnyFusion, Fusion
 from vedette.scenarios.sections.network import NetworkSection
@@ -128,13 +129,13 @@ class ScenarioModel(Section):
 
     @classmethod
     def in_metres(cls, data: Mapping[str, Any]) -> Mapping[str, Any]:
-        """With places in degrees, as an origin allows them, in metres."""
-        return in_metres(data)
+        """With places in degrees, as an origin allows them, in metres, and courses as headings."""
+        return from_east(in_metres(data))
 
     @classmethod
     def prepared(cls, data: Mapping[str, Any]) -> Mapping[str, Any]:
         """In metres, with what `sensor_defaults` gives in every sensor, and a reward where none is named."""
-        return with_reward(merge_sensor_defaults(in_metres(data)))
+        return with_reward(merge_sensor_defaults(cls.in_metres(data)))
 
     @field_validator("sensor_defaults")
     @classmethod
