@@ -9,6 +9,7 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
+from vedette.recorded.conventions import ONE_PLACE, ONE_PLACE_SHARE
 from vedette.recorded.geography import Origin
 from vedette.recorded.opensky import is_opensky, of_opensky
 from vedette.recorded.tables import FARTHEST, Table
@@ -100,6 +101,29 @@ def _velocities(
     return np.asarray(np.einsum("nij,nj->ni", Origin(*origin).axes(*degrees), found))
 
 
+def _degrees(table: Table, given: Mapping[str, str]) -> list[Floats]:
+    """Longitudes and latitudes."""
+    degrees = []
+    for name, limit in (("longitude", 360.0), ("latitude", 90.0)):
+        column = given.get(name, name)
+        values = table.numbers(column, np.inf)
+        if (wrong := np.abs(values) > limit).any():
+            raise table.fault(int(np.argmax(wrong)), column, f"a {name} in degrees, at most {limit:g}")
+        degrees.append(values)
+    return degrees
+
+
+def _check_agreed(table: Table, found: Floats, origin: Origin) -> None:
+    """That places in metres are those of the longitudes and latitudes beside them."""
+    told = origin.to_plane(*_degrees(table, {})) if len(found) else found
+    apart = np.hypot(*(found - told).T)
+    if (wrong := apart > ONE_PLACE + ONE_PLACE_SHARE * np.hypot(*told.T)).any():
+        i = int(np.argmax(wrong))
+        where = f"the place of its longitude and latitude ({told[i, 0]:.0f}, {told[i, 1]:.0f} m)"
+        wanted = f"x, y at {where}, not {apart[i]:.0f} m away; `columns: {{x: x, y: y}}` takes them alone"
+        raise table.fault(i, "x", wanted)
+
+
 def _positions(
     table: Table,
     given: Mapping[str, str],
@@ -115,14 +139,11 @@ def _positions(
     if not named_geographic and (has_plane or not has_globe):
         if origin_deg is not None:
             raise InputError("origin_deg: expected only for longitudes and latitudes; the record has x and y")
-        return _pair(table, [given.get(name, name) for name in ("x", "y")]), None, None
-    degrees = []
-    for name, limit in (("longitude", 360.0), ("latitude", 90.0)):
-        column = given.get(name, name)
-        values = table.numbers(column, np.inf)
-        if (wrong := np.abs(values) > limit).any():
-            raise table.fault(int(np.argmax(wrong)), column, f"a {name} in degrees, at most {limit:g}")
-        degrees.append(values)
+        found = _pair(table, [given.get(name, name) for name in ("x", "y")])
+        if has_globe and usual_origin_deg is not None and "x" not in given:
+            _check_agreed(table, found, Origin(*usual_origin_deg))
+        return found, None, None
+    degrees = _degrees(table, given)
     origin_deg = origin_deg or usual_origin_deg
     if origin_deg is None:
         origin_deg = (float(np.median(degrees[0])), float(np.median(degrees[1]))) if len(degrees[0]) else (0.0, 0.0)
