@@ -140,11 +140,15 @@ def is_number(cell: Any) -> bool:
 
 
 def are_dates(cells: Sequence[Any]) -> bool:
-    """Whether more of the cells are ISO 8601 times than numbers, so that a bad one among them is the bad one."""
+    """Whether more of the cells are ISO 8601 times than numbers; of as many the first cell says.
+
+    What most cells are decides, so that a bad one among them is the bad one.
+    """
     num = sum(map(is_number, cells))
-    if num == 0 or 2 * num >= len(cells):
+    if num == 0 or 2 * num > len(cells):
         return num == 0 and len(cells) > 0
-    return sum(_is_date(cell) for cell in cells if not is_number(cell)) > num
+    dates = sum(_is_date(cell) for cell in cells if not is_number(cell))
+    return dates > num or (dates == num and not is_number(cells[0]))
 
 
 def _is_date(cell: Any) -> bool:
