@@ -162,6 +162,27 @@ def test_the_course_of_a_plan_is_the_course_of_a_pose(tmp_path: Path) -> None:
         assert after.timeline.poses[s, 2] == pytest.approx(float(told[2]), abs=1e-12)
 
 
+def test_lines_from_north_are_answered_from_north(tmp_path: Path) -> None:
+    """Without an origin, too: bearings in rad, as the units do not say another."""
+    text = BOATS.replace("origin: {lon: -1.05, lat: 50.7}", "recording: {bearings: north}").replace(
+        "  compass: true\n", ""
+    )
+    text = text.replace("{lon: 0.35, lat: 50.7}", "[98900.0, 0.0]").replace("{lon: 0.36, lat: 50.7}", "[99600.0, 0.0]")
+    text = text.replace("course_deg: 60", "heading_deg: 30").replace("course_deg: 0}", "heading_deg: 90}")
+    text = text.replace("courses_deg: [0, 60, 135, 270]", "headings_deg: [90, 30, -45, 180]")
+    live = live_of(boats(tmp_path, text), decide_every=1.0, num_threads=1)
+    state, plans = live.initial(), []
+    for k in range(3):
+        for s in (1, 2):
+            pose = [98200.0 + 700.0 * s, 0.0, math.radians(60.0)]
+            line = {"sensor": s, "time": float(k), "measurements": [[2.0, 800.0]], "pose": pose}
+            state, answers = live.take(state, json.dumps(line).encode())
+            plans += [answer["plan"] for answer in answers if "plan" in answer]
+    assert state.timeline.poses[0, 2] == pytest.approx(math.radians(30.0))
+    assert state.timeline.instants[0].scans[0].measurements[0, 0] == pytest.approx(math.pi / 2.0 - 2.0)
+    assert {action["course_deg"] for plan in plans for action in plan["actions"]} <= {0.0, 60.0, 135.0, 270.0}
+
+
 @pytest.mark.parametrize(
     ("pose", "words"),
     [

@@ -37,12 +37,8 @@ _POINTS_A_SIDE = 21
 def cautions(scenario: Scenario) -> tuple[str, ...]:
     """Warnings of a valid scenario, one line each, with file, line and column where it was read from a file."""
     found = [*_records(scenario), *_views(scenario), *_births(scenario), *_late_beliefs(scenario)]
-    found += [
-        *_many_sensors(scenario),
-        *_cells(scenario.model),
-        *_labels(scenario.model),
-        *coverage_cautions(scenario.model),
-    ]
+    found += [*_many_sensors(scenario), *_cells(scenario.model), *_labels(scenario.model)]
+    found += coverage_cautions(scenario.model)
     found += [*implausible(scenario.model), *coastline_cautions(scenario.model, scenario.folder)]
     if not found:
         return ()

@@ -1,7 +1,7 @@
 """Directions by compass in a scenario: where a heading in degrees from east is read, a course may stand.
 
-With an origin, or a sensor with a compass, `course_deg`, `courses_deg`, `azimuth_deg` and `azimuths_deg` count
-clockwise from true north, as plans do. A file counts all directions of its sensors in one of the two ways.
+With an origin, a sensor with a compass or scans that count from north, `course_deg`, `courses_deg`, `azimuth_deg` and
+`azimuths_deg` count clockwise from true north, as plans do. A file counts all directions of its sensors in one way.
 """
 
 from __future__ import annotations
@@ -36,7 +36,9 @@ def from_east(data: Mapping[str, Any]) -> Mapping[str, Any]:
     if not keys & set(COURSES) or keys & _HEADINGS:
         return data
     origin = origin_of(data)
-    if origin is None and not any(part.get("compass") is True for part in parts):
+    recording = data.get("recording")
+    is_told = _is_mapping(recording) and recording.get("bearings") == "north"
+    if origin is None and not is_told and not any(part.get("compass") is True for part in parts):
         return data
     from vedette.platforms.compass import PlaneCompass
 

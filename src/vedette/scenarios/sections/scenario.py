@@ -155,7 +155,8 @@ class ScenarioModel(Section):
     @property
     def by_compass(self) -> bool:
         """Whether directions come in and go out as courses, clockwise from true north, as on a chart."""
-        return self.origin is not None or any(sensor.compass for sensor in self.sensors)
+        recorded = self.recording is not None and self.recording.bearings == "north"
+        return self.origin is not None or recorded or any(sensor.compass for sensor in self.sensors)
 
     def north(self) -> Compass:
         """Where true north is: at an origin's place on the Earth, else along y."""
