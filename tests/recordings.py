@@ -54,6 +54,7 @@ def write_recording(
             clutter = rng.uniform(-6000.0, 6000.0, (rng.poisson(2.0), 2)) - own
             ranges = np.concatenate([ranges, np.hypot(*clutter.T)])
             bearings = np.concatenate([bearings, np.arctan2(*clutter.T)])
+            bearings = ORIGIN.azimuth(0.5 * math.pi - bearings, own)  # from true north at the radar
             lon, lat = ORIGIN.to_degrees([own])[0].tolist()
             told = (lon, lat)
             found = [

@@ -105,7 +105,10 @@ BAD: list[tuple[bytes, str]] = [
     (line(1, 2.0, [], pose=[1.0, 2.0]), "line 3, pose: expected numbers [x, y, heading_rad], or lon and lat"),
     (line(1, 2.0, [], pose=[0.0] * 4), "line 3, pose: expected numbers"),
     (line(1, 2.0, [], pose=[0.0, 0.0, 90.0]), "column 'pose.heading_rad': expected a number from -6.28319"),
-    (line(1, 2.0, [], pose={"lat": 1.0}), "line 3, pose: expected lon, lat and, if it is known, heading_deg; got lat"),
+    (
+        line(1, 2.0, [], pose={"lat": 1.0}),
+        "pose: expected lon, lat and, if it is known, course_deg or heading_deg; got lat",
+    ),
     (line(1, 2.0, [], pose={"lon": "a", "lat": 1}), "line 3, pose.lon: expected a number; got a"),
     (line(1, 2.0, [], pose={"lon": 1, "lat": 1}), "line 3: expected an origin"),
     (line(1, 2.0, [], pose={"lon": 1, "lat": 1, "heading_deg": 0}), "expected bearings: north"),

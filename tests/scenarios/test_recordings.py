@@ -17,7 +17,8 @@ from vedette.evaluation.runs import run_scenario
 from vedette.evaluation.scans import scan_table, scans_of_record
 from vedette.evaluation.track_table import table_of_run, write_tracks
 from vedette.models import Bias
-from vedette.recorded import Conventions, Origin, RecordedScans, Site, parse_scans, table_of
+from vedette.recorded import Conventions, Origin, RecordedScans, RecordedTargets, Site, parse_scans, table_of
+from vedette.recorded.reports import parse_reports
 from vedette.recorded.tables import Table, read_table
 from vedette.scenarios import load_scenario
 from vedette.scenarios.dumping import dump_scenario
@@ -555,3 +556,80 @@ def test_a_bias_of_a_compass_is_the_same_simulated_and_read(tmp_path: Path) -> N
             of_targets = other.origins >= 0
             assert of_targets.any()
             np.testing.assert_allclose(scan[of_targets], other.measurements[of_targets], rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize(("first", "last"), [("2016-01-12T13:02:21Z", 6.0), ("", 6.0), ("n/a", 6.0)])
+def test_one_bad_time_is_the_bad_one_wherever_it_stands(first: Any, last: float) -> None:
+    rows = [{**ROWS[0], "time": first}, *({**ROWS[0], "time": float(k)} for k in range(1, 7))]
+    with pytest.raises(InputError, match=r"row 2, column 'time': expected a finite number of seconds; got"):
+        parsed(rows)
+    found = parsed(rows, bad_rows="skip")
+    assert (len(found.times), len(found.skipped), found.start + found.times[-1]) == (6, 1, last)
+    dates = [{**ROWS[0], "time": "5"}, *({**ROWS[0], "time": f"2016-01-12T13:02:2{k}Z"} for k in range(6))]
+    with pytest.raises(InputError, match=r"row 2, column 'time': expected an ISO 8601 time; got '5'"):
+        parsed(dates)
+    assert (parsed(dates, bad_rows="skip").is_utc, len(parsed(dates, bad_rows="skip").times)) == (True, 6)
+    reports = {"time": [first, *map(float, range(6))], "id": ["a"] * 7, "x": [0.0] * 7, "y": [0.0] * 7}
+    with pytest.raises(InputError, match="row 1, column 'time': expected a finite number; got"):
+        RecordedTargets.from_columns(reports)
+
+
+POSITION = Site("radar", "position", (0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("cells", "words"),
+    [
+        ({"x": 1.0, "y": 2.0, "lon": -1.1}, "column 'lon': expected a column of lat beside it, as a place has both"),
+        ({"x": 1.0, "y": 2.0, "lat": 50.8}, "column 'lat': expected a column of lon beside it"),
+        ({"lon": -1.1, "lat": 50.8, "x": 1.0}, "column 'x': expected a column of y beside it"),
+        ({"x": 1.0, "y": 2.0, "own_x": 0.0}, "column 'own_x': expected a column of own_y beside it"),
+        ({"x": 1.0, "y": 2.0, "own_lat_deg": 50.8}, "column 'own_lat_deg': expected a column of own_lon beside it"),
+        (
+            {"x": 7000.0, "y": 0.0, "lon": -1.1171, "lat": 50.7865},
+            r"row 2, column 'x': expected x, y at the place of its longitude .* .-?0, -?0 m., not 7000 m away",
+        ),
+        (
+            {"x": 1.0, "y": 2.0, "own_x": 0.0, "own_y": 900.0, "own_lon": -1.1171, "own_lat": 50.7865},
+            r"column 'own_x': expected own_x, own_y at the place of its longitude and latitude .*, not 900 m away",
+        ),
+    ],
+)
+def test_places_are_whole_and_say_one_thing(cells: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        parsed([{"time": 0.0, "sensor": "radar", **cells}], [POSITION], ORIGIN)
+
+
+def test_places_that_agree_may_be_said_twice() -> None:
+    lon, lat = ORIGIN.to_degrees([[2000.0, -900.0]])[0].tolist()
+    row = {"time": 0.0, "sensor": "radar", "x": 2010.0, "y": -890.0, "lon": lon, "lat": lat}
+    found = parsed([row, {**row, "time": 1.0, "x": "", "y": ""}], [POSITION], ORIGIN)
+    for scans in found.scans:
+        np.testing.assert_allclose(np.asarray(scans[0]), [[2000.0, -900.0]], atol=1e-6)
+    # Of no matter to a sensor that measures no place.
+    assert parsed([{**ROWS[0], "x": 5.0}]).num_measurements == 1
+    reports = {"time": [0.0, 1.0], "id": ["a", "a"], "x": [2010.0, 2015.0], "y": [-890.0] * 2}
+    reports |= {"longitude": [lon] * 2, "latitude": [lat] * 2}
+    parse_reports(table_of(reports), usual_origin_deg=(ORIGIN.longitude_deg, ORIGIN.latitude_deg))
+    reports["x"] = [9000.0, 2015.0]
+    with pytest.raises(InputError, match=r"row 1, column 'x': expected x, y at the place .*, not 7000 m away"):
+        parse_reports(table_of(reports), usual_origin_deg=(ORIGIN.longitude_deg, ORIGIN.latitude_deg))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("bearings: north", "bearings: North", r"recording.bearings: expected one of east, north, got \"North\""),
+        ("bearings: north", "bearings: north, gather: -1", "recording.gather: expected a number of at least 0"),
+        ("bearings: north", "bearings: north, units: 3", "recording.units: expected a mapping"),
+        ("bearings: north", "bearings: north, columns: {range: 3}", "recording.columns"),
+        ("bearings: north", "bearings: north, units: {range: [nmi]}", "recording.units"),
+    ],
+)
+def test_what_is_wrong_with_a_recording_is_named(folder: Path, old: str, new: str, words: str) -> None:
+    text = (folder / "radars.yaml").read_text("utf-8").replace("columns: {sensor: radar, bearing: brg_deg}, ", "")
+    (folder / "radars.yaml").write_text(text.replace(old, new), "utf-8")
+    with pytest.raises(ScenarioError, match=words):
+        scenario_of_recording(folder / "radars.yaml", folder / "scans.csv")
+    with pytest.raises(InputError, match="units: expected a mapping of quantities"):
+        Conventions({}, 3)  # type: ignore[arg-type]

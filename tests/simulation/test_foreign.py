@@ -127,7 +127,9 @@ def test_tracks_of_a_system_are_scans_of_positions_and_reports(tmp_path: Path) -
     assert (table.columns["id"], table.columns["time"]) == (["7", "7", "8"], [86399.0, 86400.0, 86402.0])
     assert "vx" not in table.columns  # the last does not say
     targets = RecordedTargets.from_file(tmp_path / "system.ast", origin_deg=(ORIGIN.longitude_deg, ORIGIN.latitude_deg))
-    np.testing.assert_array_equal(targets.tracks[0].velocities, [[4.0, -3.0]] * 2)
+    # VY is to true north at the place of the track, which the plane has 6.6e-5 radians from y.
+    (axes,) = ORIGIN.axes([lon], [lat])
+    np.testing.assert_allclose(targets.tracks[0].velocities, [axes @ [4.0, -3.0]] * 2, rtol=1e-6)
     (tmp_path / "plots.ast").write_bytes(plot(1.0, 5.0, 10.0))
     with pytest.raises(InputError, match=r"plots.ast: expected tracks of category 062; got none"):
         read_table(tmp_path / "plots.ast", reports=True)

@@ -79,8 +79,10 @@ def test_aircraft_are_where_they_were_last_heard(tmp_path: Path) -> None:
     south, east = targets.tracks
     np.testing.assert_allclose(east.times, START - 0.25 + np.array([0.0, 2.0, 4.0]))
     np.testing.assert_allclose(east.positions, [[0.0, 0.0], [120.0, 160.0], [240.0, 320.0]], atol=1e-3)
-    np.testing.assert_allclose(east.velocities, [[60.0, 80.0]] * 3)
-    np.testing.assert_allclose(south.velocities, [[0.0, -150.0]] * 3, atol=1e-9)
+    # Headings are from true north at the place of the aircraft.
+    for track, velocity in ((east, [60.0, 80.0]), (south, [0.0, -150.0])):
+        axes = ORIGIN.axes(*ORIGIN.to_degrees(track.positions).T)
+        np.testing.assert_allclose(track.velocities, axes @ velocity, rtol=1e-9)
 
 
 def test_files_and_frames_say_the_same(tmp_path: Path) -> None:

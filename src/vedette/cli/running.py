@@ -132,6 +132,7 @@ def run(
                 end_stopped(error, "nothing was written")
             record, stop = error.record, error
         print_run(record, loaded)
+        tell_disagreements(record, loaded)
         kept = out if stop is None or not _holds_whole_run(out) else None
         if kept is not None:
             save_run(record, kept, scenario_text=dump_kept(loaded), overwrite=overwrite)
@@ -205,6 +206,16 @@ def print_run(record: RunRecord, scenario: Scenario | None) -> None:
     spent = ", ".join(f"{stage} {seconds.sum():.2f} s" for stage, seconds in record.timings.items())
     console.print(f"time spent: {spent}")
     console.print(health_line(record.health, names), soft_wrap=True)
+
+
+def tell_disagreements(record: RunRecord, scenario: Scenario) -> tuple[str, ...]:
+    """Warn of sensors of a recording that agree on no target; returns the warnings."""
+    from vedette.evaluation.agreement import disagreements
+
+    found = disagreements(record, scenario)
+    for line in found:
+        note(f"warning: {line}")
+    return found
 
 
 def _draw_run(record: RunRecord, scenario: Scenario, folder: Path) -> None:

@@ -98,11 +98,18 @@ def _numbers_table(title: str, *columns: str) -> Table:
 def _sensors(scenario: Scenario) -> Table:
     from rich.text import Text
 
-    table = _numbers_table("sensors", "name", "x\n(m)", "y\n(m)", "heading\n(deg)", "platform", "moves from")
-    for name, sensor in zip(scenario.model.sensor_names, scenario.model.sensors, strict=True):
+    from vedette.scenarios.sections.courses import start_course
+
+    model = scenario.model
+    direction = "course\n(deg)" if model.by_compass else "heading\n(deg)"
+    table = _numbers_table("sensors", "name", "x\n(m)", "y\n(m)", direction, "platform", "moves from")
+    for name, sensor in zip(model.sensor_names, model.sensors, strict=True):
+        heading = sensor.heading_deg
+        if model.by_compass:
+            heading = start_course(heading, model.north(), sensor.position)
         place = (f"{sensor.position[0]:g}", f"{sensor.position[1]:g}")
         start = "-" if sensor.platform.kind == "still" else sensor.moves_from.replace("_", " ")
-        table.add_row(Text(name), *place, f"{sensor.heading_deg:g}", sensor.platform.kind, start)
+        table.add_row(Text(name), *place, f"{heading:g}", sensor.platform.kind, start)
     return table
 
 
@@ -110,7 +117,8 @@ def _sensing(scenario: Scenario) -> Table:
     """What the sensors measure: once where it is the same for all."""
     from vedette.scenarios.summary import sensing
 
-    described = [sensing(sensor) for sensor in scenario.model.sensors]
+    north = scenario.model.north() if scenario.model.by_compass else None
+    described = [sensing(sensor, north) for sensor in scenario.model.sensors]
     if all(rows == described[0] for rows in described):
         return _grid(described[0])
     names = scenario.model.sensor_names

@@ -14,7 +14,14 @@ from vedette.cli.errors import named_options, usage_error
 from vedette.cli.options import BAD_ROWS, BadRows, Overwrite, SensorsFile, Speed, Trust
 from vedette.cli.output import note, publish, say
 from vedette.cli.progress import bar
-from vedette.cli.running import Approval, compile_if_cold, end_stopped, interruptible, print_run
+from vedette.cli.running import (
+    Approval,
+    compile_if_cold,
+    end_stopped,
+    interruptible,
+    print_run,
+    tell_disagreements,
+)
 from vedette.cli.scenario_files import warn
 from vedette.extras import need
 from vedette.text import counted
@@ -82,6 +89,7 @@ def track(
         except (RunStopped, RunInterrupted) as error:
             end_stopped(error, "nothing was written")
         print_run(record, scenario)
+        warned = tell_disagreements(record, scenario)
         tracks = _summary(record)
         say(f"{counted(recording.num_measurements, 'measurement')}, {tracks}")
         table = table_of_run(record, scenario)
@@ -97,7 +105,16 @@ def track(
             _draw(record, scenario, out)
         say(f"wrote {out}")
     document = run_document(record, scenario.model.ospa.unit)
-    publish({**document, "assumed": assumed, "skipped": recording.skipped, "folder": out, "written": written})
+    publish(
+        {
+            **document,
+            "assumed": assumed,
+            "skipped": recording.skipped,
+            "warnings": warned,
+            "folder": out,
+            "written": written,
+        }
+    )
 
 
 def read_recording(

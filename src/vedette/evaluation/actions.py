@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -14,7 +14,9 @@ from vedette.text import with_minus
 # What one sensor was sent to do, rounded for counting: name and number of each column.
 Row: TypeAlias = tuple[tuple[str, float], ...]
 
-_UNITS = {"_deg": ("deg", "°"), "_rad": ("rad", " rad"), "_m": ("m", " m")}
+_UNITS = {"_deg": ("deg", "°"), "_rad": ("rad", " rad"), "_m": ("m", " m"), "_mps": ("m/s", " m/s")}
+# Directions in whole turns from 0 to 360 degrees.
+_AZIMUTHS = ("course_deg", "azimuth_deg")
 
 
 class ActionAxis(NamedTuple):
@@ -43,7 +45,11 @@ class ActionAxis(NamedTuple):
 
 
 def action_axis(actions: Actions) -> ActionAxis:
-    """The axis of a lone column in its numbers; of several columns the actions one after the other."""
+    """The axis of a lone column in its numbers; of several columns the actions one after the other.
+
+    A speed that all courses have is no column of them.
+    """
+    actions = _without_speed(actions)
     rows = [rounded(actions.columns, row) for row in actions.values]
     ticks = tuple(with_minus(", ".join(f"{value:g}" for _, value in row)) for row in rows)
     labels = tuple(map(row_words, rows))
@@ -56,15 +62,41 @@ def action_axis(actions: Actions) -> ActionAxis:
     return ActionAxis(", ".join(each) or "action", units[0] if same else "", places, ticks, labels, False)
 
 
+def _without_speed(actions: Actions) -> Actions:
+    if "course_deg" not in actions.columns or "speed_mps" not in actions.columns:
+        return actions
+    place = actions.columns.index("speed_mps")
+    if np.ptp(actions.values[:, place]) > 0.0:
+        return actions
+    kept = [i for i in range(len(actions.columns)) if i != place]
+    return Actions(tuple(actions.columns[i] for i in kept), actions.values[:, kept])
+
+
 def rounded(columns: Sequence[str], row: Floats) -> Row:
     """A row to whole degrees and four digits of all else."""
     numbers = zip(columns, row.tolist(), strict=True)
-    return tuple((name, (round(x) if name.endswith("_deg") else float(f"{x:.4g}")) + 0.0) for name, x in numbers)
+    return tuple((name, _rounded(name, x) + 0.0) for name, x in numbers)
+
+
+def _rounded(name: str, number: float) -> float:
+    if not name.endswith("_deg"):
+        return float(f"{number:.4g}")
+    return round(number) % 360 if name in _AZIMUTHS else round(number)
+
+
+def angle_of(row: Mapping[str, float], heading: str = "heading_deg", azimuth: str = "course_deg") -> float | None:
+    """The direction of an action for a drawing, deg counter-clockwise from east; None of an action without one.
+
+    True north is drawn upwards, wherever the sensor is.
+    """
+    if azimuth in row:
+        return 90.0 - row[azimuth]
+    return row.get(heading)
 
 
 def row_words(row: Row) -> str:
-    """`-30°` of a heading, `heading -30°, speed 5` of more columns, `still` of none."""
-    if len(row) == 1 and row[0][0] == "heading_deg":
+    """`-30°` of a heading or course, `heading -30°, speed 5` of more columns, `still` of none."""
+    if len(row) == 1 and row[0][0] in ("heading_deg", "course_deg"):
         return f"{row[0][1]:g}°"
     words = (f"{name} {value:g}{sign}" for (name, _, sign), value in ((_parts(name), x) for name, x in row))
     return ", ".join(words) or "still"

@@ -25,7 +25,7 @@ class MeanRewards:
     Attributes:
         time: s.
         actions: for each sensor its actions; where every run came with another heading, `turn_deg` from it in the place
-            of `heading_deg`.
+            of `heading_deg`, and `turn_right_deg` in the place of `course_deg`.
         tables: as those of a plan, averaged over the runs that evaluated an entry; the standard error is over the runs
             (0 for a single one), and entries that no run evaluated are NaN.
         shares: for each table, the share of the runs in which each of its entries was chosen.
@@ -157,11 +157,15 @@ def _turns(decision: Decision) -> tuple[Actions, ...]:
 
 
 def _as_turns(actions: Actions, heading: float) -> Actions:
-    if "heading_deg" not in actions.columns:
-        return actions
-    values, column = actions.values.copy(), actions.columns.index("heading_deg")
-    values[:, column] = np.degrees(wrap_angles(np.radians(values[:, column]) - heading))
-    return Actions(tuple("turn_deg" if name == "heading_deg" else name for name in actions.columns), values)
+    for name, turn, now in (
+        ("heading_deg", "turn_deg", heading),
+        ("course_deg", "turn_right_deg", np.pi / 2 - heading),
+    ):
+        if name in actions.columns:
+            values, column = actions.values.copy(), actions.columns.index(name)
+            values[:, column] = np.degrees(wrap_angles(np.radians(values[:, column]) - now))
+            return Actions(tuple(turn if each == name else each for each in actions.columns), values)
+    return actions
 
 
 def _head_alike(made: Sequence[Decision]) -> bool:

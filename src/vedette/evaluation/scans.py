@@ -10,7 +10,8 @@ import numpy as np
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import reject
-from vedette.recorded.instants import COMPONENTS, turned
+from vedette.platforms.compass import course_deg
+from vedette.recorded.instants import COMPONENTS
 from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_scan_times, build_true_sensors, drop_outs
 from vedette.scenarios.sections.recording import RecordingSection, sites_of
@@ -72,7 +73,7 @@ def scan_table(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
     """The scans of a run by columns, a row a measurement, as `vedette.recorded.parse_scans` reads them.
 
     `time`, `sensor`, what the sensors measure (`bearing_deg`, `range_m`, `x_m`, `y_m`), and where they were (`own_x_m`,
-    `own_y_m`, `own_heading_deg`). Angles are degrees clockwise from the north where every sensor with a bearing has a
+    `own_y_m`, `own_heading_deg`). Angles are degrees clockwise from true north where every sensor with a bearing has a
     compass; else they are `bearing_rad` and `own_heading_rad` from the east, which a reader must be told
     (`bearings: east`). What biases the scenario knows of are taken off.
 
@@ -95,11 +96,11 @@ def scan_table(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
         for site, scan, pose in zip(sites, scans, poses, strict=True):
             if scan is None:
                 continue
-            heading = float(np.degrees(turned(pose[2], "north")) % 360.0) if compass else float(pose[2])
+            heading = float(course_deg(site.north, pose[2], pose)) if compass else float(pose[2])
             of_all = {"time": time, "sensor": site.name, "own_x_m": pose[0], "own_y_m": pose[1]}
             of_all[f"own_heading_{unit}"] = heading
             columns = [names[name] for name in COMPONENTS[site.kind]]
-            for row in (site.told(scan.measurements) if compass else scan.measurements).tolist() or [()]:
+            for row in (site.told(scan.measurements, pose) if compass else scan.measurements).tolist() or [()]:
                 cells = {**of_all, **dict(zip(columns, row, strict=False))}
                 for name, column in table.items():
                     column.append(cells.get(name))

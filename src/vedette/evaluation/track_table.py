@@ -17,6 +17,7 @@ from vedette.evaluation.told import told_by
 from vedette.evaluation.track_formats import czml, geojson, mcap, utc_text
 from vedette.extras import need
 from vedette.files import write_file
+from vedette.platforms.compass import Compass, courses_of
 from vedette.recorded import Origin
 from vedette.scenarios import Scenario
 from vedette.simulation.records import RunRecord
@@ -30,13 +31,15 @@ def track_table(
     start: float = 0.0,
     is_utc: bool = False,
     names: Sequence[str] = (),
+    compass: Compass | None = None,
 ) -> dict[str, list[Any]]:
     """One row an estimate, by columns.
 
     `time_s` is that of the record plus `start`; `utc` where that is since 1970. `label` is `birth step.index`; `x_m`,
     `y_m`, `vx_mps`, `vy_mps` the estimate, `std_...` its standard deviations (velocities only where the state goes on
     with them: four components or more), `existence` the probability that it is there. `lon_deg`, `lat_deg` with an
-    origin. `target` names the true target that OSPA's assignment gives it, nearer than `cutoff` (m); None: none.
+    origin; with a compass `course_deg`, clockwise from true north, and `speed_mps`. `target` names the true target that
+    OSPA's assignment gives it, nearer than `cutoff` (m); None: none.
 
     names: of the true targets, by their ids; else `id + 1`.
     """
@@ -66,6 +69,9 @@ def track_table(
     if origin is not None:
         places = origin.to_degrees(np.array([row[2][:2] for row in rows]).reshape(-1, 2))
         table["lon_deg"], table["lat_deg"] = places[:, 0].tolist(), places[:, 1].tolist()
+    if compass is not None and dim >= 4:
+        courses = courses_of(compass, means.reshape(-1, dim))
+        table["course_deg"], table["speed_mps"] = courses[:, 0].tolist(), courses[:, 1].tolist()
     table["existence"] = [row[4] for row in rows]
     table["target"] = [_name(partners.get((row[0], row[1])), names) for row in rows]
     return table
@@ -76,7 +82,15 @@ def table_of_run(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
     model = scenario.model
     origin = None if model.origin is None else model.origin.build()
     start, is_utc, names = told_by(record, scenario)
-    return track_table(record, cutoff=model.ospa.cutoff, origin=origin, start=start, is_utc=is_utc, names=names)
+    return track_table(
+        record,
+        cutoff=model.ospa.cutoff,
+        origin=origin,
+        start=start,
+        is_utc=is_utc,
+        names=names,
+        compass=model.north() if model.by_compass else None,
+    )
 
 
 def write_tracks(path: Path, table: Mapping[str, Sequence[Any]]) -> None:

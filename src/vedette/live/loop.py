@@ -16,6 +16,7 @@ from vedette.errors import VedetteError
 from vedette.evaluation.track_formats import utc_text
 from vedette.live.messages import Message, read_message
 from vedette.models.arguments import reject
+from vedette.platforms.compass import Compass, PlaneCompass, courses_of
 from vedette.recorded import Conventions, Origin, Site
 from vedette.simulation.loop import PLANNER, cause_of
 from vedette.tracking import LateScans, Timeline
@@ -86,6 +87,13 @@ class Live:
     decide_every: float | None = None
     ahead: float = 60.0
     seed: int = 0
+
+    @property
+    def compass(self) -> Compass | None:
+        """By which directions go out; None: they are angles of the plane, counter-clockwise from east."""
+        if self.origin is not None:
+            return self.origin
+        return PlaneCompass() if any(site.compass for site in self.sites) else None
 
     def initial(self) -> LiveState:
         """Before the first line."""
@@ -163,6 +171,10 @@ class Live:
         if self.origin is not None and tracks:
             for track, (lon, lat) in zip(tracks, self.origin.to_degrees(found.means[:, :2]).tolist(), strict=True):
                 track.update(lon=lon, lat=lat)
+        compass = self.compass
+        if compass is not None and len(names) == 4:
+            for track, (course, speed) in zip(tracks, courses_of(compass, found.means).tolist(), strict=True):
+                track.update(course_deg=course, speed_mps=speed)
         counts = {"late": timeline.num_late, "dropped": timeline.num_dropped, "repeated": timeline.num_repeated}
         return {"line": state.num_lines, **self._told(state, belief.time), "tracks": tracks, **counts}
 

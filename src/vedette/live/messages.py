@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -35,8 +36,9 @@ def read_message(
     `{"sensor": name or number from 1, "time": s or ISO 8601, "measurements": [[...], ...], "pose": ...}`: measurements
     as `vedette.recorded.scans.COMPONENTS` has them, in rad (of a sensor with a compass in degrees) and m unless
     `conventions.units` says another; angles count as `conventions.bearings` says, else as the sensor tells them. The
-    pose, which may be left out, is `[x, y, heading_rad, ...]`, or `{"lon": , "lat": , "heading_deg": }`, whose heading
-    may be left out and else needs `bearings` or a compass.
+    pose, which may be left out, is `[x, y, heading_rad, ...]`, or `{"lon": , "lat": , "course_deg": }`, where the
+    course, clockwise from true north as in plans, may be left out; or with `heading_deg`, which counts as bearings do
+    and needs `bearings` or a compass.
 
     Args:
         line: of UTF-8 text.
@@ -57,6 +59,7 @@ def read_message(
     pose, more = _pose(data.get("pose"), f"{place}, pose", site)
     if "pose.heading_deg" not in pose and conventions.bearings is None and not site.compass:
         conventions = replace(conventions, bearings="east")
+    course = pose.pop("pose.course_deg", None)
     num, names = max(len(rows), 1), COMPONENTS[site.kind]
     columns: dict[str, list[Any]] = {"time": [time] * num, "sensor": [site.name] * num}
     columns |= {name: [row[j] for row in rows] if rows else [None] for j, name in enumerate(names)}
@@ -71,6 +74,8 @@ def read_message(
     )
     at = read.poses[0, 0].copy()
     at[3 : 3 + len(more)] = more
+    if course is not None and origin is not None:  # with a place in degrees an origin was needed
+        at[2] = origin.angle(math.radians(course), at)
     return Message(SensorScan(number, read.start, read.scans[0][0], at), read.is_utc)
 
 
@@ -128,11 +133,15 @@ def _pose(given: Any, field: str, site: Site) -> tuple[dict[str, float], list[fl
     if given is None:
         return {}, []
     if isinstance(given, dict):
-        if not {"lon", "lat"} <= set(given) <= {"lon", "lat", "heading_deg"}:
-            raise reject(field, "lon, lat and, if it is known, heading_deg", ", ".join(map(str, given)) or "nothing")
+        known = {"lon", "lat"} <= set(given) <= {"lon", "lat", "course_deg", "heading_deg"}
+        if not known or {"course_deg", "heading_deg"} <= set(given):
+            wanted = "lon, lat and, if it is known, course_deg or heading_deg"
+            raise reject(field, wanted, ", ".join(map(str, given)) or "nothing")
         for name, value in given.items():
             if not _is_number(value):
                 raise reject(f"{field}.{name}", "a number", value)
+            if name == "course_deg" and not 0.0 <= value <= 360.0:
+                raise reject(f"{field}.{name}", "degrees from 0 to 360, clockwise from true north", value)
         return {f"pose.{name}": value for name, value in given.items()}, []
     if not isinstance(given, list) or not 3 <= len(given) <= len(site.pose) or not all(map(_is_number, given)):
         wanted = "[x, y, heading_rad" + (", ...]" if len(site.pose) > 3 else "]")

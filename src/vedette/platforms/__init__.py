@@ -1,7 +1,9 @@
 """What a sensor may do, as rows of named numbers, and the poses that follow."""
 
 from vedette.platforms.base import Actions, Options, Platform, options_at
+from vedette.platforms.by_compass import ByCompass
 from vedette.platforms.camera import Carried, Pointing
+from vedette.platforms.compass import Compass, PlaneCompass
 from vedette.platforms.courses import PAPER_HEADINGS_DEG, Courses
 from vedette.platforms.fleet import Fleet
 from vedette.platforms.sequences import Sequences
@@ -10,10 +12,13 @@ from vedette.platforms.steps import Steps, Still, Waypoints
 __all__ = [
     "PAPER_HEADINGS_DEG",
     "Actions",
+    "ByCompass",
     "Carried",
+    "Compass",
     "Courses",
     "Fleet",
     "Options",
+    "PlaneCompass",
     "Platform",
     "Pointing",
     "Sequences",

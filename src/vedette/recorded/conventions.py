@@ -27,6 +27,8 @@ QUANTITIES: dict[str, Mapping[str, float]] = {
     "own_heading": ANGLES,
 }
 OTHER_NAMES = {"lon": ("longitude",), "lat": ("latitude",), "time": ("time_s", "time_utc"), "range": ("distance",)}
+# m, and a share of the distance from the origin: places in metres and in degrees of one row are nearer than that.
+ONE_PLACE, ONE_PLACE_SHARE = 50.0, 0.001
 MOST = {
     **dict.fromkeys(("lon", "own_lon"), 360.0),
     **dict.fromkeys(("lat", "own_lat"), 90.0),
@@ -60,6 +62,8 @@ class Conventions:
     def __post_init__(self) -> None:
         known = ("time", "sensor", *QUANTITIES)
         for where, given in (("columns", self.columns), ("units", self.units)):
+            if not isinstance(given, Mapping):
+                raise reject(where, "a mapping of quantities, such as {range: nmi}", given)
             for name in given:
                 if name not in known:
                     raise reject(where, f"quantities among {', '.join(known)}", name)

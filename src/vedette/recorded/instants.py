@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -14,6 +14,7 @@ from vedette.kernels.base.types import Floats
 from vedette.models import Bias
 from vedette.models.arguments import float_array
 from vedette.models.bias import LEAST_RANGE, NO_BIAS
+from vedette.platforms.compass import Compass, PlaneCompass, course_deg, wrapped
 from vedette.speaking import Speaking
 from vedette.text import counted
 from vedette.tracking import SensorScan
@@ -29,14 +30,9 @@ COMPONENTS = {
 }
 
 
-def turned(angles: ArrayLike, bearings: Bearings | None) -> Floats:
-    """Angles (rad) counted from the north, clockwise, as those from the east, counter-clockwise, or back again.
-
-    In [-pi, pi]; those that are from the east already are only brought there.
-    """
-    given = np.asarray(angles, np.float64)
-    found = math.pi / 2.0 - given if bearings == "north" else given
-    return np.asarray(found - 2.0 * math.pi * np.rint(found / (2.0 * math.pi)))
+def turned(angles: ArrayLike, bearings: Bearings | None, compass: Compass, place: ArrayLike) -> Floats:
+    """Return angles of the plane, rad in [-pi, pi], of angles that a sensor at `place` counts as `bearings` says."""
+    return compass.angle(angles, place) if bearings == "north" else wrapped(angles)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +45,8 @@ class Site:
         pose: [px, py, heading_rad, ...] where the rows do not say.
         bias: what the rows say too much, which is taken off as they are read; ranges that would be below 1 m without it
             are taken as 1 m.
-        compass: whether it tells bearings in degrees clockwise from the north, where the rows say nothing else.
+        compass: whether it tells bearings in degrees clockwise from true north, where the rows say nothing else.
+        north: where true north is; an `Origin` knows it at every place, without one it is along y.
     """
 
     name: str
@@ -57,20 +54,26 @@ class Site:
     pose: tuple[float, ...]
     bias: Bias = NO_BIAS
     compass: bool = False
+    north: Compass = field(default_factory=PlaneCompass)
 
-    def measured(self, told: ArrayLike) -> Floats:
+    def measured(self, told: ArrayLike, pose: ArrayLike | None = None) -> Floats:
         """(num, meas_dim) measurements as filters take them but for the bias, of the same as the sensor tells them.
+
+        pose: of the sensor then; None: the site's own.
 
         Raises:
             InputError: another shape, or numbers that are not finite.
         """
-        found = float_array("told", told, (None, len(COMPONENTS[self.kind])))
-        return self._with_bearings(found, lambda angles: turned(np.radians(angles), "north"))
+        found, at = float_array("told", told, (None, len(COMPONENTS[self.kind]))), self._place(pose)
+        return self._with_bearings(found, lambda angles: self.north.angle(np.radians(angles), at))
 
-    def told(self, measured: ArrayLike) -> Floats:
+    def told(self, measured: ArrayLike, pose: ArrayLike | None = None) -> Floats:
         """The inverse of `measured`; degrees from 0 to 360."""
-        found = float_array("measured", measured, (None, len(COMPONENTS[self.kind])))
-        return self._with_bearings(found, lambda angles: np.degrees(turned(angles, "north")) % 360.0)
+        found, at = float_array("measured", measured, (None, len(COMPONENTS[self.kind]))), self._place(pose)
+        return self._with_bearings(found, lambda angles: course_deg(self.north, angles, at))
+
+    def _place(self, pose: ArrayLike | None) -> Floats:
+        return np.asarray(self.pose if pose is None else pose, np.float64)[:2]
 
     def _with_bearings(self, measurements: Floats, change: Callable[[Floats], Floats]) -> Floats:
         if not self.compass or "bearing" not in COMPONENTS[self.kind]:

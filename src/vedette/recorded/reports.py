@@ -9,6 +9,7 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
+from vedette.recorded.conventions import ONE_PLACE, ONE_PLACE_SHARE
 from vedette.recorded.geography import Origin
 from vedette.recorded.opensky import is_opensky, of_opensky
 from vedette.recorded.tables import FARTHEST, Table
@@ -24,7 +25,7 @@ class Reports:
         times: (n,) s; of ISO 8601 times, seconds since 1970 UTC.
         tracks: (n,) index into `names`.
         positions: (n, 2) m.
-        velocities: (n, 2) m/s, or None where the record has none.
+        velocities: (n, 2) m/s along x and y of the plane, or None where the record has none.
         names: the record's own name of each target.
         origin_deg: longitude and latitude of (0, 0) where the record was geographic, else None.
         bounds_deg: its least and greatest longitude and latitude where it was geographic, else None.
@@ -50,6 +51,8 @@ def parse_reports(
 ) -> Reports:
     """Reports out of a table with columns time, id and x, y or longitude, latitude; vx, vy where there are any.
 
+    Of a geographic record `vx` and `vy` are to true east and north at the place of each report.
+
     Args:
         table: see `read_table`; state vectors of OpenSky are known by their columns where `columns` names none.
         columns: names in the table where they differ: {"time": "Time", "id": "MMSI", ...}. Naming a longitude and
@@ -71,7 +74,7 @@ def parse_reports(
         raise InputError(f"{table.source}: expected at least one report; got none")
     speed_columns = [given.get(name, name) for name in ("vx", "vy")]
     has_velocity = any(name in given for name in ("vx", "vy")) or all(name in table.columns for name in speed_columns)
-    velocities = _pair(table, speed_columns) if has_velocity else None
+    velocities = _velocities(table, given, speed_columns, origin) if has_velocity else None
     names, tracks = np.unique(labels, return_inverse=True)
     order = np.lexsort((times, tracks))  # of equal ones, the order of the file
     again = (np.diff(times[order], prepend=-np.inf) < _SAME_TIME) & (np.diff(tracks[order], prepend=-1) == 0)
@@ -85,6 +88,40 @@ def parse_reports(
 def _pair(table: Table, names: Sequence[str]) -> Floats:
     """(n, 2) of two columns, in m or m/s."""
     return np.stack([table.numbers(name, FARTHEST) for name in names], axis=1)
+
+
+def _velocities(
+    table: Table, given: Mapping[str, str], names: Sequence[str], origin: tuple[float, float] | None
+) -> Floats:
+    """(n, 2) along x and y of the plane, m/s."""
+    found = _pair(table, names)
+    if origin is None:
+        return found
+    degrees = (table.numbers(given.get(name, name), np.inf) for name in ("longitude", "latitude"))
+    return np.asarray(np.einsum("nij,nj->ni", Origin(*origin).axes(*degrees), found))
+
+
+def _degrees(table: Table, given: Mapping[str, str]) -> list[Floats]:
+    """Longitudes and latitudes."""
+    degrees = []
+    for name, limit in (("longitude", 360.0), ("latitude", 90.0)):
+        column = given.get(name, name)
+        values = table.numbers(column, np.inf)
+        if (wrong := np.abs(values) > limit).any():
+            raise table.fault(int(np.argmax(wrong)), column, f"a {name} in degrees, at most {limit:g}")
+        degrees.append(values)
+    return degrees
+
+
+def _check_agreed(table: Table, found: Floats, origin: Origin) -> None:
+    """That places in metres are those of the longitudes and latitudes beside them."""
+    told = origin.to_plane(*_degrees(table, {})) if len(found) else found
+    apart = np.hypot(*(found - told).T)
+    if (wrong := apart > ONE_PLACE + ONE_PLACE_SHARE * np.hypot(*told.T)).any():
+        i = int(np.argmax(wrong))
+        where = f"the place of its longitude and latitude ({told[i, 0]:.0f}, {told[i, 1]:.0f} m)"
+        wanted = f"x, y at {where}, not {apart[i]:.0f} m away; `columns: {{x: x, y: y}}` takes them alone"
+        raise table.fault(i, "x", wanted)
 
 
 def _positions(
@@ -102,14 +139,11 @@ def _positions(
     if not named_geographic and (has_plane or not has_globe):
         if origin_deg is not None:
             raise InputError("origin_deg: expected only for longitudes and latitudes; the record has x and y")
-        return _pair(table, [given.get(name, name) for name in ("x", "y")]), None, None
-    degrees = []
-    for name, limit in (("longitude", 360.0), ("latitude", 90.0)):
-        column = given.get(name, name)
-        values = table.numbers(column, np.inf)
-        if (wrong := np.abs(values) > limit).any():
-            raise table.fault(int(np.argmax(wrong)), column, f"a {name} in degrees, at most {limit:g}")
-        degrees.append(values)
+        found = _pair(table, [given.get(name, name) for name in ("x", "y")])
+        if has_globe and usual_origin_deg is not None and "x" not in given:
+            _check_agreed(table, found, Origin(*usual_origin_deg))
+        return found, None, None
+    degrees = _degrees(table, given)
     origin_deg = origin_deg or usual_origin_deg
     if origin_deg is None:
         origin_deg = (float(np.median(degrees[0])), float(np.median(degrees[1]))) if len(degrees[0]) else (0.0, 0.0)

@@ -72,9 +72,9 @@ class Table:
         return values
 
     def times(self, name: str) -> Floats:
-        """A column of numbers of seconds, or of ISO 8601 times."""
+        """A column of numbers of seconds, or of ISO 8601 times, whichever most of its cells are."""
         cells = self.column(name)
-        if not len(cells) or is_number(cells[0]):
+        if not are_dates(cells):
             return self.numbers(name, LATEST)
         values = np.empty(len(cells))
         for i, cell in enumerate(cells):
@@ -134,6 +134,26 @@ def is_number(cell: Any) -> bool:
     """Whether `number` takes it."""
     try:
         number(cell)
+    except (TypeError, ValueError, OverflowError):
+        return False
+    return True
+
+
+def are_dates(cells: Sequence[Any]) -> bool:
+    """Whether more of the cells are ISO 8601 times than numbers; of as many the first cell says.
+
+    What most cells are decides, so that a bad one among them is the bad one.
+    """
+    num = sum(map(is_number, cells))
+    if num == 0 or 2 * num > len(cells):
+        return num == 0 and len(cells) > 0
+    dates = sum(_is_date(cell) for cell in cells if not is_number(cell))
+    return dates > num or (dates == num and not is_number(cells[0]))
+
+
+def _is_date(cell: Any) -> bool:
+    try:
+        seconds(cell)
     except (TypeError, ValueError, OverflowError):
         return False
     return True

@@ -92,6 +92,7 @@ class LiveScreen:
             "recorded": True,
             "known": False,
             "origin": None if model.origin is None else [model.origin.lon, model.origin.lat],
+            **({"compass": True} if model.by_compass else {}),
             "utc": None,
             "names": [],
             "ospa_unit": "",

@@ -70,6 +70,7 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
         "names": told.names,
         "utc": told.start if told.is_utc else None,
         "origin": None if origin is None else [origin.lon, origin.lat],
+        **({"compass": True} if scenario.model.by_compass else {}),
         "ospa": [rounded_to(parts, 2) for parts in record.ospa] if is_known else [],
         "ospa_unit": scenario.model.ospa.unit,
         "axes": list(axes.values()),

@@ -9,6 +9,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,9 +21,10 @@ from vedette.filters import Filter, TwoStepFilter, labels_targets, shared_target
 from vedette.fusion import Clmb, CmDeltaGlmb, Fusion, Matched, ParallelUpdate
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models import SensorModel, TargetModel
-from vedette.platforms import Actions
+from vedette.platforms import Actions, ByCompass, Platform
 from vedette.platforms.base import actions_at
 from vedette.scenarios.loading import Scenario
+from vedette.scenarios.sections.courses import in_courses
 from vedette.scenarios.sections.custom import Custom, NotGiven
 from vedette.scenarios.sections.deciding import Lookahead
 from vedette.scenarios.sections.fusion import IN_FULL, OF_SCANS, ONE_BELIEF, CustomFusion
@@ -99,8 +101,14 @@ def build_sensors(scenario: Scenario) -> tuple[MobileSensor, ...]:
         known = sensor.build(region, method, folder, model.filter.detection_at)
         local = model.filter.build(targets, known, folder)
         _check_own(scenario, sensor, known, local)
-        found.append(MobileSensor(local, sensor.platform.build(folder), _scan_times(model, sensor)))
+        found.append(MobileSensor(local, _platform(model, sensor, folder), _scan_times(model, sensor)))
     return tuple(found)
+
+
+def _platform(model: ScenarioModel, sensor: Sensor, folder: Path) -> Platform:
+    """What carries a sensor; with an origin or a compass its actions are courses."""
+    platform = sensor.platform.build(folder)
+    return ByCompass(platform, model.north()) if model.by_compass and platform.columns else platform
 
 
 def _scan_times(model: ScenarioModel, sensor: Sensor) -> Floats | None:
@@ -220,7 +228,10 @@ def _first_actions(scenario: Scenario, sensors: tuple[MobileSensor, ...]) -> tup
     for s, (section, sensor, pose) in enumerate(places):
         row = section.platform.first_action(section.heading_deg)
         own = actions_at(f"sensors[{s}].platform", sensor.platform, pose)
-        found.append(Actions(own.columns, own.values[:1] if row is None else np.array([row])))
+        rows = own.values[:1] if row is None else np.array([row])
+        if row is not None and isinstance(sensor.platform, ByCompass):
+            rows = sensor.platform.of_plane(rows, pose)
+        found.append(Actions(own.columns, rows))
     return tuple(found)
 
 
@@ -294,6 +305,10 @@ def _told(scenario: Scenario) -> dict[str, Any]:
     model, (horizon_steps, horizon_period) = scenario.model, scenario.model.horizon
     told = model.model_dump(mode="json", include=_TOLD)
     told["sensors"] = [sensor.model_dump(mode="json", exclude={"truth"}) for sensor in model.sensors]
+    if model.by_compass:
+        told["sensors"] = [
+            in_courses(data, sensor, model.north()) for data, sensor in zip(told["sensors"], model.sensors, strict=True)
+        ]
     return told | {"decision_steps": list(model.decision_steps), "horizon": [horizon_steps, horizon_period]}
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from vedette.kernels.base.types import Bools, Floats
 from vedette.scenarios.coastline import coastline_cautions
+from vedette.scenarios.coverage import coverage_cautions
 from vedette.scenarios.cures import accepted, fusions_instead, with_own_labels
 from vedette.scenarios.faults import Path, Told
 from vedette.scenarios.loading import Scenario, document_of, place_fault
@@ -37,6 +38,7 @@ def cautions(scenario: Scenario) -> tuple[str, ...]:
     """Warnings of a valid scenario, one line each, with file, line and column where it was read from a file."""
     found = [*_records(scenario), *_views(scenario), *_births(scenario), *_late_beliefs(scenario)]
     found += [*_many_sensors(scenario), *_cells(scenario.model), *_labels(scenario.model)]
+    found += coverage_cautions(scenario.model)
     found += [*implausible(scenario.model), *coastline_cautions(scenario.model, scenario.folder)]
     if not found:
         return ()

@@ -13,6 +13,7 @@ from pydantic_core import ErrorDetails
 
 from vedette.scenarios.faults import Path, Told, describe
 from vedette.scenarios.sections.base import IN_PART, Section, Unread
+from vedette.scenarios.sections.courses import COURSES
 
 S = TypeVar("S", bound=Section)
 
@@ -125,6 +126,11 @@ def _unknown_key(path: Path, key: str, known: list[str]) -> Told:
         hint = "a box of degrees needs an `origin: {lon: , lat: }` of the scenario, and its four ends in order"
     if key in ("speed", "actions_deg", "headings") and "platform" not in path:
         hint = "the platform of a sensor has it: `platform: {kind: courses, speed: 50.0, headings_deg: [0, 90]}`"
+    if key in COURSES:
+        hint = (
+            "courses and azimuths count from true north, which needs an `origin` or a sensor with `compass: true`, "
+            "and no heading, direction or pointing beside them in the file"
+        )
     return Told((*path, key), _one_of(known), UNKNOWN, hint)
 
 

@@ -17,6 +17,7 @@ from vedette.scenarios.file_checks import BUILTIN_FOLDER, recorded_findings, ref
 from vedette.scenarios.geojson import with_zones
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.base import attempt
+from vedette.scenarios.sections.courses import as_written
 from vedette.scenarios.sections.recording import recording_findings
 from vedette.scenarios.yaml_reader import MOST_BYTES, Document, read_yaml
 from vedette.speaking import Speaking
@@ -62,7 +63,7 @@ def list_builtin() -> dict[str, FilePath]:
 
 def place_fault(document: Document, told: Told) -> Fault:
     """The fault at the place in the file where it says what stands at the data's path."""
-    written = _written_path(told.path, document.data)
+    written = as_written(_written_path(told.path, document.data), document.data)
     at_key = told.got == UNKNOWN or written not in document.value_places
     place = document.place(written) if at_key else document.value_place(written)
     return Fault(place, told._replace(path=written))

@@ -120,6 +120,9 @@ def scenario_of_sensors(
     own = document.data.get("recording")
     own = own if isinstance(own, Mapping) else {}
     conventions = Conventions({}, own.get("units") or {}, own.get("bearings"))
+    if conventions.bearings == "north":  # who counts from north is answered so; units stay what they would be
+        conventions = replace(conventions, units={"bearing": "rad", **conventions.units})
+        said["sensors"] = _with_compass(said)
     words = list[str]()
     told = {**_STAND_INS, "name": sensors.stem, **said, "targets": {"kind": "scripted", "tracks": []}}
     told |= _assumed_motion(said, speed, words)
@@ -137,6 +140,20 @@ def scenario_of_sensors(
         measured = [[np.array([[0.0, side / 4.0]])]] * len(model.sensors)
         model = _model(document, {**told, **_assumed_birth(model, measured, sensors.parent, speed, words)}, sensors)
     return OfSensors(Scenario(model, sensors), conventions, tuple(words))
+
+
+def _with_compass(said: Mapping[str, Any]) -> Any:
+    """The sensors, those with bearings that say nothing else with a compass."""
+    defaults, sensors = said.get("sensor_defaults"), said.get("sensors")
+    shared = defaults if isinstance(defaults, Mapping) else {}
+    if "compass" in shared or not isinstance(sensors, list):
+        return sensors
+    found = []
+    for sensor in sensors:
+        own = sensor.get("measurement", shared.get("measurement")) if isinstance(sensor, Mapping) else None
+        is_custom = isinstance(own, Mapping) and own.get("kind") == "custom"
+        found.append({"compass": True, **sensor} if isinstance(sensor, Mapping) and not is_custom else sensor)
+    return found
 
 
 def _reached(model: ScenarioModel, sensors: FilePath, words: list[str]) -> dict[str, float]:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Literal
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Literal
 
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.base import Section
 from vedette.scenarios.sections.birth import Birth
 from vedette.scenarios.sections.control import Control
+from vedette.scenarios.sections.courses import as_courses
 from vedette.scenarios.sections.fusion import OF_SCANS, AnyFusion, CustomFusion
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.tracking import AnyFilter, Filter
@@ -17,6 +18,9 @@ from vedette.scenarios.sections.true_sensors import BiasSection
 from vedette.scenarios.sections.undetected import UndetectedSection
 from vedette.scenarios.sections.world import RegionSection
 from vedette.text import counted
+
+if TYPE_CHECKING:
+    from vedette.platforms import Compass
 
 
 def one_line(scenario: Scenario) -> str:
@@ -38,11 +42,14 @@ def _tracker(model: ScenarioModel) -> str:
     return f"{kinds[0]} filter, {kinds[1]} fusion"
 
 
-def settings(section: Section) -> str:
-    """A section's kind and its plain values with their units: `constant_velocity, sigma_v 5 m/s^2`."""
+def settings(section: Section, told: Mapping[str, tuple[str, object]] | None = None) -> str:
+    """A section's kind and its plain values with their units: `constant_velocity, sigma_v 5 m/s^2`.
+
+    told: other names and values of some of its fields.
+    """
     words: list[str] = []
     for name, field in type(section).model_fields.items():
-        value = getattr(section, name)
+        name, value = (told or {}).get(name, (name, getattr(section, name)))
         if name == "kind":
             words.insert(0, str(value))
         elif value not in (None, ()) and not isinstance(value, Section | dict):
@@ -164,11 +171,12 @@ def _steps(steps: Literal["every"] | Sequence[int]) -> str:
     return ("step " if len(steps) == 1 else "steps ") + ", ".join(map(str, steps))
 
 
-def sensing(sensor: Sensor) -> list[tuple[str, str]]:
-    """What carries a sensor, what it measures, and how well."""
-    carrier = getattr(sensor.platform, "carrier", None)
+def sensing(sensor: Sensor, north: Compass | None = None) -> list[tuple[str, str]]:
+    """What carries a sensor, what it measures, and how well; its directions by a compass where there is one."""
+    carriers = [section for section in (sensor.platform, getattr(sensor.platform, "carrier", None)) if section]
+    words = [settings(one, None if north is None else as_courses(one, north, sensor.position)) for one in carriers]
     return [
-        ("platform", settings(sensor.platform) + (f", on: {settings(carrier)}" if carrier is not None else "")),
+        ("platform", ", on: ".join(words)),
         ("measures", sensor.measurement.kind),
         ("noise", settings(sensor.noise)),
         ("detection", settings(sensor.detection)),

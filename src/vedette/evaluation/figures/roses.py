@@ -38,11 +38,11 @@ _SECTORS = 24  # that headings which are no fixed set are counted in
 def roses_figure(comparison: Comparison, scene: Scene | None = None) -> Figure:
     """Shares of the runs in which each action was chosen: a row a strategy that decides, a column a decision.
 
-    A rose where every sensor was sent on a heading, and bars of the actions in words elsewhere. Headings are
-    counter-clockwise from east (0). Sensors stand side by side within the sector of a heading. The area of a bar of a
-    rose is in proportion to the share: the radius goes with its square root. Sensors that never had anything to do but
-    stand are left out, and more than six are taken together. Of many decisions at most six are shown, evenly spread,
-    the first and the last among them.
+    A rose where every sensor was sent on a heading or a course, and bars of the actions in words elsewhere. Headings
+    are counter-clockwise from east (0), courses clockwise from north (0, upwards). Sensors stand side by side within
+    the sector of a heading. The area of a bar of a rose is in proportion to the share: the radius goes with its square
+    root. Sensors that never had anything to do but stand are left out, and more than six are taken together. Of many
+    decisions at most six are shown, evenly spread, the first and the last among them.
 
     Raises `InputError` where no strategy made a decision, or no sensor had a choice.
     """
@@ -57,10 +57,11 @@ def roses_figure(comparison: Comparison, scene: Scene | None = None) -> Figure:
     shades = [shade for shade, _, _ in sensor_looks(list(sensors)).values()]
     size = min(TEXT_WIDTH / (len(columns) + 0.35), _SIZE)
     figure = new_figure(size * len(rows) + 0.5, width=size * (len(columns) + 0.35))
-    are_headings = all(
-        "heading_deg" in dict(choice[sensor]) for choice in _all_choices(comparison) for sensor in movers
-    )
-    polar = {"projection": "polar"} if are_headings else {}
+    rows_of = [dict(choice[sensor]) for choice in _all_choices(comparison) for sensor in movers]
+    angle = next((name for name in ("heading_deg", "course_deg") if all(name in row for row in rows_of)), None)
+    polar: dict[str, Any] = {"projection": "polar"} if angle else {}
+    if angle == "course_deg":
+        polar |= {"theta_offset": np.pi / 2.0, "theta_direction": -1}
     panels = figure.subplots(len(rows), len(columns), subplot_kw=polar, squeeze=False)
     for row, index in enumerate(rows):
         for column, decision in enumerate(columns):
@@ -69,8 +70,8 @@ def roses_figure(comparison: Comparison, scene: Scene | None = None) -> Figure:
             chosen = [tuple(choice[sensor] for sensor in movers) for choice in runs]
             if together:
                 chosen = [(each,) for choice in chosen for each in choice]
-            if are_headings and chosen:
-                _draw_rose(panel, _headings(chosen), shades)
+            if angle and chosen:
+                _draw_rose(panel, _headings(chosen, angle), shades)
             else:
                 _draw_bars(panel, chosen, shades)
             if row == 0:
@@ -95,9 +96,9 @@ def _all_choices(comparison: Comparison) -> list[Choice]:
     return [choice for each in comparison.ensembles for run in each.choices for choice in run]
 
 
-def _headings(chosen: list[Choice]) -> Ints:
-    """(num_runs, num_sensors) headings in whole degrees."""
-    degrees = [[dict(row)["heading_deg"] for row in choice] for choice in chosen]
+def _headings(chosen: list[Choice], angle: str) -> Ints:
+    """(num_runs, num_sensors) headings or courses in whole degrees."""
+    degrees = [[dict(row)[angle] for row in choice] for choice in chosen]
     return np.array(degrees, np.int64).reshape(len(chosen), -1) % 360
 
 

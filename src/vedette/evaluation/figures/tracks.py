@@ -14,6 +14,7 @@ from matplotlib.patches import Wedge
 from matplotlib.ticker import MaxNLocator
 
 from vedette.errors import InputError
+from vedette.evaluation.actions import angle_of
 from vedette.evaluation.comparison import Comparison
 from vedette.evaluation.figures.labels import drawn_text, short_label
 from vedette.evaluation.figures.ospa import draw_ospa
@@ -213,9 +214,10 @@ def _draw_field(axes: Axes, decision: Decision, sensor: int, size: float, scale:
     """A sector of a given size, where the sensor was told to point."""
     plan, pose = decision.plan, decision.poses[sensor]
     row = dict(zip(plan.actions[sensor].columns, plan.chosen_actions[sensor].tolist(), strict=True))
-    if "pointing_deg" in row:
+    middle = angle_of(row, "pointing_deg", "azimuth_deg")
+    if middle is not None:
         half = row.get("half_width_deg", float(np.rad2deg(pose[4])) if len(pose) > 4 else 0.0)
-        sides = row["pointing_deg"] - half, row["pointing_deg"] + half
+        sides = middle - half, middle + half
         axes.add_patch(Wedge(_point(pose[:2] * scale), size * scale, *sides, color=INK, alpha=0.2, lw=0, zorder=5))
 
 
@@ -223,8 +225,9 @@ def _direction(decision: Decision, sensor: int) -> Floats:
     """Where the sensor was sent, of length 1; 0 where its action is no heading and no step."""
     plan = decision.plan
     row = dict(zip(plan.actions[sensor].columns, plan.chosen_actions[sensor].tolist(), strict=True))
-    if "heading_deg" in row:
-        return np.array([np.cos(np.deg2rad(row["heading_deg"])), np.sin(np.deg2rad(row["heading_deg"]))])
+    heading = angle_of(row)
+    if heading is not None and row.get("distance_m") != 0.0:
+        return np.array([np.cos(np.deg2rad(heading)), np.sin(np.deg2rad(heading))])
     step = np.array([row.get("dx", 0.0), row.get("dy", 0.0)])
     return np.asarray(step / max(float(np.hypot(*step)), np.finfo(float).tiny))
 

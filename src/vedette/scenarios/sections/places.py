@@ -51,11 +51,18 @@ def in_metres(data: Mapping[str, Any]) -> Mapping[str, Any]:
 
     A place that is none stays, and is told of where it is read.
     """
-    try:
-        origin = OriginSection.model_validate(data.get("origin")).build()
-    except ValueError:
+    origin = origin_of(data)
+    if origin is None:
         return data
     return {key: value if key == "origin" else _converted(value, origin) for key, value in data.items()}
+
+
+def origin_of(data: Mapping[str, Any]) -> Origin | None:
+    """The origin of a scenario's data; None where it has none, or one that cannot be read."""
+    try:
+        return OriginSection.model_validate(data.get("origin")).build()
+    except ValueError:
+        return None
 
 
 def is_place(value: Any) -> bool:

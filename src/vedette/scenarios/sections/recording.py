@@ -13,7 +13,7 @@ from pydantic import Field
 
 from vedette.errors import InputError
 from vedette.scenarios.faults import Finding, describe
-from vedette.scenarios.sections.base import SHA256_FIELD, NonNegative, Section, Sha256, attempt
+from vedette.scenarios.sections.base import SHA256_FIELD, NonNegative, Section, Sha256, attempt, is_whole
 
 if TYPE_CHECKING:
     from vedette.recorded import Origin, RecordedScans, Site
@@ -87,8 +87,9 @@ def sites_of(world: ScenarioModel) -> list[Site]:
     """The sensors of a recording."""
     from vedette.recorded import Site
 
+    north = world.north()
     return [
-        Site(name, sensor.measurement.kind, sensor.pose, sensor.bias.build(), sensor.compass)
+        Site(name, sensor.measurement.kind, sensor.pose, sensor.bias.build(), sensor.compass, north)
         for name, sensor in zip(world.sensor_names, world.sensors, strict=True)
     ]
 
@@ -107,6 +108,8 @@ def recording_findings(world: ScenarioModel, folder: Path) -> Iterator[Finding]:
 
 
 def _content(section: RecordingSection, world: ScenarioModel, folder: Path) -> Iterator[Finding]:
+    if not is_whole(section):
+        return
     try:
         section.build(world, folder)
     except InputError as error:

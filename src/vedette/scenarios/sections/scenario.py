@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, field_validator
 
@@ -15,6 +15,7 @@ from vedette.scenarios.sections.base import Name, Section, attempt, check
 from vedette.scenarios.sections.birth import Birth
 from vedette.scenarios.sections.checks import CHECKS, step_of_time
 from vedette.scenarios.sections.control import Control
+from vedette.scenarios.sections.courses import from_east
 from vedette.scenarios.sections.derived import of_kind
 from vedette.scenarios.sections.fusion import AnyFusion, Fusion
 from vedette.scenarios.sections.network import NetworkSection
@@ -32,6 +33,9 @@ from vedette.scenarios.sections.world import (
     Survival,
     Time,
 )
+
+if TYPE_CHECKING:  # with it come the models, which a check does without
+    from vedette.platforms.compass import Compass
 
 # Of a horizon that is as long as it is to the next decision.
 _MOST_STEPS = 100
@@ -125,13 +129,13 @@ class ScenarioModel(Section):
 
     @classmethod
     def in_metres(cls, data: Mapping[str, Any]) -> Mapping[str, Any]:
-        """With places in degrees, as an origin allows them, in metres."""
-        return in_metres(data)
+        """With places in degrees, as an origin allows them, in metres, and courses as headings."""
+        return from_east(in_metres(data))
 
     @classmethod
     def prepared(cls, data: Mapping[str, Any]) -> Mapping[str, Any]:
         """In metres, with what `sensor_defaults` gives in every sensor, and a reward where none is named."""
-        return with_reward(merge_sensor_defaults(in_metres(data)))
+        return with_reward(merge_sensor_defaults(cls.in_metres(data)))
 
     @field_validator("sensor_defaults")
     @classmethod
@@ -147,6 +151,18 @@ class ScenarioModel(Section):
     def sensor_names(self) -> tuple[str, ...]:
         """Name of each sensor; `sensor 1`, `sensor 2`, ... where none is given."""
         return tuple(sensor.name or f"sensor {number}" for number, sensor in enumerate(self.sensors, 1))
+
+    @property
+    def by_compass(self) -> bool:
+        """Whether directions come in and go out as courses, clockwise from true north, as on a chart."""
+        recorded = self.recording is not None and self.recording.bearings == "north"
+        return self.origin is not None or recorded or any(sensor.compass for sensor in self.sensors)
+
+    def north(self) -> Compass:
+        """Where true north is: at an origin's place on the Earth, else along y."""
+        from vedette.platforms.compass import PlaneCompass
+
+        return PlaneCompass() if self.origin is None else self.origin.build()
 
     @property
     def decision_steps(self) -> tuple[int, ...]:

@@ -127,7 +127,11 @@ class Sensor(Section):
 
     name: Name | None = Field(default=None, description="What to call it; none: `sensor 1`, `sensor 2`, ... [-].")
     position: Point = Field(description="Where it starts [m].")
-    heading_deg: float = Field(default=0.0, description="Heading at the start, counter-clockwise from east [deg].")
+    heading_deg: float = Field(
+        default=0.0,
+        description="Heading at the start, counter-clockwise from east; with an origin or a compass `course_deg` may "
+        "stand instead, clockwise from true north [deg].",
+    )
     platform: AnyPlatform = Field(default=of_kind("still"), description="What carries it: what it may do [-].")
     moves_from: Literal["first_decision", "start"] = Field(
         default="first_decision",
@@ -137,8 +141,9 @@ class Sensor(Section):
     measurement: Measurement = Field(default=of_kind("bearing_range"), description="What it measures [-].")
     compass: bool = Field(
         default=False,
-        description="Whether it tells bearings as a compass does, in degrees clockwise from the north: in recordings "
-        "and lines that say nothing else, and where scans are written; else in radians from the east [-].",
+        description="Whether it tells bearings as a compass does, in degrees clockwise from true north: in recordings "
+        "and lines that say nothing else, and where scans are written; else in radians from the east. Plans and tables "
+        "of the scenario then have courses [-].",
     )
     noise: Noise = Field(default=of_kind("range_dependent"), description="Measurement noise [-].")
     detection: Detection = Field(default=of_kind("gaussian"), description="Probability of detection [-].")

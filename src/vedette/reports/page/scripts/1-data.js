@@ -7,7 +7,6 @@ for (const run of runs) run.decisions.forEach((decision) => joined(decision, run
 const minus = (text) => text.replaceAll("-", "\u2212");
 const fixed = (value, digits) => minus(value.toFixed(digits));
 const bounded = (value, low, high) => Math.min(high, Math.max(low, value));
-const degrees = (radians) => minus(String(Math.round((radians * 180) / Math.PI)));
 
 const extentOf = (run) => Math.max(run.extent[1] - run.extent[0], run.extent[3] - run.extent[2]);
 const unitOf = (run) => (extentOf(run) > 5000 ? { name: "km", metres: 1000 } : { name: "m", metres: 1 });

@@ -25,6 +25,24 @@ function earthBelow([lonDegrees, latDegrees], east, north) {
   return undefined;
 }
 
+// Radians clockwise from true north at a place, of an angle of the plane; without an origin north is along y.
+function azimuthOf(run, east, north, angle) {
+  const found = run.origin && earthBelow(run.origin, east, north);
+  if (!found) return Math.PI / 2 - angle;
+  const [off, start] = [found[0] - (run.origin[0] * Math.PI) / 180, (run.origin[1] * Math.PI) / 180];
+  const [eastX, northX] = [Math.cos(off), -Math.sin(found[1]) * Math.sin(off)];
+  const eastY = Math.sin(start) * Math.sin(off);
+  const northY = Math.sin(start) * Math.sin(found[1]) * Math.cos(off) + Math.cos(start) * Math.cos(found[1]);
+  const [along, up] = [Math.cos(angle), Math.sin(angle)];
+  return Math.atan2(northY * along - northX * up, eastX * up - eastY * along);
+}
+
+// A direction in whole degrees: from 0 to 359 clockwise from true north, or counter-clockwise from east without a compass.
+function directionOf(run, east, north, angle) {
+  if (!run.compass) return minus(String(Math.round((angle * 180) / Math.PI)));
+  return String((Math.round((azimuthOf(run, east, north, angle) * 180) / Math.PI) + 360) % 360);
+}
+
 // `50.78650° N, 1.11710° W`; nothing where there is no origin.
 function degreesOf(run, east, north) {
   const found = run.origin && earthBelow(run.origin, east, north);

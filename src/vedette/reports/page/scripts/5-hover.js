@@ -13,7 +13,9 @@ function describeAt(run, step, view, x, y, show) {
   run.poses[step].forEach(([east, north, heading, pointing], s) => {
     if (near(east, north)) {
       const at = `${metres(east, run)}, ${metres(north, run)}`;
-      found.push(`${run.sensors[s].name}: at ${at}, heading ${degrees(heading)}\u00b0${pointing === undefined ? "" : `, pointing ${degrees(pointing)}\u00b0`}`);
+      const [ahead, aside] = run.compass ? ["course", "azimuth"] : ["heading", "pointing"];
+      const along = (angle) => `${directionOf(run, east, north, angle)}\u00b0`;
+      found.push(`${run.sensors[s].name}: at ${at}, ${ahead} ${along(heading)}${pointing === undefined ? "" : `, ${aside} ${along(pointing)}`}`);
     }
   });
   if (show.measurements && found.length < 3) found.push(...measurementsAt(run, step, view, x, y).slice(0, 3));
@@ -21,7 +23,8 @@ function describeAt(run, step, view, x, y, show) {
 }
 
 function describeTarget(run, target, east, north, velocity) {
-  const speed = velocity.length > 1 ? `, speed ${fixed(Math.hypot(velocity[0], velocity[1]), 1)} m/s` : "";
+  const course = run.compass ? `, course ${directionOf(run, east, north, Math.atan2(velocity[1], velocity[0]))}\u00b0` : "";
+  const speed = velocity.length > 1 ? `${course}, speed ${fixed(Math.hypot(velocity[0], velocity[1]), 1)} m/s` : "";
   return `${targetName(run, target)}: at ${metres(east, run)}, ${metres(north, run)}${speed}`;
 }
 
@@ -59,8 +62,8 @@ function distanceTo(kind, view, x, y, px, py, u, v) {
 }
 
 function describeMeasurement(run, kind, east, north, u, v) {
-  if (kind === "ray") return `bearing ${degrees(u)}\u00b0`;
+  if (kind === "ray") return `bearing ${directionOf(run, east, north, u)}\u00b0`;
   if (kind === "circle") return `range ${metres(u, run)}`;
   if (kind === "position") return `at ${metres(u, run)}, ${metres(v, run)}`;
-  return `bearing ${degrees(Math.atan2(v - north, u - east))}\u00b0, range ${metres(Math.hypot(u - east, v - north), run)}`;
+  return `bearing ${directionOf(run, east, north, Math.atan2(v - north, u - east))}\u00b0, range ${metres(Math.hypot(u - east, v - north), run)}`;
 }

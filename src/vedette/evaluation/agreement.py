@@ -1,0 +1,165 @@
+"""Whether the sensors of a recording agree on targets, for the errors of units, north and places that filters bear."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from itertools import combinations
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from vedette.evaluation.scans import LIE, Scans, scans_of_record
+from vedette.kernels.base.types import Floats
+from vedette.scenarios import Scenario
+from vedette.scenarios.sections.sensors import Sensor
+from vedette.scenarios.views import field_of_view
+from vedette.simulation.records import RunRecord
+
+_GATE = 4.0  # standard deviations between an estimate and a measurement of it
+_LASTING = 10  # estimates of a track that counts
+_LEAST, _SHARE = 3, 0.25  # scans, and their share, at which a sensor has measured a track that is its own
+_FEWEST_PAIRS, _CHANCE = 10, 0.1  # so many pairs tell something; at most this share of them agrees by chance
+_STEADY = 0.25  # of an offset between two tracks: how much it may vary
+_BESIDE = 0.1  # of the distance from a sensor, at most: an offset beyond is of no bias
+_SEEN = 0.3  # probability of detection from which on a scan should have the target
+
+Label: TypeAlias = tuple[int, ...]
+
+
+class _Life(NamedTuple):
+    """A track: its estimates by scan, means and variances of position, and at which scans a sensor did measure it.
+
+    looks: for each sensor, whether each of its scans of what it sees had a measurement of the track.
+    """
+
+    means: dict[int, Floats]
+    looks: tuple[list[bool], ...]
+
+    def measured_by(self, sensor: int) -> bool:
+        own = self.looks[sensor]
+        return sum(own) >= max(_LEAST, _SHARE * len(own))
+
+
+def disagreements(record: RunRecord, scenario: Scenario) -> tuple[str, ...]:
+    """Return warnings of sensors of a recording that agree on no target, and of tracks that run side by side.
+
+    A pair is a track that one of two sensors measures and a scan of the other that should have seen it. Sensors that
+    measure no places in the plane are left out. Raises `VedetteError` for a recording that cannot be read.
+    """
+    model = scenario.model
+    placed = [s for s, sensor in enumerate(model.sensors) if LIE.get(sensor.measurement.kind) in ("point", "position")]
+    if model.recording is None or len(placed) < 2:
+        return ()
+    lives = _lives(record, scenario, scans_of_record(record, scenario), placed)
+    found = list[str]()
+    for first, second in combinations(placed, 2):
+        looks = [
+            look
+            for life in lives.values()
+            for one, other in ((first, second), (second, first))
+            if life.measured_by(one)
+            for look in life.looks[other]
+        ]
+        both = any(life.measured_by(first) and life.measured_by(second) for life in lives.values())
+        if both or len(looks) < _FEWEST_PAIRS or sum(looks) > _CHANCE * len(looks):
+            continue
+        names = model.sensor_names[first], model.sensor_names[second]
+        pairs = f"{sum(looks)} of {len(looks)} pairs of a track of one and a scan of the other"
+        checks = "check units, north (compass or east) and places"
+        found.append(f"{names[0]} and {names[1]} agree on no target ({pairs}): {checks}")
+        found += _side_by_side(lives, (first, second), names, record.poses[0, [first, second], :2])
+    return tuple(found)
+
+
+def _lives(record: RunRecord, scenario: Scenario, scans: Scans, placed: list[int]) -> dict[Label, _Life]:
+    """The tracks that last, by label."""
+    sensors, stds = scenario.model.sensors, _stds(scenario, placed)
+    lives: dict[Label, _Life] = {}
+    for k, estimate in enumerate(record.estimates):
+        for label, mean, cov in zip(map(tuple, estimate.labels.tolist()), estimate.means, estimate.covs, strict=True):
+            life = lives.setdefault(label, _Life({}, tuple([] for _ in sensors)))
+            life.means[k] = mean[:2]
+            for s in placed:
+                scan, pose = scans[k][s], record.poses[k, s]
+                if scan is None or not _sees(sensors[s], pose, mean):
+                    continue
+                kind = sensors[s].measurement.kind
+                life.looks[s].append(_has_measured(scan.measurements, kind, stds[s], pose, mean[:2], cov[:2, :2]))
+    return {label: life for label, life in lives.items() if len(life.means) >= _LASTING}
+
+
+def _has_measured(scan: Floats, kind: str, stds: Floats, pose: Floats, mean: Floats, cov: Floats) -> bool:
+    """Whether a measurement of a scan lies within the gate of an estimate."""
+    if not len(scan):
+        return False
+    if kind == "position":
+        off, turn = scan - mean, np.eye(2)
+    else:
+        ahead = mean - pose[:2]
+        distance = max(float(np.hypot(*ahead)), 1.0)
+        along = ahead / distance
+        turn = np.array([[-along[1] / distance, along[0] / distance], along])
+        off = scan - [math.atan2(ahead[1], ahead[0]), distance]
+        off[:, 0] = np.remainder(off[:, 0] + math.pi, 2.0 * math.pi) - math.pi
+    spread = turn @ cov @ turn.T + np.diag(stds**2)
+    return bool((np.einsum("ni,ij,nj->n", off, np.linalg.inv(spread), off) <= _GATE**2).any())
+
+
+def _stds(scenario: Scenario, placed: list[int]) -> dict[int, Floats]:
+    """For each sensor the least standard deviations of its two components; 0 where a custom noise gives none."""
+    model = scenario.model
+    region, method, found = model.region.build(), model.filter.gaussian_method, {}
+    for s in placed:
+        local = model.sensors[s].build(region, method, scenario.folder, model.filter.detection_at)
+        found[s] = np.zeros(2) if local.noise.least_stds is None else np.asarray(local.noise.least_stds)
+    return found
+
+
+def _sees(sensor: Sensor, pose: Floats, mean: Floats) -> bool:
+    """Whether a sensor at a pose should see a place, as far as its detection says."""
+    ahead = mean[:2] - pose[:2]
+    distance = float(np.hypot(*ahead))
+    if sensor.detection.kind == "constant":
+        return float(sensor.detection.probability) >= _SEEN
+    if sensor.detection.kind == "gaussian":
+        return math.exp(-0.5 * (distance / sensor.detection.sigma) ** 2) >= _SEEN
+    view = field_of_view(sensor, pose.tolist())
+    if view is None:
+        return True
+    off = abs(math.remainder(math.atan2(ahead[1], ahead[0]) - view.middle, 2.0 * math.pi))
+    return distance <= view.reach and off <= view.half_width and view.probability >= _SEEN
+
+
+def _side_by_side(
+    lives: Mapping[Label, _Life], pair: tuple[int, int], names: tuple[str, str], places: Floats
+) -> Iterator[str]:
+    """Tracks of one sensor that keep a small distance from one of the other, as two of one target do.
+
+    places: (2, 2) m, of the two sensors.
+    """
+    first, second = (
+        [life for life in lives.values() if life.measured_by(one) and not life.measured_by(other)]
+        for one, other in (pair, pair[::-1])
+    )
+    offsets = [found for one in first if (found := _nearest(one, second, places)) is not None]
+    if offsets:
+        apart = f"{np.median(offsets):.0f} m from one of {names[1]}"
+        what = f"{len(offsets)} of {len(first)} tracks of {names[0]} keep {apart}, as two tracks of one target do"
+        yield f"{what}: `vedette calibrate` finds biases of range, bearing, clock and place"
+
+
+def _nearest(life: _Life, others: list[_Life], places: Floats) -> float | None:
+    """m to the nearest of other tracks that keeps its distance; None where none does, or none that is near enough."""
+    found: float | None = None
+    mean = np.mean(list(life.means.values()), axis=0)
+    most = _BESIDE * float(np.hypot(*(mean - places).T).min())
+    for other in others:
+        both = sorted(life.means.keys() & other.means.keys())
+        if len(both) < _LASTING:
+            continue
+        offsets = np.array([other.means[k] - life.means[k] for k in both])
+        varies, size = float(np.sqrt(offsets.var(axis=0).sum())), float(np.hypot(*offsets.mean(axis=0)))
+        if varies <= _STEADY * size and size <= (most if found is None else found):
+            found = size
+    return found

@@ -1,0 +1,162 @@
+"""Platforms whose actions are given by compass: courses clockwise from true north, with speeds in m/s."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from vedette.kernels.base.types import Floats
+from vedette.models.arguments import instance
+from vedette.platforms.base import Platform, actions_at, check_platform, courses_of
+from vedette.platforms.camera import Carried, Pointing
+from vedette.platforms.compass import Compass, PlaneCompass, course_deg
+from vedette.platforms.courses import Courses
+from vedette.platforms.steps import Steps, Waypoints
+
+_COURSES = {"heading_deg": "course_deg", "pointing_deg": "azimuth_deg"}
+_NAMES = {**_COURSES, "speed": "speed_mps"}
+_AT_ONCE = 1e-3  # s after a decision, when a platform is under way
+_DIGITS = 9  # of degrees and metres, so that a course of 60 degrees reads 60
+
+
+@dataclass(frozen=True, slots=True)
+class ByCompass:
+    """A platform whose directions are counted clockwise from true north instead of counter-clockwise from east.
+
+    `heading_deg` becomes `course_deg`, from 0 to 360, with `speed_mps`; `pointing_deg` becomes `azimuth_deg`. A step is
+    `course_deg`, `speed_mps` and `distance_m`; a waypoint has the course and the speed at which it is headed for.
+    The fixed directions of `Courses`, `Steps` and `Pointing` are true ones wherever the platform is. Those that the
+    pose or a custom platform gives are angles of the plane, which are turned at the place of the platform.
+
+    Attributes:
+        platform: what moves.
+        compass: where true north is, such as a `vedette.recorded.Origin`.
+
+    Raises:
+        InputError: no platform.
+    """
+
+    platform: Platform
+    compass: Compass = field(default_factory=PlaneCompass)
+
+    def __post_init__(self) -> None:
+        check_platform("platform", self.platform)
+        instance("compass", self.compass, Compass)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Those of the platform under the names of the compass."""
+        return tuple(name for part in self._parts for name in _columns(part))
+
+    def actions(self, pose: Floats) -> Floats:
+        """(num_actions, num_columns) those of the platform, in its order."""
+        return self._given(actions_at("platform", self.platform, pose).values, pose, fixed=True)
+
+    def of_plane(self, rows: Floats, pose: Floats) -> Floats:
+        """(num_rows, num_columns) of rows of the platform's own columns, all of whose angles are of the plane."""
+        return self._given(rows, pose, fixed=False)
+
+    def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
+        """That of the platform."""
+        return np.asarray(self.courses(pose, action[np.newaxis], times)[0])
+
+    def courses(self, pose: Floats, actions: Floats, times: Floats) -> Floats:
+        """Those of many actions at once."""
+        return courses_of("platform", self.platform, pose, self._own(actions, pose), times)
+
+    @property
+    def _parts(self) -> tuple[Platform, ...]:
+        found = self.platform
+        return (found.carrier, found.pointing) if isinstance(found, Carried) else (found,)
+
+    def _given(self, rows: Floats, pose: Floats, *, fixed: bool) -> Floats:
+        """(num_rows, num_columns) of rows of the platform's own columns; fixed directions may be true ones."""
+        found, place = [], 0
+        for part in self._parts:
+            own = rows[:, place : place + len(part.columns)]
+            place += len(part.columns)
+            compass = PlaneCompass() if fixed and _is_fixed(part) else self.compass
+            found.append(_given(part, own, self._pose_of(part, pose), compass))
+        return np.hstack(found)
+
+    def _own(self, actions: Floats, pose: Floats) -> Floats:
+        """(num_actions, num_columns of the platform) the platform's own rows of actions."""
+        found, place = [], 0
+        for part in self._parts:
+            own = actions[:, place : place + len(_columns(part))]
+            place += len(_columns(part))
+            found.append(_own(part, own, self._pose_of(part, pose), self.compass))
+        return np.hstack(found)
+
+    def _pose_of(self, part: Platform, pose: Floats) -> Floats:
+        """What `Carried` passes on: a carrier gets place and heading alone."""
+        is_carrier = isinstance(self.platform, Carried) and part is self.platform.carrier
+        return pose[:3] if is_carrier else pose
+
+
+def _is_fixed(part: Platform) -> bool:
+    """Whether its directions are the same at every pose."""
+    return isinstance(part, Steps) or (isinstance(part, Courses | Pointing) and not part.relative)
+
+
+def _columns(part: Platform) -> tuple[str, ...]:
+    if isinstance(part, Steps):
+        return ("course_deg", "speed_mps", "distance_m")
+    if isinstance(part, Waypoints):
+        return (*part.columns, "course_deg", "speed_mps")
+    names = tuple(_NAMES.get(name, name) for name in part.columns)
+    if len(set(names)) < len(names):  # a custom platform that has a course beside its heading
+        return tuple(part.columns)
+    return (*names, "speed_mps") if "heading_deg" in part.columns and "speed_mps" not in names else names
+
+
+def _given(part: Platform, rows: Floats, pose: Floats, compass: Compass) -> Floats:
+    """Rows of a platform under the columns of the compass."""
+    if isinstance(part, Steps):
+        lengths = np.hypot(rows[:, 0], rows[:, 1])
+        courses = np.where(lengths > 0.0, _course(compass, np.arctan2(rows[:, 1], rows[:, 0]), pose), 0.0)
+        return np.column_stack([courses, np.where(lengths > 0.0, part.speed, 0.0), np.round(lengths, _DIGITS)])
+    if isinstance(part, Waypoints):
+        return np.hstack([rows, _under_way(part, rows, pose, compass)])
+    names, found = _columns(part), np.array(rows)
+    for i, name in enumerate(part.columns):
+        if name in _COURSES and names[i] != name:
+            found[:, i] = _course(compass, np.radians(rows[:, i]), pose)
+    if len(names) == len(part.columns):
+        return found
+    speeds = (
+        np.full(len(rows), part.speed) if isinstance(part, Courses) else _under_way(part, rows, pose, compass)[:, 1]
+    )
+    return np.column_stack([found, speeds])
+
+
+def _under_way(part: Platform, rows: Floats, pose: Floats, compass: Compass) -> Floats:
+    """(num_rows, 2) course, deg, and speed, m/s, just after each action began; 0 and 0 of one that stays."""
+    poses = courses_of("platform", part, pose, rows, np.array([_AT_ONCE]))[:, 0]
+    away = np.hypot(*(poses[:, :2] - pose[:2]).T) / _AT_ONCE
+    speeds = np.round(away, 6)  # a metre in a million m of a place has no more digits
+    return np.column_stack([np.where(speeds > 0.0, _course(compass, poses[:, 2], pose), 0.0), speeds])
+
+
+def _own(part: Platform, actions: Floats, pose: Floats, compass: Compass) -> Floats:
+    """The rows of a platform that actions under the columns of the compass are."""
+    if isinstance(part, Waypoints):
+        return actions[:, :1]
+    if isinstance(part, Steps):
+        angles = compass.angle(np.radians(actions[:, 0]), pose)
+        return np.asarray(actions[:, 2:] * np.column_stack([np.cos(angles), np.sin(angles)]))
+    names, found = _columns(part), np.array(actions[:, : len(part.columns)])
+    for i, name in enumerate(part.columns):
+        if name in _COURSES and names[i] != name:
+            found[:, i] = np.degrees(compass.angle(np.radians(actions[:, i]), pose))
+    if _is_fixed(part) or not len(part.columns):
+        return found
+    # A custom platform gets its own row back, to the last bit.
+    own = np.asarray(part.actions(pose.copy()), np.float64)
+    same = (_given(part, own, pose, compass) == actions[:, np.newaxis]).all(axis=2)
+    return np.where(same.any(axis=1)[:, np.newaxis], own[same.argmax(axis=1)], found)
+
+
+def _course(compass: Compass, angles: Floats, pose: Floats) -> Floats:
+    return np.asarray(np.round(course_deg(compass, angles, pose), _DIGITS) % 360.0)

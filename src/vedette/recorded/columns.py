@@ -1,0 +1,106 @@
+"""The columns of a table of scans: which quantity each is, in which unit, and whether they are what sensors measure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from vedette.errors import InputError
+from vedette.models.arguments import reject
+from vedette.platforms.compass import PlaneCompass
+from vedette.recorded.conventions import ANGLES, OTHER_NAMES, QUANTITIES, Conventions
+from vedette.recorded.geography import Origin
+from vedette.recorded.instants import COMPONENTS, Site
+from vedette.recorded.tables import Table, are_dates, column_names
+from vedette.text import shown
+
+
+class ScanColumns:
+    """The columns of a table as quantities; raises `InputError` for those that are missing or do not fit together."""
+
+    def __init__(self, table: Table, sites: Sequence[Site], conventions: Conventions, origin: Origin | None) -> None:
+        self.table, self.sites, self.conventions, self.origin = table, sites, conventions, origin
+        self.compass = origin or PlaneCompass()
+        self.bearings = tuple(conventions.bearings or ("north" if site.compass else table.bearings) for site in sites)
+        self._columns: dict[str, tuple[str, float]] = {}
+        for quantity, units in QUANTITIES.items():
+            if (found := self._found(quantity, units)) is not None:
+                self._columns[quantity] = found
+        self._time, self._sensor = self._plain("time"), self._plain("sensor")
+        self._numbers = {site.name: s for s, site in enumerate(sites)} | {
+            str(s): s - 1 for s in range(1, len(sites) + 1) if str(s) not in {site.name for site in sites}
+        }
+        self.is_utc = are_dates(table.columns[self._time])
+        self._check()
+
+    def _plain(self, quantity: str) -> str:
+        """The column of time or sensor."""
+        names = (self.conventions.columns.get(quantity, quantity), *OTHER_NAMES.get(quantity, ()))
+        for name in names:
+            if name in self.table.columns:
+                return name
+        self.table.column(names[0])
+        raise AssertionError  # it is not there, which was told
+
+    def _found(self, quantity: str, units: Mapping[str, float]) -> tuple[str, float] | None:
+        """The column of a quantity and what one of its units is in SI; None where there is none."""
+        if (named := self.conventions.columns.get(quantity)) is not None:
+            self.table.column(named)
+            return named, self._unit(quantity, named, units)
+        for stem in (quantity, *OTHER_NAMES.get(quantity, ())):
+            for name in (stem, *(f"{stem}_{unit}" for unit in units)):
+                if name in self.table.columns:
+                    return name, self._unit(quantity, name, units)
+        return None
+
+    def _unit(self, quantity: str, name: str, units: Mapping[str, float]) -> float:
+        given = self.conventions.units.get(quantity)
+        ends = [unit for unit in units if name.endswith(f"_{unit}")]
+        if given is None and not ends and units is ANGLES:
+            if self._told_by_compass(quantity):
+                return ANGLES["deg"]
+            wanted = f"a unit of {quantity}: a column {quantity}_deg or {quantity}_rad, or units: {{{quantity}: deg}}"
+            raise InputError(f"{self.table.source}, column {shown(name)}: expected {wanted}; got none")
+        return units[given or (ends[0] if ends else next(iter(units)))]
+
+    def _told_by_compass(self, quantity: str) -> bool:
+        """Whether all sensors that have an angle tell it in degrees, as a compass does."""
+        sites = [site for site in self.sites if quantity != "bearing" or "bearing" in COMPONENTS.get(site.kind, ())]
+        return bool(sites) and all(site.compass for site in sites)
+
+    def _check(self) -> None:
+        """That the table has what the sensors measure, and says how."""
+        have = column_names(self.table.columns) or "none"
+        geographic = {"lon", "lat"} <= set(self._columns)
+        for site in self.sites:
+            if site.kind not in COMPONENTS:
+                raise reject(f"sensor {site.name}", f"measurements of kind {', '.join(COMPONENTS)}", site.kind)
+            for quantity in COMPONENTS[site.kind]:
+                if quantity not in self._columns and not (site.kind == "position" and geographic):
+                    wanted = f"a column of {quantity}, as sensor {shown(site.name)} measures {site.kind}"
+                    raise InputError(f"{self.table.source}: expected {wanted}; got columns {have}")
+        angles = {"bearing", "own_heading"} & set(self._columns)
+        if angles and any(
+            bearings is None and ("own_heading" in angles or "bearing" in COMPONENTS[site.kind])
+            for site, bearings in zip(self.sites, self.bearings, strict=True)
+        ):
+            wanted = "bearings: north (clockwise, a compass) or east (counter-clockwise)"
+            name = shown(self._columns[min(angles)][0])
+            raise InputError(f"{self.table.source}, column {name}: expected {wanted}; got none")
+        if {"lon", "lat", "own_lon", "own_lat"} & set(self._columns) and self.origin is None:
+            wanted = "an origin {lon: , lat: } for longitudes and latitudes"
+            raise InputError(f"{self.table.source}: expected {wanted}; got none")
+
+        self._check_places()
+
+    def _check_places(self) -> None:
+        """That places have both of their numbers."""
+        pairs = [("own_x", "own_y"), ("own_lon", "own_lat")]
+        if any(site.kind == "position" for site in self.sites):
+            pairs += [("x", "y"), ("lon", "lat")]
+        for pair in pairs:
+            there = [name for name in pair if name in self._columns]
+            if len(there) == 1:
+                (missing,) = set(pair) - set(there)
+                wanted = f"a column of {missing} beside it, as a place has both"
+                name = shown(self._columns[there[0]][0])
+                raise InputError(f"{self.table.source}, column {name}: expected {wanted}; got none")

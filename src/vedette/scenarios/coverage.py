@@ -1,0 +1,51 @@
+"""Whether the sensors of a recording can see a place in common, as far as their coverage is given."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from vedette.scenarios.faults import Path
+from vedette.scenarios.sections import ScenarioModel
+from vedette.scenarios.sections.sensors import Sensor
+from vedette.scenarios.views import FieldOfView, field_of_view
+
+_POINTS_A_SIDE = 21
+
+
+def coverage_cautions(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
+    """Sensors of a recording that share no place with any other, as far as their coverage is given."""
+    views = [field_of_view(sensor) for sensor in model.sensors]
+    if model.recording is None or len(views) < 2:
+        return
+    for s, (sensor, own) in enumerate(zip(model.sensors, views, strict=True)):
+        others = [(model.sensors[t], views[t]) for t in range(len(views)) if t != s]
+        if own is None or _may_move(sensor) or any(_share_places(sensor, own, *other) for other in others):
+            continue
+        names = model.sensor_names
+        rest = f"{names[s]} and the other sensors" if len(names) > 2 else f"{names[0]} and {names[1]}"
+        yield (
+            ("sensors", s, "detection"),
+            f"{rest} see no place in common, as far as positions, headings and ranges of detection say: check units, "
+            "north and places",
+        )
+        if len(names) == 2:  # the other one has none in common with this one either
+            return
+
+
+def _may_move(sensor: Sensor) -> bool:
+    return sensor.platform.top_speed > 0.0
+
+
+def _share_places(one: Sensor, own: FieldOfView, other: Sensor, view: FieldOfView | None) -> bool:
+    """Whether two sensors see a place in common where they start; one that moves or has no edge may."""
+    if view is None or _may_move(other):
+        return True
+    shares = np.linspace(0.0, 1.0, _POINTS_A_SIDE)
+    radii, angles = np.meshgrid(own.reach * shares, own.middle + own.half_width * (2.0 * shares - 1.0))
+    points = np.array(one.position) + np.stack([radii * np.cos(angles), radii * np.sin(angles)], axis=-1).reshape(-1, 2)
+    ahead = points - np.array(other.position)
+    off = np.abs(np.remainder(np.arctan2(ahead[:, 1], ahead[:, 0]) - view.middle + math.pi, 2.0 * math.pi) - math.pi)
+    return bool(((np.hypot(*ahead.T) <= view.reach) & (off <= view.half_width)).any())

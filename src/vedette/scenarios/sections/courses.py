@@ -1,0 +1,161 @@
+"""Directions by compass in a scenario: where a heading in degrees from east is read, a course may stand.
+
+With an origin, a sensor with a compass or scans that count from north, `course_deg`, `courses_deg`, `azimuth_deg` and
+`azimuths_deg` count clockwise from true north, as plans do. A file counts all directions of its sensors in one way.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterator, Mapping
+from typing import TYPE_CHECKING, Any, TypeGuard
+
+from vedette.scenarios.faults import Path
+from vedette.scenarios.sections.base import Section
+from vedette.scenarios.sections.places import origin_of
+
+if TYPE_CHECKING:
+    from vedette.platforms.compass import Compass
+    from vedette.scenarios.sections.sensors import Sensor
+
+COURSES = ("course_deg", "courses_deg", "azimuth_deg", "azimuths_deg")
+_HEADINGS = {"heading_deg", "headings_deg", "directions_deg", "pointing_deg", "pointings_deg"}
+# What the keys of a platform become; those of `courses_deg` by its kind.
+_LISTS = {"courses": "headings_deg", "steps": "directions_deg"}
+
+
+def from_east(data: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return a scenario's data with its courses as headings, counter-clockwise from east.
+
+    Data stays as it is where nothing counts from north, or where it counts directions in both ways; the keys are then
+    unknown ones.
+    """
+    sensors, defaults = data.get("sensors"), data.get("sensor_defaults")
+    parts = [part for part in (defaults, *(sensors if isinstance(sensors, list | tuple) else ())) if _is_mapping(part)]
+    keys = {key for part in parts for key in _keys(part)}
+    if not keys & set(COURSES) or keys & _HEADINGS:
+        return data
+    origin = origin_of(data)
+    recording = data.get("recording")
+    is_told = _is_mapping(recording) and recording.get("bearings") == "north"
+    if origin is None and not is_told and not any(part.get("compass") is True for part in parts):
+        return data
+    from vedette.platforms.compass import PlaneCompass
+
+    compass, shared = origin or PlaneCompass(), defaults if _is_mapping(defaults) else {}
+    directed = {key: shared[key] for key in ("course_deg", "platform") if key in shared}
+    found = {**data}
+    if isinstance(sensors, list | tuple):
+        found["sensors"] = [_sensor({**directed, **one}, compass) if _is_mapping(one) else one for one in sensors]
+    return {**found, "sensor_defaults": _sensor(shared, compass)} if shared else found
+
+
+def as_courses(platform: Section, compass: Compass, place: Any) -> dict[str, tuple[str, Any]]:
+    """Return the directions of a platform as a file by compass has them: name and value by the name of its field."""
+    found: dict[str, tuple[str, Any]] = {}
+    lists = {"headings_deg": "courses_deg", "directions_deg": "courses_deg", "pointings_deg": "azimuths_deg"}
+    for name, key in lists.items():
+        if name in type(platform).model_fields:
+            turns = getattr(platform, "relative", False)
+            found[name] = key, tuple(-each if turns else (90.0 - each) % 360.0 for each in getattr(platform, name))
+    if "pointing_deg" in type(platform).model_fields:
+        found["pointing_deg"] = "azimuth_deg", start_course(platform.pointing_deg, compass, place)  # type: ignore[attr-defined]
+    return found
+
+
+def in_courses(data: Mapping[str, Any], sensor: Sensor, compass: Compass) -> dict[str, Any]:
+    """Return the plain data of a sensor with its directions by compass, as plans have them."""
+    found = {key: value for key, value in data.items() if key != "heading_deg"}
+    found["course_deg"] = start_course(sensor.heading_deg, compass, sensor.position)
+    found["platform"] = _told(data["platform"], sensor.platform, compass, sensor.position)
+    return found
+
+
+def _told(data: Mapping[str, Any], platform: Section, compass: Compass, place: Any) -> dict[str, Any]:
+    told = as_courses(platform, compass, place)
+    found = dict(told.get(key, (key, value)) for key, value in data.items())
+    if isinstance(carrier := getattr(platform, "carrier", None), Section):
+        found["carrier"] = _told(data["carrier"], carrier, compass, place)
+    return found
+
+
+def start_course(heading_deg: float, compass: Compass, place: Any) -> float:
+    """Return the course that a heading of the plane is at a place, deg in [0, 360)."""
+    return round(math.degrees(float(compass.azimuth(math.radians(heading_deg), place))), 9) % 360.0
+
+
+def as_written(path: Path, data: Any) -> Path:
+    """Return the path in a file of what stands at a path after `from_east`."""
+    found: list[str | int] = []
+    for key in path:
+        if _is_mapping(data) and key not in data:
+            key = next((name for name in COURSES if name in data and key in _names_of(name)), key)
+        found.append(key)
+        try:
+            data = data[key]
+        except (KeyError, IndexError, TypeError):
+            data = None
+    return tuple(found)
+
+
+def _names_of(key: str) -> Collection[str]:
+    """What a key of courses may become."""
+    named = {"course_deg": "heading_deg", "azimuth_deg": "pointing_deg", "azimuths_deg": "pointings_deg"}
+    return (named[key],) if key in named else _LISTS.values()
+
+
+def _keys(part: Mapping[str, Any]) -> Iterator[str]:
+    """Keys of a sensor, its platform and what carries that."""
+    platform = part.get("platform")
+    for section in (part, platform, platform.get("carrier") if _is_mapping(platform) else None):
+        if _is_mapping(section):
+            yield from map(str, section)
+
+
+def _sensor(data: Mapping[str, Any], compass: Compass) -> dict[str, Any]:
+    position = data.get("position")
+    is_place = isinstance(position, list | tuple) and len(position) == 2 and all(map(_is_number, position))
+    place = position if is_place else (0.0, 0.0)
+    found = _renamed(data, "course_deg", "heading_deg", lambda course: _angle(course, compass, place))
+    if _is_mapping(found.get("platform")):
+        found["platform"] = _platform(found["platform"], compass, place)
+    return found
+
+
+def _platform(data: Mapping[str, Any], compass: Compass, place: Any) -> dict[str, Any]:
+    turns = data.get("relative") is True
+    found = _renamed(data, "azimuth_deg", "pointing_deg", lambda azimuth: _angle(azimuth, compass, place))
+    for key, name in (("courses_deg", _LISTS.get(str(data.get("kind")))), ("azimuths_deg", "pointings_deg")):
+        if name is not None:
+            found = _renamed(found, key, name, lambda given: [-each if turns else _turned(each) for each in given])
+    if _is_mapping(found.get("carrier")):
+        found["carrier"] = _platform(found["carrier"], compass, place)
+    return found
+
+
+def _renamed(data: Mapping[str, Any], key: str, name: str, change: Any) -> dict[str, Any]:
+    """A copy in which a key has another name and its numbers are changed; what is no number stays."""
+    found = dict(data)
+    if key in found:
+        value = found.pop(key)
+        listed = isinstance(value, list | tuple) and all(map(_is_number, value))
+        found[name] = change(value) if listed or _is_number(value) else value
+    return found
+
+
+def _angle(azimuth: float, compass: Compass, place: Any) -> float:
+    """The heading that a course is at a place of the plane, deg."""
+    return math.degrees(float(compass.angle(math.radians(azimuth), place)))
+
+
+def _turned(course: float) -> float:
+    """The true direction that a course is, deg counter-clockwise from east in [-180, 180)."""
+    return (270.0 - course) % 360.0 - 180.0
+
+
+def _is_mapping(value: Any) -> TypeGuard[Mapping[str, Any]]:
+    return isinstance(value, Mapping)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
