@@ -27,7 +27,7 @@ from control.examples import (
     situation,
     sums_of,
 )
-from control.known_association import followed, measurement_moments
+from control.known_association import followed, updated
 from vedette import models
 from vedette.control import CauchySchwarzReward, RenyiReward
 from vedette.control.problem import best_values
@@ -233,9 +233,8 @@ def test_the_expected_loss_is_what_its_formula_says(steps: int, order: float, me
             for s, course in enumerate(joint):
                 own, pose = example.sensors[s].filter.sensor, evaluator.options[s].courses[course, -1]
                 detection = float(own.mean_detection(mean[None], cov[None], pose)[0])
-                _, spread, cross = measurement_moments(mean, cov, pose, example.sensors[s])
-                innovation = spread + own.noise.covs(mean[None], pose, 2)[0]
-                measured = cov - cross @ np.linalg.solve(innovation, cross.T)
+                centre = own.measurement.measure(mean[None], pose)[0]
+                _, measured, _ = updated(mean, cov, centre, pose, example.sensors[s])
                 missed *= 1.0 - detection
                 information += detection * (np.linalg.inv(measured) - np.linalg.inv(cov))
             seen = np.linalg.inv(np.linalg.inv(cov) + information / (1.0 - missed))

@@ -24,6 +24,7 @@ def make_options(rows: list[list[tuple[int, float]]], num_measurements: int) -> 
         np.zeros(len(columns), np.int64),
         np.zeros(1),
         np.zeros((1, 1)),
+        np.empty((0, 0, 0)),
         num_measurements,
     )
 

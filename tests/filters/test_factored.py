@@ -274,3 +274,26 @@ def test_products_of_many_factors_stay_few_and_lose_no_hypothesis():
 def test_the_error_bound_over_many_scenes():
     for seed in range(1000, 2000):
         assert_bound_holds(seed)
+
+
+def test_a_first_detection_that_bends_is_that_of_a_label_from_the_start():
+    """A wide birth site before a radar with a fine bearing: existence and density of both kinds of births agree."""
+    site = models.BirthModel([0.02], [[1500.0, 0.0, 0.0, 0.0]], [np.diag([150.0, 150.0, 5.0, 5.0]) ** 2])
+    sensor = models.SensorModel(
+        models.bearing_range(),
+        models.constant_noise([math.radians(0.1), 10.0]),
+        models.constant_detection(0.9),
+        models.region_clutter(5.0, models.Region(0.0, 3000.0, -1500.0, 1500.0), "bearing_range"),
+    )
+    targets = models.TargetModel(models.constant_velocity(0.1), models.constant_survival(0.999), site)
+    found, rng = [], np.random.default_rng(0)
+    for births in ("poisson", "labelled"):
+        tracker = FactoredGlmbFilter(targets, sensor, births=births)
+        belief, _ = tracker.step(tracker.initial(), [[0.12, 1480.0]], np.zeros(3), 1.0, 1, rng=rng)
+        [target] = belief.targets()
+        undetected = 0.0 if belief.undetected is None else belief.undetected.expected_number
+        found.append((target.existence + undetected, target.mean, target.cov))
+    (poisson, mean, cov), (labelled, other_mean, other_cov) = found
+    assert poisson == pytest.approx(labelled, rel=0.03)
+    np.testing.assert_allclose(mean, other_mean, atol=0.5)
+    np.testing.assert_allclose(np.diagonal(cov), np.diagonal(other_cov), rtol=0.05)

@@ -11,9 +11,16 @@ from vedette import models
 from vedette.control.priors import forms_of
 from vedette.kernels.gaussian.innovation import expect, make_innovation
 from vedette.kernels.gaussian.prediction import predict
+from vedette.kernels.gaussian.relinearisation import Pair, make_pair_work, relinearise
 from vedette.kernels.gaussian.scratch import make_scratch
 from vedette.kernels.planning.forms import ANY
-from vedette.kernels.planning.lanes import expect_lanes, make_lane_work, make_lanes, predict_lanes
+from vedette.kernels.planning.lanes import (
+    expect_lanes,
+    make_lane_work,
+    make_lanes,
+    predict_lanes,
+    relinearise_lanes,
+)
 
 NUM, ROOM, DT = 11, 16, 1.5
 POSE = np.array([-300.0, 120.0, 0.4])
@@ -93,6 +100,28 @@ def test_steps_are_those_of_one_gaussian_at_a_time(name: str, motion: models.Mot
         np.testing.assert_allclose(lanes.posterior[:, s], expected.covs[0][lower], rtol=1e-10, atol=1e-12)
         np.testing.assert_allclose(lanes.log_norm[s], expected.log_norm[0], **close)
         np.testing.assert_allclose(lanes.prob_detection[s], expected.prob_detection[0], **close)
+
+
+@pytest.mark.parametrize("name", ["wide", "one component", "own parts"])
+def test_gaussians_that_bend_are_updated_as_one_at_a_time(name: str) -> None:
+    sensor, rng = sensor_of(name), np.random.default_rng(3)
+    sees, (means, covs) = sensor.to_kernel(), gaussians(4, 4.0)
+    forms = forms_of(models.kernel_motion(models.constant_velocity(2.0), models.constant_survival(1.0)), sees, DT, 4)
+    lanes, work = make_lanes(4, sensor.meas_dim, ROOM), make_lane_work(4, sensor.meas_dim, ROOM)
+    lanes.means[:], lanes.covs[:] = side_by_side(means), side_by_side(covs)
+    expect_lanes(sees, forms, POSE, NUM, lanes, work)
+    is_seen, scans = np.arange(ROOM) % 3 > 0, sensor.measurement.measure(means + rng.normal(size=(NUM, 4)), POSE)
+    assert (work.bends[:NUM] & is_seen[:NUM]).any()
+    measurements, pair = side_by_side(scans), make_pair_work(4, sensor.meas_dim)
+    relinearise_lanes(sees, POSE, measurements, is_seen, NUM, lanes, work)
+    for s in np.flatnonzero(work.bends[:NUM] & is_seen[:NUM]):
+        expect(sees, POSE, means[s], covs[s], 0, pair.innovation, pair.scratch)
+        relinearise(sees, Pair(POSE, means[s], covs[s], scans[s]), pair)
+        np.testing.assert_allclose(measurements[:, s], pair.scratch.residual, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(lanes.whitened_cross[:, s], pair.innovation.whitened_cross[0].ravel(), rtol=1e-9)
+        np.testing.assert_allclose(lanes.log_norm[s], pair.innovation.log_norm[0])
+        np.testing.assert_allclose(lanes.posterior[:, s], pair.innovation.covs[0][np.tril_indices(4)], rtol=1e-8)
+        assert (lanes.predicted[:, s] == 0.0).all()
 
 
 def test_models_of_a_users_own_have_no_form() -> None:

@@ -21,7 +21,7 @@ METHODS = {"ekf": LINEARISED, "ukf": UNSCENTED, "ckf": CUBATURE}
 def resolve_method(name: str, method: str, has_jacobian: bool, *, bends: bool = False) -> int:
     """The kernel's number of a Gaussian method; "auto" is the EKF where there is a Jacobian, else the UKF.
 
-    bends: whether "auto" takes the UKF of wide Gaussians close to the sensor also where there is a Jacobian.
+    bends: whether "auto" may linearise again at each measurement, where there is a Jacobian.
 
     Raises:
         InputError: unknown method, or "ekf" without a Jacobian.

@@ -50,8 +50,8 @@ class SensorModel:
 
     Attributes:
         measurement, noise, detection, clutter: the four models.
-        method: "ekf", "ukf", "ckf", or "auto": the EKF where a target is far from the sensor for how well its place is
-            known, or measurements are linear; the UKF where it is close, or the measurement has no Jacobian.
+        method: "ekf", "ukf", "ckf", or "auto": the EKF where measurements are close to linear for their noise, else a
+            linearisation of its own for each measurement; the UKF where the measurement has no Jacobian.
         detection_at: of a predicted Gaussian, the filters take the probability of detection at its "centre", as the
             paper does, or its "mean" over the Gaussian: by the model's `mean_function`, or by nodes over the position.
         meas_dim: number of components of a measurement.

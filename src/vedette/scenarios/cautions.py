@@ -16,6 +16,14 @@ from vedette.scenarios.faults import Path, Told
 from vedette.scenarios.loading import Scenario, document_of, place_fault
 from vedette.scenarios.plausibility import implausible
 from vedette.scenarios.sections import ScenarioModel
+from vedette.scenarios.sections.birth_labels import (
+    LARGEST_SHARE,
+    birth_probability,
+    has_one_belief,
+    labels_until_detection,
+    most_hypotheses,
+    share_cut,
+)
 from vedette.scenarios.sections.fusion import BY_LABEL, Fusion
 from vedette.scenarios.sections.sensing import Detection
 from vedette.scenarios.sections.sensors import Sensor
@@ -39,6 +47,7 @@ def cautions(scenario: Scenario) -> tuple[str, ...]:
     found = [*_records(scenario), *_views(scenario), *_births(scenario), *_late_beliefs(scenario)]
     found += [*_many_sensors(scenario), *_cells(scenario.model), *_labels(scenario.model)]
     found += coverage_cautions(scenario.model)
+    found += _undetected_births(scenario.model)
     found += [*implausible(scenario.model), *coastline_cautions(scenario.model, scenario.folder)]
     if not found:
         return ()
@@ -165,6 +174,27 @@ def _labels(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
             f"at most {model.filter.limits.max_labels} labels are kept, and {number:.0f} targets are there at once: "
             f"the others are never tracked; take filter.limits.max_labels of {number:.0f} and more, as what may become "
             "one takes labels, too",
+        )
+
+
+def _undetected_births(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
+    """Births that a cap on hypotheses cuts where sensors hardly see the sites."""
+    most, order = most_hypotheses(model), grouped_order(model.motion)[:2]
+    if most is None:
+        return
+    places = np.array([site.mean for site in model.birth.sites])[:, order]
+    chances = [found for sensor in model.sensors if (found := prob_detection(sensor, places)) is not None]
+    if len(chances) < len(model.sensors):
+        return
+    detected = 1.0 - np.prod(1.0 - np.array(chances), axis=0) if has_one_belief(model) else np.min(chances, axis=0)
+    number = labels_until_detection(model, detected)
+    share = share_cut(number, birth_probability(model), most)
+    if share > LARGEST_SHARE:
+        yield (
+            ("filter", "kind"),
+            f"targets born at the sites are detected late from where the sensors start: some {number:.0f} labels are "
+            f"unconfirmed at a time, and {most} hypotheses cut {100.0 * share:.0f} % of the expected births; take "
+            "filter.kind: factored_glmb or lmb, or births at fewer birth.steps",
         )
 
 

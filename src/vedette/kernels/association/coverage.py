@@ -110,7 +110,7 @@ def _with_spare_row(options: Options) -> Options:
         columns[option] = options.columns[option]
         log_weights[option] = options.log_weights[option]
     entries, weights, whitened = options.entries, options.component_log_weights, options.whitened
-    return Options(offsets, columns, log_weights, entries, weights, whitened, options.num_measurements)
+    return Options(offsets, columns, log_weights, entries, weights, whitened, options.updated, options.num_measurements)
 
 
 @kernel

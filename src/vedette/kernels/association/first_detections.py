@@ -18,14 +18,15 @@ import numpy as np
 
 from vedette.kernels.association.assignment import ABSENT, Options
 from vedette.kernels.association.near import near_measurements
-from vedette.kernels.association.options import sort_row
+from vedette.kernels.association.options import Sight, make_room, room_for_bent, sort_row, weigh_detection
 from vedette.kernels.association.predicted import Rows, expect_rows, log_or_minus_inf, make_rows
 from vedette.kernels.base.arrays import group_members, grown_floats, grown_ints
-from vedette.kernels.base.compile import borrowing, kernel
-from vedette.kernels.base.types import Bools, Floats, Ints, Mixture, ScanInput, Sensor
-from vedette.kernels.gaussian.innovation import copy_innovation, whiten
+from vedette.kernels.base.compile import borrowing, inlined, kernel
+from vedette.kernels.base.types import Floats, Ints, Mixture, ScanInput, Sensor
+from vedette.kernels.gaussian.innovation import copy_innovation
 from vedette.kernels.gaussian.linalg import log_add
 from vedette.kernels.gaussian.mixtures import copy_component, make_components
+from vedette.kernels.gaussian.relinearisation import make_pair_work
 from vedette.kernels.gaussian.scratch import make_scratch
 
 _LEAST_SHARE = math.log(1e-5)  # of a candidate's density, below which a component of the intensity is not in it
@@ -60,6 +61,7 @@ class _Pairs(NamedTuple):
     components: Ints  # (num_pairs,)
     measurements: Ints  # (num_pairs,)
     log_odds: Floats  # (num_pairs,)
+    options: Options  # whose entries are those of the pairs
 
 
 @kernel
@@ -93,24 +95,22 @@ def missed_intensity(seen: Rows, num: int) -> tuple[Mixture, float]:
 
 
 @kernel
-def _gated_pairs(seen: Rows, num_local: int, scan: Floats, log_clutter: Floats, angular: Bools, gate: float) -> _Pairs:
-    near = near_measurements(seen, scan, angular, gate)
-    num, filled, whitened = near.offsets[len(near.offsets) - 1], 0, np.empty(scan.shape[1])
-    components, measurements, log_odds = np.empty(num, np.int64), np.empty(num, np.int64), np.empty(num)
-    for c in range(len(seen.log_absent)):
-        log_detected = seen.log_weights[c] + log_or_minus_inf(seen.innovation.prob_detection[c])
-        if log_detected == -math.inf:
-            continue
+def _gated_pairs(seen: Rows, num_local: int, scan: Floats, log_clutter: Floats, sight: Sight, gate: float) -> _Pairs:
+    near = near_measurements(seen, scan, sight.sensor.angular, gate)
+    num, num_rows = near.offsets[len(near.offsets) - 1], len(seen.log_absent)
+    options = make_room(0, num, num, len(scan), scan.shape[1], room_for_bent(seen, num))
+    components, filled = np.empty(num, np.int64), 0
+    for c in range(num_rows):
+        own = c - (num_rows - num_local)
         for at in range(near.offsets[c], near.offsets[c + 1]):
-            j, own = near.measurements[at], c - (len(seen.log_absent) - num_local)
+            j = near.measurements[at]
             if own >= 0 and j != own:
                 continue
-            distance = whiten(seen.innovation, c, scan[j], angular, gate, whitened)
-            if distance <= gate:
-                components[filled], measurements[filled] = c, j
-                log_odds[filled] = log_detected + seen.innovation.log_norm[c] - 0.5 * distance - log_clutter[j]
+            weight = weigh_detection(seen, c, scan[j], log_clutter[j], sight, gate, filled, options)
+            if weight > -math.inf:
+                components[filled], options.columns[filled], options.log_weights[filled] = c, j, weight
                 filled += 1
-    return _Pairs(components[:filled], measurements[:filled], log_odds[:filled])
+    return _Pairs(components[:filled], options.columns[:filled], options.log_weights[:filled], options)
 
 
 class _Chosen(NamedTuple):
@@ -157,38 +157,24 @@ def candidates_of(
         least_logit: log odds rho / kappa below which a candidate is left out.
         label: by which candidates are named.
     """
-    pairs = _gated_pairs(seen, len(label.local.log_weights), scan.measurements, log_clutter, sensor.angular, gate)
+    sight = Sight(sensor, scan.pose, make_pair_work(seen.means.shape[1], len(sensor.angular)))
+    pairs = _gated_pairs(seen, len(label.local.log_weights), scan.measurements, log_clutter, sight, gate)
     chosen, log_left_out, left_out = _chosen(pairs, len(scan.measurements), least_logit)
     num, meas_dim = len(chosen.measurements), len(sensor.angular)
     rows = make_rows(num, chosen.num_pairs, seen.means.shape[1], meas_dim)
-    options = Options(
-        np.zeros(num + 1, np.int64),
-        np.empty(2 * num, np.int64),
-        np.empty(2 * num),
-        np.empty(2 * num, np.int64),
-        np.empty(chosen.num_pairs),
-        np.empty((chosen.num_pairs, meas_dim)),
-        len(scan.measurements),
-    )
+    bent = room_for_bent(seen, chosen.num_pairs)
+    options = make_room(num, 2 * num, chosen.num_pairs, len(scan.measurements), meas_dim, bent)
     for row in range(num):
         j = chosen.measurements[row]
-        rows.labels[row, 0], rows.labels[row, 1], rows.log_absent[row] = label.step, label.first_index + j, 0.0
-        _write_candidate(row, j, seen, pairs, chosen, scan.measurements[j], sensor.angular, gate, rows, options)
+        rows.labels[row, 0], rows.labels[row, 1] = label.step, label.first_index + j
+        rows.log_absent[row] = 0.0
+        _write_candidate(row, j, seen, pairs, chosen, rows, options)
     return Candidates(rows, options, log_left_out, left_out)
 
 
 @borrowing
 def _write_candidate(
-    row: int,
-    j: int,
-    seen: Rows,
-    pairs: _Pairs,
-    chosen: _Chosen,
-    measurement: Floats,
-    angular: Bools,
-    gate: float,
-    rows: Rows,
-    options: Options,
+    row: int, j: int, seen: Rows, pairs: _Pairs, chosen: _Chosen, rows: Rows, options: Options
 ) -> None:
     """Write the components and the two options of a candidate."""
     filled = rows.offsets[row]
@@ -196,13 +182,14 @@ def _write_candidate(
     options.columns[2 * row + 1], options.log_weights[2 * row + 1] = j, chosen.log_odds[j]
     options.entries[2 * row + 1] = filled
     for i in range(chosen.offsets[j], chosen.offsets[j + 1]):
-        c, own = pairs.components[chosen.pairs[i]], pairs.log_odds[chosen.pairs[i]]
+        pair = chosen.pairs[i]
+        c, own = pairs.components[pair], pairs.log_odds[pair]
         if own - chosen.log_odds[j] < _LEAST_SHARE:
             continue
         rows.log_weights[filled] = seen.log_weights[c]
         copy_component(seen.means, seen.covs, c, rows.means, rows.covs, filled)
         copy_innovation(seen.innovation, c, rows.innovation, filled)
-        whiten(seen.innovation, c, measurement, angular, gate, options.whitened[filled])
+        copy_entry(pairs.options, pair, options, filled)
         options.component_log_weights[filled] = own
         filled += 1
     rows.offsets[row + 1] = filled
@@ -226,9 +213,18 @@ def with_candidates(rows: Rows, options: Options, new: Candidates) -> tuple[Rows
     log_weights = grown_floats(options.log_weights, end_options)
     component_log_weights = grown_floats(options.component_log_weights, end_entries)
     whitened = np.empty((len(component_log_weights), meas_dim))
+    all_options = Options(
+        offsets,
+        columns,
+        log_weights,
+        entries,
+        component_log_weights,
+        whitened,
+        room_for_bent(out, len(component_log_weights)),
+        options.num_measurements,
+    )
     for entry in range(num_entries):
-        for a in range(meas_dim):
-            whitened[entry, a] = options.whitened[entry, a]
+        copy_entry(options, entry, all_options, entry)
     for row in range(num_rows):
         offsets[row + 1] = options.offsets[row + 1]
     for row in range(num_new):
@@ -240,11 +236,19 @@ def with_candidates(rows: Rows, options: Options, new: Candidates) -> tuple[Rows
         entries[num_options + option] = num_entries + entry if entry >= 0 else -1
     for entry in range(new.rows.offsets[num_new]):
         component_log_weights[num_entries + entry] = new.options.component_log_weights[entry]
-        for a in range(meas_dim):
-            whitened[num_entries + entry, a] = new.options.whitened[entry, a]
-    return out, Options(
-        offsets, columns, log_weights, entries, component_log_weights, whitened, options.num_measurements
-    )
+        copy_entry(new.options, entry, all_options, num_entries + entry)
+    return out, all_options
+
+
+@inlined
+def copy_entry(source: Options, entry: int, out: Options, at: int) -> None:
+    """Copy the whitened residual of an entry, and what it becomes where components bend."""
+    for a in range(source.whitened.shape[1]):
+        out.whitened[at, a] = source.whitened[entry, a]
+    if source.updated.shape[0] > 0:
+        for i in range(source.updated.shape[1]):
+            for j in range(source.updated.shape[2]):
+                out.updated[at, i, j] = source.updated[entry, i, j]
 
 
 @kernel

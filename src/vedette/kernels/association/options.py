@@ -6,6 +6,7 @@ This is the part of the joint prediction and update that all filters share (Vo, 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,19 +16,32 @@ from vedette.kernels.association.near import Near, near_measurements
 from vedette.kernels.association.predicted import Rows, log_or_minus_inf
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import Bools, Floats, Ints, ScanInput, Sensor
-from vedette.kernels.gaussian.innovation import whiten
+from vedette.kernels.base.types import Floats, Ints, ScanInput, Sensor
+from vedette.kernels.gaussian.innovation import copy_innovation, whiten
+from vedette.kernels.gaussian.relinearisation import Pair, PairWork, make_pair_work, update_pair
+
+
+class Sight(NamedTuple):
+    """The sensor of a scan and its pose, and arrays in which components that bend are updated."""
+
+    sensor: Sensor
+    pose: Floats  # (pose_dim,)
+    work: PairWork
 
 
 @kernel
-def make_options(num_rows: int, num_components: int, num_measurements: int, meas_dim: int) -> Options:
+def make_options(num_rows: int, num_components: int, num_measurements: int, state_dim: int, meas_dim: int) -> Options:
     """Room for every option that there can be."""
     most_options, most_entries = num_rows * (num_measurements + 2), num_components * (num_measurements + 1)
-    return _room(num_rows, most_options, most_entries, num_measurements, meas_dim)
+    updated = np.empty((most_entries, state_dim + 1, state_dim))
+    return make_room(num_rows, most_options, most_entries, num_measurements, meas_dim, updated)
 
 
 @kernel
-def _room(num_rows: int, most_options: int, most_entries: int, num_measurements: int, meas_dim: int) -> Options:
+def make_room(
+    num_rows: int, most_options: int, most_entries: int, num_measurements: int, meas_dim: int, updated: Floats
+) -> Options:
+    """Room for so many options and entries. updated: as of `Options`."""
     return Options(
         np.zeros(num_rows + 1, np.int64),
         np.empty(most_options, np.int64),
@@ -35,6 +49,7 @@ def _room(num_rows: int, most_options: int, most_entries: int, num_measurements:
         np.empty(most_options, np.int64),
         np.empty(most_entries),
         np.empty((most_entries, meas_dim)),
+        updated,
         num_measurements,
     )
 
@@ -45,7 +60,15 @@ def _room_for(rows: Rows, near: Near, num_measurements: int, meas_dim: int) -> O
     num, most_entries = len(rows.log_absent), 0
     for row in range(num):
         most_entries += (rows.offsets[row + 1] - rows.offsets[row]) * (near.offsets[row + 1] - near.offsets[row] + 1)
-    return _room(num, near.offsets[num] + 2 * num, most_entries, num_measurements, meas_dim)
+    updated = room_for_bent(rows, most_entries)
+    return make_room(num, near.offsets[num] + 2 * num, most_entries, num_measurements, meas_dim, updated)
+
+
+@kernel
+def room_for_bent(rows: Rows, num_entries: int) -> Floats:
+    """(num_entries, state_dim + 1, state_dim), or (0, ...) where no component bends."""
+    dim = rows.means.shape[1]
+    return np.empty((num_entries if rows.innovation.bends.any() else 0, dim + 1, dim))
 
 
 @inlined
@@ -58,6 +81,7 @@ def view_options(options: Options, num_rows: int, num_measurements: int) -> Opti
         options.entries,
         options.component_log_weights,
         options.whitened,
+        options.updated,
         num_measurements,
     )
 
@@ -103,23 +127,38 @@ def sort_row(start: int, stop: int, columns: Ints, log_weights: Floats, entries:
 
 
 @inlined
+def weigh_detection(
+    rows: Rows, c: int, measurement: Floats, log_clutter: float, sight: Sight, gate: float, entry: int, out: Options
+) -> float:
+    """Log weight of component `c` detected as a measurement, relative to clutter; -inf outside the gate.
+
+    Its whitened residual, and what becomes of it where it bends, are written at `entry`.
+    """
+    innovation = rows.innovation
+    distance = whiten(innovation, c, measurement, sight.sensor.angular, gate, out.whitened[entry])
+    log_norm = innovation.log_norm[c]
+    if innovation.bends[c] and distance <= gate:
+        copy_innovation(innovation, c, sight.work.innovation, 0)
+        pair = Pair(sight.pose, rows.means[c], rows.covs[c], measurement)
+        distance = update_pair(sight.sensor, pair, sight.work, out.updated[entry])
+        log_norm = sight.work.innovation.log_norm[0]
+    if not distance <= gate:
+        return -math.inf
+    # The predicted component times p_D g(z | x) / kappa(z), integrated over x.
+    weight = rows.log_weights[c] + log_norm - 0.5 * distance - log_clutter
+    return float(weight + log_or_minus_inf(innovation.prob_detection[c]))
+
+
+@inlined
 def _detection_option(
-    rows: Rows, row: int, measurement: Floats, log_clutter: float, angular: Bools, gate: float, entry: int, out: Options
+    rows: Rows, row: int, measurement: Floats, log_clutter: float, sight: Sight, gate: float, entry: int, out: Options
 ) -> float:
     """Write the component entries of row `row` detected as a measurement; its log weight, -inf outside the gate."""
-    innovation = rows.innovation
-    peak = -math.inf
-    first = rows.offsets[row]
+    peak, first = -math.inf, rows.offsets[row]
     count = rows.offsets[row + 1] - first
     for i in range(count):
-        c = first + i
-        distance = whiten(innovation, c, measurement, angular, gate, out.whitened[entry + i])
-        weight = -math.inf
-        if distance <= gate:
-            # The predicted component times p_D g(z | x) / kappa(z), integrated over x.
-            weight = rows.log_weights[c] + innovation.log_norm[c] - 0.5 * distance - log_clutter
-            weight += log_or_minus_inf(innovation.prob_detection[c])
-            peak = max(peak, weight)
+        weight = weigh_detection(rows, first + i, measurement, log_clutter, sight, gate, entry + i, out)
+        peak = max(peak, weight)
         out.component_log_weights[entry + i] = weight
     return _total_from_peak(out.component_log_weights, entry, count, peak)
 
@@ -136,7 +175,7 @@ def _total_from_peak(values: Floats, start: int, count: int, peak: float) -> flo
 
 @borrowing
 def _fill_options(
-    rows: Rows, near: Near, scan: Floats, log_clutter: Floats, angular: Bools, gate: float, out: Options
+    rows: Rows, near: Near, scan: Floats, log_clutter: Floats, sight: Sight, gate: float, out: Options
 ) -> None:
     """Options of every row, heaviest first; options of weight zero are left out."""
     filled, entry, every = 0, 0, len(near.offsets) == 0
@@ -161,7 +200,7 @@ def _fill_options(
         begin, end = (0, len(scan)) if every else (near.offsets[row], near.offsets[row + 1])
         for at in range(begin, end):
             j = at if every else near.measurements[at]
-            weight = _detection_option(rows, row, scan[j], log_clutter[j], angular, gate, entry, out)
+            weight = _detection_option(rows, row, scan[j], log_clutter[j], sight, gate, entry, out)
             # Outside the gate nothing is kept: the next option writes over the entries.
             if weight > -math.inf:
                 out.columns[filled], out.log_weights[filled], out.entries[filled] = j, weight, entry
@@ -174,15 +213,23 @@ def _fill_options(
 
 @inlined
 def weigh_options(
-    rows: Rows, near: Near, scan: ScanInput, sensor: Sensor, caps: Truncation, log_clutter: Floats, out: Options
+    rows: Rows,
+    near: Near,
+    scan: ScanInput,
+    sensor: Sensor,
+    caps: Truncation,
+    log_clutter: Floats,
+    work: PairWork,
+    out: Options,
 ) -> tuple[float, int]:
     """Write the options of every row, their weights relative to clutter, heaviest first.
 
     near: the measurements that are looked at. log_clutter: (>= num_measurements,) the log clutter intensity at each
-    measurement is written there. Returns the sum of these, and how many of them were raised to the floor.
+    measurement is written there. work: to update components that bend in. Returns the sum of the log clutter
+    intensities, and how many of them were raised to the floor.
     """
     total, num_raised = _log_clutter(sensor, scan.measurements, scan.pose, caps.log_clutter_floor, log_clutter)
-    _fill_options(rows, near, scan.measurements, log_clutter, sensor.angular, caps.gate, out)
+    _fill_options(rows, near, scan.measurements, log_clutter, Sight(sensor, scan.pose, work), caps.gate, out)
     return total, num_raised
 
 
@@ -199,5 +246,6 @@ def weighed_options_at(
     """As `weighed_options`; log_clutter: (num_measurements,) written as of `weigh_options`."""
     num, near = len(scan.measurements), near_measurements(rows, scan.measurements, sensor.angular, caps.gate)
     options = _room_for(rows, near, num, len(sensor.angular))
-    log_total, num_raised = weigh_options(rows, near, scan, sensor, caps, log_clutter, options)
+    work = make_pair_work(rows.means.shape[1], len(sensor.angular))
+    log_total, num_raised = weigh_options(rows, near, scan, sensor, caps, log_clutter, work, options)
     return options, log_total, num_raised

@@ -69,6 +69,7 @@ def view_rows(rows: Rows, num: int) -> Rows:
             innovation.covs[:num],
             innovation.log_norm[:num],
             innovation.prob_detection[:num],
+            innovation.bends[:num],
         ),
     )
 

@@ -18,12 +18,15 @@ from vedette.kernels.gaussian.sigma_points import (
     SWITCHED,
     PointWeights,
     fill_sigma_points,
-    is_wide,
     moments_of_images,
 )
 
 # Where a scan leaves less than this of the volume that was expected of it, cov - cross' cross cancels too many digits.
 LEAST_SHRINKAGE = 1e-8
+
+# Second-order error of a measurement over a Gaussian, in standard deviations of the noise, from which SWITCHED treats
+# the measurement as bent. Below it the normalised error squared of the extended filter is at most 2.4 (2 is exact).
+LARGEST_BEND = 0.3
 
 
 class Innovation(NamedTuple):
@@ -39,6 +42,7 @@ class Innovation(NamedTuple):
     covs: Floats  # (num, state_dim, state_dim) posterior covariances, the same for all measurements
     log_norm: Floats  # (num,) log of the normalising constant of the predicted measurement's Gaussian
     prob_detection: Floats  # (num,)
+    bends: Bools  # (num,) whether updates linearise again at each measurement, see `relinearisation`
 
 
 @kernel
@@ -50,6 +54,7 @@ def make_innovation(num: int, state_dim: int, meas_dim: int) -> Innovation:
         np.empty((num, state_dim, state_dim)),
         np.empty(num),
         np.empty(num),
+        np.empty(num, np.bool_),
     )
 
 
@@ -68,6 +73,7 @@ def copy_innovation(innovation: Innovation, source: int, out: Innovation, target
             out.covs[target, i, j] = innovation.covs[source, i, j]
     out.log_norm[target] = innovation.log_norm[source]
     out.prob_detection[target] = innovation.prob_detection[source]
+    out.bends[target] = innovation.bends[source]
 
 
 @borrowing
@@ -93,7 +99,7 @@ def _expect_sigma_points(
 
 
 @inlined
-def _project(jacobian: Floats, cov: Floats, cross: Floats, innovation: Floats, n: int, m: int) -> None:
+def project(jacobian: Floats, cov: Floats, cross: Floats, innovation: Floats, n: int, m: int) -> None:
     """cross = jacobian cov; innovation = cross jacobian', its lower triangle."""
     for a in range(m):
         for j in range(n):
@@ -131,7 +137,7 @@ def _has_volume(noise: Floats, factor: Floats, work: Floats, m: int) -> bool:
 
 
 @inlined
-def _condition(
+def condition(
     cov: Floats, noise: Floats, innovation: Floats, factor: Floats, cross: Floats, posterior: Floats, n: int, m: int
 ) -> bool:
     """Add the noise to `innovation` and factor it; whiten `cross`; posterior = cov - cross' cross.
@@ -161,11 +167,28 @@ def _condition(
 
 
 @inlined
-def _is_linearised(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats) -> bool:
-    if sensor.method != SWITCHED:
-        return sensor.method == LINEARISED
-    dx, dy = mean[0] - pose[0], mean[1] - pose[1]
-    return not is_wide(cov[0, 0] + cov[1, 1], dx * dx + dy * dy)
+def _bends(pose: Floats, mean: Floats, cov: Floats, jacobian: Floats, noise: Floats, n: int, m: int) -> bool:
+    """Whether the second-order error of some component exceeds `LARGEST_BEND` standard deviations of its noise.
+
+    A measurement of a position at distance d has second derivatives of about |H| / d. Over a position of variance V,
+    both axes together, component a is then off by |H_a| V / (2 d), which is the sagitta V / (2 d) of a range; and by
+    |H_aj| sqrt(V P_jj) / d with another component j of the state.
+    """
+    dx, dy, variance = mean[0] - pose[0], mean[1] - pose[1], cov[0, 0] + cov[1, 1]
+    limit = 4.0 * LARGEST_BEND * LARGEST_BEND * (dx * dx + dy * dy)
+    for a in range(m):
+        slope = (jacobian[a, 0] * jacobian[a, 0] + jacobian[a, 1] * jacobian[a, 1]) * variance
+        for j in range(2, n):
+            slope += 4.0 * jacobian[a, j] * jacobian[a, j] * cov[j, j]
+        if variance * slope > limit * noise[a, a]:
+            return True
+    return False
+
+
+@inlined
+def log_norm_of_factor(factor: Floats) -> float:
+    """Log of the normalising constant of a Gaussian with covariance L L'."""
+    return -0.5 * (log_det_from_factor(factor) + factor.shape[0] * LOG_2PI)
 
 
 @inlined
@@ -183,24 +206,26 @@ def expect_measurement(
     n, m = mean.shape[0], out.predicted.shape[1]
     jacobian, noise, innovation = scratch.measurement_jacobian, scratch.measurement_noise, scratch.innovation_cov
     factor, cross, posterior = out.factor[at], out.whitened_cross[at], out.covs[at]
-    linearised, weights = _is_linearised(sensor, pose, mean, cov), PointWeights(0, 0.0, 0.0)
+    linearised, weights = sensor.method == LINEARISED or sensor.method == SWITCHED, PointWeights(0, 0.0, 0.0)
+    sensor.measurement_noise_cov(mean, pose, sensor.noise_params, noise)
     if linearised:
         sensor.measurement(mean, pose, sensor.measurement_params, out.predicted[at])
         sensor.measurement_jacobian(mean, pose, sensor.measurement_params, jacobian)
-    else:
+    out.bends[at] = sensor.method == SWITCHED and _bends(pose, mean, cov, jacobian, noise, n, m)
+    if out.bends[at] or not linearised:
+        linearised = False
         weights = _expect_sigma_points(sensor, pose, mean, cov, out.predicted[at], cross, scratch)
-    sensor.measurement_noise_cov(mean, pose, sensor.noise_params, noise)
     # A constant size is unrolled by the compiler.
     if linearised and n == 4 and m == 2:
-        _project(jacobian, cov, cross, innovation, 4, 2)
-        exact = _condition(cov, noise, innovation, factor, cross, posterior, 4, 2)
+        project(jacobian, cov, cross, innovation, 4, 2)
+        exact = condition(cov, noise, innovation, factor, cross, posterior, 4, 2)
     else:
         if linearised:
-            _project(jacobian, cov, cross, innovation, n, m)
-        exact = _condition(cov, noise, innovation, factor, cross, posterior, n, m)
+            project(jacobian, cov, cross, innovation, n, m)
+        exact = condition(cov, noise, innovation, factor, cross, posterior, n, m)
     if not exact:
         posterior_of_squares(mean, cov, factor, cross, weights, scratch, posterior)
-    out.log_norm[at] = -0.5 * (log_det_from_factor(factor) + m * LOG_2PI)
+    out.log_norm[at] = log_norm_of_factor(factor)
 
 
 @inlined

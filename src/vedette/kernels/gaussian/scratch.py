@@ -24,6 +24,7 @@ class Scratch(NamedTuple):
     images: Floats  # (2 n + 1, max(n, m)) their images, then the deviations of these from their mean
     measurement_jacobian: Floats  # (m, n)
     measurement_noise: Floats  # (m, m)
+    noise_factor: Floats  # (m, m) Cholesky factor of the measurement noise
     innovation_cov: Floats  # (m, m)
     residual: Floats  # (m,)
     gain: Floats  # (m, n) transposed
@@ -41,6 +42,7 @@ def make_scratch(state_dim: int, meas_dim: int) -> Scratch:
         np.empty((num_points, state_dim)),
         np.empty((num_points, max(state_dim, meas_dim))),
         np.empty((meas_dim, state_dim)),
+        np.empty((meas_dim, meas_dim)),
         np.empty((meas_dim, meas_dim)),
         np.empty((meas_dim, meas_dim)),
         np.empty(meas_dim),

@@ -2,7 +2,7 @@
 
 UNSCENTED has 2 n + 1 points with kappa = 1 (Julier and Uhlmann 1997; all weights positive, so that covariances stay
 positive definite), CUBATURE the 2 n points of the third-degree rule (Arasaratnam and Haykin 2009). LINEARISED uses
-Jacobians and no points; SWITCHED does too, but for a Gaussian that `is_wide` where it is, of which it takes UNSCENTED.
+Jacobians and no points. SWITCHED does too, except for a Gaussian over which measurements bend (`innovation.bends`).
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import math
 from typing import NamedTuple
 
 from vedette.errors import NumericalError
-from vedette.kernels.base.compile import borrowing, inlined
+from vedette.kernels.base.compile import borrowing
 from vedette.kernels.base.types import Bools, Floats
 from vedette.kernels.gaussian.linalg import cholesky
 from vedette.kernels.gaussian.scratch import wrap_angle
@@ -22,10 +22,6 @@ CUBATURE = 2
 SWITCHED = 3  # of measurements alone
 UNSCENTED_KAPPA = 1.0
 
-# Standard deviation of the position, of both axes together, over the distance from the sensor: about the share by which
-# a bearing of a place that far off is wrong where it is taken as linear.
-LARGEST_LINEAR_SPREAD = 0.2
-
 
 class PointWeights(NamedTuple):
     """How many sigma points there are, and what they weigh."""
@@ -33,15 +29,6 @@ class PointWeights(NamedTuple):
     num: int  # 0 where a model is linearised
     first: float  # of the mean; 0 where it is no point of the rule
     other: float  # of every other point
-
-
-@inlined
-def is_wide(variance: float, square: float) -> bool:
-    """Whether measurements are anything but linear over a Gaussian.
-
-    variance: of its position, of both axes together. square: of its distance from the sensor.
-    """
-    return variance > LARGEST_LINEAR_SPREAD * LARGEST_LINEAR_SPREAD * square
 
 
 @borrowing

@@ -19,7 +19,7 @@ from vedette.kernels.association.search import WIDEST, Search, grown_search, mak
 from vedette.kernels.base.arrays import counted_ints, filled_ints
 from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, Tracks
-from vedette.kernels.gaussian.scratch import Scratch, make_scratch
+from vedette.kernels.gaussian.relinearisation import PairWork, make_pair_work
 from vedette.kernels.steps.assembly import Naming, make_naming
 
 
@@ -35,7 +35,7 @@ class GlmbWork(NamedTuple):
     """Arrays in which a case is worked on."""
 
     needed: Ints  # (1,) tracks that a case has asked for
-    scratch: Scratch
+    pair: PairWork  # and scratch
     measurements: Floats  # (most_measurements, meas_dim)
     log_clutter: Floats  # (most_measurements,)
     first_rows: Rows  # of the prior, for all samples of an action
@@ -99,12 +99,12 @@ def grown_work(work: GlmbWork) -> GlmbWork:
     # Doubled, as a longer horizon will ask for more tracks yet.
     if not has_rows(work, num):
         rows = make_rows(2 * num, 2 * num, dim, meas_dim)
-        options = make_options(2 * num, 2 * num, most_measurements, meas_dim)
+        options = make_options(2 * num, 2 * num, most_measurements, dim, meas_dim)
     children = grown_children(work.children, work.search.sizes[WIDEST])
     num_options, num_hyps, num_entries = len(options.columns), len(children.parents), len(children.options)
     return GlmbWork(
         work.needed,
-        work.scratch,
+        work.pair,
         work.measurements,
         work.log_clutter,
         work.first_rows,
@@ -131,13 +131,13 @@ def make_work(num_tracks: int, num_sets: int, dim: int, meas_dim: int, most_meas
     none, belief = np.empty(0, np.int64), _make_belief(0, 0, 0, dim)
     work = GlmbWork(
         filled_ints(1, 2 * num_tracks),
-        make_scratch(dim, meas_dim),
+        make_pair_work(dim, meas_dim),
         np.empty((most_measurements, meas_dim)),
         np.empty(most_measurements),
         make_rows(num_tracks, num_tracks, dim, meas_dim),
         make_rows(0, 0, dim, meas_dim),
         all_measurements(),
-        make_options(0, 0, most_measurements, meas_dim),
+        make_options(0, 0, most_measurements, dim, meas_dim),
         make_search(0),
         make_children(64, 512),
         make_naming(0),

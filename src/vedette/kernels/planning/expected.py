@@ -13,11 +13,12 @@ import numpy as np
 
 from vedette.errors import NumericalError
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import Floats, Sensor
 from vedette.kernels.gaussian.detection import detection_probability
 from vedette.kernels.gaussian.innovation import Innovation, expect_measurement, make_innovation
 from vedette.kernels.gaussian.linalg import cholesky, inverse_from_factor
 from vedette.kernels.gaussian.prediction import predict
+from vedette.kernels.gaussian.relinearisation import Pair, PairWork, relinearise
 from vedette.kernels.gaussian.scratch import Scratch, make_scratch
 from vedette.kernels.planning.bernoulli_rows import log_miss
 from vedette.kernels.planning.ideal import Decision
@@ -30,6 +31,7 @@ class _Work(NamedTuple):
 
     scratch: Scratch
     seen: Innovation  # of one entry
+    measurement: Floats  # (meas_dim,)
     predicted_mean: Floats  # (state_dim,)
     predicted_cov: Floats  # (state_dim, state_dim)
     cov: Floats  # (state_dim, state_dim)
@@ -42,6 +44,7 @@ def _make_work(dim: int, meas_dim: int) -> _Work:
     return _Work(
         make_scratch(dim, meas_dim),
         make_innovation(1, dim, meas_dim),
+        np.empty(meas_dim),
         np.empty(dim),
         np.empty((dim, dim)),
         np.empty((dim, dim)),
@@ -55,6 +58,15 @@ def _invert(matrix: Floats, factor: Floats, out: Floats) -> None:
     if not cholesky(matrix, factor):
         raise NumericalError("expected information: covariance of a track is not positive definite")
     inverse_from_factor(factor, out)
+
+
+@inlined
+def _expect_at_centre(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, work: _Work) -> None:
+    """Posterior covariance of a measurement; where it bends, of that of a target at the mean."""
+    expect_measurement(sensor, pose, mean, cov, 0, work.seen, work.scratch)
+    if work.seen.bends[0]:
+        sensor.measurement(mean, pose, sensor.measurement_params, work.measurement)
+        relinearise(sensor, Pair(pose, mean, cov, work.measurement), PairWork(work.seen, work.scratch))
 
 
 @borrowing
@@ -91,7 +103,7 @@ def _expected_cov(
                 for j in range(n):
                     out[i, j] = cov[i, j]
             continue
-        expect_measurement(decision.sensor, horizon.poses[course, h], mean, cov, 0, work.seen, work.scratch)
+        _expect_at_centre(decision.sensor, horizon.poses[course, h], mean, cov, work)
         detection = detections[h]
         missed += log_miss(detection)
         _invert(cov, factor, prior)

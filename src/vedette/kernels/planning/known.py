@@ -40,6 +40,7 @@ from vedette.kernels.planning.lanes import (
     make_lane_work,
     make_lanes,
     predict_lanes,
+    relinearise_lanes,
 )
 from vedette.kernels.planning.pseudo_lmb import LmbResults
 from vedette.kernels.planning.reach import Belief
@@ -179,7 +180,7 @@ def _whiten(decision: Decision, num: int, work: Work) -> None:
                 away += 0 if -math.pi < residuals[s] <= math.pi else 1
             if away > 0:
                 for s in range(num):
-                    residuals[s] = wrap_angle(residuals[s])
+                    residuals[s] = residuals[s] if work.own.bends[s] else wrap_angle(residuals[s])
         for k in range(a):
             factors, others = lanes.factor[place(a, k)], work.measurements[k]
             for s in range(num):
@@ -269,6 +270,7 @@ def _follow(
             out.log_odds[s] += missed[s]
         if _look(belief, decision, course, label, step, first, num, work) > 0:
             _take_clutter(decision, pose, num, work)
+            relinearise_lanes(sensor, pose, work.measurements, work.is_seen, num, lanes, own)
             _whiten(decision, num, work)
             _weigh(num, work, out)
             _update(num, work, out)

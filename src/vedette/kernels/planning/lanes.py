@@ -14,12 +14,20 @@ import numpy as np
 
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.elementary import logs
-from vedette.kernels.base.types import Floats, Motion, Sensor
-from vedette.kernels.gaussian.innovation import LEAST_SHRINKAGE, Innovation, expect, make_innovation
+from vedette.kernels.base.types import Bools, Floats, Motion, Sensor
+from vedette.kernels.gaussian.innovation import (
+    LARGEST_BEND,
+    LEAST_SHRINKAGE,
+    Innovation,
+    expect,
+    expect_measurement,
+    make_innovation,
+)
 from vedette.kernels.gaussian.linalg import LOG_2PI
 from vedette.kernels.gaussian.prediction import predict
+from vedette.kernels.gaussian.relinearisation import Pair, PairWork, relinearise
 from vedette.kernels.gaussian.scratch import Scratch, make_scratch
-from vedette.kernels.gaussian.sigma_points import LINEARISED, SWITCHED, is_wide
+from vedette.kernels.gaussian.sigma_points import LINEARISED, SWITCHED
 from vedette.kernels.planning.forms import (
     Forms,
     Offsets,
@@ -57,8 +65,10 @@ class LaneWork(NamedTuple):
     jacobian: Floats  # (meas_dim * state_dim, room) of the measurement
     noise: Floats  # (meas_dim (meas_dim + 1) / 2, room)
     volume: Floats  # (room,) determinant of the innovation covariance; NaN where a Gaussian goes by itself
+    bends: Bools  # (room,) see `innovation`
     scratch: Scratch
-    mean: Floats  # (state_dim,) of one Gaussian, as the rest
+    measurement: Floats  # (meas_dim,) of one Gaussian, as the rest
+    mean: Floats  # (state_dim,)
     cov: Floats  # (state_dim, state_dim)
     out_mean: Floats  # (state_dim,)
     out_cov: Floats  # (state_dim, state_dim)
@@ -88,7 +98,9 @@ def make_lane_work(dim: int, meas_dim: int, room: int) -> LaneWork:
         np.empty((meas_dim * dim, room)),
         np.empty((place(meas_dim, 0), room)),
         np.empty(room),
+        np.empty(room, np.bool_),
         make_scratch(dim, meas_dim),
+        np.empty(meas_dim),
         np.empty(dim),
         np.empty((dim, dim)),
         np.empty(dim),
@@ -224,11 +236,18 @@ def _condition(num: int, lanes: Lanes, work: LaneWork) -> None:
 
 
 @inlined
-def _mark_wide(num: int, lanes: Lanes, work: LaneWork) -> None:
-    """Make NaN the volumes of Gaussians for which sigma points are taken."""
+def _mark_bent(width: int, num: int, lanes: Lanes, work: LaneWork) -> None:
+    """Make NaN the volumes of Gaussians over which measurements bend, see `innovation`."""
     volume, squares, first, second = work.volume, work.offsets.squares, lanes.covs[0], lanes.covs[place(1, 1)]
-    for s in range(num):
-        volume[s] = math.nan if is_wide(first[s] + second[s], squares[s]) else volume[s]
+    dim, scale = lanes.means.shape[0], 4.0 * LARGEST_BEND * LARGEST_BEND
+    for a in range(lanes.predicted.shape[0]):
+        along, across, noise = work.jacobian[a * dim], work.jacobian[a * dim + 1], work.noise[place(a, a)]
+        for s in range(num):
+            variance = first[s] + second[s]
+            slope = (along[s] * along[s] + across[s] * across[s]) * variance
+            for j in range(2, width):
+                slope += 4.0 * work.jacobian[a * dim + j, s] ** 2 * lanes.covs[place(j, j), s]
+            volume[s] = math.nan if variance * slope > scale * squares[s] * noise[s] else volume[s]
 
 
 @inlined
@@ -249,12 +268,10 @@ def _mark_cancelled(num: int, lanes: Lanes, work: LaneWork) -> int:
     return wrong
 
 
-@borrowing
-def _expect_alone(sensor: Sensor, pose: Floats, s: int, lanes: Lanes, work: LaneWork) -> None:
+@inlined
+def _put_innovation(s: int, lanes: Lanes, work: LaneWork) -> None:
+    """Write what one Gaussian expects to its lane, all except the probability of detection."""
     dim, innovation = lanes.means.shape[0], work.innovation
-    take_state(lanes.means, s, work.mean)
-    take_matrix(lanes.covs, s, work.cov)
-    expect(sensor, pose, work.mean, work.cov, 0, innovation, work.scratch)
     for a in range(lanes.predicted.shape[0]):
         lanes.predicted[a, s] = innovation.predicted[0, a]
         for b in range(a + 1):
@@ -264,13 +281,24 @@ def _expect_alone(sensor: Sensor, pose: Floats, s: int, lanes: Lanes, work: Lane
     for i in range(dim):
         for j in range(i + 1):
             lanes.posterior[place(i, j), s] = innovation.covs[0, i, j]
-    lanes.log_norm[s], lanes.prob_detection[s] = innovation.log_norm[0], innovation.prob_detection[0]
+    lanes.log_norm[s] = innovation.log_norm[0]
+
+
+@borrowing
+def _expect_alone(sensor: Sensor, pose: Floats, s: int, lanes: Lanes, work: LaneWork) -> None:
+    take_state(lanes.means, s, work.mean)
+    take_matrix(lanes.covs, s, work.cov)
+    expect(sensor, pose, work.mean, work.cov, 0, work.innovation, work.scratch)
+    _put_innovation(s, lanes, work)
+    lanes.prob_detection[s], work.bends[s] = work.innovation.prob_detection[0], work.innovation.bends[0]
 
 
 @borrowing
 def expect_lanes(sensor: Sensor, forms: Forms, pose: Floats, num: int, lanes: Lanes, work: LaneWork) -> None:
     """Fill in what the first `num` predicted Gaussians expect of a scan from a pose, as `innovation.expect`."""
     meas_dim, scratch, offsets = lanes.predicted.shape[0], work.scratch, work.offsets
+    for s in range(num):
+        work.bends[s] = False
     if sensor.method not in (LINEARISED, SWITCHED) or meas_dim > 2:
         for s in range(num):
             _expect_alone(sensor, pose, s, lanes, work)
@@ -280,10 +308,11 @@ def expect_lanes(sensor: Sensor, forms: Forms, pose: Floats, num: int, lanes: La
     fill_measurements(sensor, forms.measurement, pose, means, offsets, num, scratch, lanes.predicted)
     fill_jacobians(sensor, forms.measurement, pose, means, offsets, num, scratch, work.jacobian)
     fill_noise(sensor, forms.noise, pose, means, offsets, num, scratch, work.noise)
-    _project(jacobian_width(forms.measurement, means.shape[0]), num, lanes, work)
+    width = jacobian_width(forms.measurement, means.shape[0])
+    _project(width, num, lanes, work)
     _condition(num, lanes, work)
     if sensor.method == SWITCHED:
-        _mark_wide(num, lanes, work)
+        _mark_bent(width, num, lanes, work)
     wrong = _mark_cancelled(num, lanes, work)
     for s in range(num):
         lanes.log_norm[s] = work.volume[s]
@@ -295,3 +324,28 @@ def expect_lanes(sensor: Sensor, forms: Forms, pose: Floats, num: int, lanes: La
         for s in range(num):
             if not 1e-290 < work.volume[s] < 1e290:
                 _expect_alone(sensor, pose, s, lanes, work)
+
+
+@borrowing
+def relinearise_lanes(
+    sensor: Sensor, pose: Floats, measurements: Floats, is_seen: Bools, num: int, lanes: Lanes, work: LaneWork
+) -> None:
+    """Replace what Gaussians that bend expect by what they expect near their measurements, where these are seen.
+
+    measurements: (meas_dim, room); those of Gaussians that bend become whitened residuals, which are expected to be
+    zero with unit covariance.
+    """
+    for s in range(num):
+        if not (work.bends[s] and is_seen[s]):
+            continue
+        take_state(lanes.means, s, work.mean)
+        take_matrix(lanes.covs, s, work.cov)
+        take_state(measurements, s, work.measurement)
+        expect_measurement(sensor, pose, work.mean, work.cov, 0, work.innovation, work.scratch)
+        pair = Pair(pose, work.mean, work.cov, work.measurement)
+        relinearise(sensor, pair, PairWork(work.innovation, work.scratch))
+        _put_innovation(s, lanes, work)
+        for a in range(len(work.measurement)):
+            measurements[a, s], lanes.predicted[a, s] = work.scratch.residual[a], 0.0
+            for b in range(a + 1):
+                lanes.factor[place(a, b), s] = 1.0 if a == b else 0.0

@@ -75,17 +75,17 @@ def _update_cases(
             work.needed[0] = num_tracks
             if not has_rows(work, num_tracks):
                 return case
-            num = ideal_scan(decision, action, sample, step, work.scratch, work.measurements)
+            num = ideal_scan(decision, action, sample, step, work.pair.scratch, work.measurements)
             scan = ScanInput(decision.birth, work.measurements[:num], horizon.poses[action, step], horizon.dt)
             # The first prediction depends on neither sample nor measurements: it is taken once an action.
             rows = work.first_rows if step == 0 else view_rows(work.rows, num_tracks)
             if step > 0 or action != prepared:
-                predict_rows(belief.tracks, scan, decision.motion, sensor, rows, work.scratch)
+                predict_rows(belief.tracks, scan, decision.motion, sensor, rows, work.pair.scratch)
                 if not horizon.scans[step]:
                     leave_unseen(rows)
             prepared = action
             options = view_options(work.options, num_tracks, num)
-            weigh_options(rows, work.near, scan, sensor, caps, work.log_clutter, options)
+            weigh_options(rows, work.near, scan, sensor, caps, work.log_clutter, work.pair, options)
             if not _find_children(options, belief, caps.search, work):
                 return case
             if work.children.filled[0] == 0:

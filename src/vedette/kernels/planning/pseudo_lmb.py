@@ -23,7 +23,7 @@ from vedette.kernels.base.arrays import counted_ints
 from vedette.kernels.base.compile import borrowing, kernel
 from vedette.kernels.base.types import Floats, Ints, Lmb, ScanInput, Tracks
 from vedette.kernels.gaussian.mixtures import copy_component
-from vedette.kernels.gaussian.scratch import Scratch, make_scratch
+from vedette.kernels.gaussian.relinearisation import PairWork, make_pair_work
 from vedette.kernels.planning.ideal import Decision, ideal_scan, most_targets
 from vedette.kernels.steps.lmb import fill_existence, weigh_by_existence
 from vedette.kernels.steps.matching import Mixture, make_mixture, match_rows
@@ -40,7 +40,7 @@ class LmbResults(NamedTuple):
 class LmbWork(NamedTuple):
     """Arrays in which a case is worked on; there is one row a label of the prior."""
 
-    scratch: Scratch
+    pair: PairWork  # and scratch
     measurements: Floats  # (most_measurements, meas_dim)
     log_clutter: Floats  # (most_measurements,)
     first_rows: Rows  # of the prior, for all samples of an action
@@ -57,11 +57,11 @@ class LmbWork(NamedTuple):
 @kernel
 def _make_work(prior: Lmb, meas_dim: int, most_measurements: int) -> LmbWork:
     num, dim = prior.tracks.means.shape
-    options = make_options(num, num, most_measurements, meas_dim)
+    options = make_options(num, num, most_measurements, dim, meas_dim)
     means, covs = np.empty((num, dim)), np.empty((num, dim, dim))
     tracks = Tracks(prior.tracks.labels, prior.tracks.offsets, prior.tracks.log_weights, means, covs)
     return LmbWork(
-        make_scratch(dim, meas_dim),
+        make_pair_work(dim, meas_dim),
         np.empty((most_measurements, meas_dim)),
         np.empty(most_measurements),
         make_rows(num, num, dim, meas_dim),
@@ -79,7 +79,7 @@ def _make_work(prior: Lmb, meas_dim: int, most_measurements: int) -> LmbWork:
 @kernel
 def _grown_work(work: LmbWork) -> LmbWork:
     return LmbWork(
-        work.scratch,
+        work.pair,
         work.measurements,
         work.log_clutter,
         work.first_rows,
@@ -110,18 +110,18 @@ def _update_cases(
     for case in range(first, last):
         action, sample = case // num_samples, case % num_samples
         for step in range(horizon.poses.shape[1]):
-            num = ideal_scan(decision, action, sample, step, work.scratch, work.measurements)
+            num = ideal_scan(decision, action, sample, step, work.pair.scratch, work.measurements)
             scan = ScanInput(decision.birth, work.measurements[:num], horizon.poses[action, step], horizon.dt)
             # The first prediction depends on neither sample nor measurements: it is taken once an action.
             rows, current = (work.first_rows, prior) if step == 0 else (work.rows, belief)
             if step > 0 or action != prepared:
-                predict_rows(current.tracks, scan, decision.motion, sensor, rows, work.scratch)
+                predict_rows(current.tracks, scan, decision.motion, sensor, rows, work.pair.scratch)
                 if not horizon.scans[step]:
                     leave_unseen(rows)
                 weigh_by_existence(current.existence_logit, rows)
             prepared = action
             options = view_options(work.options, len(rows.log_absent), num)
-            weigh_options(rows, work.near, scan, sensor, caps, work.log_clutter, options)
+            weigh_options(rows, work.near, scan, sensor, caps, work.log_clutter, work.pair, options)
             sums, has_room = fill_marginals(options, caps.search, association, work.clusters, work.marginals)
             if not has_room:
                 return case

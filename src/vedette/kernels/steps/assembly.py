@@ -15,6 +15,7 @@ from vedette.kernels.base.types import Glmb, Ints, Mixture, Tracks
 from vedette.kernels.gaussian.innovation import update_mean
 from vedette.kernels.gaussian.linalg import normalise_logs
 from vedette.kernels.gaussian.mixtures import copy_component
+from vedette.kernels.gaussian.relinearisation import copy_updated
 
 
 class Naming(NamedTuple):
@@ -44,7 +45,9 @@ def write_updated(row: int, option: int, rows: Rows, options: Options, start: in
         if weight == -math.inf:
             continue
         out.log_weights[start] = weight
-        if detected:
+        if detected and rows.innovation.bends[first + i]:
+            copy_updated(options.updated[entry + i], out.means[start], out.covs[start])
+        elif detected:
             c, whitened = first + i, options.whitened[entry + i]
             copy_component(rows.means, rows.innovation.covs, c, out.means, out.covs, start)
             update_mean(rows.innovation, c, whitened, rows.means[c], out.means[start])

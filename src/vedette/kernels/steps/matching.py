@@ -13,13 +13,18 @@ from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.innovation import update_mean
 
+# Where the covariance of a component of the mixture is: of the rows, of their innovation, of the options' entries.
+PREDICTED = 0
+UPDATED = 1
+RELINEARISED = 2
+
 
 class Mixture(NamedTuple):
     """Room for the components of one row's mixture, an entry for each option and component."""
 
     weights: Floats  # (num_entries,) linear, relative to the likeliest option
     means: Floats  # (num_entries, state_dim), then their deviations from the mean of the mixture
-    sources: Ints  # (num_entries,) twice the number of the component among the rows', and one more where it is detected
+    sources: Ints  # (num_entries,) three times the place of the covariance, and PREDICTED, UPDATED or RELINEARISED
 
 
 @kernel
@@ -47,10 +52,15 @@ def _gather(row: int, rows: Rows, options: Options, marginals: Floats, out: Mixt
                 continue
             # The option's marginal, shared out over its components; a single Gaussian needs no exponential.
             out.weights[count] = scale if log_weight == 0.0 else scale * math.exp(log_weight)
-            out.sources[count] = 2 * c + (1 if detected else 0)
-            if detected:
+            if detected and rows.innovation.bends[c]:
+                out.sources[count] = 3 * at + RELINEARISED
+                for i in range(out.means.shape[1]):
+                    out.means[count, i] = options.updated[at, 0, i]
+            elif detected:
+                out.sources[count] = 3 * c + UPDATED
                 update_mean(rows.innovation, c, options.whitened[at], rows.means[c], out.means[count])
             else:
+                out.sources[count] = 3 * c + PREDICTED
                 for i in range(out.means.shape[1]):
                     out.means[count, i] = rows.means[c, i]
             count += 1
@@ -62,14 +72,16 @@ def _gather_predicted(row: int, rows: Rows, out: Mixture) -> int:
     """Write the components as they were predicted, all of one weight; returns their number."""
     first, last = rows.offsets[row], rows.offsets[row + 1]
     for c in range(first, last):
-        out.weights[c - first], out.sources[c - first] = 1.0, 2 * c
+        out.weights[c - first], out.sources[c - first] = 1.0, 3 * c + PREDICTED
         for i in range(out.means.shape[1]):
             out.means[c - first, i] = rows.means[c, i]
     return last - first
 
 
 @inlined
-def _moments(count: int, rows: Rows, mixture: Mixture, out_mean: Floats, out_cov: Floats, n: int) -> None:
+def _moments(
+    count: int, rows: Rows, options: Options, mixture: Mixture, out_mean: Floats, out_cov: Floats, n: int
+) -> None:
     """Mean and covariance of the first `count` components; their means are left as deviations from the mean."""
     weights, means, sources = mixture.weights, mixture.means, mixture.sources
     total = 0.0
@@ -84,10 +96,14 @@ def _moments(count: int, rows: Rows, mixture: Mixture, out_mean: Floats, out_cov
             means[k, i] -= out_mean[i]
         for j in range(i + 1):
             out_cov[i, j] = 0.0
-    # All detections of a component have one posterior covariance, so that only means and weights were gathered.
+    # All detections of a component that does not bend have one posterior covariance: only means were gathered.
     for k in range(count):
-        c, share = sources[k] // 2, weights[k] / total
-        if sources[k] % 2 == 1:
+        c, share = sources[k] // 3, weights[k] / total
+        if sources[k] % 3 == RELINEARISED:
+            for i in range(n):
+                for j in range(i + 1):
+                    out_cov[i, j] += share * (options.updated[c, 1 + i, j] + means[k, i] * means[k, j])
+        elif sources[k] % 3 == UPDATED:
             for i in range(n):
                 for j in range(i + 1):
                     out_cov[i, j] += share * (rows.innovation.covs[c, i, j] + means[k, i] * means[k, j])
@@ -115,6 +131,6 @@ def match_rows(
             count = _gather_predicted(chosen[k], rows, mixture)
         # A constant size is unrolled by the compiler.
         if means.shape[1] == 4:
-            _moments(count, rows, mixture, means[k], covs[k], 4)
+            _moments(count, rows, options, mixture, means[k], covs[k], 4)
         else:
-            _moments(count, rows, mixture, means[k], covs[k], means.shape[1])
+            _moments(count, rows, options, mixture, means[k], covs[k], means.shape[1])

@@ -14,6 +14,7 @@ from vedette.covariances import covariance_fault
 from vedette.scenarios.faults import Finding, Path, describe
 from vedette.scenarios.sections.base import attempt
 from vedette.scenarios.sections.birth import BirthSite
+from vedette.scenarios.sections.birth_labels import births_cut
 from vedette.scenarios.sections.control import DECISION_CHECKS
 from vedette.scenarios.sections.fusion import OF_LMBS, OF_SCANS
 from vedette.scenarios.sections.network import NETWORK_CHECKS
@@ -240,6 +241,7 @@ CHECKS = (
     _combinations,
     _birth_steps,
     _birth_sites,
+    births_cut,
     _targets,
     _unknown_targets,
     _sensor_names,

@@ -48,8 +48,8 @@ class _Sensing(Section):
 
     gaussian_method: GaussianMethod = Field(
         default="auto",
-        description="Extended, unscented or cubature Kalman; auto: extended where Jacobians exist, but unscented for a "
-        "target that is close to a sensor for how well its place is known [-].",
+        description="Extended, unscented or cubature Kalman; auto: extended where Jacobians exist, but linearised "
+        "again at each measurement of a target whose position is too uncertain for the sensor's noise [-].",
     )
     detection_at: DetectionAt = Field(
         default="centre",

@@ -1,0 +1,107 @@
+"""Labels of births that no scan has confirmed yet, and the share of births that a cap on hypotheses cuts.
+
+A delta-GLMB makes a label for each birth site at each step. Until a scan confirms or rejects them, every set of these
+labels is a hypothesis. `birth.period` keeps the expected number of births the same for steps of any length, but shorter
+steps make more labels, of which the cap on hypotheses cuts the larger sets.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vedette.scenarios.faults import Finding, describe
+from vedette.scenarios.sections.fusion import ONE_BELIEF
+
+if TYPE_CHECKING:
+    from vedette.kernels.base.types import Floats
+    from vedette.scenarios.sections.scenario import ScenarioModel
+
+# Share of the expected births from which a scenario is refused, or warned of.
+LARGEST_SHARE = 0.05
+CAPPED = ("delta_glmb", "m_delta_glmb")
+
+
+def share_cut(num_labels: float, probability: float, most: int) -> float:
+    """Share of the expected births that is cut where the heaviest `most` sets of unconfirmed labels are kept.
+
+    Of n labels of probability q each, the sets of k labels have the probability q^k (1 - q)^(n - k). Small sets are the
+    heaviest, and what is kept is normalised.
+
+    Args:
+        num_labels: number of unconfirmed labels, at least 0.
+        probability: of each, in (0, 0.5); larger ones are not judged.
+        most: number of hypotheses kept.
+    """
+    n, expected = math.floor(num_labels), math.floor(num_labels) * probability
+    if n == 0 or probability >= 0.5:
+        return 0.0
+    room, total, births = float(most), 0.0, 0.0
+    for k in range(min(n, math.ceil(expected + 10.0 * math.sqrt(expected) + 20.0)) + 1):
+        log_sets = math.lgamma(n + 1) - math.lgamma(k + 1) - math.lgamma(n - k + 1)
+        kept = min(math.exp(min(log_sets, 700.0)), room)
+        weight = kept * math.exp(k * math.log(probability / (1.0 - probability)))  # relative to no birth
+        room, total, births = room - kept, total + weight, births + k * weight
+        if room <= 0.5:
+            break
+    return max(0.0, 1.0 - births / total / expected)
+
+
+def most_hypotheses(model: ScenarioModel) -> int | None:
+    """The cap on sets of labels of a filter that keeps such, where births have a period; None where there is none."""
+    birth, own = model.birth, model.filter
+    if own.kind == "custom" or own.kind not in CAPPED:
+        return None
+    if birth.period is None or not birth.sites or model.recording is not None:
+        return None
+    return int(own.limits.max_hypotheses)
+
+
+def birth_probability(model: ScenarioModel) -> float:
+    """Mean probability of a birth at a site within a step."""
+    steps = model.time.step_period / (model.birth.period or model.time.step_period)
+    return float(np.mean([-math.expm1(steps * math.log1p(-site.existence)) for site in model.birth.sites]))
+
+
+def birth_steps(model: ScenarioModel) -> int:
+    """Largest number of steps with births from one scan of a belief to its next."""
+    num, steps = model.time.num_steps, model.birth.steps
+    births = np.ones(num) if steps == "every" else np.isin(np.arange(1, num + 1), steps)
+    scans = np.array([sensor.scans.build(model.time) for sensor in model.sensors])
+    beliefs = [np.logical_or.reduce(scans)] if has_one_belief(model) else scans
+    longest = 0
+    for each in beliefs:
+        ends = np.concatenate([[0], np.flatnonzero(each) + 1, [num]])
+        longest = max(longest, int(np.diff(np.concatenate([[0.0], np.cumsum(births)])[ends]).max()))
+    return longest
+
+
+def has_one_belief(model: ScenarioModel) -> bool:
+    """Whether all scans go into one belief."""
+    return model.fusion.kind in ONE_BELIEF
+
+
+def labels_until_detection(model: ScenarioModel, chances: Floats) -> float:
+    """Mean number of labels that are unconfirmed, where a target of each site is detected with these probabilities."""
+    most = model.time.num_steps if model.birth.steps == "every" else len(model.birth.steps)
+    steps = birth_steps(model) / np.maximum(chances, 1e-9)
+    return float(np.minimum(steps, most).sum())
+
+
+def births_cut(model: ScenarioModel) -> Iterator[Finding]:
+    """A filter that cuts its own births between scans, whatever these detect."""
+    most = most_hypotheses(model)
+    if most is None:
+        return
+    steps, sites = birth_steps(model), len(model.birth.sites)
+    share = share_cut(steps * sites, birth_probability(model), most)
+    if share > LARGEST_SHARE:
+        wanted = (
+            f"factored_glmb or lmb (or births at fewer birth.steps, or a longer time.step_period), as {steps} steps "
+            f"with births from one scan to the next make {steps * sites} labels, and {most} hypotheses cut "
+            f"{100.0 * share:.0f} % of the expected births"
+        )
+        yield ("filter", "kind"), wanted, describe(model.filter.kind)

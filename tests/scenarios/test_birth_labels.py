@@ -1,0 +1,100 @@
+"""Births that a cap on hypotheses cuts: the estimate against the filter, and which scenarios are refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from scenarios.minimal import changed
+from vedette import models
+from vedette.densities import existence_probabilities
+from vedette.errors import ScenarioError
+from vedette.filters import DeltaGlmbFilter
+from vedette.scenarios import load_scenario, parse_scenario
+from vedette.scenarios.cautions import cautions
+from vedette.scenarios.sections.birth_labels import share_cut
+
+REGION = models.Region(-5e3, 5e3, -5e3, 5e3)
+FAST = (
+    ("num_steps: 20, step_period: 0.5", "num_steps: 240, step_period: 0.05"),
+    ("steps: [1, 5]", "period: 1.0"),
+    ("decision_steps: [4, 8]", "decision_steps: [60]"),
+)
+SLOW_SCANS = (
+    "noise: {kind: constant, std: [0.02, 3.0]}",
+    "noise: {kind: constant, std: [0.02, 3.0]}\n  scans: {every: 60}",
+)
+FAR = (
+    "noise: {kind: constant, std: [0.02, 3.0]}",
+    "noise: {kind: constant, std: [0.02, 3.0]}\n  detection: {kind: gaussian, sigma: 12.0}",
+)
+
+
+def predicted(existence: float, dt: float, steps: int, sites: int, marginalised: bool) -> float:
+    """Expected number of targets after as many predictions without a scan, with births of a period of 1 s."""
+    means = np.array([[100.0 * i, 0.0, 0.0, 0.0] for i in range(sites)])
+    covs = np.tile(np.diag([100.0, 100.0, 9.0, 9.0]), (sites, 1, 1))
+    birth = models.BirthModel(np.full(sites, existence), means, covs, period=1.0)
+    targets = models.TargetModel(models.constant_velocity(1.0), models.constant_survival(1.0), birth)
+    noise, clutter = models.constant_noise([10.0, 10.0]), models.region_clutter(5.0, REGION, "position")
+    sensor = models.SensorModel(models.position(), noise, models.constant_detection(0.9), clutter)
+    local = DeltaGlmbFilter(targets, sensor, marginalised=marginalised)
+    belief: Any = local.initial()
+    for step in range(1, steps + 1):
+        belief, _ = local.predict(belief, dt, step)
+    return float(existence_probabilities(belief)[1].sum())
+
+
+@pytest.mark.parametrize("marginalised", [False, True])
+@pytest.mark.parametrize(
+    ("existence", "dt", "steps", "sites"),
+    [(0.06, 0.05, 60, 2), (0.05, 0.05, 20, 2), (0.2, 0.05, 60, 1), (0.1, 1.0, 5, 1)],
+)
+def test_the_share_that_is_cut_is_that_of_the_filter(
+    existence: float, dt: float, steps: int, sites: int, marginalised: bool
+) -> None:
+    each = 1.0 - (1.0 - existence) ** dt
+    left = predicted(existence, dt, steps, sites, marginalised) / (steps * sites * each)
+    assert share_cut(steps * sites, each, 300) == pytest.approx(1.0 - left, abs=2e-3)
+
+
+def test_few_labels_or_many_hypotheses_cut_nothing() -> None:
+    assert share_cut(0, 0.1, 300) == 0.0
+    assert share_cut(8, 0.1, 300) == pytest.approx(0.0, abs=1e-12)
+    assert share_cut(120, 0.003, 10_000) < 0.05 < share_cut(120, 0.003, 300)
+    assert share_cut(100_000, 0.01, 300) == pytest.approx(1.0, abs=0.01)
+
+
+@pytest.mark.parametrize("kind", ["delta_glmb", "m_delta_glmb"])
+def test_births_at_many_steps_between_scans_are_refused(kind: str) -> None:
+    text = changed(*FAST, SLOW_SCANS, ("m_delta_glmb}\nf", f"{kind}}}\nf"), ("existence: 0.1", "existence: 0.2"))
+    with pytest.raises(ScenarioError, match=r"filter\.kind: expected factored_glmb or lmb") as caught:
+        parse_scenario(text)
+    assert "60 steps with births from one scan to the next make 60 labels" in str(caught.value)
+    assert "300 hypotheses cut 35 % of the expected births" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "cure",
+    [
+        ("kind: m_delta_glmb}", "kind: m_delta_glmb, limits: {max_hypotheses: 40000}}"),
+        ("scans: {every: 60}", "scans: {every: 6}"),
+        ("period: 1.0", "period: 1.0\n  steps: [1, 61]"),
+        ("period: 1.0", "period: 100.0"),
+        ("filter: {kind: m_delta_glmb}\nfusion: {kind: cm_delta_glmb", "filter: {kind: lmb}\nfusion: {kind: clmb"),
+    ],
+)
+def test_what_cuts_few_births_is_accepted(cure: tuple[str, str]) -> None:
+    parse_scenario(changed(*FAST, SLOW_SCANS, ("existence: 0.1", "existence: 0.2"), cure))
+
+
+def test_sites_that_sensors_hardly_see_are_warned_of(tmp_path: Path) -> None:
+    file = tmp_path / "scene.yaml"
+    for changes, is_warned in ((FAST, False), ((*FAST, FAR), True)):
+        file.write_text(changed(*changes))
+        found = [line for line in cautions(load_scenario(file)) if "are detected late" in line]
+        assert len(found) == is_warned
+        assert all("take filter.kind: factored_glmb or lmb" in line for line in found)
