@@ -278,7 +278,9 @@ def test_the_error_bound_over_many_scenes():
 
 def test_a_first_detection_that_bends_is_that_of_a_label_from_the_start():
     """A wide birth site before a radar with a fine bearing: existence and density of both kinds of births agree."""
-    site = models.BirthModel([0.02], [[1500.0, 0.0, 0.0, 0.0]], [np.diag([150.0, 150.0, 5.0, 5.0]) ** 2])
+    site = models.BirthModel(
+        np.array([0.02]), np.array([[1500.0, 0.0, 0.0, 0.0]]), np.diag([150.0, 150.0, 5.0, 5.0])[None] ** 2
+    )
     sensor = models.SensorModel(
         models.bearing_range(),
         models.constant_noise([math.radians(0.1), 10.0]),

@@ -242,10 +242,10 @@ def with_candidates(rows: Rows, options: Options, new: Candidates) -> tuple[Rows
 
 @inlined
 def copy_entry(source: Options, entry: int, out: Options, at: int) -> None:
-    """Copy the whitened residual of an entry, and what it becomes where components bend."""
+    """Copy the whitened residual of an entry, and what it becomes where components of both bend."""
     for a in range(source.whitened.shape[1]):
         out.whitened[at, a] = source.whitened[entry, a]
-    if source.updated.shape[0] > 0:
+    if source.updated.shape[0] > 0 and out.updated.shape[0] > 0:
         for i in range(source.updated.shape[1]):
             for j in range(source.updated.shape[2]):
                 out.updated[at, i, j] = source.updated[entry, i, j]
