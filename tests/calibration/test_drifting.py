@@ -53,8 +53,11 @@ def test_each_window_has_the_bias_of_its_middle(problem: Problem) -> None:
     for window in windows:
         found = window.calibration.found[i]
         truth = 300.0 + DRIFT * 0.5 * (window.begin + window.end)
-        assert abs(found.value - truth) < 3.2 * found.std
+        assert abs(found.value - truth) < 3.0 * found.std
         assert 3.92 * found.std == pytest.approx(found.high - found.low, rel=1e-3)
+        values = part.free([each.value for each in window.calibration.found])
+        own = replace(part, recording=part.recording.between(window.begin, window.end))
+        assert own.log_likelihoods(values).sum() == pytest.approx(window.calibration.log_likelihood, abs=1e-9)
 
 
 def test_one_window_is_the_whole_recording(problem: Problem) -> None:

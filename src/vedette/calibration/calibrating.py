@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from vedette.calibration.maximum import covariance, maximise
+from vedette.calibration.maximum import Maximum, Terms, covariance, holding, maximise
 from vedette.calibration.parameters import Parameter, Problem
 from vedette.calibration.registration import BIASES, Pairs, linked, matched, register
 from vedette.kernels.base.types import Floats
@@ -69,25 +70,45 @@ def calibrate(
     """
 
     said = problem.free([each.start for each in problem.parameters])
-    own = [i for i, each in enumerate(problem.parameters) if only is None or each in only]
-    asked = replace(problem, parameters=tuple(problem.parameters[i] for i in own))
+    asked = [i for i, each in enumerate(problem.parameters) if only is None or each in only]
 
-    def terms(free: Floats) -> Floats:
+    def terms(free: Floats, own: Sequence[int]) -> Floats:
         watch()
         whole = said.copy()
         whole[own] = free
         return problem.log_likelihoods(whole)
 
-    unknown = np.array([each.unknown for each in asked.parameters])
-    before = float(terms(said[own]).sum())
-    guessed, pairs = _guess(problem, said, own, watch)
-    start = guessed[own] if float(terms(guessed[own]).sum()) > before else said[own]
-    maximum = maximise(terms, start, unknown, _blocks(asked.parameters))
+    before = float(terms(said[asked], asked).sum())
+    guessed, pairs = _guess(problem, said, asked, watch)
+    start = guessed if float(terms(guessed[asked], asked).sum()) > before else said.copy()
     together = linked(pairs, len(problem.sites))
     apart = np.flatnonzero(~together | (together.sum() == 1)).tolist()  # with nobody else, the first one is, too
+    found, directions, own = dict[int, Found](), list[int](), asked
+    while True:
+        maximum, judged, rank = _found(problem, own, partial(terms, own=own), start[own], apart)
+        found |= zip(own, judged, strict=True)
+        directions.append(rank)
+        told = [i for i in own if not found[i].why]
+        if told == own or not told:
+            break
+        # What cannot be found stays as it was said: the others are at the maximum beside that.
+        unknown = np.array([problem.parameters[i].unknown for i in own])
+        start[own] = holding(maximum, unknown, [i not in told for i in own], said[own])
+        own = told
+    log_likelihood = maximum.log_likelihood if told else before
+    return Calibration(tuple(found[i] for i in asked), log_likelihood, before, maximum.converged, directions[0])
+
+
+def _found(
+    problem: Problem, own: Sequence[int], terms: Terms, start: Floats, apart: Sequence[int]
+) -> tuple[Maximum, tuple[Found, ...], int]:
+    """The maximum over some of the parameters, what it says of each, and of how many directions it says something."""
+    parameters = tuple(problem.parameters[i] for i in own)
+    unknown = np.array([each.unknown for each in parameters])
+    maximum = maximise(terms, start, unknown, _blocks(parameters))
     cov, lost = covariance(maximum.information, unknown)
-    found, rank = _judged(asked, maximum.at, cov, lost, apart), len(own) - round(float(np.trace(lost)))
-    return Calibration(found, maximum.log_likelihood, before, maximum.converged, rank)
+    judged = _judged(replace(problem, parameters=parameters), maximum.at, cov, lost, apart)
+    return maximum, judged, len(own) - round(float(np.trace(lost)))
 
 
 def _blocks(parameters: tuple[Parameter, ...]) -> list[list[int]]:

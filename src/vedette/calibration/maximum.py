@@ -83,6 +83,20 @@ def covariance(information: Floats, unknown: Floats) -> tuple[Floats, Floats]:
     return scale * ((sure / values[known]) @ sure.T), lost @ lost.T
 
 
+def holding(maximum: Maximum, unknown: Floats, held: Sequence[bool], values: Floats) -> Floats:
+    """(p,) about where the maximum is when some parameters are held at these values.
+
+    By the second derivatives, as of the mean of a Gaussian given some of its components; what they cannot tell keeps
+    still within `unknown`.
+    """
+    known, fixed = ~np.asarray(held), np.asarray(held)
+    bend = maximum.information + np.diag(unknown**-2.0)
+    at = np.where(fixed, values, maximum.at)
+    pull = bend[np.ix_(known, fixed)] @ (values - maximum.at)[fixed]
+    at[known] -= np.linalg.solve(bend[np.ix_(known, known)], pull)
+    return at
+
+
 def _spectrum(information: Floats, unknown: Floats) -> tuple[Floats, Floats]:
     """Eigenvalues and eigenvectors for parameters in units of `unknown`."""
     scaled = information * np.outer(unknown, unknown)
