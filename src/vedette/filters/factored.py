@@ -26,6 +26,7 @@ from vedette.filters.undetected import (
     seen_by,
     split_births,
     undetected_after,
+    with_dropped,
 )
 from vedette.kernels.base.types import Bools, FactoredGlmb, Ints, Lmb
 from vedette.kernels.steps.factor_updates import Factoring
@@ -113,12 +114,15 @@ class _OfFactors(OfKind[FactoredGLMB]):
     def _concluded(
         self, posterior: _Before, reports: Sequence[FactoredReport], *, log_likelihood: float, repeats: Sequence[Ints]
     ) -> tuple[FactoredGLMB, FilterInfo]:
-        found, dropped, is_full = self.limits.without_excess(FactoredGLMB.from_kernel(posterior.density))
-        # Labels that kernels drop become undetected targets, where these are an intensity.
-        lost = "dropped_existence" if posterior.undetected is None else "left_out"
-        dropped += sum(float(getattr(report, lost)) for report in reports)
+        whole, undetected = FactoredGLMB.from_kernel(posterior.density), posterior.undetected
+        found, dropped, is_full = self.limits.without_excess(whole)
+        if undetected is None:
+            dropped += sum(float(report.dropped_existence) for report in reports)
+        else:  # dropped labels are undetected targets again
+            undetected = with_dropped(undetected, whole, found)
+            dropped = sum(float(report.left_out) for report in reports)
         factoring = posterior.error + sum(float(report.split_error + 4.0 * report.taken_twice) for report in reports)
-        return found.with_fields(undetected=posterior.undetected), FilterInfo(
+        return found.with_fields(undetected=undetected), FilterInfo(
             log_likelihood=log_likelihood,
             num_hypotheses=found.num_hyps,
             num_tracks=found.tracks.num_tracks,

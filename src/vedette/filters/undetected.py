@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vedette.densities import LMB, Poisson, UndetectedIntensity, UndetectedTargets
+from vedette.densities import LMB, FactoredGLMB, Poisson, UndetectedIntensity, UndetectedTargets, as_lmb
+from vedette.densities.label_sets import without_labels
 from vedette.filters.limits import Limits
 from vedette.kernels.association.first_detections import Undetected
 from vedette.kernels.base.types import Floats, Lmb, Mixture, Sensor
@@ -80,9 +81,8 @@ def predicted_undetected(
     motion = kernel_motion(targets.motion, targets.survival)
     intensity = predict_intensity_by(before.intensity.to_kernel(), motion, dt)
     if len(births.existence_logit):
-        existence, tracks = expit(births.existence_logit), births.tracks
-        log_weights = tracks.log_weights + np.repeat(np.log(existence), np.diff(tracks.offsets))
-        intensity = stacked_mixtures(intensity, Mixture(log_weights, tracks.means, tracks.covs))
+        existence = expit(births.existence_logit)
+        intensity = stacked_mixtures(intensity, _intensity_of(births))
         error = float((2.0 * existence * -np.expm1(-existence)).sum())
     intensity, _ = condensed(intensity, max(limits.max_intensity_components, _COMPONENTS_A_SITE * birth.num_sites))
     cells, places = before.cells, appearing(birth)
@@ -92,6 +92,26 @@ def predicted_undetected(
         share = birth.from_measurements.expected * (1.0 if birth.period is None else dt / birth.period) / len(known)
         cells = UndetectedIntensity(places.model.grid, places.model.predict(known, dt, survival) + share)
     return UndetectedTargets(Poisson.from_kernel(intensity), before.next_label, cells), error
+
+
+def with_dropped(undetected: UndetectedTargets, before: FactoredGLMB, kept: FactoredGLMB) -> UndetectedTargets:
+    """The undetected targets, and those whose labels a belief no longer holds, each as the Gaussians of its label.
+
+    before, kept: the belief with these labels and without them.
+    """
+    if kept.tracks.num_tracks == before.tracks.num_tracks:
+        return undetected
+    lost = as_lmb(without_labels(before, kept.tracks.labels)[0])
+    intensity = stacked_mixtures(undetected.intensity.to_kernel(), _intensity_of(lost.to_kernel()))
+    return replace(undetected, intensity=Poisson.from_kernel(intensity))
+
+
+def _intensity_of(labels: Lmb) -> Mixture:
+    """The tracks of labels, weighed by their existence."""
+    existence, tracks = expit(labels.existence_logit), labels.tracks
+    return Mixture(
+        tracks.log_weights + np.repeat(np.log(existence), np.diff(tracks.offsets)), tracks.means, tracks.covs
+    )
 
 
 def named_at(undetected: UndetectedTargets, step: Any, num_sites: int) -> UndetectedTargets:
