@@ -116,11 +116,12 @@ class _OfFactors(OfKind[FactoredGLMB]):
     ) -> tuple[FactoredGLMB, FilterInfo]:
         whole, undetected = FactoredGLMB.from_kernel(posterior.density), posterior.undetected
         found, dropped, is_full = self.limits.without_excess(whole)
-        if undetected is None:
-            dropped += sum(float(report.dropped_existence) for report in reports)
-        else:  # dropped labels are undetected targets again
+        # Where undetected targets are an intensity, dropped labels return to it: the caps' are counted as dropped all
+        # the same, those below `min_existence` are not.
+        if undetected is not None:
             undetected = with_dropped(undetected, whole, found)
-            dropped = sum(float(report.left_out) for report in reports)
+        lost = "dropped_existence" if undetected is None else "left_out"
+        dropped += sum(float(getattr(report, lost)) for report in reports)
         factoring = posterior.error + sum(float(report.split_error + 4.0 * report.taken_twice) for report in reports)
         return found.with_fields(undetected=undetected), FilterInfo(
             log_likelihood=log_likelihood,
