@@ -26,6 +26,7 @@ _STAND_INS: dict[str, Any] = {
 }
 _MARGIN = 0.05  # of the extent of what was measured, around it
 _EXISTENCE = 0.03  # of a birth where something was measured
+_EXPECTED = 0.5  # births from measurements, in the region between two scans
 _LOST_PER_SECOND = 0.001
 _BIRTH_STDS = 2.0  # of the noise across, where most was measured
 _ENDLESS = 1_000_000  # steps, the most of a scenario
@@ -250,7 +251,9 @@ def _assumed_birth(
 ) -> dict[str, Any]:
     """Births of what is measured, by the scans of each sensor."""
     std = _BIRTH_STDS * _spread(model, measured, folder)
-    words.append(f"birth: of measurements, std {std:.3g} m and {speed:g} m/s, existence up to {_EXISTENCE:g}")
+    words.append(
+        f"birth: {_EXPECTED:g} a scan, anywhere in the region (std {std:.3g} m and {speed:g} m/s where measured)"
+    )
     return {"birth": _measured_birth(std, speed, model.motion.state_dim)}
 
 
@@ -264,7 +267,7 @@ def _state_dim(said: Mapping[str, Any]) -> int:
 def _measured_birth(std: float, speed: float, state_dim: int) -> dict[str, Any]:
     rest = [0.1] * (state_dim - 4)  # a turn rate, rad/s
     stds = [std, std, speed, speed, *rest]
-    return {"sites": [], "from_measurements": {"expected": 0.5, "max_existence": _EXISTENCE, "std": stds}}
+    return {"sites": [], "from_measurements": {"expected": _EXPECTED, "max_existence": _EXISTENCE, "std": stds}}
 
 
 def _time(recording: RecordedScans) -> dict[str, Any]:

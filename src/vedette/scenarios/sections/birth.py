@@ -59,10 +59,14 @@ class BirthSite(Section):
 
 
 class MeasuredBirth(Section):
-    """Births where something was measured at the scan before that no track explains."""
+    """Births anywhere in the region, of which tracks start where something is measured that no track explains."""
 
     expected: Positive = Field(default=0.5, description="Mean number of such births a scan [-].")
-    max_existence: Chance = Field(default=0.03, description="Most that any of them may have as existence [-].")
+    max_existence: Chance = Field(
+        default=0.03,
+        description="Most that any of them may have as existence in filters with labelled births; in others it follows "
+        "from the probability of detection and the clutter [-].",
+    )
     std: Reals = Field(description="Standard deviation of each state component of a birth [m, m/s, ...].")
 
     @check
