@@ -17,11 +17,12 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.kernels.association.assignment import ABSENT, Options
+from vedette.kernels.association.joined_rows import copy_entry
 from vedette.kernels.association.near import near_measurements
 from vedette.kernels.association.options import Sight, make_room, room_for_bent, sort_row, weigh_detection
 from vedette.kernels.association.predicted import Rows, expect_rows, log_or_minus_inf, make_rows
-from vedette.kernels.base.arrays import group_members, grown_floats, grown_ints
-from vedette.kernels.base.compile import borrowing, inlined, kernel
+from vedette.kernels.base.arrays import group_members
+from vedette.kernels.base.compile import borrowing, kernel
 from vedette.kernels.base.types import Floats, Ints, Mixture, ScanInput, Sensor
 from vedette.kernels.gaussian.innovation import copy_innovation
 from vedette.kernels.gaussian.linalg import log_add
@@ -195,70 +196,3 @@ def _write_candidate(
     rows.offsets[row + 1] = filled
     options.offsets[row + 1] = 2 * row + 2
     sort_row(2 * row, 2 * row + 2, options.columns, options.log_weights, options.entries)
-
-
-@kernel
-def with_candidates(rows: Rows, options: Options, new: Candidates) -> tuple[Rows, Options]:
-    """The rows and options of tracks, followed by those of candidates."""
-    num_rows, num_new = len(rows.log_absent), len(new.rows.log_absent)
-    num, num_components = rows.offsets[num_rows], rows.offsets[num_rows] + new.rows.offsets[num_new]
-    meas_dim, state_dim = rows.innovation.whitened_cross.shape[1:]
-    out = make_rows(num_rows + num_new, num_components, state_dim, meas_dim)
-    _copy_rows(rows, out, 0, 0)
-    _copy_rows(new.rows, out, num_rows, num)
-    num_options, num_entries = options.offsets[num_rows], len(options.component_log_weights)
-    end_options, end_entries = num_options + new.options.offsets[num_new], num_entries + new.rows.offsets[num_new]
-    offsets = np.zeros(num_rows + num_new + 1, np.int64)
-    columns, entries = grown_ints(options.columns, end_options), grown_ints(options.entries, end_options)
-    log_weights = grown_floats(options.log_weights, end_options)
-    component_log_weights = grown_floats(options.component_log_weights, end_entries)
-    whitened = np.empty((len(component_log_weights), meas_dim))
-    all_options = Options(
-        offsets,
-        columns,
-        log_weights,
-        entries,
-        component_log_weights,
-        whitened,
-        room_for_bent(out, len(component_log_weights)),
-        options.num_measurements,
-    )
-    for entry in range(num_entries):
-        copy_entry(options, entry, all_options, entry)
-    for row in range(num_rows):
-        offsets[row + 1] = options.offsets[row + 1]
-    for row in range(num_new):
-        offsets[num_rows + row + 1] = num_options + new.options.offsets[row + 1]
-    for option in range(new.options.offsets[num_new]):
-        columns[num_options + option] = new.options.columns[option]
-        log_weights[num_options + option] = new.options.log_weights[option]
-        entry = new.options.entries[option]
-        entries[num_options + option] = num_entries + entry if entry >= 0 else -1
-    for entry in range(new.rows.offsets[num_new]):
-        component_log_weights[num_entries + entry] = new.options.component_log_weights[entry]
-        copy_entry(new.options, entry, all_options, num_entries + entry)
-    return out, all_options
-
-
-@inlined
-def copy_entry(source: Options, entry: int, out: Options, at: int) -> None:
-    """Copy the whitened residual of an entry, and what it becomes where components of both bend."""
-    for a in range(source.whitened.shape[1]):
-        out.whitened[at, a] = source.whitened[entry, a]
-    if source.updated.shape[0] > 0 and out.updated.shape[0] > 0:
-        for i in range(source.updated.shape[1]):
-            for j in range(source.updated.shape[2]):
-                out.updated[at, i, j] = source.updated[entry, i, j]
-
-
-@kernel
-def _copy_rows(source: Rows, out: Rows, first: int, start: int) -> None:
-    """Write rows from row `first` and component `start` on."""
-    for row in range(len(source.log_absent)):
-        out.labels[first + row, 0], out.labels[first + row, 1] = source.labels[row, 0], source.labels[row, 1]
-        out.log_absent[first + row] = source.log_absent[row]
-        out.offsets[first + row + 1] = start + source.offsets[row + 1]
-    for c in range(source.offsets[len(source.log_absent)]):
-        out.log_weights[start + c] = source.log_weights[c]
-        copy_component(source.means, source.covs, c, out.means, out.covs, start + c)
-        copy_innovation(source.innovation, c, out.innovation, start + c)

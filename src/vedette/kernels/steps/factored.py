@@ -18,8 +18,8 @@ from vedette.kernels.association.first_detections import (
     candidates_of,
     missed_intensity,
     seen_intensity,
-    with_candidates,
 )
+from vedette.kernels.association.joined_rows import joined_rows
 from vedette.kernels.association.links import linked_factors
 from vedette.kernels.association.options import weighed_options_at
 from vedette.kernels.association.predicted import rows_of_scan
@@ -96,7 +96,7 @@ def step_factored(
     seen = seen_intensity(stacked_mixtures(undetected.intensity, undetected.local), scan, sensor)
     new = candidates_of(seen, scan, sensor, log_levels, truncation.gate, reduction.min_existence_logit, undetected)
     if len(new.rows.log_absent) > 0:
-        rows, options = with_candidates(rows, options, new)
+        rows, options = joined_rows(rows, options, new.rows, new.options)
     factors = factors_of(prior, len(rows.log_absent) - len(prior.tracks.labels))
     presence = presence_of_rows(factors, len(rows.log_absent))
     sizes = factors.num_labels.copy()
