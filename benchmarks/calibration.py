@@ -16,10 +16,11 @@ from prior_targets import Names, PriorTargets
 from scenes import Scene
 
 from vedette.densities import Labelled, cardinality_distribution
+from vedette.errors import ScenarioError
 from vedette.evaluation import ospa_of_run
 from vedette.models import CellGrid
 from vedette.plausible import told_elsewhere
-from vedette.scenarios import with_fields
+from vedette.scenarios import Scenario, with_fields
 from vedette.scenarios.build import build_experiment
 from vedette.simulation import World
 
@@ -153,9 +154,23 @@ class Case:
         return self.fields["filter.kind"] not in ("phd", "cphd", "cb_member")
 
     def fits(self, scene: Scene) -> bool:
-        """Whether it can be run there: fusion needs several sensors, filters without labels need one."""
+        """Whether it can be run there.
+
+        Fusion needs several sensors, filters without labels need one; a delta-GLMB is refused where it cuts births.
+        """
         several = len(scene.scenario(0).model.sensors) > 1
-        return several if self.fusion is not None else self.has_labels or not several
+        if not (several if self.fusion is not None else self.has_labels or not several):
+            return False
+        try:
+            self.in_scene(scene)
+        except ScenarioError:
+            return False
+        return True
+
+    def in_scene(self, scene: Scene) -> Scenario:
+        """The scenario of the scene's first run with this filter. Raises `ScenarioError` where it is refused."""
+        fields = self.fields if self.fusion is None else {**self.fields, "fusion": self.fusion}
+        return with_fields(scene.scenario(0), fields)
 
 
 def cases(errors: Iterable[float] = ()) -> Iterator[Case]:
@@ -190,8 +205,7 @@ def calibration(scene: Scene, case: Case, seeds: Iterable[int], num_runs: int, f
         num_runs: number of runs of each seed.
         first_run: number of the first of them.
     """
-    fields = case.fields if case.fusion is None else {**case.fields, "fusion": case.fusion}
-    experiment = build_experiment(with_fields(scene.scenario(0), fields))
+    experiment = build_experiment(case.in_scene(scene))
     targets, timed = PriorTargets(experiment.tracker.targets), Timed(experiment.tracker, [])
     experiment = replace(experiment, targets=targets, tracker=timed)
     region = scene.scenario(0).model.region.build()
