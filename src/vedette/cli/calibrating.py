@@ -47,7 +47,8 @@ def calibrate(
 
     if out is not None and out.exists() and not overwrite:
         raise InputError(f"{out}: already there; --overwrite replaces it")
-    scenario, recording, assumed = read_recording(sensors, scans, None, speed=speed, bad_rows=bad_rows, trust=trust)
+    read, cautions = read_recording(sensors, scans, None, speed=speed, bad_rows=bad_rows, trust=trust)
+    scenario, recording, assumed = read
     with interruptible("nothing was written"):
         compile_if_cold(scenario)
         problem = problem_of(scenario, position=position)
@@ -65,7 +66,12 @@ def calibrate(
     if out is not None:
         say(f"wrote {out}")
     documents = [_document(each.calibration, names) for each in windows]
-    told = {"assumed": assumed, "skipped": recording.skipped, "written": [] if out is None else [out]}
+    told = {
+        "assumed": assumed,
+        "skipped": recording.skipped,
+        "warnings": cautions,
+        "written": [] if out is None else [out],
+    }
     if window is None:
         publish({**documents[0], **told})
     else:

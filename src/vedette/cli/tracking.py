@@ -77,7 +77,8 @@ def track(
         need("vedette track --out", "matplotlib", "pyarrow")
         with named_options({"directory": "--out"}):
             check_free(out, overwrite)
-    scenario, recording, assumed = read_recording(sensors, scans, truth, speed=speed, bad_rows=bad_rows, trust=trust)
+    found, cautions = read_recording(sensors, scans, truth, speed=speed, bad_rows=bad_rows, trust=trust)
+    scenario, recording, assumed = found
     on_earth = [name for name in formats or () if name in ON_EARTH]
     if on_earth and scenario.model.origin is None:  # before there is a folder with a part of what was asked for
         raise usage_error(f"expected an origin in {sensors}, as {on_earth[0]} has degrees; got none", "--format")
@@ -110,7 +111,7 @@ def track(
             **document,
             "assumed": assumed,
             "skipped": recording.skipped,
-            "warnings": warned,
+            "warnings": [*cautions, *warned],
             "folder": out,
             "written": written,
         }
@@ -119,22 +120,22 @@ def track(
 
 def read_recording(
     sensors: Path, scans: Path, truth: Path | None, *, speed: float, bad_rows: str, trust: bool
-) -> OfRecording:
-    """The scenario of recorded scans; tells what was left out, what is assumed and which code it runs."""
+) -> tuple[OfRecording, list[str]]:
+    """The scenario of recorded scans, and warnings; tells what was left out, what is assumed, which code it runs."""
     from vedette.scenarios.of_recording import scenario_of_recording
 
     if bad_rows not in BAD_ROWS:
         raise usage_error(f"expected one of {', '.join(BAD_ROWS)}; got {bad_rows!r}", "--bad-rows")
     found = scenario_of_recording(sensors, scans, truth, speed=speed, bad_rows=bad_rows)
     Approval(trust)(found.scenario)
-    warn(found.scenario)
+    cautions = warn(found.scenario)
     for text in found.recording.skipped[:_SHOWN_ROWS]:
         note(f"skipped: {text}")
     if len(found.recording.skipped) > _SHOWN_ROWS:
         note(f"skipped: {len(found.recording.skipped) - _SHOWN_ROWS} more rows")
     for text in found.assumed:
         note(f"not said, so {text}")
-    return found
+    return found, cautions
 
 
 def _summary(record: RunRecord) -> str:

@@ -12,8 +12,8 @@ import numpy as np
 from vedette.evaluation.scans import LIE, Scans, scans_of_record
 from vedette.kernels.base.types import Floats
 from vedette.scenarios import Scenario
+from vedette.scenarios.sections.field_of_view import field_of_view
 from vedette.scenarios.sections.sensors import Sensor
-from vedette.scenarios.views import field_of_view
 from vedette.simulation.records import RunRecord
 
 _GATE = 4.0  # standard deviations between an estimate and a measurement of it

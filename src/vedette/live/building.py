@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 from vedette.control import KnowsTruth
 from vedette.errors import InputError
 from vedette.live.loop import Live
 from vedette.models.arguments import reject
+from vedette.recorded.extents import box_of
 from vedette.recorded.instants import COMPONENTS
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.scenarios.of_recording import OfSensors
@@ -39,7 +43,8 @@ def live_of(
             knows the targets.
     """
     model = known.scenario.model
-    sites = tuple(sites_of(model))
+    # What lies beyond is left out by the loop, which counts it.
+    sites = tuple(replace(site, reach=math.inf) for site in sites_of(model))
     for site in sites:
         if site.kind not in COMPONENTS:
             raise reject(f"sensor {site.name}", f"measurements of kind {', '.join(COMPONENTS)}", site.kind)
@@ -61,4 +66,5 @@ def live_of(
         decide_every=decide_every,
         ahead=ahead,
         seed=seed,
+        within=box_of(model.region.build().corners),
     )

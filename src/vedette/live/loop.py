@@ -14,12 +14,14 @@ from vedette.control import Planner
 from vedette.densities import Estimator
 from vedette.errors import VedetteError
 from vedette.evaluation.track_formats import utc_text
+from vedette.kernels.base.types import Floats
 from vedette.live.messages import Message, read_message
 from vedette.models.arguments import reject
 from vedette.platforms.compass import Compass, PlaneCompass, courses_of
 from vedette.recorded import Conventions, Origin, Site
+from vedette.recorded.extents import PLACED, is_within, places_of
 from vedette.simulation.loop import PLANNER, cause_of
-from vedette.tracking import LateScans, Timeline
+from vedette.tracking import LateScans, SensorScan, Timeline
 
 Answer: TypeAlias = dict[str, Any]
 # So many scans in a row that agree about a time far ahead are believed, as all may have been silent for long; of one
@@ -74,6 +76,8 @@ class Live:
         ahead: s; a scan further ahead of all others is refused, as one wrong clock would end the window of all others;
             unless several in a row agree.
         seed: of the decisions.
+        within: (2, 2) m, the lower left and upper right corner of where measurements are taken; others are left out
+            and counted in the answer as `beyond`. None: everywhere.
     """
 
     late: LateScans
@@ -87,6 +91,7 @@ class Live:
     decide_every: float | None = None
     ahead: float = 60.0
     seed: int = 0
+    within: Floats | None = None
 
     @property
     def compass(self) -> Compass | None:
@@ -115,11 +120,12 @@ class Live:
                 wanted += f" ({_ALONE} of one sensor)" if len(self.sites) > 1 else ""
                 fault = str(reject(f"{place}, time", wanted, f"{time - (state.timeline.newest or 0.0):g} s after it"))
                 return _failed(checked, fault)
-            timeline, _ = self.late.take(state.timeline, [replace(message.scan, time=time)])
+            scan, num_beyond = self._within(message.scan)
+            timeline, _ = self.late.take(state.timeline, [replace(scan, time=time)])
             latest = list(state.latest)
             latest[message.scan.sensor] = max(latest[message.scan.sensor], time)
             taken = replace(checked, timeline=timeline, latest=tuple(latest))
-            answer = self._estimates(taken)
+            answer = self._estimates(taken) | ({"beyond": num_beyond} if num_beyond else {})
         except Exception as error:  # of whatever code of the user's own it comes, the next line is another
             text = str(error) if isinstance(error, VedetteError) else cause_of(error)
             return _failed(state, text if text.startswith(place) else f"{place}: {text}")
@@ -127,6 +133,15 @@ class Live:
             taken, plan = self._decided(taken)
             return taken, (answer, plan)
         return taken, (answer,)
+
+    def _within(self, scan: SensorScan) -> tuple[SensorScan, int]:
+        """A scan without measurements beyond where they are taken, and how many these are."""
+        kind, pose = self.sites[scan.sensor].kind, scan.pose
+        if self.within is None or kind not in PLACED:
+            return scan, 0
+        measured = np.asarray(scan.measurements, np.float64).reshape(-1, 2)
+        inside = is_within(places_of(measured, np.asarray(pose), kind), self.within)
+        return replace(scan, measurements=measured[inside]), int(np.count_nonzero(~inside))
 
     def _on_clock(self, state: LiveState, message: Message, place: str) -> tuple[LiveState, float]:
         """The state that knows how times are told, and the scan's time on the clock of the tracker.

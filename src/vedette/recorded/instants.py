@@ -46,6 +46,7 @@ class Site:
         bias: what the rows say too much, which is taken off as they are read; ranges that would be below 1 m without it
             are taken as 1 m.
         compass: whether it tells bearings in degrees clockwise from true north, where the rows say nothing else.
+        reach: m, beyond which it measures nothing; inf: not known.
         north: where true north is; an `Origin` knows it at every place, without one it is along y.
     """
 
@@ -54,6 +55,7 @@ class Site:
     pose: tuple[float, ...]
     bias: Bias = NO_BIAS
     compass: bool = False
+    reach: float = math.inf
     north: Compass = field(default_factory=PlaneCompass)
 
     def measured(self, told: ArrayLike, pose: ArrayLike | None = None) -> Floats:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from vedette.recorded.conventions import (
     ONE_PLACE_SHARE,
     Conventions,
 )
+from vedette.recorded.extents import PLACED, places_of, wild
 from vedette.recorded.geography import PLANE_REACH, Origin
 from vedette.recorded.instants import (
     COMPONENTS,
@@ -45,7 +46,8 @@ def parse_scans(
 ) -> RecordedScans:
     """Scans out of rows of one measurement each: time, sensor, and what was measured.
 
-    A row whose measured cells are all empty says that the sensor scanned and found nothing.
+    A row whose measured cells are all empty says that the sensor scanned and found nothing. So does one that lies
+    beyond the sensor's reach or far beyond all others (see `vedette.recorded.extents.wild`); it is named in `skipped`.
 
     Args:
         table: see `vedette.recorded.tables.read_table`.
@@ -60,12 +62,14 @@ def parse_scans(
     found, skipped = rows.read()
     if not found:
         raise InputError(f"{table.source}: expected at least one row that can be read; got none of {len(table.rows)}")
-    recording = _at_instants(found, rows, skipped)
+    found, beyond = _without_wild(found, table, sites)
+    recording = _at_instants(found, rows, skipped + beyond)
     return without_biases(recording, sites) if any(site.bias != NO_BIAS for site in sites) else recording
 
 
 @dataclass(frozen=True, slots=True)
 class _Row:
+    index: int
     time: float
     sensor: int
     measured: tuple[float, ...] | None
@@ -94,7 +98,7 @@ class _Rows(ScanColumns):
             raise self.table.fault(i, self._sensor, f"a sensor among {names}, or its number from 1")
         s = self._numbers[label]
         time, pose = self._seconds(i), self._pose(i, s)
-        return _Row(time, s, self._measured(i, s, pose), pose)
+        return _Row(i, time, s, self._measured(i, s, pose), pose)
 
     def _seconds(self, i: int) -> float:
         """The time of a row, all as dates or all as numbers."""
@@ -175,6 +179,30 @@ class _Rows(ScanColumns):
             wanted = f"with latitude {degrees[1]:g} a longitude within {PLANE_REACH / 1000.0:g} km of the origin"
             raise self.table.fault(i, self._columns[lon][0], f"{wanted} (are they exchanged?)")
         return place
+
+
+def _without_wild(rows: list[_Row], table: Table, sites: Sequence[Site]) -> tuple[list[_Row], tuple[str, ...]]:
+    """The rows, wild ones without what was measured and before the others, and what is wrong with these."""
+    placed = [i for i, row in enumerate(rows) if row.measured is not None and sites[row.sensor].kind in PLACED]
+    if not placed:
+        return rows, ()
+    some = [rows[i] for i in placed]
+    own = np.array([row.pose[:2] for row in some])
+    measured = [np.array([row.measured]) for row in some]
+    places = np.concatenate(
+        [places_of(scan, at, sites[row.sensor].kind) for scan, at, row in zip(measured, own, some, strict=True)]
+    )
+    reaches = np.array([sites[row.sensor].reach for row in some])
+    is_wild = wild(np.array([row.time for row in some]), places, own, reaches)
+    texts, emptied = list[str](), dict[int, _Row]()
+    for j in np.flatnonzero(is_wild).tolist():
+        row, away = some[j], float(np.hypot(*(places[j] - own[j])))
+        reach = sites[row.sensor].reach
+        why = f"within its reach of {reach:g} m" if away > reach else "no farther than the others"
+        wanted = f"a measurement of {shown(sites[row.sensor].name)} {why}"
+        texts.append(f"{table.source}, row {table.rows[row.index]}: expected {wanted}; got one {away:.0f} m away")
+        emptied[placed[j]] = replace(row, measured=None)
+    return [*emptied.values(), *(row for i, row in enumerate(rows) if i not in emptied)], tuple(texts)
 
 
 def _at_instants(rows: list[_Row], how: _Rows, skipped: tuple[str, ...]) -> RecordedScans:

@@ -21,8 +21,8 @@ from vedette.kernels.base.types import Floats
 from vedette.reports.groups import Strategy
 from vedette.reports.why import why_data
 from vedette.scenarios import Scenario
+from vedette.scenarios.sections.field_of_view import field_of_view
 from vedette.scenarios.sections.sensors import Sensor as SensorSection
-from vedette.scenarios.views import field_of_view
 from vedette.simulation.records import Decision, RunRecord
 from vedette.simulation.scans import Scan
 

@@ -24,13 +24,13 @@ from vedette.scenarios.sections.birth_labels import (
     most_hypotheses,
     share_cut,
 )
+from vedette.scenarios.sections.field_of_view import field_of_view
 from vedette.scenarios.sections.fusion import BY_LABEL, Fusion
 from vedette.scenarios.sections.sensing import Detection
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.targets import RecordedTargets
 from vedette.scenarios.sections.tracking import LABELS_CAPPED, Filter
 from vedette.scenarios.sections.world import grouped_order
-from vedette.scenarios.views import field_of_view
 
 # Sensors whose probabilities of detection of one place differ by more than this do not see the same.
 MAX_DIFFERENCE = 0.5
@@ -61,7 +61,7 @@ def cautions(scenario: Scenario) -> tuple[str, ...]:
 
 
 def _records(scenario: Scenario) -> Iterator[tuple[Path, str]]:
-    if isinstance(scenario.model.targets, RecordedTargets):
+    if isinstance(scenario.model.targets, RecordedTargets) or scenario.model.recording is not None:
         from vedette.scenarios.record_cautions import record_cautions  # with it comes what takes long to import
 
         yield from record_cautions(scenario)

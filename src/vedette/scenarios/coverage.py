@@ -9,8 +9,8 @@ import numpy as np
 
 from vedette.scenarios.faults import Path
 from vedette.scenarios.sections import ScenarioModel
+from vedette.scenarios.sections.field_of_view import FieldOfView, field_of_view
 from vedette.scenarios.sections.sensors import Sensor
-from vedette.scenarios.views import FieldOfView, field_of_view
 
 _POINTS_A_SIDE = 21
 

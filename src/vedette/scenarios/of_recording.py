@@ -13,10 +13,9 @@ from vedette.errors import InputError, ScenarioError
 from vedette.kernels.base.types import Floats
 from vedette.reading import read_text
 from vedette.recorded import Conventions, RecordedScans
+from vedette.scenarios.extents import measured_region, reached_region, region_in_words
 from vedette.scenarios.loading import Scenario, diagnose
 from vedette.scenarios.sections import ScenarioModel
-from vedette.scenarios.sections.sensors import Sensor
-from vedette.scenarios.views import field_of_view
 from vedette.scenarios.yaml_reader import MOST_BYTES, Document, read_yaml
 
 # What a file about sensors need not say; a scenario must.
@@ -24,7 +23,6 @@ _STAND_INS: dict[str, Any] = {
     "time": {"num_steps": 1},
     "region": {"x_min": -1e6, "x_max": 1e6, "y_min": -1e6, "y_max": 1e6},
 }
-_MARGIN = 0.05  # of the extent of what was measured, around it
 _EXISTENCE = 0.03  # of a birth where something was measured
 _EXPECTED = 0.5  # births from measurements, in the region between two scans
 _LOST_PER_SECOND = 0.001
@@ -134,7 +132,8 @@ def scenario_of_sensors(
     told.setdefault("birth", _measured_birth(100.0, speed, _state_dim(said)))  # until its deviations can be said
     model = _model(document, told, sensors)
     if "region" not in said:
-        told["region"] = _reached(model, sensors, words)
+        told["region"] = region = reached_region(model, sensors)
+        words.append(f"region: {region_in_words(region)}, as far as the sensors see from where they are first")
         model = _model(document, told, sensors)
     if "birth" not in said:
         side = max(model.region.x_max - model.region.x_min, model.region.y_max - model.region.y_min)
@@ -155,30 +154,6 @@ def _with_compass(said: Mapping[str, Any]) -> Any:
         is_custom = isinstance(own, Mapping) and own.get("kind") == "custom"
         found.append({"compass": True, **sensor} if isinstance(sensor, Mapping) and not is_custom else sensor)
     return found
-
-
-def _reached(model: ScenarioModel, sensors: FilePath, words: list[str]) -> dict[str, float]:
-    """The region of what the sensors see from where they are; raises where nothing says how far."""
-    corners = list[Floats]()
-    for name, sensor in zip(model.sensor_names, model.sensors, strict=True):
-        reach = _reach(sensor)
-        if reach is None:
-            wanted = (
-                f"a region, or of {name} `detection: {{max_range: ...}}` or `clutter: {{kind: around_sensor, ...}}`"
-            )
-            raise InputError(f"{sensors}: expected {wanted}, as nothing says how far it sees; got none of them")
-        corners += [np.array(sensor.position) - reach, np.array(sensor.position) + reach]
-    region = _box(np.array(corners), 0.0)
-    words.append(f"region: {_in_words(region)}, as far as the sensors see from where they are first")
-    return region
-
-
-def _reach(sensor: Sensor) -> float | None:
-    """m that a sensor sees, where its detection or its clutter has an edge."""
-    view, clutter = field_of_view(sensor), sensor.clutter
-    if view is not None:
-        return view.reach
-    return (clutter.radius or clutter.half_side) if clutter.kind == "around_sensor" else None
 
 
 def _endless(said: Mapping[str, Any], decide_every: float) -> dict[str, Any]:
@@ -218,8 +193,8 @@ def _assumed(
     told: dict[str, Any] = {"time": _time(recording)}
     words = list[str]()
     if "region" not in said:
-        told["region"] = region = _extent(model, recording)
-        words.append(f"region: {_in_words(region)}")
+        told["region"] = region = measured_region(model, recording)
+        words.append(f"region: {region_in_words(region)}")
     told |= _assumed_motion(said, speed, words)
     if "birth" not in said:
         measured = [
@@ -294,40 +269,6 @@ def _assumed_clutter(
         why = "half of what it measures" if counts else "as it has no scan in the recording"
         words.append(f"clutter of {model.sensor_names[s]}: {rate:g} a scan, {why}")
     return {"sensors": sensors}
-
-
-def _places(model: ScenarioModel, recording: RecordedScans) -> Floats:
-    """(n, 2) where measurements lie that say so, m."""
-    found = [np.empty((0, 2))]
-    for scans, poses in zip(recording.scans, recording.poses, strict=True):
-        for scan, pose, sensor in zip(scans, poses, model.sensors, strict=True):
-            if scan is None or sensor.measurement.kind not in ("bearing_range", "position"):
-                continue
-            if sensor.measurement.kind == "bearing_range":
-                offsets = scan[:, 1:] * np.column_stack([np.cos(scan[:, 0]), np.sin(scan[:, 0])])
-                scan = pose[:2] + offsets
-            found.append(scan)
-    return np.concatenate(found)
-
-
-def _extent(model: ScenarioModel, recording: RecordedScans) -> dict[str, float]:
-    """A rectangle around all that was measured, and the sensors."""
-    places = np.concatenate([_places(model, recording), recording.poses[:, :, :2].reshape(-1, 2)])
-    if np.ptp(places, axis=0).max() <= 0.0:
-        raise InputError("region: expected it in the file about sensors, as what they measure says no places; got none")
-    return _box(places, _MARGIN)
-
-
-def _box(places: Floats, share: float) -> dict[str, float]:
-    """The rectangle of places, with a margin of a share of its longer side."""
-    low, high = places.min(axis=0), places.max(axis=0)
-    margin = share * float((high - low).max())
-    (x_min, y_min), (x_max, y_max) = np.floor(low - margin).tolist(), np.ceil(high + margin).tolist()
-    return {"x_min": x_min, "x_max": x_max, "y_min": y_min, "y_max": y_max}
-
-
-def _in_words(region: Mapping[str, float]) -> str:
-    return "x from {x_min:g} to {x_max:g} m, y from {y_min:g} to {y_max:g} m".format(**region)
 
 
 def _spread(model: ScenarioModel, measured: Sequence[Sequence[Floats]], folder: FilePath) -> float:

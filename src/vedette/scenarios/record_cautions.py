@@ -1,4 +1,4 @@
-"""What looks odd in the recorded targets of a scenario, though a run accepts it."""
+"""What looks odd in the recorded targets and scans of a scenario, though a run accepts it."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from vedette.recorded import RecordedTargets as RecordedSource
+from vedette.scenarios.extents import beyond_region
 from vedette.scenarios.faults import Path, format_path
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections.sensors import Sensor
@@ -17,8 +18,10 @@ _NEAR = 1000.0  # m; what is nearer than this to the targets is not called far
 
 
 def record_cautions(scenario: Scenario) -> Iterator[tuple[Path, str]]:
-    """What a run accepts of recorded targets but may not be meant: where in the scenario, and what it is."""
+    """What a run accepts of recorded data but may not be meant: where in the scenario, and what it is."""
     model, folder = scenario.model, scenario.folder
+    if model.recording is not None:
+        yield from beyond_region(model, model.recording.build(model, folder))
     if not isinstance(model.targets, RecordedTargets):
         return
     source = model.targets.source(model, folder)

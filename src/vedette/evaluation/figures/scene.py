@@ -19,9 +19,10 @@ from vedette.evaluation.figures.style import GREY, INK
 from vedette.kernels.base.types import Floats
 from vedette.recorded import Origin
 from vedette.scenarios import Scenario
+from vedette.scenarios.sections.field_of_view import FieldOfView, field_of_view
 from vedette.scenarios.sections.planners import STRATEGIES, NamedIndependent, NamedJoint, NamedLookahead
 from vedette.scenarios.sections.sensors import Sensor
-from vedette.scenarios.views import COAST, HOLE, INSIDE, NO_GO, REGION, FieldOfView, Zone, field_of_view, zones
+from vedette.scenarios.views import COAST, HOLE, INSIDE, NO_GO, REGION, Zone, zones
 from vedette.text import elided
 
 _NEAR = 0.1  # of the extent of a figure

@@ -14,6 +14,7 @@ from pydantic import Field
 from vedette.errors import InputError
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import SHA256_FIELD, NonNegative, Section, Sha256, attempt, is_whole
+from vedette.scenarios.sections.field_of_view import reach_of
 
 if TYPE_CHECKING:
     from vedette.recorded import Origin, RecordedScans, Site
@@ -25,6 +26,7 @@ class RecordingSection(Section):
 
     The sensors are as `sensors` says, at their positions unless a row has `own_x` and `own_y`, or `own_lon` and
     `own_lat`, and `own_heading`. A row with empty cells says that a sensor scanned and found nothing.
+    Rows beyond a sensor's reach, or far beyond all others, are left out and named.
     """
 
     path: str = Field(min_length=1, description="CSV or Parquet file, relative to the scenario file [-].")
@@ -89,7 +91,7 @@ def sites_of(world: ScenarioModel) -> list[Site]:
 
     north = world.north()
     return [
-        Site(name, sensor.measurement.kind, sensor.pose, sensor.bias.build(), sensor.compass, north)
+        Site(name, sensor.measurement.kind, sensor.pose, sensor.bias.build(), sensor.compass, reach_of(sensor), north)
         for name, sensor in zip(world.sensor_names, world.sensors, strict=True)
     ]
 

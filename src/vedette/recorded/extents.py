@@ -1,0 +1,76 @@
+"""Where measurements lie in the plane, how far they extend, and which rows of a recording lie far beyond all others."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from vedette.kernels.base.types import Bools, Floats
+
+PLACED = ("bearing_range", "position")  # kinds of measurements that are places in the plane
+MARGIN = 0.05  # of the longer side of an extent, around it
+_LONELY = 0.9  # a value is far from all others where the third on its side is nearer than this share of its distance
+_FEWEST, _FEWEST_TIMES = 20, 10  # rows and times of a recording; of fewer no row is taken for wild
+_MOST_WILD = 50  # one row of so many may be wild on a side
+
+
+def places_of(scan: Floats, pose: Floats, kind: str) -> Floats:
+    """Return the (num, 2) places in m of a scan by a sensor at a pose; none of a kind that measures no places."""
+    if kind not in PLACED:
+        return np.empty((0, 2))
+    if kind == "position":
+        return scan
+    return np.asarray(pose[:2] + scan[:, 1:] * np.column_stack([np.cos(scan[:, 0]), np.sin(scan[:, 0])]))
+
+
+def box_of(places: Floats, share: float = MARGIN) -> Floats:
+    """Return the (2, 2) lower left and upper right corners around places, with a share of the longer side around."""
+    low, high = places.min(axis=0), places.max(axis=0)
+    margin = share * float((high - low).max())
+    return np.array([low - margin, high + margin])
+
+
+def is_within(places: Floats, box: Floats) -> Bools:
+    """(num,) whether places lie in a box."""
+    found: Bools = ((places >= box[0]) & (places <= box[1])).all(axis=1)
+    return found
+
+
+def wild(times: Floats, places: Floats, own: Floats, reaches: Floats) -> Bools:
+    """Return (num,) whether each of the rows of a recording lies beyond its sensor's reach or far beyond all others.
+
+    On each side of the median an extent ends at the outermost value whose distance is at most 1 / 0.9 times that of two
+    others. At most one row in 50, and one at least, is left out of it on a side, and rows within 5 % of its longer side
+    belong to it, too. One more row so moves a side of the extent by at most a ninth of its distance from the median.
+    Nothing is far beyond the others where there are fewer than 20 rows or 10 times.
+
+    Args:
+        times: (num,) s.
+        places: (num, 2) m, what was measured.
+        own: (num, 2) m, of the sensors then.
+        reaches: (num,) m, inf where it is not known.
+    """
+    beyond: Bools = np.hypot(*(places - own).T) > (1.0 + MARGIN) * reaches
+    near = ~beyond
+    if np.count_nonzero(near) < _FEWEST or len(np.unique(times)) < _FEWEST_TIMES:
+        return beyond
+    corners = np.concatenate([_extent(places[near]), _extent(own)])
+    return np.asarray(beyond | ~is_within(places, box_of(corners)))
+
+
+def _extent(places: Floats) -> Floats:
+    """(2, 2) lower left and upper right corners of places without those far beyond all others."""
+    return np.array([_ends(places[:, 0]), _ends(places[:, 1])]).T
+
+
+def _ends(values: Floats) -> Sequence[float]:
+    """Lower and upper end of values."""
+    middle, most, ends = float(np.median(values)), max(len(values) // _MOST_WILD, 1), list[float]()
+    for side in (-1.0, 1.0):
+        distances = np.sort(side * (values - middle))[::-1]
+        i = 0
+        while i < most and distances[i + 2] < _LONELY * distances[i]:
+            i += 1
+        ends.append(middle + side * float(distances[i]))
+    return ends

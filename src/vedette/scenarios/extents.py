@@ -1,0 +1,89 @@
+"""The region of a recording and of scans that are to come: where its sensors measure, as far as they reach."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path as FilePath
+
+import numpy as np
+
+from vedette.errors import InputError
+from vedette.kernels.base.types import Floats
+from vedette.recorded import RecordedScans
+from vedette.recorded.extents import box_of, places_of
+from vedette.scenarios.faults import Path
+from vedette.scenarios.sections import ScenarioModel
+from vedette.scenarios.sections.field_of_view import field_of_view
+from vedette.scenarios.sections.sensors import Sensor
+from vedette.text import counted
+
+_NAMED = 3  # measurements beyond the region, in a warning
+
+
+def measured_region(model: ScenarioModel, recording: RecordedScans) -> dict[str, float]:
+    """The rectangle around the sensors and all that they measured; raises where their measurements are no places."""
+    places = [own for _, _, own in _measured(model, recording)]
+    corners = np.concatenate([*places, recording.poses[:, :, :2].reshape(-1, 2)])
+    if np.ptp(corners, axis=0).max() <= 0.0:
+        raise InputError("region: expected it in the file about sensors, as what they measure says no places; got none")
+    return _edges(box_of(corners))
+
+
+def reached_region(model: ScenarioModel, sensors: FilePath) -> dict[str, float]:
+    """The rectangle of what the sensors reach from where they start; raises where nothing says how far."""
+    corners = list[Floats]()
+    for name, sensor in zip(model.sensor_names, model.sensors, strict=True):
+        reach = _reach(sensor)
+        if reach is None:
+            wanted = (
+                f"a region, or of {name} `detection: {{max_range: ...}}` or `clutter: {{kind: around_sensor, ...}}`"
+            )
+            raise InputError(f"{sensors}: expected {wanted}, as nothing says how far it sees; got none of them")
+        corners += [np.array(sensor.position) - reach, np.array(sensor.position) + reach]
+    return _edges(box_of(np.array(corners), share=0.0))
+
+
+def beyond_region(model: ScenarioModel, recording: RecordedScans) -> Iterator[tuple[Path, str]]:
+    """A warning of the measurements that lie beyond the region: how many there are, and the first of them."""
+    region, named, num = model.region.build(), list[str](), 0
+    for k, s, places in _measured(model, recording):
+        for place in places[~region.contains(places)]:
+            num += 1
+            if num <= _NAMED:
+                away = float(np.hypot(*(place - recording.poses[k, s, :2])))
+                at = f"x {place[0]:.0f}, y {place[1]:.0f} m"
+                named.append(
+                    f"{model.sensor_names[s]} {recording.times[k]:g} s after the first scan, {away:.0f} m away ({at})"
+                )
+    if num:
+        more = f" and {num - _NAMED} more" if num > _NAMED else ""
+        which = f"{num} of {counted(recording.num_measurements, 'measurement')}"
+        what = f"{which} {'lies' if num == 1 else 'lie'} beyond the region, where no clutter and no births are expected"
+        yield ("region",), f"{what}: {', '.join(named)}{more}"
+
+
+def region_in_words(region: Mapping[str, float]) -> str:
+    """Its edges, with units."""
+    return "x from {x_min:g} to {x_max:g} m, y from {y_min:g} to {y_max:g} m".format(**region)
+
+
+def _measured(model: ScenarioModel, recording: RecordedScans) -> Iterator[tuple[int, int, Floats]]:
+    """Instant and sensor of each scan, and the (num, 2) places that it measured."""
+    for k, (scans, poses) in enumerate(zip(recording.scans, recording.poses, strict=True)):
+        for s, (scan, pose, sensor) in enumerate(zip(scans, poses, model.sensors, strict=True)):
+            if scan is not None:
+                yield k, s, places_of(scan, pose, sensor.measurement.kind)
+
+
+def _reach(sensor: Sensor) -> float | None:
+    """m that a sensor sees, where its detection or its clutter has an edge."""
+    view, clutter = field_of_view(sensor), sensor.clutter
+    if view is not None:
+        return view.reach
+    return (clutter.radius or clutter.half_side) if clutter.kind == "around_sensor" else None
+
+
+def _edges(box: Floats) -> dict[str, float]:
+    """The region of a box, in whole metres."""
+    (x_min, y_min), (x_max, y_max) = np.floor(box[0]).tolist(), np.ceil(box[1]).tolist()
+    return {"x_min": x_min, "x_max": x_max, "y_min": y_min, "y_max": y_max}

@@ -1,0 +1,46 @@
+"""What a sensor sees where its view ends: for checks, which compile nothing, and for drawings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from vedette.scenarios.sections.sensors import Sensor
+
+_FADED = 0.01  # share of the probability of a soft sector from which on nothing is detected
+
+
+class FieldOfView(NamedTuple):
+    """A sector of a disc around a sensor: middle and half width in rad, reach in m, probability within it."""
+
+    middle: float
+    half_width: float
+    reach: float
+    probability: float
+
+
+def field_of_view(sensor: Sensor, pose: Sequence[float] | None = None) -> FieldOfView | None:
+    """Of a sensor at a pose, or where it starts; None where its view has no edge, or is of the user's own.
+
+    The edge of a soft sector is where half of its probability is left.
+    """
+    section, at = sensor.detection, sensor.pose if pose is None else pose
+    if section.kind == "limited_range":
+        return FieldOfView(at[2], math.pi, section.max_range, section.probability)
+    if section.kind in ("limited_sector", "soft_sector"):
+        return FieldOfView(at[2], math.radians(section.half_width_deg), section.max_range, section.probability)
+    if section.kind == "camera" and len(at) >= 5:
+        reference, width = section.reference_half_width_deg, at[4]
+        reach = section.max_range * (math.radians(reference) / width if reference is not None and width > 0.0 else 1.0)
+        return FieldOfView(at[3], width, reach, section.probability)
+    return None
+
+
+def reach_of(sensor: Sensor) -> float:
+    """m beyond which a sensor measures nothing, wherever it is; inf where its detection has no such edge."""
+    view, detection = field_of_view(sensor), sensor.detection
+    if view is None or detection.kind == "camera" or getattr(detection, "outside", 0.0) > 0.0:  # a camera zooms
+        return math.inf
+    faded = math.log(1.0 / _FADED - 1.0) / detection.range_slope if detection.kind == "soft_sector" else 0.0
+    return view.reach + faded
