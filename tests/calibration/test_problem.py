@@ -54,6 +54,24 @@ def test_clutter_has_its_density_beyond_what_is_seen(tmp_path: Path, clutter: st
         assert np.mean(drawn) == pytest.approx(wider.rate, rel=0.1)
 
 
+@pytest.mark.parametrize("clutter", ["{kind: around_sensor, rate: 2.0, radius: 3000.0}", "{kind: region, rate: 2.0}"])
+def test_false_measurements_do_not_pay_for_a_bias(tmp_path: Path, clutter: str) -> None:
+    """Their density is that at the raw measurement; at the corrected one a longer range would be likelier."""
+    region = "region: {x_min: -4000.0, x_max: 4000.0, y_min: -4000.0, y_max: 4000.0}\n"
+    found, (tracker, _), _ = problem(tmp_path, clutter, region)
+    values = np.array([each.start for each in found.parameters])
+    for i, each in enumerate(found.parameters):
+        if each.kind == "bias" and each.component in ("range", "bearing"):
+            values[i] = {"range": 250.0, "bearing": 3.0}[each.component]
+    biased, _ = found.tracker(values)
+    assert isinstance(biased, Central)
+    raw = np.array([[0.6, 2500.0], [-1.0, 800.0]])
+    corrected = raw - [-math.radians(3.0), 250.0]  # clockwise
+    for plain, other in zip(tracker.sensors, biased.sensors, strict=True):
+        at = other.clutter.log_intensity_at(corrected, POSE)
+        np.testing.assert_allclose(at, plain.clutter.log_intensity_at(raw, POSE), rtol=1e-12)
+
+
 def test_births_do_not_hang_on_when_the_next_scan_comes(tmp_path: Path) -> None:
     born = (
         "birth: {sites: [], period: 2.0, from_measurements: {expected: 0.2, max_existence: 0.02, std: [9, 9, 5, 5]}}\n"

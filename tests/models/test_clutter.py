@@ -169,3 +169,27 @@ def test_region():
     assert REGION.area == 1600.0 * 1200.0
     np.testing.assert_array_equal(REGION.contains([[0.0, 0.0], [600.0, 900.0], [601.0, 0.0]]), [True, True, False])
     assert REGION.contains(REGION.sample(100, rng=np.random.default_rng(0))).all()
+
+
+BUILT_IN = {
+    "region, bearing_range": models.region_clutter(25.0, REGION, "bearing_range"),
+    "region, bearing_only": models.region_clutter(25.0, REGION, "bearing_only"),
+    "region, range_only": models.region_clutter(25.0, REGION, "range_only"),
+    "region, position": models.region_clutter(25.0, REGION, "position"),
+    "disc, bearing_range": models.around_sensor(25.0, "bearing_range", radius=500.0),
+    "square, position": models.around_sensor(25.0, "position", half_side=500.0, half_width_rad=0.7),
+    "box, bearing_range": models.measurement_space_clutter(25.0, [-3.0, 100.0], [3.0, 900.0], angular=[True, False]),
+}
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_at_a_corrected_measurement_the_density_is_that_at_the_raw_one(name):
+    clutter, pose, moved, kind = BUILT_IN[name], POSES["inside"], np.array([40.0, -70.0]), name.split(", ")[1]
+    bias = {"bearing_range": [0.2, -60.0], "bearing_only": [0.2], "range_only": [-60.0], "position": [30.0, -20.0]}
+    taken, measurement = np.array(bias[kind]), getattr(models, kind)()
+    raw = clutter.sample(pose, measurement, state_dim=4, rng=np.random.default_rng(0))
+    corrected = models.clutter.at_raw_measurements(clutter, taken, moved)
+    found = corrected.log_intensity_at(raw - taken, pose - [*moved, 0.0])
+    np.testing.assert_allclose(found, clutter.log_intensity_at(raw, pose), rtol=1e-9)
+    assert np.isfinite(found).all()
+    assert found.size > 5

@@ -58,6 +58,17 @@ class Parameter:
         return math.exp(bounded) if self.scale == "log" else 1.0 / (1.0 + math.exp(-bounded))
 
 
+def with_biases(sites: Sequence[Site], parameters: Sequence[Parameter], values: Floats) -> list[Site]:
+    """The sensors with the biases among these values of the parameters."""
+    found = list(sites)
+    for each, value in zip(parameters, values.tolist(), strict=True):
+        if each.kind == "bias":
+            # The bearing of a `Bias` has the rows' direction, as its parameter has.
+            own, change = found[each.sensor], {each.component: value / abs(each.per_si)}
+            found[each.sensor] = replace(own, bias=replace(own.bias, **change))
+    return found
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Problem:
     """A recording and what is to be found of its sensors.
@@ -89,13 +100,7 @@ class Problem:
 
     def with_biases(self, values: Floats) -> list[Site]:
         """The sensors with the biases among these values of the parameters."""
-        sites = list(self.sites)
-        for each, value in zip(self.parameters, values.tolist(), strict=True):
-            if each.kind == "bias":
-                # The bearing of a `Bias` has the rows' direction, as its parameter has.
-                own, change = sites[each.sensor], {each.component: value / abs(each.per_si)}
-                sites[each.sensor] = replace(own, bias=replace(own.bias, **change))
-        return sites
+        return with_biases(self.sites, self.parameters, values)
 
     def log_likelihoods(self, free: Floats) -> Floats:
         """(num_scans,) what each scan of each sensor adds to the log likelihood, whatever order they are in.

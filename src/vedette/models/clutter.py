@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -123,6 +123,28 @@ def _box(measurement: Floats, pose: Floats, params: Floats) -> float:
         if not 0.0 <= offset <= width:
             return -math.inf
     return params[0]  # type: ignore[no-any-return]
+
+
+NO_OFFSETS = np.zeros(4)  # the last params of clutter that is uniform in the plane: see `at_raw_measurements`
+
+
+def at_raw_measurements(clutter: ClutterModel, bias: Floats, moved: Floats) -> ClutterModel:
+    """Return built-in clutter whose intensity at a corrected measurement is that at the raw one.
+
+    Biases are taken off measurements before filters see them, while false measurements are distributed as the sensor
+    gives them: at a corrected measurement z the intensity is that at z + bias from the place of the sensor + moved.
+
+    Args:
+        clutter: of `region_clutter`, `around_sensor` or `measurement_space_clutter`.
+        bias: (meas_dim,) what is taken off measurements [rad, m].
+        moved: (2,) what is taken off the place of the sensor [m].
+    """
+    params = clutter.params.copy()
+    if clutter.log_intensity is _box:
+        params[1 : 1 + len(bias)] -= bias
+    else:
+        params[-4 : len(params) - 4 + len(bias)], params[-2:] = bias, moved
+    return replace(clutter, params=params)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

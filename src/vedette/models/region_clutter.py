@@ -14,13 +14,14 @@ import numpy as np
 from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import non_negative, one_of, reject
-from vedette.models.clutter import ClutterModel, log_or_minus_infinity
+from vedette.models.clutter import NO_OFFSETS, ClutterModel, log_or_minus_infinity
 from vedette.models.fields import NonNegative, part
 from vedette.models.functions import ModelFunction, model_function, write_rows
 from vedette.models.measurement import MeasurementModel
 from vedette.models.region import Region
 
-# params of every function here: log(rate / area), x_min, x_max, y_min, y_max
+# params of every function here: log(rate / area), x_min, x_max, y_min, y_max; what is added to the two components of a
+# measurement (the second one is unused where there is one); what is added to x, y of the sensor
 
 
 @inlined
@@ -49,14 +50,15 @@ def _arc_in_quadrant(radius: float, x_low: float, x_high: float, y_low: float, y
 
 @model_function("log_clutter_intensity")
 def _position(measurement: Floats, pose: Floats, params: Floats) -> float:
-    return params[0] if _inside(measurement[0], measurement[1], params) else -math.inf
+    inside = _inside(measurement[0] + params[5], measurement[1] + params[6], params)
+    return params[0] if inside else -math.inf
 
 
 @model_function("log_clutter_intensity")
 def _bearing_range(measurement: Floats, pose: Floats, params: Floats) -> float:
-    distance = measurement[1]
-    x = pose[0] + distance * math.cos(measurement[0])
-    y = pose[1] + distance * math.sin(measurement[0])
+    bearing, distance = measurement[0] + params[5], measurement[1] + params[6]
+    x = pose[0] + params[7] + distance * math.cos(bearing)
+    y = pose[1] + params[8] + distance * math.sin(bearing)
     if not (distance > 0.0 and _inside(x, y, params)):
         return -math.inf
     return params[0] + math.log(distance)  # type: ignore[no-any-return]
@@ -64,8 +66,9 @@ def _bearing_range(measurement: Floats, pose: Floats, params: Floats) -> float:
 
 @model_function("log_clutter_intensity")
 def _bearing(measurement: Floats, pose: Floats, params: Floats) -> float:
-    near, far = _clip_ray(pose[0], math.cos(measurement[0]), params[1], params[2], 0.0, math.inf)
-    near, far = _clip_ray(pose[1], math.sin(measurement[0]), params[3], params[4], near, far)
+    bearing, x, y = measurement[0] + params[5], pose[0] + params[7], pose[1] + params[8]
+    near, far = _clip_ray(x, math.cos(bearing), params[1], params[2], 0.0, math.inf)
+    near, far = _clip_ray(y, math.sin(bearing), params[3], params[4], near, far)
     if not near < far:
         return -math.inf
     return params[0] + math.log(0.5 * (far - near) * (far + near))  # type: ignore[no-any-return]
@@ -73,11 +76,10 @@ def _bearing(measurement: Floats, pose: Floats, params: Floats) -> float:
 
 @model_function("log_clutter_intensity")
 def _range(measurement: Floats, pose: Floats, params: Floats) -> float:
-    distance = measurement[0]
+    distance, x, y = measurement[0] + params[5], pose[0] + params[7], pose[1] + params[8]
     if not distance > 0.0:
         return -math.inf
-    x_low, x_high = params[1] - pose[0], params[2] - pose[0]
-    y_low, y_high = params[3] - pose[1], params[4] - pose[1]
+    x_low, x_high, y_low, y_high = params[1] - x, params[2] - x, params[3] - y, params[4] - y
     arc = (
         _arc_in_quadrant(distance, x_low, x_high, y_low, y_high)
         + _arc_in_quadrant(distance, -x_high, -x_low, y_low, y_high)
@@ -128,5 +130,5 @@ def region_clutter(rate: NonNegative, region: Region, kind: str) -> ClutterModel
         raise reject("region", "a Region", region)
     rate = non_negative("rate", rate)
     function, angular = _KINDS[kind]
-    params = np.concatenate([[log_or_minus_infinity(rate / region.area)], region.bounds])
+    params = np.concatenate([[log_or_minus_infinity(rate / region.area)], region.bounds, NO_OFFSETS])
     return ClutterModel(rate, function, params, _RegionSampler(rate, region), len(angular), np.array(angular))

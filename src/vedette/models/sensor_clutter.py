@@ -15,12 +15,13 @@ from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats
 from vedette.kernels.gaussian.scratch import wrap_angle
 from vedette.models.arguments import non_negative, one_of, positive, reject
-from vedette.models.clutter import ClutterModel, log_or_minus_infinity
+from vedette.models.clutter import NO_OFFSETS, ClutterModel, log_or_minus_infinity
 from vedette.models.fields import HalfWidth, NonNegative, Positive, part
 from vedette.models.functions import ModelFunction, model_function
 from vedette.models.measurement import MeasurementModel
 
-# params of every function here: log rate, radius or half side, 1 of a square and 0 of a disc, half width of the sector
+# params of every function here: log rate, radius or half side, 1 of a square and 0 of a disc, half width of the sector,
+# and what is added to the two components of a measurement and to x, y of the sensor
 
 
 @kernel
@@ -50,15 +51,17 @@ def _log_density(dx: float, dy: float, heading: float, params: Floats) -> float:
 
 @model_function("log_clutter_intensity")
 def _position(measurement: Floats, pose: Floats, params: Floats) -> float:
-    return _log_density(measurement[0] - pose[0], measurement[1] - pose[1], pose[2], params)
+    dx = measurement[0] + params[4] - (pose[0] + params[6])
+    dy = measurement[1] + params[5] - (pose[1] + params[7])
+    return _log_density(dx, dy, pose[2], params)
 
 
 @model_function("log_clutter_intensity")
 def _bearing_range(measurement: Floats, pose: Floats, params: Floats) -> float:
-    distance = measurement[1]
+    bearing, distance = measurement[0] + params[4], measurement[1] + params[5]
     if not distance > 0.0:
         return -math.inf
-    dx, dy = distance * math.cos(measurement[0]), distance * math.sin(measurement[0])
+    dx, dy = distance * math.cos(bearing), distance * math.sin(bearing)
     return _log_density(dx, dy, pose[2], params) + math.log(distance)
 
 
@@ -124,6 +127,6 @@ def around_sensor(
     rate, is_square = non_negative("rate", rate), radius is None
     size = positive("half_side", half_side) if is_square else positive("radius", radius)
     function, angular = _KINDS[kind]
-    params = np.array([log_or_minus_infinity(rate), size, float(is_square), half_width_rad])
+    params = np.array([log_or_minus_infinity(rate), size, float(is_square), half_width_rad, *NO_OFFSETS])
     sampler = _AroundSampler(rate, size, is_square, half_width_rad)
     return ClutterModel(rate, function, params, sampler, len(angular), np.array(angular))

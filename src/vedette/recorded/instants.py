@@ -194,20 +194,26 @@ def without_biases(recording: RecordedScans, sites: Sequence[Site]) -> RecordedS
     return in_order(looks, recording.poses[0], *told)
 
 
+def bias_of(site: Site, bearings: Bearings | None) -> tuple[Floats, Floats]:
+    """Return what the bias of a sensor adds to measurements, (meas_dim,) in rad and m, and to its place, (2,) in m."""
+    bias, is_place = site.bias, site.kind == "position"
+    turn = -bias.bearing if bearings == "north" else bias.bearing
+    own = {"bearing": turn, "range": bias.range, "x": bias.x, "y": bias.y}
+    measured = np.array([own[component] for component in COMPONENTS[site.kind]])
+    return measured, np.zeros(2) if is_place else np.array([bias.x, bias.y])
+
+
 def without_bias(look: Look, site: Site, bearings: Bearings | None) -> Look:
     """A scan as its sensor would have made it without its bias."""
     kind, bias = site.kind, site.bias
     if bias == NO_BIAS:
         return look
-    turn = -bias.bearing if bearings == "north" else bias.bearing
-    own = {"bearing": turn, "range": bias.range, "x": bias.x, "y": bias.y}
-    scan = look.scan - [own[component] for component in COMPONENTS[kind]]
-    pose = look.pose.copy()
+    measured, place = bias_of(site, bearings)
+    scan, pose = look.scan - measured, look.pose.copy()
     for i, component in enumerate(COMPONENTS[kind]):
         if component == "range":
             scan[:, i] = np.maximum(scan[:, i], LEAST_RANGE)
         elif component == "bearing":
             scan[:, i] = np.remainder(scan[:, i] + math.pi, 2.0 * math.pi) - math.pi
-    if kind != "position":
-        pose[:2] -= bias.x, bias.y
+    pose[:2] -= place
     return Look(look.time - bias.clock, look.sensor, scan, pose)

@@ -10,13 +10,15 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from vedette.calibration import Calibration, Parameter, Problem
+from vedette.calibration.parameters import with_biases
 from vedette.filters import Limits, SequentialLmbFilter, shared_targets
 from vedette.kernels.base.types import Floats
 from vedette.models import Bias, Region, SensorModel, TargetModel
+from vedette.models.clutter import at_raw_measurements
 from vedette.plausible import told_elsewhere
 from vedette.reading import read_text
 from vedette.recorded import RecordedScans
-from vedette.recorded.instants import COMPONENTS, Bearings
+from vedette.recorded.instants import COMPONENTS, Bearings, bias_of
 from vedette.scenarios.build import build_sensors
 from vedette.scenarios.dumping import dump_data
 from vedette.scenarios.loading import Scenario
@@ -30,7 +32,9 @@ _DEGREE = 180.0 / math.pi
 # A standard deviation from which on nothing is known: of biases; of logarithms, of log-odds.
 _UNKNOWN = {"range": 1000.0, "bearing": 10.0, "clock": 5.0, "x": 1000.0, "y": 1000.0}
 _UNKNOWN_LOG, _UNKNOWN_ODDS = 1.0, 4.0
-_WIDER = 3.0  # times the region, along each axis: what is turned or shifted stays in it
+_WIDER = 3.0  # times the region, along each axis: noise at its edge stays in it
+_BUILT_IN = ("region", "around_sensor", "measurement_space")  # clutter that can be had at the raw measurement
+_NOT_CONVERGED = "# The search did not converge: these values may not be those of the maximum of the likelihood."
 _LEAST_RATE, _SUREST = 0.01, 0.98  # to start from
 
 
@@ -65,13 +69,18 @@ def problem_of(scenario: Scenario, *, position: bool = False, bearings: Bearings
 
     def tracker(values: Floats) -> tuple[Tracker, Floats]:
         known, more = list[SensorModel](), np.zeros(len(model.sensors))
+        biased = with_biases(sites, parameters, values)
         with told_elsewhere():
-            for sensor in _with_values(model.sensors, parameters, values.tolist()):
+            for s, sensor in enumerate(_with_values(model.sensors, parameters, values.tolist())):
                 changes = _wider_clutter(sensor)
                 within = wide if sensor.clutter.kind == "region" else region
-                more[len(known)] = changes.get("rate", 0.0) - sensor.clutter.rate if changes else 0.0
+                more[s] = changes.get("rate", 0.0) - sensor.clutter.rate if changes else 0.0
                 sensor = sensor.model_copy(update={"clutter": sensor.clutter.model_copy(update=changes)})
-                known.append(sensor.build(within, method, folder, model.filter.detection_at))
+                built = sensor.build(within, method, folder, model.filter.detection_at)
+                if sensor.clutter.kind in _BUILT_IN:
+                    raw = at_raw_measurements(built.clutter, *bias_of(biased[s], recording.bearings[s]))
+                    built = replace(built, clutter=raw)
+                known.append(built)
         return Central(SequentialLmbFilter(targets, tuple(known), _LIMITS)), more
 
     return Problem(recording, sites, tuple(parameters), tracker)
@@ -93,8 +102,8 @@ def _born_at_once(targets: TargetModel, times: Floats) -> TargetModel:
 def _wider_clutter(sensor: Sensor) -> dict[str, float]:
     """What makes the clutter of a sensor reach farther, at the same density.
 
-    It must not end where a bias that is tried, or noise at the edge of what is seen, may take a measurement: there it
-    would be certain that no clutter is, and the likelihood would jump.
+    It must not end where noise at the edge of what is seen may take a measurement: there it would be certain that no
+    clutter is, and the likelihood would jump.
     """
     clutter = sensor.clutter
     if clutter.kind == "region":
@@ -178,7 +187,7 @@ def _with_values(
 def calibrated_text(scenario: Scenario, sensors: FilePath, calibration: Calibration, folder: FilePath) -> str:
     """The file about the sensors with what was found in it at each.
 
-    What was not found stays as it was; comments are lost.
+    What was not found stays as it was; comments are lost. A first line says so where the search did not converge.
 
     Args:
         scenario: of the recording.
@@ -201,4 +210,5 @@ def calibrated_text(scenario: Scenario, sensors: FilePath, calibration: Calibrat
         }
         for own, section, bias in zip(said["sensors"], sections, biases, strict=True)
     ]
-    return dump_data(said, None if folder.resolve() == sensors.parent.resolve() else sensors.parent)
+    text = dump_data(said, None if folder.resolve() == sensors.parent.resolve() else sensors.parent)
+    return text if calibration.converged else f"{_NOT_CONVERGED}\n{text}"
