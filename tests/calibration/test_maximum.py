@@ -75,3 +75,20 @@ def test_blocks_that_do_not_depend_on_each_other_need_no_second_differences() ->
     found = maximise(terms, np.zeros(3), UNKNOWN, [[0, 1], [2]])
     np.testing.assert_allclose(found.information[2], [0.0, 0.0, 4.0 * len(came)], rtol=1e-6, atol=1e-4)
     assert found.at[2] == pytest.approx(came.mean() / 2.0, abs=1e-6)
+
+
+def test_where_terms_jump_second_derivatives_say_whether_it_converged() -> None:
+    """Outer products promise 1 where no step goes up, as the start lies on a jump of 0.4; a Newton step, 0.09."""
+    start = np.array([0.3])
+
+    def terms(at: Floats) -> Floats:
+        return np.full(2, -0.5 * at[0] ** 2 + (0.2 if at[0] == start[0] else 0.0))
+
+    found = maximise(terms, start, np.array([100.0]), [[0]])
+    assert (found.converged, found.at.tolist()) == (True, [0.3])
+
+
+def test_far_from_the_maximum_it_did_not_converge(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("vedette.calibration.maximum._MOST_STEPS", 1)
+    far = np.array([60.0])
+    assert not maximise(lambda at: np.full(20, -0.5 * (at[0] - 1.0) ** 2), far, np.array([100.0]), [[0]]).converged

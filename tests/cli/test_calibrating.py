@@ -54,6 +54,22 @@ def test_windows_are_printed_side_by_side_and_the_last_is_written(place: Path) -
     assert written["sensors"][1]["bias"]["range"] == pytest.approx(last["boat", "range"], rel=1e-6)
 
 
+def test_a_search_that_did_not_converge_has_no_intervals(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("vedette.calibration.maximum._MOST_STEPS", 1)
+    words = ("calibrate", "scans.csv", "--sensors", "radars.yaml", "--out", "found.yaml", "--overwrite")
+    result = call(*words)
+    assert result.exit_code == 3, result.output
+    assert "the search did not converge" in result.stderr
+    assert " to " not in result.stdout.split("clocks are against")[0]
+    assert (place / "found.yaml").read_text("utf-8").startswith("# The search did not converge")
+    assert set(read_yaml((place / "found.yaml").read_text("utf-8"), "found.yaml").data) >= {"sensors"}
+    result = call(*words, "--json")
+    assert result.exit_code == 3, result.output
+    told = json.loads(result.stdout)
+    assert told["converged"] is False
+    assert {row["low"] for row in told["found"]} == {row["high"] for row in told["found"]} == {None}
+
+
 def test_what_is_there_is_not_overwritten_unasked(place: Path) -> None:
     result = call("calibrate", "scans.csv", "--sensors", "radars.yaml", "--out", "radars.yaml")
     assert (result.exit_code, result.stderr) == (1, "radars.yaml: already there; --overwrite replaces it\n")

@@ -26,7 +26,8 @@ _PART = 0.1  # of a parameter that lies where nothing is known: it cannot be fou
 class Found(NamedTuple):
     """What was found of a parameter.
 
-    value, low, high: with the interval that covers it 95 times of 100. why: why it cannot be found; empty where it is.
+    value, low, high: with the interval that covers it 95 times of 100; NaN where the search did not converge. why: why
+    it cannot be found; empty where it is.
     """
 
     parameter: Parameter
@@ -37,7 +38,7 @@ class Found(NamedTuple):
 
     @property
     def std(self) -> float:
-        """Standard deviation of a parameter whose scale is plain; NaN where it was not found."""
+        """Standard deviation of a parameter whose scale is plain; NaN where there is no interval."""
         return (self.high - self.low) / (2.0 * _QUANTILE)
 
 
@@ -96,7 +97,10 @@ def calibrate(
         start[own] = holding(maximum, unknown, [i not in told for i in own], said[own])
         own = told
     log_likelihood = maximum.log_likelihood if told else before
-    return Calibration(tuple(found[i] for i in asked), log_likelihood, before, maximum.converged, directions[0])
+    kept = tuple(found[i] for i in asked)
+    if not maximum.converged:  # second derivatives elsewhere than at a maximum are no information
+        kept = tuple(each._replace(low=math.nan, high=math.nan) for each in kept)
+    return Calibration(kept, log_likelihood, before, maximum.converged, directions[0])
 
 
 def _found(

@@ -15,7 +15,7 @@ from vedette.kernels.base.types import Bools, Floats
 
 Terms = Callable[[Floats], Floats]  # the terms of the log likelihood, of all parameters on their scales
 _ENOUGH = 0.05  # of log likelihood that a further step promises
-_JUMPS = 0.5  # the same, where no step goes up: the terms may jump by so much
+_JUMPS = 0.5  # the same, by second derivatives: the terms may jump by so much
 _MOST_STEPS = 15
 _SHARES = (1.0, 0.5, 0.25, 0.1)  # of a step
 _STEP = 0.5  # of differences, in conditional standard deviations
@@ -28,7 +28,7 @@ class Maximum(NamedTuple):
     """Of p parameters on their scales.
 
     at: (p,) where. log_likelihood: there. information: (p, p) minus its second derivatives there. converged: whether
-    a further step promises next to nothing.
+    a further step promises next to nothing, by outer products or by second derivatives.
     """
 
     at: Floats
@@ -59,11 +59,12 @@ def maximise(terms: Terms, start: Floats, unknown: Floats, blocks: Sequence[Sequ
             break
         at, found = _best(terms, at, way, highest)
         if found <= highest:
-            converged = promised < _JUMPS
             break
         highest = found
     slope, information = _second(terms, at, highest, 2.0 * steps, blocks)
-    at, highest = _best(terms, at, covariance(information, unknown)[0] @ slope, highest)
+    way = covariance(information, unknown)[0] @ slope
+    converged = converged or float(0.5 * slope @ way) < _JUMPS  # outer products promise too much where the terms jump
+    at, highest = _best(terms, at, way, highest)
     return Maximum(at, highest, _refined(terms, at, highest, information, unknown), converged)
 
 

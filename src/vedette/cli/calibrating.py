@@ -17,6 +17,8 @@ from vedette.cli.running import compile_if_cold, interruptible
 from vedette.cli.tracking import read_recording
 from vedette.errors import InputError
 
+NOT_CONVERGED = 3  # exit status
+
 if TYPE_CHECKING:
     from vedette.calibration import Calibration, Window
 
@@ -65,6 +67,7 @@ def calibrate(
     _print(windows, names, position)
     if out is not None:
         say(f"wrote {out}")
+    converged = all(each.calibration.converged for each in windows)
     documents = [_document(each.calibration, names) for each in windows]
     told = {
         "assumed": assumed,
@@ -77,6 +80,8 @@ def calibrate(
     else:
         spans = [{"begin_s": each.begin, "end_s": each.end} for each in windows]
         publish({"windows": [span | own for span, own in zip(spans, documents, strict=True)], **told})
+    if not converged:
+        raise typer.Exit(NOT_CONVERGED)
 
 
 def _document(calibration: Calibration, names: tuple[str, ...]) -> dict[str, Any]:
@@ -133,7 +138,8 @@ def _print(windows: list[Window], names: tuple[str, ...], position: bool) -> Non
             if row["why_not"]:
                 table.add_row(*told, "not found", "")
             else:
-                table.add_row(*told, f"{row['found']:.4g}{unit}", f"{row['low']:.4g} to {row['high']:.4g}")
+                interval = f"{row['low']:.4g} to {row['high']:.4g}" if window.calibration.converged else ""
+                table.add_row(*told, f"{row['found']:.4g}{unit}", interval)
     table.pad_edge = False
     console().print(table)
     told_of = [
@@ -150,7 +156,10 @@ def _print(windows: list[Window], names: tuple[str, ...], position: bool) -> Non
     for window in windows:
         calibration, part = window.calibration, f"from {window.begin:.0f} s on: " if several else ""
         if not calibration.converged:
-            note(f"{part}the search did not come to an end: what was found may not be the maximum")
+            why = "these values may not be those of the maximum, and there are no intervals"
+            note(
+                f"{part}the search did not converge: {why}; check units, north and --speed, or take a longer recording"
+            )
         if any(each.why for each in calibration.found):
             say(f"{part}the recording says something of {calibration.rank} of {len(calibration.found)} directions")
         say(f"{part}log likelihood {calibration.before:.1f} as said, {calibration.log_likelihood:.1f} as found")
