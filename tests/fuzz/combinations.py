@@ -43,7 +43,7 @@ def combination(rng: Rng) -> Data:
         "sensors": sensors,
         "filter": _filter(rng, len(sensors)),
         "control": _control(rng, num_steps),
-        "planners": {"own": _planner(rng)} if rng.random() < 0.5 else {},
+        "planners": {name: _planner(rng) for name in ("own", "other")[: int(rng.integers(3))]},
         "ospa": _ospa(rng, num_steps),
     }
     data["fusion"] = _fusion(rng, len(sensors), data["filter"]["kind"])
@@ -151,6 +151,8 @@ def _sensor(rng: Rng) -> Data:
         )
     if rng.random() < 0.2:
         sensor["scans"] = {"every": 2, "first": int(rng.integers(1, 3))}
+    if rng.random() < 0.1:
+        sensor.setdefault("scans", {})["late"] = {"up_to": 1.0, "share": 0.5}
     return sensor
 
 
@@ -353,7 +355,7 @@ def _planner(rng: Rng) -> Data:
         return {"kind": "independent", **pick(rng, [{}, {"reward": _reward(rng)}])}
     if how < 0.85:
         return {"kind": pick(rng, ["nearest", "assigned", "centroid"])}
-    if how < 0.9:
+    if how < 0.95:
         return {"kind": "oracle", "depth": int(rng.integers(1, 3))}
     return own_part("Last")
 

@@ -21,7 +21,7 @@ from vedette.control import (
     RenyiReward,
 )
 from vedette.densities import GLMB, LMB
-from vedette.errors import InputError
+from vedette.errors import InputError, ScenarioError
 from vedette.filters import (
     CbMemberFilter,
     CphdFilter,
@@ -378,8 +378,10 @@ def test_named_strategies_need_labels_too() -> None:
         ("{kind: marginal, threshold: 0.6}", "{kind: map}"),
     )
     text = text.replace("  - {name: south, position: [0.0, -40.0]}\n", "")
-    with pytest.raises(InputError, match="as planner ascent needs labels; got phd"):
-        build.build_planner(Scenario(parse_scenario(text + NAMED)), "ascent")
+    with pytest.raises(
+        ScenarioError, match=r"planners\.ascent\.kind: expected nearest, .*, as phd filters have no labels"
+    ):
+        parse_scenario(text + NAMED)
 
 
 def test_first_states_of_targets_have_their_spread_in_the_librarys_order() -> None:

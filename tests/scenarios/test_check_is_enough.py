@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import re
+import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from scenarios.minimal import MINIMAL, changed
 from vedette.cli import app
 from vedette.errors import InputError, ScenarioError
+from vedette.evaluation.runs import run_scenario
 from vedette.models import BirthModel
-from vedette.scenarios import load_scenario, parse_scenario
-from vedette.scenarios.build import build_experiment
+from vedette.scenarios import Scenario, load_scenario, parse_scenario
+from vedette.scenarios.build import build_experiment, build_planner
 from vedette.scenarios.record_cautions import record_cautions
 
 TARGETS = MINIMAL[MINIMAL.index("targets:") : MINIMAL.index("sensor_defaults:")]
@@ -166,3 +169,100 @@ def test_a_model_of_ones_own_is_looked_for_but_not_run(
     else:
         load_scenario(file)
     assert capsys.readouterr().out == ""
+
+
+ONE_SENSOR = """
+name: one
+time: {num_steps: 4, step_period: 1.0}
+region: {x_min: -500.0, x_max: 500.0, y_min: -500.0, y_max: 500.0}
+motion: {kind: constant_velocity, sigma_v: 1.0}
+birth: {sites: [{existence: 0.05, mean: [0.0, 0.0, 0.0, 0.0], std: [30.0, 30.0, 5.0, 5.0]}]}
+targets: {kind: scripted, tracks: [{state: [10.0, 10.0, 1.0, 0.0]}]}
+sensors:
+  - position: [0.0, 0.0]
+    platform: {kind: courses, speed: 5.0, headings_deg: [0.0, 90.0]}
+    measurement: {kind: position}
+    noise: {kind: constant, std: [5.0, 5.0]}
+    detection: {kind: constant, probability: 0.9}
+    clutter: {kind: region, rate: 1.0}
+filter: {kind: lmb}
+fusion: {kind: none}
+control: {decision_steps: [2]}
+"""
+
+
+def one_sensor(*changes: tuple[str, str]) -> str:
+    text = ONE_SENSOR
+    for old, new in changes:
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    return text
+
+
+@pytest.mark.parametrize("kind", ["phd", "cphd", "cb_member"])
+def test_late_scans_and_planners_of_labels_do_not_go_with_filters_without(kind: str) -> None:
+    late = ("clutter: {kind: region, rate: 1.0}", "clutter: {kind: region, rate: 1.0}\n    scans: {late: {up_to: 1.0}}")
+    planners = "planners: {a: {kind: joint}, b: {kind: independent}, c: {kind: lookahead}, d: {kind: nearest}}"
+    text = one_sensor(("kind: lmb", f"kind: {kind}"), late, ("control:", f"{planners}\ncontrol:"))
+    with pytest.raises(ScenarioError) as error:
+        parse_scenario(text)
+    wanted = f"as {kind} filters have no labels (delta_glmb, m_delta_glmb, lmb and factored_glmb do)"
+    assert [fault.split(": ")[1] for fault in error.value.faults] == [
+        "sensors[0].scans.late",
+        "planners.a.kind",
+        "planners.b.kind",
+        "planners.c.kind",
+    ]
+    assert all(wanted in fault for fault in error.value.faults[1:])
+    assert f"as {kind} filters cannot predict without a scan" in error.value.faults[0]
+
+
+@pytest.mark.parametrize("kind", ["clmb", "arithmetic_average", "cm_delta_glmb"])
+def test_one_sensor_has_nothing_to_match_its_labels_with(kind: str) -> None:
+    births = "{from_measurements: {expected: 0.5, max_existence: 0.03, std: [20.0, 20.0, 5.0, 5.0]}}"
+    old = "{sites: [{existence: 0.05, mean: [0.0, 0.0, 0.0, 0.0], std: [30.0, 30.0, 5.0, 5.0]}]}"
+    filters = "delta_glmb" if kind == "cm_delta_glmb" else "lmb"
+    changes = ((old, births), ("fusion: {kind: none}", f"fusion: {{kind: {kind}}}"), ("kind: lmb", f"kind: {filters}"))
+    record = run_scenario(Scenario(parse_scenario(one_sensor(*changes))), "still", seed=0)
+    assert len(record.estimates) == 4
+
+
+def turning(folder: Path, motion: str, more: str = "") -> Path:
+    """A scenario of ships that were recorded, under a motion with other states than theirs."""
+    (folder / "ships.csv").write_text("time,id,x,y\n" + "".join(f"{t},a,{10.0 + t},{20.0 * t}\n" for t in range(5)))
+    shutil.copy(Path(__file__).parent / "own_models.py", folder)
+    num = 3 if "custom" in motion else 5
+    file = folder / "scenario.yaml"
+    changes = (
+        ("targets: {kind: scripted, tracks: [{state: [10.0, 10.0, 1.0, 0.0]}]}", TURNING_TARGETS),
+        ("{kind: constant_velocity, sigma_v: 1.0}", motion),
+        ("mean: [0.0, 0.0, 0.0, 0.0]", f"mean: {[0.0] * num}"),
+        ("std: [30.0, 30.0, 5.0, 5.0]", f"std: {[30.0, 30.0, 5.0, 5.0, 0.1][:num]}"),
+        ("control:", f"{more}\ncontrol:"),
+    )
+    file.write_text(one_sensor(*changes))
+    return file
+
+
+TURNING_TARGETS = "targets: {kind: recorded, path: ships.csv}"
+
+
+def test_an_oracle_takes_turn_rates_that_were_not_recorded_as_zero(tmp_path: Path) -> None:
+    file = turning(tmp_path, "{kind: coordinated_turn, sigma_v: 1.0}", "planners: {known: {kind: oracle, depth: 2}}")
+    scenario = load_scenario(file)
+    record = run_scenario(scenario, "known", seed=0)
+    assert len(record.decisions) == 1
+    told = build_planner(scenario, "oracle").told(record.truth)  # type: ignore[union-attr]
+    assert record.truth.states.shape[1] == 4
+    np.testing.assert_array_equal(told.truth.states[:, :4], record.truth.states)
+    np.testing.assert_array_equal(told.truth.states[:, 4], 0.0)
+
+
+def test_an_oracle_needs_all_components_of_a_custom_motion(tmp_path: Path) -> None:
+    motion = "{kind: custom, function: 'own_models.py:motion', state_dim: 3}"
+    assert "planners.known.kind: expected another kind, as states have 3 components under motion and" in fault(
+        turning(tmp_path, motion, "planners: {known: {kind: oracle}}")
+    )
+    scenario = load_scenario(turning(tmp_path, motion))
+    with pytest.raises(InputError, match="planner oracle: expected another kind, as states have 3 components"):
+        build_planner(scenario, "oracle")

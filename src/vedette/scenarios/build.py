@@ -252,8 +252,8 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
         num_threads: share a decision; 0: one a processor.
 
     Raises:
-        InputError: another name, joint or independent decisions with filters that have no labels, or a custom part
-            that cannot be had.
+        InputError: another name, joint or independent decisions with filters that have no labels, an oracle of recorded
+            targets that lack components of the motion's states, or a custom part that cannot be had.
     """
     model, folder = scenario.model, scenario.folder
     if name not in (*STRATEGIES, *model.planners):
@@ -263,6 +263,8 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
     if strategy.needs_labels and not labels_targets(sensors[0].filter):
         kinds = "delta_glmb, m_delta_glmb, lmb or factored_glmb"
         raise InputError(f"filter.kind: expected {kinds}, as planner {name} needs labels; got {model.filter.kind}")
+    if fault := strategy.misfit(model):
+        raise InputError(f"planner {name}: expected {fault[0]}; got {fault[1]}")
     parts = build_parts(scenario, sensors, strategy, num_threads)
     if name in model.planners:
         return Named(name, model.planners[name].planner(parts, folder))

@@ -22,7 +22,8 @@ from vedette.densities import Estimator, best_estimate
 from vedette.errors import InputError
 from vedette.filters import shared_targets
 from vedette.kernels.base.types import Bools, Floats, Ints
-from vedette.models.arguments import dimension, generator, instance, positive
+from vedette.models import MotionModel
+from vedette.models.arguments import dimension, generator, instance, positive, reject
 from vedette.models.fields import Count
 from vedette.platforms import Options
 from vedette.platforms.base import courses_of
@@ -65,7 +66,8 @@ class OraclePlanner:
 
     It begins with the covariances that the filters have of the targets that they track, and follows them through all
     scans (`vedette.simulation.cramer_rao.Stretch`). Scans may miss and filters may err, so that no single run is bound
-    by it; of what control does for localisation it is the floor. Targets that appear later are not foreseen.
+    by it; of what control does for localisation it is the floor. Targets that appear later are not foreseen. Components
+    of the motion's states that recorded targets lack, such as a turn rate, are taken as 0.
 
     Attributes:
         sensors: the sensors.
@@ -80,7 +82,7 @@ class OraclePlanner:
         truth: the targets; None: `told` brings them.
 
     Raises:
-        InputError: parts of another kind.
+        InputError: parts of another kind, or targets with more components than the motion's states.
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -101,6 +103,13 @@ class OraclePlanner:
         dimension("depth", self.depth)
         dimension("beam_width", self.beam_width)
         instance("search", self.search, JointSearch)
+        if self.truth is not None:
+            object.__setattr__(self, "truth", _with_components(self.truth, self._motion.state_dim))
+
+    @property
+    def _motion(self) -> MotionModel:
+        """How the filters take the targets to move."""
+        return shared_targets([sensor.filter for sensor in self.sensors]).motion
 
     def told(self, truth: Truth) -> OraclePlanner:
         """The same for the targets of a run."""
@@ -187,7 +196,7 @@ class OraclePlanner:
     def _stretch(self, first: int, last: int, courses: tuple[Floats, ...], truth: Truth, ids: Ints) -> Stretch:
         """The scans after scan `first`, when all of `ids` are there, to scan `last`; who ends stays where it was."""
         table, times = self.timetable, self.timetable.times
-        motion = shared_targets([sensor.filter for sensor in self.sensors]).motion
+        motion = self._motion
         dim, num = motion.state_dim, len(ids)
         states, alive = np.full((last - first + 1, num, dim), np.nan), np.zeros((last - first + 1, num))
         for k in range(len(states)):
@@ -213,3 +222,11 @@ class OraclePlanner:
             table.one_belief,
             self.cutoff,
         )
+
+
+def _with_components(truth: Truth, dim: int) -> Truth:
+    """The same targets with states of `dim` components, of which those that are missing are 0."""
+    missing = dim - truth.states.shape[1]
+    if missing < 0:
+        raise reject("truth", f"states of at most {dim} components, as the motion's", truth.states.shape[1])
+    return replace(truth, states=np.pad(truth.states, ((0, 0), (0, missing)))) if missing else truth

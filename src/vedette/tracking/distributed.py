@@ -59,7 +59,8 @@ class Distributed(LocalFilters):
             return
         if self._shares_prediction:
             raise InputError("feedback: expected true, as the fusion is of beliefs that share their prediction")
-        check_labels_of_births(self.fusion, self.targets)
+        if len(self.filters) > 1:  # one sensor has nothing to match its labels with
+            check_labels_of_births(self.fusion, self.targets)
 
     def initial(self) -> State:
         """No target anywhere; the fused belief is then the first sensor's."""

@@ -18,7 +18,8 @@ from vedette.scenarios.sections.birth_labels import births_cut
 from vedette.scenarios.sections.control import DECISION_CHECKS
 from vedette.scenarios.sections.fusion import OF_LMBS, OF_SCANS
 from vedette.scenarios.sections.network import NETWORK_CHECKS
-from vedette.scenarios.sections.tracking import UNLABELLED
+from vedette.scenarios.sections.targets import RECORDED_DIM
+from vedette.scenarios.sections.tracking import LABELLING, UNLABELLED
 from vedette.scenarios.sections.undetected import cells_of_undetected
 
 if TYPE_CHECKING:
@@ -27,8 +28,6 @@ if TYPE_CHECKING:
 
 # How far a decision time may be from the time of a scan, in scans: rounding of sums of decimal fractions.
 _TIME_TOLERANCE = 1e-6
-# Components of the state of a recorded target: position and velocity.
-_RECORDED_DIM = 4
 
 
 def step_of_time(time: float, start: float, step_period: float) -> int | None:
@@ -204,8 +203,19 @@ def _scan_steps(model: ScenarioModel) -> Iterator[Finding]:
 def _scans_of_unlabelled(model: ScenarioModel) -> Iterator[Finding]:
     kind = model.filter.kind
     for i, sensor in enumerate(model.sensors):
-        if kind in UNLABELLED and (sensor.scans.drop_out or not sensor.scans.build(model.time).all()):
+        if kind not in UNLABELLED:
+            continue
+        if sensor.scans.late is not None:
+            wanted = f"none, as {kind} filters cannot predict without a scan ({LABELLING} can)"
+            yield ("sensors", i, "scans", "late"), wanted, "late scans"
+        if sensor.scans.drop_out or not sensor.scans.build(model.time).all():
             yield ("sensors", i, "scans"), f"every step, as {kind} filters go on from each scan", "only some"
+
+
+def _planners_fit(model: ScenarioModel) -> Iterator[Finding]:
+    for name, planner in model.planners.items():
+        if fault := planner.misfit(model):
+            yield ("planners", name, "kind"), *fault
 
 
 def _first_scan(path: Path, sensor: Sensor, model: ScenarioModel) -> Iterator[Finding]:
@@ -219,12 +229,8 @@ def _first_scan(path: Path, sensor: Sensor, model: ScenarioModel) -> Iterator[Fi
 def _score(model: ScenarioModel) -> Iterator[Finding]:
     for name in ("from_step", "to_step"):
         yield from attempt(_last_step(("ospa", name), model.ospa, name, model))
-    if (
-        model.ospa.components == "state"
-        and model.targets.kind == "recorded"
-        and model.motion.state_dim != _RECORDED_DIM
-    ):
-        wanted = f"position, as states have {model.motion.state_dim} components and recorded targets {_RECORDED_DIM}"
+    if model.ospa.components == "state" and model.targets.kind == "recorded" and model.motion.state_dim != RECORDED_DIM:
+        wanted = f"position, as states have {model.motion.state_dim} components and recorded targets {RECORDED_DIM}"
         yield ("ospa", "components"), wanted, '"state"'
 
 
@@ -247,6 +253,7 @@ CHECKS = (
     _sensor_names,
     _scan_steps,
     _scans_of_unlabelled,
+    _planners_fit,
     _score,
     cells_of_undetected,
     *NETWORK_CHECKS,

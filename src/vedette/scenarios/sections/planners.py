@@ -16,6 +16,8 @@ from vedette.scenarios.sections.custom import Custom
 from vedette.scenarios.sections.deciding import AnyReward, AnySearch, Lookahead
 from vedette.scenarios.sections.derived import Derived, derived
 from vedette.scenarios.sections.program import ProgramSection
+from vedette.scenarios.sections.targets import RECORDED_DIM
+from vedette.scenarios.sections.tracking import LABELLING, UNLABELLED
 
 if TYPE_CHECKING:  # with the planners comes the compiler, which a check does without
     from vedette.control import Constraint, JointSearch, MobileSensor, Plan, Planner, PlanningSettings
@@ -23,6 +25,7 @@ if TYPE_CHECKING:  # with the planners comes the compiler, which a check does wi
     from vedette.densities import Estimator
     from vedette.fusion import Fusion
     from vedette.platforms import Actions
+    from vedette.scenarios.sections.scenario import ScenarioModel
     from vedette.simulation import Truth
 
 
@@ -57,6 +60,10 @@ class Strategy(Section):
 
     needs_labels: ClassVar[bool] = False
 
+    def misfit(self, model: ScenarioModel) -> tuple[str, str] | None:
+        """What was expected and what came, where a scenario's filters or targets do not suit the planner; else None."""
+        return None
+
     def planner(self, parts: Parts, folder: Path) -> Planner | None:
         """Who decides; None: nobody."""
         return None
@@ -67,6 +74,14 @@ class _Valued(Strategy):
 
     reward: AnyReward | None = Field(default=None, description="In place of control.reward; none: that one [-].")
     needs_labels: ClassVar[bool] = True
+
+    def misfit(self, model: ScenarioModel) -> tuple[str, str] | None:
+        """Unfit where filters have no labels, which its values are of."""
+        kind = model.filter.kind
+        if kind not in UNLABELLED:
+            return None
+        wanted = f"nearest, assigned, centroid, oracle or custom, as {kind} filters have no labels ({LABELLING} do)"
+        return wanted, describe(getattr(self, "kind", None))
 
     def shared(self, parts: Parts, folder: Path) -> dict[str, Any]:
         """What all planners that value densities are made of."""
@@ -153,6 +168,17 @@ class NamedOracle(Strategy, Derived):
     """What is done by who knows where the targets are, as of oracle: the floor beside which strategies are put."""
 
     kind: Literal["oracle"] = Field(default="oracle", description="Kind of planner [-].")
+
+    def misfit(self, model: ScenarioModel) -> tuple[str, str] | None:
+        """Unfit where recorded targets lack the components of a custom motion."""
+        motion = model.motion
+        if model.targets.kind != "recorded" or motion.kind != "custom" or motion.state_dim == RECORDED_DIM:
+            return None
+        wanted = (
+            f"another kind, as states have {motion.state_dim} components under motion and the recorded targets "
+            f"{RECORDED_DIM} (a motion of {RECORDED_DIM} components, or targets that are simulated, would do)"
+        )
+        return wanted, describe(self.kind)
 
     def planner(self, parts: Parts, folder: Path) -> Planner:
         """Who waits to be told of the targets."""

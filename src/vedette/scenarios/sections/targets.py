@@ -35,6 +35,9 @@ if TYPE_CHECKING:  # with the models comes the compiler, which a check does with
     from vedette.simulation import PoissonTargets as PoissonSource
     from vedette.simulation import ScriptedTargets as ScriptedSource
 
+# Components of the state of a recorded target: position and velocity.
+RECORDED_DIM = 4
+
 
 def _negative_stds(stds: Sequence[float]) -> Iterator[Finding]:
     for i, std in enumerate(stds):

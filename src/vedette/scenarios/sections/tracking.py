@@ -37,6 +37,8 @@ class FilterLimits(Part):
 
 # Filters that keep no identity of their targets.
 UNLABELLED = ("phd", "cphd", "cb_member")
+# The others, in messages.
+LABELLING = "delta_glmb, m_delta_glmb, lmb and factored_glmb"
 # What filters ask of an assignment, where not both.
 _ASKED = {"delta_glmb": "choices", "m_delta_glmb": "choices", "lmb": "marginals"}
 # Filters of which `max_labels` bounds how many targets there can be.
