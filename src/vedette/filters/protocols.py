@@ -23,9 +23,9 @@ class FilterInfo:
         num_hypotheses, num_tracks: size of the posterior; of a PHD or CPHD filter 1 and the number of components, of a
             CB-MeMBer filter 1 and the number of Bernoullis.
         discarded_weight_bound: upper bound on the share of the posterior weight that was left out by the caps. Attained
-            where no measurement is contested; contested ones are counted in it though they carry no weight. Weight
-            outside the gates is not in it. For an LMB the share of all joint choices that is left out of the inexact
-            clusters, where what pairs of tracks contend for is counted once; it bounds the error of every existence and
+            unless tracks that share measurements contend for more than six of them; 0 where nothing was left out.
+            Weight outside the gates is not in it. For an LMB the share of all joint choices that is left out of the
+            inexact clusters, where what pairs of tracks contend for is counted once; it bounds the error of every existence and
             association probability; 0 without them. For a CPHD filter the probability of the large numbers of targets
             that were left out, for a PHD filter 0. NaN for a multi-Bernoulli, which is no sum of hypotheses, and where
             an LMB is associated by belief propagation or a function of the user's own, whose error is not known. For
@@ -49,7 +49,8 @@ class FilterInfo:
             fewer Gaussians for a track, has made at this scan; other filters do not count it and say 0. Not kept with
             runs. The posterior is within factoring_error + reduction_error + 4 discarded_weight_bound of the exact one
             in L1, but for gates and dropped labels: what is cut off is missed once and spread over the rest once, twice
-            where the claims to measurements are of the rest alone. All this is of one scan, from the belief before it;
+            where the claims to measurements are of the rest alone. The error of belief propagation between groups
+            that share several measurements in a cycle is not in it. All this is of one scan, from the belief before it;
             bounds of several scans do not add up to a bound, as a scan may enlarge the error that it finds.
     """
 

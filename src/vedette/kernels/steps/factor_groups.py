@@ -8,18 +8,14 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.kernels.association.assignment import Options
-from vedette.kernels.association.children import Children, Parents
+from vedette.kernels.association.children import Parents
 from vedette.kernels.association.predicted import Rows, taken_rows
 from vedette.kernels.association.products import product_of
-from vedette.kernels.association.search import SearchCaps
+from vedette.kernels.association.totals import log_row_totals, log_total_bound
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import FactoredGlmb, Floats, Ints
 from vedette.kernels.gaussian.linalg import log_add
 from vedette.kernels.gaussian.mixtures import descending_order
-from vedette.kernels.steps.glmb import log_row_totals, log_total_bound
-
-# Logs of weights that a double holds beside others.
-_MOST_LOG = 600.0
 
 
 class Factors(NamedTuple):
@@ -213,43 +209,3 @@ def gathered_group(
         log_bound += log_total_bound(log_totals, other)
         parents = product_of(parents, other, max_hypotheses)
     return Group(taken_rows(rows, members), own, parents, measurements, log_bound)
-
-
-@kernel
-def log_weight_bound(group: Group, children: Children, caps: SearchCaps, cut: bool) -> float:
-    """Log of an upper bound on the weight of all joint choices of the group, those that were found included.
-
-    children: as ranked, heaviest first. cut: whether ranking stopped at its bound on nodes. Of each parent no more is
-    left than its bound less what was found, nor than the number of its choices times the heaviest that may be left; of
-    parents cut before, their bound.
-    """
-    options, parents, num = group.options, group.parents, children.filled[0]
-    if num == 0:
-        return group.log_bound
-    best, log_totals = children.log_weights[0], log_row_totals(options)
-    log_next = best - caps.max_log_gap
-    if cut or num >= caps.max_hypotheses:
-        log_next = max(log_next, children.log_weights[num - 1])
-    found, in_all, of_parents, left = np.zeros(len(parents.log_weights)), 0.0, 0.0, 0.0
-    for child in range(num):
-        weight = math.exp(children.log_weights[child] - best)
-        found[children.parents[child]] += weight
-        in_all += weight
-    for parent in range(len(found)):
-        log_all, log_count = parents.log_weights[parent], 0.0
-        for i in range(parents.offsets[parent], parents.offsets[parent + 1]):
-            row = parents.rows[i]
-            log_all += log_totals[row]
-            log_count += math.log(max(1, options.offsets[row + 1] - options.offsets[row]))
-        # Beyond what a double holds the group's own bound says all.
-        if log_all - best > _MOST_LOG:
-            return group.log_bound
-        of_parents += math.exp(log_all - best)
-        few = math.exp(min(log_count + log_next - best, _MOST_LOG))
-        left += max(0.0, min(math.exp(log_all - best) - found[parent], few))
-    if group.log_bound - best > _MOST_LOG:
-        return group.log_bound
-    before = math.exp(group.log_bound - best) - of_parents
-    # What rounding leaves of nothing is nothing.
-    left += before if before > 1e-12 * of_parents else 0.0
-    return min(group.log_bound, best + math.log(in_all + left))

@@ -11,6 +11,7 @@ from vedette.kernels.association.assignment import ABSENT, Options
 from vedette.kernels.association.children import Children
 from vedette.kernels.association.predicted import Rows
 from vedette.kernels.association.ranked import rank_children
+from vedette.kernels.association.totals import ROUNDING, log_heaviest_left, log_weight_bound
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.arrays import filled_ints
 from vedette.kernels.base.compile import borrowing, kernel
@@ -22,7 +23,7 @@ from vedette.kernels.labelled.factor_store import FactorStore, append_part, appe
 from vedette.kernels.labelled.splitting import Choices, choices_of, independent_parts
 from vedette.kernels.labelled.versions import merge_versions
 from vedette.kernels.steps.assembly import assemble
-from vedette.kernels.steps.factor_groups import Group, log_weight_bound
+from vedette.kernels.steps.factor_groups import Group
 from vedette.kernels.steps.glmb import Associated, kept_children
 from vedette.kernels.steps.lmb import Reduction, append_reduced, write_mixture
 
@@ -32,9 +33,6 @@ _NUM_SUMS = 8
 
 # A component of a label alone is dropped where it holds less of an existing target than this times the least share.
 _WORTH = 10.0
-
-# What rounding leaves between the logs of equal weights.
-_ROUNDING = 1e-12
 
 
 class Factoring(NamedTuple):
@@ -158,7 +156,8 @@ def update_group(group: Group, truncation: Truncation, work: Work) -> Glmb:
     """The posterior of a group; of one in which no joint choice was found it is empty and the log total -inf."""
     found, sums = Associated(group.rows, group.options, group.parents, 0.0, 0), work.sums
     children, cut = rank_children(group.options, group.parents, truncation.search)
-    log_bound = log_weight_bound(group, children, truncation.search, cut)
+    log_next = log_heaviest_left(children, truncation.search, cut)
+    log_bound = log_weight_bound(group.options, group.parents, children, log_next, group.log_bound)
     # A search that ran dry has left nothing out.
     is_covered = children.filled[0] < truncation.search.max_hypotheses and not cut
     children, kept = kept_children(found, children, truncation, is_covered)
@@ -168,7 +167,7 @@ def update_group(group: Group, truncation: Truncation, work: Work) -> Glmb:
     if len(kept) == 0:
         return posterior
     _claim_jointly(group, children, kept, log_total, work)
-    sums[KEPT] -= log_bound - log_total if log_bound - log_total > _ROUNDING else 0.0
+    sums[KEPT] -= log_bound - log_total if log_bound - log_total > ROUNDING else 0.0
     sums[FULL] += 1.0 if len(kept) >= truncation.search.max_hypotheses else 0.0
     return posterior
 

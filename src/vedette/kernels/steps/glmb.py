@@ -13,6 +13,7 @@ relative to the weight of all measurements being clutter. A planner runs the sam
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -24,11 +25,17 @@ from vedette.kernels.association.gibbs import sample_children
 from vedette.kernels.association.options import weighed_options
 from vedette.kernels.association.predicted import Rows, rows_of_scan
 from vedette.kernels.association.ranked import rank_children
+from vedette.kernels.association.totals import (
+    ROUNDING,
+    log_heaviest_left,
+    log_row_totals,
+    log_total_bound,
+    log_weight_bound,
+)
 from vedette.kernels.association.truncation import Truncation, heaviest_first, keep_heaviest, merge_equal
 from vedette.kernels.base.arrays import filled_ints
 from vedette.kernels.base.compile import kernel
-from vedette.kernels.base.types import Floats, Glmb, Ints, Motion, ScanInput, Sensor
-from vedette.kernels.gaussian.linalg import log_sum
+from vedette.kernels.base.types import Glmb, Ints, Motion, ScanInput, Sensor
 from vedette.kernels.gaussian.mixtures import require_gaussians
 from vedette.kernels.steps.assembly import Naming, assemble
 
@@ -85,29 +92,6 @@ def _associate(
 
 
 @kernel
-def log_row_totals(options: Options) -> Floats:
-    """(num_rows,) log total weight of each row's options."""
-    totals = np.empty(len(options.offsets) - 1)
-    for row in range(len(totals)):
-        totals[row] = log_sum(options.log_weights[options.offsets[row] : options.offsets[row + 1]])
-    return totals
-
-
-@kernel
-def log_total_bound(log_totals: Floats, parents: Parents) -> float:
-    """Log total weight of all joint choices if rows could share measurements: an upper bound on the true total.
-
-    log_totals: of the rows, as of `log_row_totals`.
-    """
-    bounds = np.empty(len(parents.log_weights))
-    for parent in range(len(bounds)):
-        bounds[parent] = parents.log_weights[parent]
-        for i in range(parents.offsets[parent], parents.offsets[parent + 1]):
-            bounds[parent] += log_totals[parents.rows[i]]
-    return log_sum(bounds)
-
-
-@kernel
 def kept_children(
     found: Associated, children: Children, truncation: Truncation, is_covered: bool
 ) -> tuple[Children, Ints]:
@@ -144,13 +128,24 @@ def _sources(naming: Naming, num_tracks: int, num_prior: int, columns: Ints) -> 
 
 @kernel
 def _conclude(
-    num_prior: int, found: Associated, children: Children, truncation: Truncation, cut: bool, is_covered: bool
+    num_prior: int,
+    found: Associated,
+    children: Children,
+    truncation: Truncation,
+    cut: bool,
+    is_covered: bool,
+    log_next: float,
 ) -> tuple[Glmb, StepReport]:
-    """Truncate and assemble. num_prior: tracks of the prior. is_covered: as of `kept_children`."""
+    """Truncate and assemble.
+
+    num_prior: tracks of the prior. log_next: as of `log_weight_bound`. is_covered: as of `kept_children`.
+    """
+    log_bound = log_total_bound(log_row_totals(found.options), found.parents)
+    log_bound = log_weight_bound(found.options, found.parents, children, log_next, log_bound)
     children, kept = kept_children(found, children, truncation, is_covered)
     posterior, log_total, naming = assemble(children, kept, found.parents, found.rows, found.options)
     require_gaussians(posterior.tracks.means, posterior.tracks.covs)
-    log_kept = min(0.0, log_total - log_total_bound(log_row_totals(found.options), found.parents))
+    log_kept = log_total - log_bound if log_bound - log_total > ROUNDING else 0.0
     full = len(kept) >= truncation.search.max_hypotheses
     sources = _sources(naming, len(posterior.tracks.labels), num_prior, found.options.columns)
     return posterior, StepReport(log_total, log_kept, found.log_clutter, found.num_raised, cut, full, sources)
@@ -168,7 +163,8 @@ def step_ranked(
     children, cut = rank_children(found.options, found.parents, truncation.search)
     # A search that ran dry has left nothing out.
     is_covered = children.filled[0] < truncation.search.max_hypotheses and not cut
-    return _conclude(len(prior.tracks.labels), found, children, truncation, cut, is_covered)
+    log_next = log_heaviest_left(children, truncation.search, cut)
+    return _conclude(len(prior.tracks.labels), found, children, truncation, cut, is_covered, log_next)
 
 
 @kernel
@@ -184,4 +180,4 @@ def step_gibbs(
     """One scan with hypotheses found by Gibbs sampling."""
     found = _associate(prior, scan, motion, sensor, truncation)
     children = sample_children(found.options, found.parents, num_samples, rng)
-    return _conclude(len(prior.tracks.labels), found, children, truncation, False, False)
+    return _conclude(len(prior.tracks.labels), found, children, truncation, False, False, math.inf)
