@@ -25,12 +25,12 @@ class FilterInfo:
         discarded_weight_bound: upper bound on the share of the posterior weight that was left out by the caps. Attained
             unless tracks that share measurements contend for more than six of them; 0 where nothing was left out.
             Weight outside the gates is not in it. For an LMB the share of all joint choices that is left out of the
-            inexact clusters, where what pairs of tracks contend for is counted once; it bounds the error of every existence and
-            association probability; 0 without them. For a CPHD filter the probability of the large numbers of targets
-            that were left out, for a PHD filter 0. NaN for a multi-Bernoulli, which is no sum of hypotheses, and where
-            an LMB is associated by belief propagation or a function of the user's own, whose error is not known. For
-            several sensors what is cut at one of them is counted as it weighs there, though later ones may raise it;
-            and combinations that an LMB drops are in it.
+            inexact clusters, where what pairs of tracks contend for is counted once; it bounds the error of every
+            existence and association probability; 0 without them. For a CPHD filter the probability of the large
+            numbers of targets that were left out, for a PHD filter 0. NaN for a multi-Bernoulli, which is no sum of
+            hypotheses, and where an LMB is associated by belief propagation or a function of the user's own, whose
+            error is not known. For several sensors what is cut at one of them is counted as it weighs there, though
+            later ones may raise it; and combinations that an LMB drops are in it.
         dropped_existence: expected number of targets in labels that an LMB, or Bernoullis that a CB-MeMBer filter,
             dropped or bounded by `Limits.max_existence`; 0 for a PHD or CPHD filter, which keeps the weight of what it
             drops.
