@@ -197,3 +197,26 @@ def test_labels_of_steps_in_the_past_are_refused() -> None:
     belief, _ = tracker.step(tracker.initial(), [[0.0, 0.0]], POSE, 1.0, 5, rng=RNG)
     with pytest.raises(InputError, match="of which the last is 5; got 4"):
         tracker.step(belief, [[0.0, 0.0]], POSE, 1.0, 4, rng=RNG)
+
+
+@pytest.mark.parametrize("seed", [5, 22, 31])
+def test_of_two_close_births_in_clutter_none_is_lost(seed: int) -> None:
+    """Four sensors of P_D .6 with 60 false measurements; births 13 to 21 m apart, within their spread, at one step."""
+    rng = np.random.default_rng(seed)
+    angle, middle = rng.uniform(0.0, 2.0 * math.pi), rng.uniform(-200.0, 200.0, 2)
+    offset = 0.5 * rng.uniform(13.0, 21.0) * np.array([math.cos(angle), math.sin(angle)])
+    births = np.array([middle - offset, middle + offset])
+    velocities = rng.uniform(-5.0, 5.0, (2, 2))
+    tracker = SequentialFactoredFilter(
+        targets(sites(0.5, births, steps=frozenset({1}))), (sensor(0.6, 60.0),) * 4, Limits(max_hypotheses=100)
+    )
+    belief = tracker.initial()
+    for step in range(1, 21):
+        places = births + step * velocities
+        scans = []
+        for _ in range(4):
+            seen = places[rng.random(2) < 0.6]
+            clutter = rng.uniform(-500.0, 500.0, (rng.poisson(60.0), 2))
+            scans.append(np.vstack([seen + rng.normal(0.0, NOISE, seen.shape), clutter]))
+        belief, _ = tracker.step(belief, scans, np.zeros((4, 3)), 1.0, step, rng=RNG)
+    assert number(belief) == pytest.approx(2.0, abs=0.2)

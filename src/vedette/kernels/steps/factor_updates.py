@@ -34,6 +34,11 @@ _NUM_SUMS = 8
 # A component of a label alone is dropped where it holds less of an existing target than this times the least share.
 _WORTH = 10.0
 
+# A posterior of more hypotheses than this share of the most that a group may have is condensed: the next scan has many
+# times as many, and of those cut off most hold more targets than those kept. The L1 error up to which versions of
+# labels are made one then grows by a factor, until it is above the most.
+_FULL, _GROWTH, _MOST_MERGED = 0.25, 3.0, 0.3
+
 
 class Factoring(NamedTuple):
     """When factors are taken together, and when they are split."""
@@ -200,9 +205,22 @@ def _append_label(
 
 
 @kernel
-def append_parts(store: FactorStore, glmb: Glmb, factoring: Factoring, reduction: Reduction, work: Work) -> FactorStore:
-    """Split the posterior of a group and enter its parts."""
-    glmb, merging_error = merge_versions(glmb, reduction.mixture, factoring.max_error)
+def _merged(glmb: Glmb, caps: MixtureCaps, max_error: float, most: int) -> tuple[Glmb, float]:
+    """The posterior with versions of labels made one, and a bound on its L1 change. most: hypotheses of a group."""
+    glmb, total = merge_versions(glmb, caps, max_error)
+    while len(glmb.hyp_log_weights) > _FULL * most and 0.0 < max_error < _MOST_MERGED:
+        max_error *= _GROWTH
+        glmb, error = merge_versions(glmb, caps, max_error)
+        total += error
+    return glmb, total
+
+
+@kernel
+def append_parts(
+    store: FactorStore, glmb: Glmb, factoring: Factoring, reduction: Reduction, most: int, work: Work
+) -> FactorStore:
+    """Split the posterior of a group and enter its parts. most: hypotheses that the group may have."""
+    glmb, merging_error = _merged(glmb, reduction.mixture, factoring.max_error, most)
     choices = choices_of(glmb)
     min_existence = 1.0 / (1.0 + math.exp(-reduction.min_existence_logit))
     part_of, error = independent_parts(choices, factoring.max_error, factoring.max_labels, min_existence)

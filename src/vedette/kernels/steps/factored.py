@@ -117,7 +117,7 @@ def step_factored(
         group = gathered_group(factors, together, rows, options, most, work.place, work.columns)
         posterior = update_group(group, truncation, work)
         if len(posterior.hyp_log_weights) > 0:
-            store = append_parts(store, posterior, factoring, reduction, work)
+            store = append_parts(store, posterior, factoring, reduction, most, work)
     sums, density = work.sums, stored(store)
     require_gaussians(density.tracks.means, density.tracks.covs)
     missed, log_missed = missed_intensity(seen, len(undetected.intensity.log_weights))
