@@ -132,7 +132,7 @@ def run(
                 end_stopped(error, "nothing was written")
             record, stop = error.record, error
         print_run(record, loaded)
-        tell_disagreements(record, loaded)
+        warn_of_recording(record, loaded)
         kept = out if stop is None or not _holds_whole_run(out) else None
         if kept is not None:
             save_run(record, kept, scenario_text=dump_kept(loaded), overwrite=overwrite)
@@ -208,11 +208,12 @@ def print_run(record: RunRecord, scenario: Scenario | None) -> None:
     console.print(health_line(record.health, names), soft_wrap=True)
 
 
-def tell_disagreements(record: RunRecord, scenario: Scenario) -> tuple[str, ...]:
-    """Warn of sensors of a recording that agree on no target; returns the warnings."""
+def warn_of_recording(record: RunRecord, scenario: Scenario) -> tuple[str, ...]:
+    """Warn of sensors of a recording that agree on no target, and of targets too fast for its tracks; returns these."""
     from vedette.evaluation.agreement import disagreements
+    from vedette.evaluation.unexplained import unexplained
 
-    found = disagreements(record, scenario)
+    found = (*disagreements(record, scenario), *unexplained(record, scenario))
     for line in found:
         note(f"warning: {line}")
     return found

@@ -20,7 +20,7 @@ from vedette.cli.running import (
     end_stopped,
     interruptible,
     print_run,
-    tell_disagreements,
+    warn_of_recording,
 )
 from vedette.cli.scenario_files import warn
 from vedette.extras import need
@@ -90,7 +90,7 @@ def track(
         except (RunStopped, RunInterrupted) as error:
             end_stopped(error, "nothing was written")
         print_run(record, scenario)
-        warned = tell_disagreements(record, scenario)
+        warned = warn_of_recording(record, scenario)
         tracks = _summary(record)
         say(f"{counted(recording.num_measurements, 'measurement')}, {tracks}")
         table = table_of_run(record, scenario)

@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from vedette.evaluation.scans import LIE, Scans, scans_of_record
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import Bools, Floats
 from vedette.scenarios import Scenario
 from vedette.scenarios.sections.field_of_view import field_of_view
 from vedette.scenarios.sections.sensors import Sensor
@@ -74,7 +74,7 @@ def disagreements(record: RunRecord, scenario: Scenario) -> tuple[str, ...]:
 
 def _lives(record: RunRecord, scenario: Scenario, scans: Scans, placed: list[int]) -> dict[Label, _Life]:
     """The tracks that last, by label."""
-    sensors, stds = scenario.model.sensors, _stds(scenario, placed)
+    sensors, stds = scenario.model.sensors, noise_stds(scenario, placed)
     lives: dict[Label, _Life] = {}
     for k, estimate in enumerate(record.estimates):
         for label, mean, cov in zip(map(tuple, estimate.labels.tolist()), estimate.means, estimate.covs, strict=True):
@@ -85,14 +85,13 @@ def _lives(record: RunRecord, scenario: Scenario, scans: Scans, placed: list[int
                 if scan is None or not _sees(sensors[s], pose, mean):
                     continue
                 kind = sensors[s].measurement.kind
-                life.looks[s].append(_has_measured(scan.measurements, kind, stds[s], pose, mean[:2], cov[:2, :2]))
+                within = measured_by(scan.measurements, kind, stds[s], pose, mean[:2], cov[:2, :2])
+                life.looks[s].append(bool(within.any()))
     return {label: life for label, life in lives.items() if len(life.means) >= _LASTING}
 
 
-def _has_measured(scan: Floats, kind: str, stds: Floats, pose: Floats, mean: Floats, cov: Floats) -> bool:
-    """Whether a measurement of a scan lies within the gate of an estimate."""
-    if not len(scan):
-        return False
+def measured_by(scan: Floats, kind: str, stds: Floats, pose: Floats, mean: Floats, cov: Floats) -> Bools:
+    """(num,) whether each measurement of a scan lies within the gate of an estimate."""
     if kind == "position":
         off, turn = scan - mean, np.eye(2)
     else:
@@ -103,10 +102,10 @@ def _has_measured(scan: Floats, kind: str, stds: Floats, pose: Floats, mean: Flo
         off = scan - [math.atan2(ahead[1], ahead[0]), distance]
         off[:, 0] = np.remainder(off[:, 0] + math.pi, 2.0 * math.pi) - math.pi
     spread = turn @ cov @ turn.T + np.diag(stds**2)
-    return bool((np.einsum("ni,ij,nj->n", off, np.linalg.inv(spread), off) <= _GATE**2).any())
+    return np.asarray(np.einsum("ni,ij,nj->n", off, np.linalg.inv(spread), off) <= _GATE**2)
 
 
-def _stds(scenario: Scenario, placed: list[int]) -> dict[int, Floats]:
+def noise_stds(scenario: Scenario, placed: list[int]) -> dict[int, Floats]:
     """For each sensor the least standard deviations of its two components; 0 where a custom noise gives none."""
     model = scenario.model
     region, method, found = model.region.build(), model.filter.gaussian_method, {}

@@ -6,10 +6,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from vedette.recorded import RecordedScans
 from vedette.recorded import RecordedTargets as RecordedSource
+from vedette.recorded.merging import crowded
 from vedette.scenarios.extents import beyond_region
 from vedette.scenarios.faults import Path, format_path
 from vedette.scenarios.loading import Scenario
+from vedette.scenarios.sections import ScenarioModel
+from vedette.scenarios.sections.recording import noise_stds, sites_of
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.targets import RecordedTargets
 from vedette.scenarios.sections.world import Time
@@ -21,7 +25,9 @@ def record_cautions(scenario: Scenario) -> Iterator[tuple[Path, str]]:
     """What a run accepts of recorded data but may not be meant: where in the scenario, and what it is."""
     model, folder = scenario.model, scenario.folder
     if model.recording is not None:
-        yield from beyond_region(model, model.recording.build(model, folder))
+        recording = model.recording.build(model, folder)
+        yield from beyond_region(model, recording)
+        yield from _several_a_target(model, recording)
     if not isinstance(model.targets, RecordedTargets):
         return
     source = model.targets.source(model, folder)
@@ -34,6 +40,20 @@ def record_cautions(scenario: Scenario) -> Iterator[tuple[Path, str]]:
             yield path, f"{place}, got {at}, which is a longitude and latitude among those of {model.targets.path}"
         elif (distance := _distance(sensor, source, model.time)) is not None:
             yield path, f"{place}, got {at}, {distance / 1000.0:.3g} km from the nearest recorded position"
+
+
+def _several_a_target(model: ScenarioModel, recording: RecordedScans) -> Iterator[tuple[Path, str]]:
+    """Measurements that were merged, or that come so close together that one target seems to have several."""
+    for text in recording.merged:
+        yield ("recording", "merge"), f"{text}; noise of the sensor should cover the spread"
+    stds = [noise_stds(sensor) for sensor in model.sensors]
+    for site, num, scans in crowded(recording, sites_of(model), stds):
+        yield (
+            ("recording",),
+            f"{site.name}: {num} of {scans} scans have measurements within 3 standard deviations of each other; "
+            "filters take targets for points with one measurement a scan: if several are of one target, give "
+            "`recording: {merge: 4.0}`, which replaces such measurements by their mean",
+        )
 
 
 def _repeats(section: RecordedTargets, source: RecordedSource) -> Iterator[tuple[Path, str]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator
 from dataclasses import replace
@@ -15,10 +16,12 @@ from vedette.errors import InputError
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import SHA256_FIELD, NonNegative, Section, Sha256, attempt, is_whole
 from vedette.scenarios.sections.field_of_view import reach_of
+from vedette.scenarios.sections.sensing import COMPONENTS
 
 if TYPE_CHECKING:
     from vedette.recorded import Origin, RecordedScans, Site
     from vedette.scenarios.sections.scenario import ScenarioModel
+    from vedette.scenarios.sections.sensors import Sensor
 
 
 class RecordingSection(Section):
@@ -47,6 +50,11 @@ class RecordingSection(Section):
     gather: NonNegative = Field(
         default=0.0, description="Rows of a sensor within this time after its first are one scan [s]."
     )
+    merge: NonNegative = Field(
+        default=0.0,
+        description="Measurements of a scan within this number of noise standard deviations of each other, directly or "
+        "through others, become one at their mean, as targets are points to filters; 0: none do [-].",
+    )
     bad_rows: Literal["refuse", "skip"] = Field(
         default="refuse", description="Whether a row that cannot be read is an error, or left out and told of [-]."
     )
@@ -68,7 +76,12 @@ class RecordingSection(Section):
         sites = sites_of(world)
         if as_told:
             sites = [replace(site, bias=NO_BIAS) for site in sites]
-        return _read(str(file), changed, self.model_dump_json(), tuple(sites), origin)
+        recording = _read(str(file), changed, self.model_dump_json(), tuple(sites), origin)
+        if self.merge == 0.0:
+            return recording
+        from vedette.recorded.merging import merged
+
+        return merged(recording, sites, tuple(map(noise_stds, world.sensors)), self.merge)
 
 
 @lru_cache(maxsize=4)
@@ -83,6 +96,15 @@ def _read(
     check_unchanged(file, own.sha256)
     conventions = Conventions(own.columns, own.units, own.bearings, own.gather, own.bad_rows)
     return parse_scans(read_table(file), sites, conventions, origin)
+
+
+def noise_stds(sensor: Sensor) -> tuple[float, ...] | None:
+    """Least standard deviation of each component that a sensor measures, rad and m; None of a custom noise."""
+    noise = sensor.noise
+    if noise.kind == "range_dependent":
+        least = {"bearing": math.radians(noise.sigma_bearing_deg), "range": noise.sigma_range}
+        return tuple(least[name] for name in COMPONENTS.get(sensor.measurement.kind, ()))
+    return tuple(noise.std) if noise.kind in ("constant", "by_axis") else None
 
 
 def sites_of(world: ScenarioModel) -> list[Site]:

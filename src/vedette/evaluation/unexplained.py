@@ -1,0 +1,146 @@
+"""Measurements of a recording that no track explains and that lie on straight courses: targets faster than assumed."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.evaluation.agreement import measured_by, noise_stds
+from vedette.evaluation.scans import LIE, scans_of_record
+from vedette.kernels.base.types import Bools, Floats
+from vedette.recorded.extents import places_of
+from vedette.scenarios import Scenario
+from vedette.simulation.records import RunRecord
+from vedette.text import counted
+
+_GATE = 4.0  # standard deviations of what a course of two measurements predicts of the third
+_FASTEST = 1500.0  # m/s
+_FASTER = 1.5  # times the speed that births assume, from which on a course is told of
+_SHORTEST = 5  # measurements of a course
+_BY_CHANCE = 0.01  # courses of a recording that may be
+_MOST = 100  # unexplained measurements of a scan, of more of which nothing can be told
+_COURSES = 20
+
+
+class _Left(NamedTuple):
+    """What a scan has that no track explains: s, (num, 2) places and (num,) standard deviations in m."""
+
+    time: float
+    places: Floats
+    stds: Floats
+
+
+class _Course(NamedTuple):
+    """First and last time in s and place in m, the number of measurements, and the mean speed in m/s."""
+
+    begin: float
+    end: float
+    first: Floats
+    number: int
+    speed: float
+
+
+def unexplained(record: RunRecord, scenario: Scenario) -> tuple[str, ...]:
+    """Return a warning for each sensor whose unexplained measurements follow each other on straight courses.
+
+    A measurement is unexplained where no estimate of its scan lies within four standard deviations. Three of scans one
+    after another are of one course where the difference of the last two is that of the first two, within the noise. Of
+    courses by chance a hundredth is expected. Only courses faster than births assume count. Raises `VedetteError` for a
+    recording that cannot be read.
+    """
+    model = scenario.model
+    births = model.birth.from_measurements
+    placed = [s for s, sensor in enumerate(model.sensors) if LIE.get(sensor.measurement.kind) in ("point", "position")]
+    if model.recording is None or births is None or not placed:
+        return ()
+    assumed, warnings, left = max(births.std[2:4]), list[str](), _left(record, scenario, placed)
+    box = model.region.build()
+    for s in placed:
+        found = _courses(left[s], _FASTER * assumed, box.area)
+        if found:
+            warnings.append(_told(found, model.sensor_names[s], record.poses[0, s, :2], assumed))
+    return tuple(warnings)
+
+
+def _told(found: list[_Course], name: str, place: Floats, assumed: float) -> str:
+    speeds, first = [each.speed for each in found], min(found, key=lambda each: each.begin)
+    away = float(np.hypot(*(first.first - place)))
+    where = f"from {first.begin:g} to {max(each.end for each in found):g} s, the first {away:.0f} m away"
+    number = counted(sum(each.number for each in found), "measurement")
+    fast = f"{min(speeds):.0f} to {max(speeds):.0f} m/s"
+    step = 10.0 ** math.floor(math.log10(max(speeds)))
+    advice = f"`--speed {0.5 * step * math.ceil(2.2 * max(speeds) / step):g}`, or `birth` and `motion`"
+    what = f"{number} that no track explains ({where}) lie on straight courses at {fast}"
+    return f"{name}: {what}, and new tracks are expected at about {assumed:g} m/s: give {advice} for such targets"
+
+
+def _left(record: RunRecord, scenario: Scenario, placed: list[int]) -> dict[int, list[_Left]]:
+    """For each sensor the scans, with what no estimate explains."""
+    sensors, stds = scenario.model.sensors, noise_stds(scenario, placed)
+    left: dict[int, list[_Left]] = {s: [] for s in placed}
+    for k, (scans, estimate) in enumerate(zip(scans_of_record(record, scenario), record.estimates, strict=True)):
+        for s in placed:
+            scan, pose, kind = scans[s], record.poses[k, s], sensors[s].measurement.kind
+            if scan is None:
+                continue
+            explained = np.zeros(len(scan.measurements), np.bool_)
+            for mean, cov in zip(estimate.means, estimate.covs, strict=True):
+                explained |= measured_by(scan.measurements, kind, stds[s], pose, mean[:2], cov[:2, :2])
+            own = scan.measurements[~explained]
+            along = np.full(len(own), stds[s].max())
+            if kind == "bearing_range":
+                along = np.maximum(stds[s][1], stds[s][0] * own[:, 1])
+            left[s].append(_Left(float(record.times[k]), places_of(own, pose, kind), along))
+    return left
+
+
+def _courses(scans: list[_Left], slowest: float, area: float) -> list[_Course]:
+    """The courses faster than this, the longest first, each without the measurements of those before it."""
+    sizes = [len(scan.places) for scan in scans]
+    if len(scans) < _SHORTEST or max(sizes) > _MOST or not any(sizes):
+        return []
+    spread = float(np.quantile(np.concatenate([scan.stds for scan in scans]), 0.75))
+    # Of a pair by chance the next scan has so many that go on, also by chance.
+    goes_on = max(sizes) * 6.0 * math.pi * (_GATE * spread) ** 2 / area
+    if not 0.0 < goes_on < 0.5:
+        return []
+    pairs = sum(a * b for a, b in pairwise(sizes))
+    enough = max(_SHORTEST, 2 + math.ceil(math.log(_BY_CHANCE / max(pairs, 1)) / math.log(goes_on)))
+    found, free = list[_Course](), [np.ones(size, np.bool_) for size in sizes]
+    while len(found) < _COURSES and (longest := _longest(scans, free, slowest)) and len(longest) >= enough:
+        for k, i in longest:
+            free[k][i] = False
+        points = np.array([scans[k].places[i] for k, i in longest])
+        begin, end = scans[longest[0][0]].time, scans[longest[-1][0]].time
+        speed = float(np.hypot(*(points[-1] - points[0]))) / (end - begin)
+        found.append(_Course(begin, end, points[0], len(longest), speed))
+    return found
+
+
+def _longest(scans: list[_Left], free: list[Bools], slowest: float) -> list[tuple[int, int]]:
+    """The longest course as (scan, measurement), among those that are free."""
+    best: list[tuple[int, int]] = []
+    courses: dict[tuple[int, int], list[tuple[int, int]]] = {}  # by the last two measurements, of the scan before
+    for k in range(1, len(scans)):
+        now, before, step = scans[k], scans[k - 1], scans[k].time - scans[k - 1].time
+        going: dict[tuple[int, int], list[tuple[int, int]]] = {}
+        if step > 0.0 and len(now.places) and len(before.places):
+            moves = now.places[None] - before.places[:, None]
+            speeds = np.hypot(moves[..., 0], moves[..., 1]) / step
+            usable = (speeds >= slowest) & (speeds <= _FASTEST) & free[k - 1][:, None] & free[k][None]
+            for i, j in zip(*(each.tolist() for each in np.nonzero(usable)), strict=True):
+                going[i, j] = [(k - 1, i), (k, j)]
+            for (h, i), course in courses.items():
+                ratio = step / (before.time - scans[k - 2].time)
+                ahead = before.places[i] + ratio * (before.places[i] - scans[k - 2].places[h])
+                off = np.hypot(*(now.places - ahead).T)
+                wide = _GATE * now.stds * math.sqrt(1.0 + (1.0 + ratio) ** 2 + ratio**2)
+                for j in np.flatnonzero((off <= wide) & usable[i]).tolist():
+                    if len(course) >= len(going[i, j]):
+                        going[i, j] = [*course, (k, j)]
+        courses = going
+        best = max([best, *courses.values()], key=len)
+    return best

@@ -1,0 +1,113 @@
+"""Several measurements of one target in a scan: filters take targets for points, so clusters become one measurement."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from vedette.errors import InputError
+from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.recorded.instants import COMPONENTS, RecordedScans, Site
+from vedette.text import counted, shown
+
+_CLOSE = 3.0  # noise standard deviations between two measurements of one target
+_FEWEST = 10  # scans that tell something
+
+
+def merged(
+    recording: RecordedScans, sites: Sequence[Site], stds: Sequence[Sequence[float] | None], distance: float
+) -> RecordedScans:
+    """Return the recording with the measurements of each cluster of a scan replaced by their mean.
+
+    Args:
+        recording: whose `merged` then says for each sensor how many clusters there were and how wide they are.
+        sites: the sensors.
+        stds: for each sensor the standard deviation of each component, rad and m; None: unknown.
+        distance: between two measurements of one cluster at most, in standard deviations; clusters are chains of these.
+
+    Raises:
+        InputError: a sensor whose standard deviations are unknown.
+    """
+    scans, texts = [list(own) for own in recording.scans], list[str]()
+    for s, (site, own) in enumerate(zip(sites, stds, strict=True)):
+        if own is None:
+            wanted = (
+                f"range_dependent, constant or by_axis noise of {shown(site.name)}, whose standard deviations count"
+            )
+            raise InputError(f"merge: expected {wanted}; got custom noise")
+        before, after, offsets = 0, 0, [np.empty((0, len(own)))]
+        for instant in scans:
+            if (scan := instant[s]) is None:
+                continue
+            means, off = _means(scan, site.kind, np.array(own), distance)
+            before, after = before + len(scan), after + len(means)
+            offsets.append(off)
+            instant[s] = means
+        if after < before:
+            texts.append(_told(site, before, after, np.concatenate(offsets)))
+    return replace(recording, scans=tuple(map(tuple, scans)), merged=tuple(texts))
+
+
+def _told(site: Site, before: int, after: int, offsets: Floats) -> str:
+    """How many measurements became how many, and the root mean square of their offsets from their means."""
+    units = [(math.degrees(1.0), "deg") if name == "bearing" else (1.0, "m") for name in COMPONENTS[site.kind]]
+    spread = np.sqrt((offsets**2).mean(axis=0)) if len(offsets) else np.zeros(len(units))
+    parts = [
+        f"{name} {unit * value:.3g} {word}"
+        for name, (unit, word), value in zip(COMPONENTS[site.kind], units, spread.tolist(), strict=True)
+    ]
+    return f"{site.name}: {counted(before, 'measurement')} merged into {after}, spread {', '.join(parts)}"
+
+
+def _means(scan: Floats, kind: str, stds: Floats, distance: float) -> tuple[Floats, Floats]:
+    """The mean of each cluster of a scan, and the offsets from it of the measurements of clusters of several."""
+    clusters, means, offsets = _clusters(scan, kind, stds, distance), list[Floats](), [np.empty((0, scan.shape[1]))]
+    for cluster in range(int(clusters.max(initial=-1)) + 1):
+        own = scan[clusters == cluster]
+        off = _wrapped(own - own[0], kind)
+        means.append(_wrapped(own[:1] + off.mean(axis=0), kind)[0])
+        if len(own) > 1:
+            offsets.append(off - off.mean(axis=0))
+    return np.array(means).reshape(-1, scan.shape[1]), np.concatenate(offsets)
+
+
+def _clusters(scan: Floats, kind: str, stds: Floats, distance: float) -> Ints:
+    """(num,) number of the cluster of each measurement."""
+    from scipy.sparse.csgraph import connected_components
+
+    if not len(scan):
+        return np.empty(0, np.int64)
+    return np.asarray(connected_components(_close(scan, kind, stds, distance), directed=False)[1], np.int64)
+
+
+def _close(scan: Floats, kind: str, stds: Floats, distance: float) -> Bools:
+    """(num, num) whether two measurements lie within a number of standard deviations."""
+    gaps = _wrapped(scan[:, None] - scan[None], kind) / stds
+    return np.asarray((gaps**2).sum(axis=2) <= distance**2)
+
+
+def _wrapped(values: Floats, kind: str) -> Floats:
+    """Measurements or their differences, bearings in [-pi, pi)."""
+    found = values.copy()
+    if COMPONENTS[kind][0] == "bearing":
+        found[..., 0] = np.remainder(found[..., 0] + math.pi, 2.0 * math.pi) - math.pi
+    return found
+
+
+def crowded(
+    recording: RecordedScans, sites: Sequence[Site], stds: Sequence[Sequence[float] | None]
+) -> Iterator[tuple[Site, int, int]]:
+    """Yield sensors with two measurements within three standard deviations in most scans: number of these, and of all.
+
+    The arguments are those of `merged`. Sensors with unknown noise, or fewer than ten scans, are left out.
+    """
+    for s, (site, own) in enumerate(zip(sites, stds, strict=True)):
+        scans = [scan for instant in recording.scans if (scan := instant[s]) is not None]
+        if own is None or len(scans) < _FEWEST:
+            continue
+        pairs = [bool(_close(scan, site.kind, np.array(own), _CLOSE).sum() > len(scan)) for scan in scans]
+        if 2 * sum(pairs) > len(pairs):
+            yield site, sum(pairs), len(pairs)
