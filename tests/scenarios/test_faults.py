@@ -98,7 +98,7 @@ targets:\n  kind: scripted\n  tracks:\n    - {state: [1.0, 2.0, 0.5, -0.5], star
 SENSORS = r"""
 targets:\n  kind: scripted\n  tracks:\n    - {state: [1.0, 2.0, 0.5, -0.5], start_step: 2, end_step: 18}
 -> targets:\n  {kind: recorded, path: ships.txt, columns: {longitude: lon}}
-    11:26: targets.path: expected a file that ends with .csv, .parquet, .nmea, .ais, .ast, .asterix, .db3, .mcap, got "ships.txt"
+    11:26: targets.path: expected a file that ends with .csv, .parquet, .nmea, .ais, .ast, .asterix, .raw, .db3, .mcap, got "ships.txt"
     11:46: targets.columns: expected longitude and latitude together, got only longitude
 std: [0.02, 3.0] -> std: [0.02]
     15:32: sensor_defaults.noise.std: expected 2 numbers, as a bearing_range measurement has, got a list of 1

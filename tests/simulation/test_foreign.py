@@ -54,6 +54,32 @@ def other_category() -> bytes:
     return block
 
 
+@pytest.mark.parametrize(
+    "pattern",
+    [
+        "2016-01-12T13:02:{:02d}Z {}",
+        "2016-01-12 13:02:{:02d},{}",
+        "[2016-01-12T13:02:{:02d}] {}",
+        "{1},r003669930,14526037{0}",
+        "14526037{} {}",
+    ],
+)
+def test_times_of_ais_logs_without_tag_blocks_are_read(tmp_path: Path, pattern: str) -> None:
+    sentences = [ais(None, mmsi="235000001", lon=-1.11 + 1e-4 * k, lat=50.79) for k in range(3)]
+    lines = [pattern.format(21 + 10 * k, sentence) for k, sentence in enumerate(sentences)]
+    (tmp_path / "a.nmea").write_text("\n".join(lines), "ascii")
+    times = read_table(tmp_path / "a.nmea").columns["time"]
+    np.testing.assert_allclose(np.diff(times), 10.0)
+    first = 1452603721.0 if pattern.count("14526037") else 1452603741.0
+    assert times[0] == first
+
+
+def test_ais_without_any_time_is_refused_with_the_lines_that_are_read(tmp_path: Path) -> None:
+    (tmp_path / "a.nmea").write_text(ais(None, mmsi="235000001", lon=-1.1, lat=50.8), "ascii")
+    with pytest.raises(InputError, match=r"2016-01-12T13:02:21Z !AIVDM.*got 1 positions without a time"):
+        read_table(tmp_path / "a.nmea")
+
+
 def test_ships_report_themselves(tmp_path: Path) -> None:
     lines = [ais(1452603741 + 10 * k, mmsi="235000001", lon=-1.11 + 1e-4 * k, lat=50.79) for k in range(6)]
     lines += ["!AIVDM,1,1,,A,garbage*00", "no message", ais(None, mmsi="235000002", lon=-1.1, lat=50.8)]
@@ -163,7 +189,8 @@ def test_plots_are_tracked(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("a.nmea", b"nothing\n", "a.nmea: expected AIS positions with times in tag blocks; got none"),
+        ("a.nmea", b"nothing\n", "got 0 positions without a time"),
+        ("a.pcap", b"\xd4\xc3\xb2\xa1", "got a capture; write it by `tshark -r a.pcap -T fields -e udp.payload | xxd"),
         ("a.ast", b"\x30\x00", "a.ast: expected ASTERIX data blocks; got other bytes"),
         ("a.ast", b"\x3e\x00\x05\xff\xff", "a.ast: expected records of category 062 in data block 1"),
         ("a.ast", b"\x30\x00\x05\xff\xff", "a.ast: expected records of category 048 in data block 1"),

@@ -25,12 +25,26 @@ class ScanColumns:
         for quantity, units in QUANTITIES.items():
             if (found := self._found(quantity, units)) is not None:
                 self._columns[quantity] = found
-        self._time, self._sensor = self._plain("time"), self._plain("sensor")
+        self._time = self._plain("time")
+        self._sensor = self._plain("sensor") if len(sites) > 1 or self._has_sensor() else None
         self._numbers = {site.name: s for s, site in enumerate(sites)} | {
             str(s): s - 1 for s in range(1, len(sites) + 1) if str(s) not in {site.name for site in sites}
         }
         self.is_utc = are_dates(table.columns[self._time])
         self._check()
+
+    def _has_sensor(self) -> bool:
+        """Whether there is a column of sensors, or one is named; of a single sensor there need not be one."""
+        return "sensor" in self.conventions.columns or "sensor" in self.table.columns
+
+    @property
+    def unused(self) -> tuple[str, ...]:
+        """The columns that are not read."""
+        measured = {name for site in self.sites for name in COMPONENTS[site.kind]}
+        measured |= {"lon", "lat"} if "x" in measured else set()
+        own = {"own_x", "own_y", "own_lon", "own_lat", "own_heading"}
+        used = {self._columns[name][0] for name in measured | own if name in self._columns} | {self._time, self._sensor}
+        return tuple(name for name in self.table.columns if name not in used)
 
     def _plain(self, quantity: str) -> str:
         """The column of time or sensor."""

@@ -26,7 +26,15 @@ QUANTITIES: dict[str, Mapping[str, float]] = {
     "own_lat": {"deg": 1.0},
     "own_heading": ANGLES,
 }
-OTHER_NAMES = {"lon": ("longitude",), "lat": ("latitude",), "time": ("time_s", "time_utc"), "range": ("distance",)}
+OTHER_NAMES = {
+    "lon": ("longitude",),
+    "lat": ("latitude",),
+    "longitude": ("lon", "LON"),  # of reports
+    "latitude": ("lat", "LAT"),
+    "id": ("mmsi", "MMSI", "icao24", "track_id"),
+    "time": ("time_s", "time_utc", "BaseDateTime"),
+    "range": ("distance",),
+}
 # m, and a share of the distance from the origin: places in metres and in degrees of one row are nearer than that.
 ONE_PLACE, ONE_PLACE_SHARE = 50.0, 0.001
 MOST = {
@@ -34,6 +42,7 @@ MOST = {
     **dict.fromkeys(("lat", "own_lat"), 90.0),
     **dict.fromkeys(("bearing", "own_heading"), 2.0 * math.pi),
 }
+OVER_A_TURN = math.radians(10.0)  # what a bias or noise may add to an angle
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,9 @@ from vedette.extras import need
 from vedette.text import shown
 
 AIS_ENDINGS = (".nmea", ".ais")
-ASTERIX_ENDINGS = (".ast", ".asterix")
+ASTERIX_ENDINGS = (".ast", ".asterix", ".raw")
+CAPTURE_ENDINGS = (".pcap", ".pcapng")
+_FIRST_TIME = 3e8  # s; numbers below are no times since 1970 of an AIS message
 _KNOT = 1852.0 / 3600.0  # m/s
 _HALF_DAY = 43_200.0  # s
 _NO_SPEED, _NO_COURSE = 102.3, 360.0  # what AIS says where a ship does not know
@@ -25,8 +28,9 @@ Columns = dict[str, list[Any]]
 def read_ais(file: Path) -> tuple[Columns, list[int]]:
     """Positions of ships: `time`, `id` (MMSI), `longitude`, `latitude`; `vx`, `vy` where every ship says them.
 
-    Times are those of the receiver in tag blocks (`\\c:1452603741*..\\`); lines without one, and messages that are no
-    positions, are passed over. Returns the columns and the line of each row.
+    Times are those of the receiver: in tag blocks (`\\c:1452603741*..\\`), before the message (`2016-01-12T13:02:21Z
+    !AIVDM,...`, or seconds since 1970), or after it (`...*5C,r003669930,1452603741`). Lines without one, and messages
+    that are no positions, are passed over. Returns the columns and the line of each row.
 
     Raises:
         MissingPackageError: pyais is not installed.
@@ -35,16 +39,19 @@ def read_ais(file: Path) -> tuple[Columns, list[int]]:
     need(f"{file}, which is a file of AIS messages,", "pyais")
     from pyais.stream import IterMessages
 
-    rows, lines = list[tuple[Any, ...]](), list[int]()
+    rows, lines, untimed = list[tuple[Any, ...]](), list[int](), 0
     with file.open("rb") as source:
         for number, line in enumerate(source, start=1):
-            for message in IterMessages([line.rstrip()]):
-                found = _position(message)
-                if found is not None:
+            sentence, time = _sentence(line.strip())
+            for message in IterMessages([sentence]):
+                found = _position(message, time)
+                untimed += found is not None and found[0] is None
+                if found is not None and found[0] is not None:
                     rows.append(found)
                     lines.append(number)
     if not rows:
-        raise InputError(f"{file}: expected AIS positions with times in tag blocks; got none")
+        wanted = r"AIS positions with times: `\c:1452603741*54\!AIVDM,...`, `2016-01-12T13:02:21Z !AIVDM,...` or "
+        raise InputError(f"{file}: expected {wanted}`!AIVDM,...*5C,1452603741`; got {untimed} positions without a time")
     names = ("time", "id", "longitude", "latitude")
     columns: Columns = {name: [row[place] for row in rows] for place, name in enumerate(names)}
     if all(row[4] is not None for row in rows):
@@ -52,22 +59,45 @@ def read_ais(file: Path) -> tuple[Columns, list[int]]:
     return columns, lines
 
 
-def _position(message: Any) -> tuple[Any, ...] | None:
-    """Time, MMSI, longitude, latitude and velocity of a message; None of any other."""
+def _sentence(line: bytes) -> tuple[bytes, float | None]:
+    """The sentence of a line, with its tag block if there is one, and the time that stands before or after it."""
+    if line.startswith(b"\\"):
+        return line, None
+    start, star = max(line.find(b"!"), 0), line.rfind(b"*")
+    end = star + 3 if star >= 0 else len(line)
+    times = [_clock(line[:start].strip(b" ,;\t[]()")), _clock(line[end:].rsplit(b",", 1)[-1].strip())]
+    return line[start:end], next((time for time in times if time is not None), None)
+
+
+def _clock(cell: bytes) -> float | None:
+    """Seconds since 1970 of an ISO 8601 time (UTC unless it names a zone) or of a number; None of anything else."""
+    text = cell.decode("ascii", "replace")
+    try:
+        if text.replace(".", "", 1).isdigit():
+            return float(text) if float(text) > _FIRST_TIME else None
+        moment = datetime.fromisoformat(text)
+    except ValueError:
+        return None
+    return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+
+
+def _position(message: Any, time: float | None) -> tuple[Any, ...] | None:
+    """Time, MMSI, longitude, latitude and velocity of a message, the time None if there is none; None of any other."""
     from pyais.exceptions import AISBaseException
 
-    if message.tag_block is None:
-        return None
     try:
-        message.tag_block.init()
+        if message.tag_block is not None:
+            message.tag_block.init()
+            time = float(message.tag_block.receiver_timestamp)
         said = message.decode().asdict()
-        time = float(message.tag_block.receiver_timestamp)
     except (AISBaseException, TypeError, ValueError):
         return None
     place = said.get("lon"), said.get("lat")
     if not all(isinstance(number, float) for number in place) or abs(place[0]) > 180.0 or abs(place[1]) > 90.0:
         return None
-    return time / 1000.0 if time > 1e11 else time, str(said["mmsi"]), *place, _velocity(said)
+    if time is not None and time > 1e11:  # milliseconds
+        time /= 1000.0
+    return time, str(said["mmsi"]), *place, _velocity(said)
 
 
 def _velocity(said: dict[str, Any]) -> tuple[float, float] | None:

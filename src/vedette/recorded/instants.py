@@ -99,6 +99,7 @@ class RecordedScans(Speaking):
         skipped: what was wrong with the rows that were left out.
         bearings: for each sensor, from where its rows counted bearings, whose direction a bearing's bias has; None: it
             has none.
+        unused: columns that were not read.
         merged: for each sensor whose measurements were merged, how many of them and how wide they spread.
     """
 
@@ -109,6 +110,7 @@ class RecordedScans(Speaking):
     poses: Floats
     skipped: tuple[str, ...]
     bearings: tuple[Bearings | None, ...]
+    unused: tuple[str, ...] = ()
     merged: tuple[str, ...] = ()
 
     def _summary(self) -> str:

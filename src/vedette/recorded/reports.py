@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
-from vedette.recorded.conventions import ONE_PLACE, ONE_PLACE_SHARE
+from vedette.recorded.conventions import ONE_PLACE, ONE_PLACE_SHARE, OTHER_NAMES
 from vedette.recorded.geography import Origin
 from vedette.recorded.opensky import is_opensky, of_opensky
 from vedette.recorded.tables import FARTHEST, Table
 
+_USED = ("time", "id", "x", "y", "longitude", "latitude", "vx", "vy")
 _SAME_TIME = 1e-6  # s; two reports of one target nearer in time than this are one
 
 
@@ -30,6 +32,7 @@ class Reports:
         origin_deg: longitude and latitude of (0, 0) where the record was geographic, else None.
         bounds_deg: its least and greatest longitude and latitude where it was geographic, else None.
         repeats: rows of the table, (kept, left out), where a target has a second report at one time: the first is kept.
+        unused: columns of the table that were not read.
     """
 
     times: Floats
@@ -40,6 +43,7 @@ class Reports:
     origin_deg: tuple[float, float] | None
     bounds_deg: tuple[tuple[float, float], tuple[float, float]] | None = None
     repeats: tuple[tuple[int, int], ...] = ()
+    unused: tuple[str, ...] = ()
 
 
 def parse_reports(
@@ -64,10 +68,11 @@ def parse_reports(
         InputError: names the file, row, column, what was expected and what came.
     """
     given = dict(columns or {})
-    if not given and is_opensky(table.columns):
+    if is_known := not given and is_opensky(table.columns):
         table, given = of_opensky(table)
     if unknown := set(given) - {"time", "id", "x", "y", "longitude", "latitude", "vx", "vy"}:
         raise InputError(f"columns: expected time, id, x, y, longitude, latitude, vx or vy; got {', '.join(unknown)}")
+    given = {**usual_names(table.columns), **given}
     times, labels = table.times(given.get("time", "time")), table.labels(given.get("id", "id"))
     positions, origin, bounds = _positions(table, given, origin_deg, usual_origin_deg)
     if len(times) == 0:
@@ -82,7 +87,23 @@ def parse_reports(
     order = order[~again]
     velocities = None if velocities is None else velocities[order]
     tracks = tracks[order].astype(np.int64)
-    return Reports(times[order], tracks, positions[order], velocities, tuple(map(str, names)), origin, bounds, repeats)
+    used = {given.get(name, name) for name in _USED} - ({"x", "y"} if origin is not None else set())
+    unused = () if is_known else tuple(name for name in table.columns if name not in used)
+    return Reports(
+        times[order], tracks, positions[order], velocities, tuple(map(str, names)), origin, bounds, repeats, unused
+    )
+
+
+def usual_names(columns: Iterable[str]) -> dict[str, str]:
+    """Columns under other names that they often have; places in degrees only where there are none in metres."""
+    have = set(columns)
+    wanted = ("time", "id") if {"x", "y"} <= have else ("time", "id", "longitude", "latitude")
+    found = {}
+    for quantity in wanted:
+        others = [name for name in OTHER_NAMES[quantity] if name in have]
+        if quantity not in have and others:
+            found[quantity] = others[0]
+    return found
 
 
 def _pair(table: Table, names: Sequence[str]) -> Floats:
@@ -111,6 +132,13 @@ def _degrees(table: Table, given: Mapping[str, str]) -> list[Floats]:
             raise table.fault(int(np.argmax(wrong)), column, f"a {name} in degrees, at most {limit:g}")
         degrees.append(values)
     return degrees
+
+
+def _median_longitude(longitudes: Floats) -> float:
+    """The median, also of longitudes on both sides of 180 degrees; from -180 to 180."""
+    around = longitudes[0] + np.remainder(longitudes - longitudes[0] + 180.0, 360.0) - 180.0
+    middle = float(np.median(around))
+    return middle if abs(middle) <= 180.0 else middle - math.copysign(360.0, middle)
 
 
 def _check_agreed(table: Table, found: Floats, origin: Origin) -> None:
@@ -146,7 +174,7 @@ def _positions(
     degrees = _degrees(table, given)
     origin_deg = origin_deg or usual_origin_deg
     if origin_deg is None:
-        origin_deg = (float(np.median(degrees[0])), float(np.median(degrees[1]))) if len(degrees[0]) else (0.0, 0.0)
+        origin_deg = (_median_longitude(degrees[0]), float(np.median(degrees[1]))) if len(degrees[0]) else (0.0, 0.0)
     if not len(degrees[0]):
         return np.empty((0, 2)), origin_deg, None
     low, high = ((float(end(degrees[0])), float(end(degrees[1]))) for end in (np.min, np.max))

@@ -13,9 +13,12 @@ from vedette.kernels.base.types import Floats
 from vedette.models.bias import NO_BIAS
 from vedette.recorded.columns import ScanColumns
 from vedette.recorded.conventions import (
+    ANGLES,
     MOST,
     ONE_PLACE,
     ONE_PLACE_SHARE,
+    OVER_A_TURN,
+    QUANTITIES,
     Conventions,
 )
 from vedette.recorded.extents import PLACED, places_of, wild
@@ -64,7 +67,9 @@ def parse_scans(
         raise InputError(f"{table.source}: expected at least one row that can be read; got none of {len(table.rows)}")
     found, beyond = _without_wild(found, table, sites)
     recording = _at_instants(found, rows, skipped + beyond)
-    return without_biases(recording, sites) if any(site.bias != NO_BIAS for site in sites) else recording
+    if any(site.bias != NO_BIAS for site in sites):
+        recording = without_biases(recording, sites)
+    return replace(recording, unused=rows.unused)
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,13 +97,19 @@ class _Rows(ScanColumns):
         return found, tuple(skipped)
 
     def _row(self, i: int) -> _Row:
+        s = self._site(i)
+        time, pose = self._seconds(i), self._pose(i, s)
+        return _Row(i, time, s, self._measured(i, s, pose), pose)
+
+    def _site(self, i: int) -> int:
+        """The sensor of a row; where there is one and no column of sensors, that one."""
+        if self._sensor is None:
+            return 0
         label = str(self.table.columns[self._sensor][i]).strip()
         if label not in self._numbers:
             names = ", ".join(shown(site.name) for site in self.sites)
             raise self.table.fault(i, self._sensor, f"a sensor among {names}, or its number from 1")
-        s = self._numbers[label]
-        time, pose = self._seconds(i), self._pose(i, s)
-        return _Row(i, time, s, self._measured(i, s, pose), pose)
+        return self._numbers[label]
 
     def _seconds(self, i: int) -> float:
         """The time of a row, all as dates or all as numbers."""
@@ -121,7 +132,8 @@ class _Rows(ScanColumns):
         if not math.isfinite(value):
             raise self.table.fault(i, name, "a finite number")
         most = MOST.get(quantity, FARTHEST)
-        if abs(value) > most * (1.0 + 1e-9) or (quantity == "range" and value < 0.0):
+        over = OVER_A_TURN if QUANTITIES[quantity] is ANGLES else 1e-9 * most
+        if abs(value) > most + over or (quantity == "range" and value < 0.0):
             limits = f"from {0 if quantity == 'range' else -most / unit:g} to {most / unit:g}"
             raise self.table.fault(i, name, f"a number {limits}")
         return value

@@ -19,7 +19,7 @@ from vedette.errors import InputError
 from vedette.extras import need
 from vedette.kernels.base.types import Floats
 from vedette.recorded.bags import BAG_ENDINGS, read_bag
-from vedette.recorded.foreign import AIS_ENDINGS, ASTERIX_ENDINGS, read_ais, read_asterix
+from vedette.recorded.foreign import AIS_ENDINGS, ASTERIX_ENDINGS, CAPTURE_ENDINGS, read_ais, read_asterix
 from vedette.text import elided, printable, shown
 
 # Beyond these, differences and speeds of reports mean nothing.
@@ -182,6 +182,9 @@ def read_table(path: str | Path, *, reports: bool = False) -> Table:
     """
     file = Path(path)
     named = elided(printable(str(file)), 200)
+    if file.suffix.lower() in CAPTURE_ENDINGS:
+        how = f"tshark -r {file.name} -T fields -e udp.payload | xxd -r -p > {file.stem}.ast"
+        raise InputError(f"{named}: expected ASTERIX without network headers; got a capture; write it by `{how}`")
     if file.suffix.lower() not in ENDINGS:
         raise InputError(f"{named}: expected a file that ends with {', '.join(ENDINGS)}")
     if not os.path.isfile(file):  # a name can be too long, or hold what no name can: for pathlib, an error

@@ -73,11 +73,12 @@ def _columns(recorded: RecordedTargets, file: FilePath) -> Iterator[Finding]:
         yield ("targets", "path"), "a readable CSV file", f"{describe(recorded.path)}: {error}"
         return
     from vedette.recorded.opensky import is_opensky
+    from vedette.recorded.reports import usual_names
     from vedette.recorded.tables import column_names
 
     if not recorded.columns.given() and is_opensky(header):
         return
-    given, shown = recorded.columns.given(), column_names(header)
+    given, shown = usual_names(header) | recorded.columns.given(), column_names(header)
     for key, name in given.items():
         if name not in header:
             yield ("targets", "columns", key), f"a column of {named(recorded.path)}: {shown}", describe(name)

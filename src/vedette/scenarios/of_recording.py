@@ -72,7 +72,7 @@ def scenario_of_recording(
     }
     if truth is not None:
         own = said.get("targets")
-        known = own if isinstance(own, Mapping) and own.get("kind") == "recorded" else {}
+        known = own if isinstance(own, Mapping) and own.get("kind", "recorded") == "recorded" else {}
         said["targets"] = {**known, "kind": "recorded", "path": str(truth.resolve())}
     elif not _are_recorded(said.get("targets")):
         said["targets"] = {"kind": "unknown"}

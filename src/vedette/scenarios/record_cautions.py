@@ -9,6 +9,7 @@ import numpy as np
 from vedette.recorded import RecordedScans
 from vedette.recorded import RecordedTargets as RecordedSource
 from vedette.recorded.merging import crowded
+from vedette.recorded.tables import column_names
 from vedette.scenarios.extents import beyond_region
 from vedette.scenarios.faults import Path, format_path
 from vedette.scenarios.loading import Scenario
@@ -17,6 +18,7 @@ from vedette.scenarios.sections.recording import noise_stds, sites_of
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.targets import RecordedTargets
 from vedette.scenarios.sections.world import Time
+from vedette.text import counted
 
 _NEAR = 1000.0  # m; what is nearer than this to the targets is not called far
 
@@ -26,12 +28,15 @@ def record_cautions(scenario: Scenario) -> Iterator[tuple[Path, str]]:
     model, folder = scenario.model, scenario.folder
     if model.recording is not None:
         recording = model.recording.build(model, folder)
+        yield from _unused(("recording", "path"), model.recording.path, recording.unused)
         yield from beyond_region(model, recording)
         yield from _several_a_target(model, recording)
     if not isinstance(model.targets, RecordedTargets):
         return
     source = model.targets.source(model, folder)
     yield from _repeats(model.targets, source)
+    yield from _single_reports(model.targets, source)
+    yield from _unused(("targets", "path"), model.targets.path, source.reports.unused)
     for index, sensor in enumerate(model.sensors):
         path: Path = ("sensors", index, "position")
         place = f"{format_path(path)}: expected metres from the origin"
@@ -40,6 +45,22 @@ def record_cautions(scenario: Scenario) -> Iterator[tuple[Path, str]]:
             yield path, f"{place}, got {at}, which is a longitude and latitude among those of {model.targets.path}"
         elif (distance := _distance(sensor, source, model.time)) is not None:
             yield path, f"{place}, got {at}, {distance / 1000.0:.3g} km from the nearest recorded position"
+
+
+def _unused(path: Path, file: str, columns: tuple[str, ...]) -> Iterator[tuple[Path, str]]:
+    """Columns that are there and not read."""
+    if columns:
+        names = column_names(columns)
+        yield path, f"{'.'.join(map(str, path))}: {file}: not used: {counted(len(columns), 'column')} ({names})"
+
+
+def _single_reports(section: RecordedTargets, source: RecordedSource) -> Iterator[tuple[Path, str]]:
+    """Targets with one report, which have no course."""
+    numbers = np.bincount(source.reports.tracks, minlength=len(source.reports.names))
+    single = [name for name, number in zip(source.reports.names, numbers.tolist(), strict=True) if number == 1]
+    if single:
+        which = f"{counted(len(single), 'target')} with one report ({column_names(single)})"
+        yield ("targets", "path"), f"targets.path: {section.path}: {which} left out, as a course needs two"
 
 
 def _several_a_target(model: ScenarioModel, recording: RecordedScans) -> Iterator[tuple[Path, str]]:
