@@ -57,7 +57,7 @@ def test_several_returns_are_warned_of_and_merged(tmp_path: Path) -> None:
     apart = run_scenario(plain.scenario, "still", seed=0)
     found = recorded(tmp_path, 4.0, ", merge: 4.0")
     (line,) = [line for line in cautions(found.scenario) if "merged into" in line]
-    assert "noise of the sensor should cover the spread" in line
+    assert "its noise should cover that" in line
     record = run_scenario(found.scenario, "still", seed=0)
     assert found.recording.num_measurements < 0.5 * plain.recording.num_measurements
     numbers = [np.mean([len(each.labels) for each in run.estimates[10:]]) for run in (apart, record)]
@@ -78,7 +78,9 @@ def test_a_cluster_is_its_mean_across_the_end_of_bearings() -> None:
     (own,) = found.scans[0]
     assert own is not None
     np.testing.assert_allclose(own, [[-math.pi + 0.001, 102.0], [0.5, 100.0]])
-    assert found.merged == ("R: 3 measurements merged into 2, spread bearing 0.115 deg, range 2 m",)
+    assert found.notes == (
+        "R: 3 measurements merged into 2, spread bearing 0.115 deg, range 2 m; its noise should cover that",
+    )
 
 
 def test_a_distance_below_zero_is_refused(tmp_path: Path) -> None:

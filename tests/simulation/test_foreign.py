@@ -16,6 +16,7 @@ from vedette.evaluation.runs import run_scenario
 from vedette.models import Bias
 from vedette.recorded import Conventions, Origin, RecordedTargets, Site, parse_scans
 from vedette.recorded.tables import read_table
+from vedette.scenarios.cautions import cautions
 from vedette.scenarios.of_recording import scenario_of_recording
 
 CATS: Any = manifest["CATS"]
@@ -34,15 +35,16 @@ def ais(time: float | None, **said: Any) -> str:
     return f"\\{body}*{total:02X}\\{line}"
 
 
-def plot(time: float, rho: float, theta: float, sic: int = 2) -> bytes:
+def plot(time: float, rho: float, theta: float, sic: int = 2, level: float | None = None, garbled: int = 0) -> bytes:
     category = CATS[48][-1]
-    record = category.cv_record.create(
-        {
-            "010": (("SAC", 1), ("SIC", sic)),
-            "140": ((time, "s")),
-            "040": (("RHO", (rho, "NM")), ("THETA", (theta, "°"))),
-        }
-    )
+    said: dict[str, Any] = {
+        "010": (("SAC", 1), ("SIC", sic)),
+        "140": ((time, "s")),
+        "040": (("RHO", (rho, "NM")), ("THETA", (theta, "°"))),
+    }
+    if level is not None:
+        said["090"] = (("V", 0), ("G", garbled), ("FL", (level, "FL")))
+    record = category.cv_record.create(said)
     block: bytes = category.create([record]).unparse().to_bytes()
     return block
 
@@ -117,6 +119,31 @@ def test_biases_of_a_radar_count_as_its_bearings_do(tmp_path: Path) -> None:
     found = parse_scans(read_table(tmp_path / "radar.ast"), [site], Conventions({}, {}))
     assert found.scans[0][0] is not None
     np.testing.assert_allclose(found.scans[0][0][0, 0], 0.0, atol=2.0 * np.pi / 2**16)
+
+
+def test_the_height_of_a_flight_level_is_taken_off_slant_ranges(tmp_path: Path) -> None:
+    """Three aircraft at flight level 330 over a round Earth, 20, 60 and 150 km from the radar along its horizon."""
+    earth, height, ground = 6_371_000.0, 330 * 30.48, np.array([20e3, 60e3, 150e3])
+    up = np.sqrt((earth + height) ** 2 - ground**2) - earth
+    slant = np.hypot(ground, up) / 1852.0
+    content = b"".join(plot(float(k), rho, 45.0, level=330.0) for k, rho in enumerate(slant.tolist()))
+    (tmp_path / "radar.ast").write_bytes(content)
+    table = read_table(tmp_path / "radar.ast")
+    np.testing.assert_allclose(1852.0 * np.array(table.columns["range_nmi"]), ground, atol=10.0)  # 1 / 256 nmi
+    assert table.notes == ()
+    others = plot(3.0, 20.0, 45.0, level=330.0, garbled=1) + plot(4.0, 1.0, 45.0, level=330.0) + plot(5.0, 8.0, 45.0)
+    (tmp_path / "radar.ast").write_bytes(content + others)
+    table = read_table(tmp_path / "radar.ast")
+    assert table.columns["range_nmi"][3:] == [20.0, 1.0, 8.0]  # garbled; nearer than it is high; none
+    assert table.notes[0].startswith("3 of 6 plots have no flight level: their slant ranges are taken for ranges along")
+
+
+def test_slant_ranges_are_warned_of(tmp_path: Path) -> None:
+    (tmp_path / "radar.ast").write_bytes(b"".join(plot(5.0 * k, 5.0 + 0.1 * k, 45.0) for k in range(6)))
+    text = "sensors:\n  - {name: 1/2, position: [0, 0], detection: {kind: constant, probability: .9}}\n"
+    (tmp_path / "radar.yaml").write_text(text, "utf-8")
+    found = scenario_of_recording(tmp_path / "radar.yaml", tmp_path / "radar.ast")
+    assert any("6 of 6 plots have no flight level" in line for line in cautions(found.scenario))
 
 
 def test_midnight_is_passed(tmp_path: Path) -> None:

@@ -19,6 +19,7 @@ _FIRST_TIME = 3e8  # s; numbers below are no times since 1970 of an AIS message
 _KNOT = 1852.0 / 3600.0  # m/s
 _HALF_DAY = 43_200.0  # s
 _NO_SPEED, _NO_COURSE = 102.3, 360.0  # what AIS says where a ship does not know
+_MILE, _FLIGHT_LEVEL, _EARTH = 1852.0, 30.48, 6_371_000.0  # m
 _PLOTS, _TRACKS = 48, 62  # categories of what a rotating radar sees, and of what a tracker has made of such
 _DEGREE = "\N{DEGREE SIGN}"
 
@@ -109,14 +110,15 @@ def _velocity(said: dict[str, Any]) -> tuple[float, float] | None:
     return _KNOT * speed * math.sin(angle), _KNOT * speed * math.cos(angle)
 
 
-def read_asterix(file: Path, *, reports: bool = False) -> tuple[Columns, list[int]]:
+def read_asterix(file: Path, *, reports: bool = False) -> tuple[Columns, list[int], tuple[str, ...]]:
     """Plots of rotating radars, category 048, or tracks of a system, category 062; a sensor is "SAC/SIC".
 
-    Of plots `time`, `sensor`, `range_nmi` (slant), `bearing_deg` from the north. Of tracks, where there are no plots or
-    `reports` are asked for, `time`, `sensor`, `longitude`, `latitude`, and what targets have: `id` (the number of the
-    track), and `vx`, `vy` where every one says them. Times are seconds from midnight UTC of the first one's day. Other
-    categories, and records without a time and place, are passed over. Returns the columns and the number of each
-    record.
+    Of plots `time`, `sensor`, `range_nmi`, `bearing_deg` from the north. Ranges are along the ground where a plot has a
+    valid flight level, which is taken as the height above the radar; others are slant. Of tracks, where there are no
+    plots or `reports` are asked for, `time`, `sensor`, `longitude`, `latitude`, and what targets have: `id` (the number
+    of the track), and `vx`, `vy` where every one says them. Times are seconds from midnight UTC of the first one's day.
+    Other categories, and records without a time and place, are passed over. Returns the columns, the number of each
+    record, and a warning of plots without a flight level.
 
     Raises:
         MissingPackageError: libasterix is not installed.
@@ -140,7 +142,17 @@ def read_asterix(file: Path, *, reports: bool = False) -> tuple[Columns, list[in
             f"{file}: expected {'' if reports else 'plots of category 048 or '}tracks of category 062; got none"
         )
     columns: Columns = {name: [row[name] for row in rows] for name in rows[0]}
-    return {name: cells for name, cells in columns.items() if name not in ("vx", "vy") or None not in cells}, numbers
+    slant = sum(columns.pop("is_slant", []))
+    notes = () if not slant else (_of_slant_ranges(slant, len(numbers)),)
+    kept = {name: cells for name, cells in columns.items() if name not in ("vx", "vy") or None not in cells}
+    return kept, numbers, notes
+
+
+def _of_slant_ranges(number: int, total: int) -> str:
+    return (
+        f"{number} of {total} plots have no flight level: their slant ranges are taken for ranges along the ground, of "
+        "an aircraft 10 km high too long by 1.7 km at 30 km and by .5 km at 100 km"
+    )
 
 
 def _records(file: Path) -> Iterator[tuple[int, Any]]:
@@ -166,8 +178,25 @@ def _plot(record: Any) -> dict[str, Any] | None:
     source, time, polar = (record.get_item(name) for name in ("010", "140", "040"))
     if source is None or time is None or polar is None:
         return None
-    reach, azimuth = _quantity(polar, "RHO", "NM"), _quantity(polar, "THETA", _DEGREE)
-    return {**_source(source, time), "range_nmi": reach, "bearing_deg": azimuth}
+    slant, azimuth = _quantity(polar, "RHO", "NM"), _quantity(polar, "THETA", _DEGREE)
+    ground = _ground_range(_MILE * slant, _height(record.get_item("090")))
+    reach = slant if ground is None else ground / _MILE
+    return {**_source(source, time), "range_nmi": reach, "bearing_deg": azimuth, "is_slant": ground is None}
+
+
+def _height(level: Any) -> float | None:
+    """m, of a flight level that is there, validated and not garbled."""
+    if level is None or any(level.variation.get_item(name).as_uint() for name in ("V", "G")):
+        return None
+    return _FLIGHT_LEVEL * _quantity(level, "FL", "FL")
+
+
+def _ground_range(slant: float, height: float | None) -> float | None:
+    """m along the radar's horizontal plane of a slant range in m to a height above a round Earth; None: not known."""
+    if height is None:
+        return None
+    up = ((_EARTH + height) ** 2 - _EARTH**2 - slant**2) / (2.0 * _EARTH)
+    return math.sqrt(slant**2 - up**2) if abs(up) <= slant else None
 
 
 def _track(record: Any) -> dict[str, Any] | None:

@@ -100,7 +100,7 @@ class RecordedScans(Speaking):
         bearings: for each sensor, from where its rows counted bearings, whose direction a bearing's bias has; None: it
             has none.
         unused: columns that were not read.
-        merged: for each sensor whose measurements were merged, how many of them and how wide they spread.
+        notes: what may mislead: slant ranges; of a sensor whose measurements were merged, how many and how wide.
     """
 
     times: Floats
@@ -111,7 +111,7 @@ class RecordedScans(Speaking):
     skipped: tuple[str, ...]
     bearings: tuple[Bearings | None, ...]
     unused: tuple[str, ...] = ()
-    merged: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def _summary(self) -> str:
         sizes = f"{counted(len(self.times), 'instant')}, {counted(self.poses.shape[1], 'sensor')}"

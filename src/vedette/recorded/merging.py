@@ -23,7 +23,7 @@ def merged(
     """Return the recording with the measurements of each cluster of a scan replaced by their mean.
 
     Args:
-        recording: whose `merged` then says for each sensor how many clusters there were and how wide they are.
+        recording: to whose `notes` is added for each sensor how many clusters there were and how wide they are.
         sites: the sensors.
         stds: for each sensor the standard deviation of each component, rad and m; None: unknown.
         distance: between two measurements of one cluster at most, in standard deviations; clusters are chains of these.
@@ -48,7 +48,7 @@ def merged(
             instant[s] = means
         if after < before:
             texts.append(_told(site, before, after, np.concatenate(offsets)))
-    return replace(recording, scans=tuple(map(tuple, scans)), merged=tuple(texts))
+    return replace(recording, scans=tuple(map(tuple, scans)), notes=(*recording.notes, *texts))
 
 
 def _told(site: Site, before: int, after: int, offsets: Floats) -> str:
@@ -59,7 +59,8 @@ def _told(site: Site, before: int, after: int, offsets: Floats) -> str:
         f"{name} {unit * value:.3g} {word}"
         for name, (unit, word), value in zip(COMPONENTS[site.kind], units, spread.tolist(), strict=True)
     ]
-    return f"{site.name}: {counted(before, 'measurement')} merged into {after}, spread {', '.join(parts)}"
+    spread_of = f"spread {', '.join(parts)}; its noise should cover that"
+    return f"{site.name}: {counted(before, 'measurement')} merged into {after}, {spread_of}"
 
 
 def _means(scan: Floats, kind: str, stds: Floats, distance: float) -> tuple[Floats, Floats]:

@@ -69,7 +69,7 @@ def parse_scans(
     recording = _at_instants(found, rows, skipped + beyond)
     if any(site.bias != NO_BIAS for site in sites):
         recording = without_biases(recording, sites)
-    return replace(recording, unused=rows.unused)
+    return replace(recording, unused=rows.unused, notes=table.notes)
 
 
 @dataclass(frozen=True, slots=True)

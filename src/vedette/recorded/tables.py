@@ -36,13 +36,14 @@ ENDINGS = (".csv", ".parquet", *AIS_ENDINGS, *ASTERIX_ENDINGS, *BAG_ENDINGS)
 class Table:
     """Columns as they came, the row number of each entry in its file, and a name for messages.
 
-    bearings: from where the format counts them, "north" or "east"; None: it does not say.
+    bearings: from where the format counts them, "north" or "east"; None: it does not say. notes: what may mislead.
     """
 
     columns: Mapping[str, Sequence[Any]]
     rows: Sequence[int]
     source: str
     bearings: Literal["east", "north"] | None = None
+    notes: tuple[str, ...] = ()
 
     def column(self, name: str) -> Sequence[Any]:
         """The cells of a column, or an error that says which there are."""
@@ -194,7 +195,8 @@ def read_table(path: str | Path, *, reports: bool = False) -> Table:
     if file.suffix.lower() in AIS_ENDINGS:
         return Table(*read_ais(file), str(file))
     if file.suffix.lower() in ASTERIX_ENDINGS:
-        return Table(*read_asterix(file, reports=reports), str(file), "north")
+        columns, rows, notes = read_asterix(file, reports=reports)
+        return Table(columns, rows, str(file), "north", notes)
     if file.suffix.lower() in BAG_ENDINGS:
         return Table(*read_bag(file, reports=reports), str(file))
     return _read_csv(file) if file.suffix.lower() == ".csv" else _read_parquet(file)

@@ -29,6 +29,7 @@ def record_cautions(scenario: Scenario) -> Iterator[tuple[Path, str]]:
     if model.recording is not None:
         recording = model.recording.build(model, folder)
         yield from _unused(("recording", "path"), model.recording.path, recording.unused)
+        yield from ((("recording", "path"), note) for note in recording.notes)
         yield from beyond_region(model, recording)
         yield from _several_a_target(model, recording)
     if not isinstance(model.targets, RecordedTargets):
@@ -64,9 +65,7 @@ def _single_reports(section: RecordedTargets, source: RecordedSource) -> Iterato
 
 
 def _several_a_target(model: ScenarioModel, recording: RecordedScans) -> Iterator[tuple[Path, str]]:
-    """Measurements that were merged, or that come so close together that one target seems to have several."""
-    for text in recording.merged:
-        yield ("recording", "merge"), f"{text}; noise of the sensor should cover the spread"
+    """Measurements that come so close together that one target seems to have several."""
     stds = [noise_stds(sensor) for sensor in model.sensors]
     for site, num, scans in crowded(recording, sites_of(model), stds):
         yield (
