@@ -241,6 +241,10 @@ def main() -> None:
     parser.add_argument("--write", type=Path, help="page of the documentation whose table is replaced")
     given = parser.parse_args()
     store = Store(given.out)
+    known = sorted({name for scene in scenes() for name in (*strategies(scene.scenario()), *BEFORE)})
+    for word in given.strategies:
+        if not any(name.startswith(word) for name in known):
+            parser.error(f"--strategies: expected the beginning of one of {', '.join(known)}; got {word!r}")
     run_all(given, store)
     names = [scene.name for scene in scenes() if scene.name in store.found]
     for name in names:

@@ -56,12 +56,12 @@ LIGHT = [
     ["schema"],
     ["run", "linear-10", "--planner", "still"],
     ["live", "--sensors", "bay.yaml"],
+    ["track", "scans.csv", "--sensors", "radars.yaml", "--out", "tracked"],
     ["calibrate", "scans.csv", "--sensors", "radars.yaml"],
 ]
 HEAVY = {
     ("show", "linear-10", "--out", "picture.png"): ("matplotlib", "report"),
     ("run", "linear-10", "--planner", "still", "--out", "run"): ("matplotlib and pyarrow", "report"),
-    ("track", "scans.csv", "--sensors", "radars.yaml", "--out", "run"): ("matplotlib and pyarrow", "report"),
     ("video", "there", "--out", "run.gif"): ("matplotlib and pyarrow", "report"),
     ("live", "--sensors", "bay.yaml", "--listen", "ws://127.0.0.1:0"): (
         "websockets and jinja2 and matplotlib and pyarrow",
@@ -203,3 +203,15 @@ def test_the_library_names_the_extra_too(program: str, names: str, extra: str, t
     assert last.startswith("vedette.errors.MissingPackageError: ")
     assert f"needs {names}, which" in last
     assert last.endswith(f"pip install 'vedette[{extra}]'")
+
+
+def test_tracks_are_written_without_any_extra(tmp_path: Path) -> None:
+    write_recording(tmp_path, seconds=30.0)
+    command = ["track", "scans.csv", "--sensors", "radars.yaml", "--out", "run"]
+    ((status, printed, told, _),) = outcomes([command], tmp_path)
+    assert status == 0, told
+    assert "wrote run" in printed
+    assert "needs pyarrow, which is not installed: pip install 'vedette[campaigns]'" in told
+    assert "needs matplotlib, which is not installed: pip install 'vedette[report]'" in told
+    found = sorted(path.relative_to(tmp_path).as_posix() for path in (tmp_path / "run").rglob("*.*"))
+    assert found == ["run/tracks/tracks.csv", "run/tracks/tracks.geojson"]

@@ -33,13 +33,19 @@ def need(what: str, *packages: str) -> None:
 
     Raises `MissingPackageError` otherwise: that `what` needs those that are missing, and how they are installed.
     """
+    if lacking := without(what, *packages):
+        raise MissingPackageError(lacking)
+
+
+def without(what: str, *packages: str) -> str:
+    """That `what` needs the packages (of `EXTRA_OF`) that are missing, and how to install them; empty: none is."""
     missing = [package for package in packages if not _is_installed(package)]
     if not missing:
-        return
+        return ""
     extras = {EXTRA_OF[package] for package in missing}
     names = ",".join(sorted(extras - {"campaigns"} or extras))
     which = "which is not installed" if len(missing) == 1 else "which are not installed"
-    raise MissingPackageError(f"{what} needs {' and '.join(missing)}, {which}: pip install 'vedette[{names}]'")
+    return f"{what} needs {' and '.join(missing)}, {which}: pip install 'vedette[{names}]'"
 
 
 def _is_installed(package: str) -> bool:

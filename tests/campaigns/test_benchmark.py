@@ -12,12 +12,13 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from vedette.campaigns import benchmark, run_campaign
+from vedette.campaigns import benchmark, run_campaign, standings
 from vedette.campaigns.benchmark import OWN, Scene, campaign_of, entrant, make_way, scenes
 from vedette.campaigns.manifest import read_manifest
 from vedette.campaigns.standings import benchmark_csv, benchmark_markdown, header, origin, row, scene_table
 from vedette.cli import app
 from vedette.errors import InputError
+from vedette.evaluation import Summary
 from vedette.scenarios import load_scenario
 
 FIRST = """
@@ -149,7 +150,9 @@ def test_the_command_ends_with_tables_and_a_page(tmp_path: Path, monkeypatch: py
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(benchmark, "scenes", lambda: {"paper-a": STEERED, "polar-10": TRACKED})
     (tmp_path / "mine.py").write_text(FIRST)
-    (tmp_path / "bad.py").write_text("raise SystemExit('not today')")
+    (tmp_path / "bad.py").write_text(
+        "print(input() and '{\"ready\": true}', flush=True)\nraise SystemExit('not today')"
+    )
     words = ["--planner", f"mine={sys.executable} mine.py", "--planner", f"bad={sys.executable} bad.py"]
     asked = ["benchmark", *words, "--runs", "2", "--workers", "1", "--seconds", "20"]
     for _ in range(2):  # again: what is there is not run again, what was lost is tried again
@@ -164,6 +167,30 @@ def test_the_command_ends_with_tables_and_a_page(tmp_path: Path, monkeypatch: py
     assert "not today" in page
     assert "polar-10" not in page  # as trackers have not been entered
     assert (tmp_path / "benchmark" / "benchmark.csv").read_text().count("\n") == 1 + 4
+
+
+@pytest.mark.parametrize(
+    ("what", "words"),
+    [
+        (f"{sys.executable} mime.py", "can't open file"),
+        ("no-such-program-here", "planner mine: expected one that can be started"),
+        ("mine.py:Plannr", 'expected a name that "mine.py" defines, got "Plannr"'),
+    ],
+)
+def test_a_typo_is_no_lost_run(what: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(benchmark, "scenes", lambda: {"paper-a": STEERED})
+    (tmp_path / "mine.py").write_text(FIRST)
+    result = CliRunner().invoke(app, ["benchmark", "--planner", f"mine={what}", "--runs", "1", "--workers", "1"])
+    assert result.exit_code != 0
+    assert words in " ".join(result.output.split())
+    assert not (tmp_path / "benchmark" / "paper-a").exists()
+
+
+def test_of_few_runs_no_interval_is_shown() -> None:
+    numbers = (np.array(3.0), np.array(1.0), np.array(2.0), np.array(4.0))
+    assert standings._interval(Summary(*numbers, 2), "+.2f") == ""
+    assert standings._interval(Summary(*numbers, 5), "+.2f") == "+2.00 to +4.00"
 
 
 def test_a_scene_that_is_none_is_named() -> None:

@@ -38,6 +38,39 @@ def test_scans_become_tracks_results_and_a_picture(place: Path) -> None:
     assert (told.exit_code, "mean OSPA" in told.stdout) == (0, True)
 
 
+def test_a_mistyped_file_is_named_itself(place: Path) -> None:
+    assert call("scnas.csv", "--sensors", "radars.yaml").stderr == (
+        "scnas.csv: no such file; expected a file of scans\n"
+    )
+    told = call("scans.csv", "--sensors", "radars.yaml", "--truth", "turth.csv").stderr
+    assert told == "turth.csv: no such file; expected a file of the targets' reports\n"
+    (place / "bad.csv").write_text("time,sensor,bearing\n0,a,0.5\n")
+    told = call("bad.csv", "--sensors", "radars.yaml").stderr
+    assert "radars.yaml" not in told
+    assert "bad.csv" in told
+
+
+def test_sensors_of_bearings_alone_are_told_what_to_write(place: Path) -> None:
+    sensor = "measurement: {kind: bearing_only}, noise: {kind: constant, std: [0.02]}, clutter: {kind: region, rate: 1}"
+    head = "region: {x_min: -5000, x_max: 5000, y_min: -5000, y_max: 5000}\nsensors:\n"
+    (place / "ears.yaml").write_text(f"{head}  - {{name: a, position: [0, 0], {sensor}, {SEES}}}\n")
+    (place / "ears.csv").write_text("time,sensor,bearing_rad\n0,a,0.5\n10,a,0.51\n")
+    told = call("ears.csv", "--sensors", "ears.yaml").output
+    assert "births at sites: give one wide site in birth.sites" in told
+    assert "from_measurements" not in told
+
+
+SEES = "detection: {kind: constant, probability: 0.9}"
+
+
+def test_the_folder_is_looked_at_before_the_run(place: Path) -> None:
+    (place / "file").write_text("")
+    result = call("scans.csv", "--sensors", "radars.yaml", "--out", "file/out")
+    assert result.exit_code != 0
+    assert "expected a folder that may be written to; got file/out" in result.stderr
+    assert "mean" not in result.stdout
+
+
 @pytest.mark.parametrize(
     "words",
     ["results run", "report run", "video run --out a.gif", "check run/scenario.yaml", "show run/scenario.yaml",

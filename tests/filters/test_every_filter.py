@@ -466,6 +466,14 @@ def test_more_targets_than_caps(kind: Any) -> None:
         assert existences(belief).sum() > 7.0
 
 
+@every_kind
+def test_a_filter_prints_in_a_line(kind: Any) -> None:
+    printed = repr(make(kind))
+    assert printed.startswith(type(make(kind)).__name__)
+    assert len(printed) <= 160
+    assert "0x" not in printed
+
+
 # What changes nothing.
 
 

@@ -54,10 +54,9 @@ def test_nothing_is_stated_as_cut_off_where_nothing_was(kind, num):
     scene = linear_scene()
     covs = np.broadcast_to(np.diag([20.0, 20.0, 5.0, 5.0]) ** 2, (num, 4, 4))
     tracks = TrackTable.from_gaussians([[-1, i] for i in range(num)], np.zeros((num, 4)), covs)
-    belief, scan = GLMB.from_hypotheses(tracks, [list(range(num))], [1.0]), 3.0 * np.arange(2.0 * num).reshape(num, 2)
+    whole, scan = GLMB.from_hypotheses(tracks, [list(range(num))], [1.0]), 3.0 * np.arange(2.0 * num).reshape(num, 2)
     known = scene.glmb_filter()
-    if kind is FactoredGlmbFilter:
-        belief = FactoredGLMB.from_glmb(belief)
+    belief: Any = FactoredGLMB.from_glmb(whole) if kind is FactoredGlmbFilter else whole
     tracker = kind(known.targets, known.sensor, Limits.none())
     _, info = tracker.step(belief, scan, scene.pose, DT, 9, rng=np.random.default_rng(0))
     assert info.discarded_weight_bound == 0.0

@@ -24,6 +24,7 @@ from vedette.scenarios.sections.sensors import Sensor
 
 SOFT: dict[str, object] = {"kind": "soft_sector", "probability": 0.9, "max_range": 150.0, "range_slope": 0.05}
 
+COURSES = "{kind: courses, speed: 5.0, headings_deg: [0.0, 90.0]}"
 STEPS = ("steps: [1, 5]", "steps: [1]")
 SECTOR = "detection: {kind: limited_sector, probability: 0.9, max_range: 60.0, half_width_deg: 40.0}"
 
@@ -32,6 +33,29 @@ def of(folder: Path, *changes: tuple[str, str]) -> tuple[str, ...]:
     file = folder / "scene.yaml"
     file.write_text(changed(*changes))
     return cautions(load_scenario(file))
+
+
+@pytest.mark.parametrize(
+    ("platform", "constraint", "told"),
+    [
+        (COURSES, "{kind: keep_out, polygon: [[-9, 30], [9, 30], [9, 50], [-9, 50]]}", "keep it out of"),
+        (COURSES, "{kind: stay_inside, region: {x_min: 5, x_max: 9, y_min: 0, y_max: 50}}", "keep it inside"),
+        (COURSES, "{kind: keep_out, polygon: [[9, 30], [19, 30], [19, 50], [9, 50]]}", ""),
+        ("{kind: still}", "{kind: keep_out, polygon: [[-9, 30], [9, 30], [9, 50], [-9, 50]]}", ""),
+    ],
+)
+def test_a_boat_that_starts_on_land(platform: str, constraint: str, told: str, tmp_path: Path) -> None:
+    place = "position: [0.0, 40.0]"
+    change = (place, f"{place}, platform: {platform}")
+    found = [
+        line
+        for line in of(tmp_path, change, ("control: {", f"control: {{constraints: [{constraint}], "))
+        if "position:" in line
+    ]
+    assert len(found) == (told != "")
+    assert all(
+        told in line and "sensors[0].position: expected a place where the sensor may be" in line for line in found
+    )
 
 
 @pytest.mark.parametrize("name", list_builtin())

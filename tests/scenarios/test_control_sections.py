@@ -125,3 +125,10 @@ def test_who_names_no_horizon_looks_to_the_next_decision_scan_by_scan(
     assert scenario.model.horizon == horizon
     planner: Any = build_planner(scenario, "jdm")
     assert (planner.settings.horizon_steps, planner.settings.horizon_period) == horizon
+
+
+@pytest.mark.parametrize(("every", "steps"), [(1, tuple(range(1, 20))), (6, (6, 12, 18)), (10, (10,)), (20, ())])
+def test_decisions_every_so_many_scans(every: int, steps: tuple[int, ...]) -> None:
+    model = parse_scenario(changed(("decision_steps: [4, 8]", f"decision_every: {every}")))
+    assert model.decision_steps == steps
+    assert model.horizon[0] == (every if steps else 1)

@@ -300,9 +300,9 @@ def test_courses_need_a_north() -> None:
 
 def test_a_program_gets_the_scene_by_compass(tmp_path: Path) -> None:
     known = boats(tmp_path).scenario
-    from vedette.scenarios.build import _told
+    from vedette.scenarios.build import told_of
 
-    told = _told(known)["sensors"]
+    told = told_of(known)["sensors"]
     assert [sensor["course_deg"] for sensor in told] == [60.0, 0.0]
     assert told[0]["platform"]["courses_deg"] == (0.0, 60.0, 135.0, 270.0)
     assert "heading" not in json.dumps(told)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import shutil
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from vedette.cli import app
 from vedette.errors import InputError
 from vedette.evaluation import run_scenario
 from vedette.scenarios import Scenario, load_scenario, with_fields
+from vedette.scenarios.sections.custom import Custom
 from vedette.simulation.loop import RunStopped
 
 OWN = Path(__file__).with_name("own_parts.py")
@@ -170,3 +172,16 @@ def test_a_measure_that_is_no_number_a_scan(folder: Path) -> None:
     record = run_scenario(loaded, "still", seed=1)
     with pytest.raises(InputError, match="metric found: expected"):
         measure_run(record, loaded, own_metrics(loaded))
+
+
+def test_files_import_those_beside_them_each_its_own(tmp_path: Path) -> None:
+    made = []
+    for number in (1, 2):
+        place = tmp_path / str(number)
+        place.mkdir()
+        (place / "helper_beside.py").write_text(f"NUMBER = {number}\n")
+        (place / "models.py").write_text("from helper_beside import NUMBER\n\n\nclass Last:\n    number = NUMBER\n")
+        made.append(Custom.model_construct(kind="custom", function="models.py:Last", arguments={}).named(place))
+    assert [found.number for found in made] == [1, 2]
+    assert "helper_beside" not in sys.modules
+    assert not {str(tmp_path / "1"), str(tmp_path / "2")} & set(sys.path)

@@ -243,12 +243,12 @@ decision_steps: [4, 8] -> decision_times: [3.0, 3.2, 100]
     22:33: control.decision_times[1]: expected the time of a scan: 2 s and every 0.5 s after it, got 3.2
     22:38: control.decision_times[2]: expected a time from 2 to 11.5 s, got 100.0
 decision_steps: [4, 8] -> decision_steps: [4], decision_times: [3.0]
-    22:10: control: expected either decision_steps or decision_times, got both
+    22:10: control: expected one of decision_steps, decision_times, decision_every, got decision_steps and decision_times
 decision_steps: [4, 8] -> horizon_steps: 0, horizon_period: 0.0
     22:26: control.horizon_steps: expected a number of at least 1, got 0
     22:45: control.horizon_period: expected a number above 0, got 0.0
 decision_steps: [4, 8] -> actions_deg: [0, 90]
-    22:11: control.actions_deg: expected one of association, confidence, constraints, decision_steps, decision_times, detection_threshold, explain, horizon_period, horizon_steps, ideal_measurements, indifference, limits, lookahead, max_samples, max_seconds, num_samples, reward, search, undetected_worth, got an unknown key (the platform of a sensor has it: `platform: {kind: courses, speed: 50.0, headings_deg: [0, 90]}`)
+    22:11: control.actions_deg: expected one of association, confidence, constraints, decision_every, decision_steps, decision_times, detection_threshold, explain, horizon_period, horizon_steps, ideal_measurements, indifference, limits, lookahead, max_samples, max_seconds, num_samples, reward, search, undetected_worth, got an unknown key (the platform of a sensor has it: `platform: {kind: courses, speed: 50.0, headings_deg: [0, 90]}`)
 decision_steps: [4, 8] -> reward: {kind: cauchy_schwarz, unit_volume: 0}
     22:55: control.reward.unit_volume: expected reference or a number above 0, got 0
 decision_steps: [4, 8] -> reward: {kind: renyi, order: 1}

@@ -39,6 +39,13 @@ def test_a_whole_section(paper: Scenario) -> None:
     assert changed.model.estimator.model_dump() == {"kind": "marginal", "threshold": 0.4}
 
 
+def test_a_section_may_leave_out_what_is_at_its_default(paper: Scenario) -> None:
+    changed = with_fields(paper, {"time": {"num_steps": 40, "step_period": 2.0}, "control.decision_times": None})
+    assert (changed.model.time.num_steps, changed.model.time.start) == (40, paper.model.time.start)
+    with pytest.raises(ScenarioError, match="expected the whole section, with step_period too"):
+        with_fields(with_fields(paper, {"time.step_period": 2.0}), {"time": {"num_steps": 30}})
+
+
 def test_a_field_set_to_what_it_is_changes_nothing(paper: Scenario) -> None:
     same = with_fields(paper, {"control.num_samples": paper.model.control.num_samples})
     assert same.model == paper.model

@@ -15,14 +15,20 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
+import numpy as np
+
 from vedette.campaigns.cells import Campaign, resolve, safe_name
 from vedette.campaigns.manifest import MANIFEST, read_manifest
 from vedette.campaigns.results import open_results
 from vedette.campaigns.spec import CampaignSpec
-from vedette.errors import InputError
+from vedette.errors import InputError, VedetteError
+from vedette.programs import greeted
 from vedette.scenarios import GeneratedCrowd
+from vedette.scenarios.build import build_experiment, build_planner, told_of
 from vedette.scenarios.generated import GeneratedScene, scene_text
 from vedette.scenarios.generated_crowd import crowd_text
+from vedette.scenarios.sections.base import sections_in
+from vedette.scenarios.sections.program import ProgramSection
 
 Role: TypeAlias = Literal["planner", "tracker"]
 
@@ -142,6 +148,25 @@ def campaign_of(scene: Scene, entrant: Entrant | None, runs: int, seed: int, fol
         ]
         spec = CampaignSpec(**given, planners=("still",), variants=variants, compare="variant")  # type: ignore[arg-type]
     return resolve(spec, **how)
+
+
+def try_entrant(own: Entrant, campaign: Campaign) -> None:
+    """Make an entrant on the scene of a campaign, and greet it where it is a program.
+
+    Raises `InputError` where it cannot be had: what a typo in a command does, and not a run that was lost.
+    """
+    scenario, planner = campaign.cells[0].scenario, campaign.cells[0].planner
+    rng = np.random.default_rng(campaign.seed)
+    try:
+        build_planner(scenario, planner)
+        build_experiment(scenario)
+        for _, section in sections_in(scenario.model):
+            if isinstance(section, ProgramSection):
+                asked = section.asked(scenario.folder)
+                scene, seconds = told_of(scenario), asked["start_seconds"]
+                greeted(asked["command"], asked["folder"], own.role, scene, rng, seconds)
+    except VedetteError as error:
+        raise InputError(f"{own.role} {own.name}: expected one that can be started; {error}") from None
 
 
 def make_way(campaign: Campaign, folder: Path) -> None:

@@ -22,6 +22,8 @@ from vedette.simulation.storage import versions
 from vedette.text import markdown_table, named_in, with_minus
 
 COUNTED = ("filter_steps", "fusions", "rewards")
+# Of fewer runs an interval says nothing.
+_LEAST_RUNS = 5
 # Below this mean NEES, estimates said nothing of their certainty: see `vedette.tracking.ProgramFilter`.
 _SAYS_NOTHING = 1e-6
 
@@ -178,7 +180,12 @@ def _known(value: float, form: str) -> str:
 
 
 def _interval(summary: Summary, form: str) -> str:
-    return "" if np.isnan(summary.low) else f"{_known(float(summary.low), form)} to {_known(float(summary.high), form)}"
+    """Empty of fewer than `_LEAST_RUNS` runs."""
+    return (
+        ""
+        if np.isnan(summary.low) or summary.num_runs < _LEAST_RUNS
+        else f"{_known(float(summary.low), form)} to {_known(float(summary.high), form)}"
+    )
 
 
 def origin(tables: Sequence[SceneTable], seed: int) -> dict[str, str]:

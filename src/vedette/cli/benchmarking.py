@@ -55,7 +55,7 @@ def benchmark(
     need("vedette benchmark", "jinja2", "matplotlib", "pyarrow")
     if not list_:
         load_workers(workers)
-    from vedette.campaigns.benchmark import OWN, campaign_of, entrant, make_way, scenes
+    from vedette.campaigns.benchmark import OWN, campaign_of, entrant, make_way, scenes, try_entrant
     from vedette.campaigns.standings import scene_table
 
     if list_:
@@ -67,6 +67,9 @@ def benchmark(
         entered += [entrant("tracker", each, seconds=seconds, folder=Path()) for each in trackers or ()]
     approve, num_runs = Approval(trust), runs or (_QUICK_RUNS if quick else _RUNS)
     chosen = _chosen(names, quick, entered)
+    for each in entered:  # before anything is kept
+        if first := next((scene for scene in chosen if scene.role == each.role), None):
+            try_entrant(each, campaign_of(first, each, num_runs, seed, out, approve=approve))
     for scene in chosen:
         for own in (*(each for each in entered if each.role == scene.role), None):  # who may fail comes first
             folder = out / scene.name / (OWN if own is None else own.name)

@@ -23,7 +23,7 @@ from vedette.cli.running import (
     warn_of_recording,
 )
 from vedette.cli.scenario_files import warn
-from vedette.extras import need
+from vedette.extras import without
 from vedette.text import counted
 
 if TYPE_CHECKING:
@@ -74,7 +74,6 @@ def track(
     if formats and out is None:
         raise usage_error("expected with --out, which names the folder", "--format")
     if out is not None:
-        need("vedette track --out", "matplotlib", "pyarrow")
         with named_options({"directory": "--out"}):
             check_free(out, overwrite)
     found, cautions = read_recording(sensors, scans, truth, speed=speed, bad_rows=bad_rows, trust=trust)
@@ -96,14 +95,20 @@ def track(
         table = table_of_run(record, scenario)
         written: list[Path] = []
         if out is not None:
-            save_run(record, out, scenario_text=dump_kept(scenario), overwrite=overwrite)
+            if lacking := without("vedette track --out: a folder of results", "pyarrow"):
+                note(f"{lacking}; the tracks are written without it")
+            else:
+                save_run(record, out, scenario_text=dump_kept(scenario), overwrite=overwrite)
             usual = ("csv", "geojson") if scenario.model.origin is not None else ("csv",)
             for name in dict.fromkeys(formats or usual):
                 write_tracks(out / "tracks" / f"tracks.{name}", table)
                 written.append(out / "tracks" / f"tracks.{name}")
     if out is not None:
-        with interruptible(f"wrote {out}, but not all of its figures"):
-            _draw(record, scenario, out)
+        if lacking := without("vedette track --out: figures", "matplotlib"):
+            note(lacking)
+        else:
+            with interruptible(f"wrote {out}, but not all of its figures"):
+                _draw(record, scenario, out)
         say(f"wrote {out}")
     document = run_document(record, scenario.model.ospa.unit)
     publish(

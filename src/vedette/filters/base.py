@@ -27,6 +27,7 @@ from vedette.models import (
     position,
 )
 from vedette.models.arguments import generator, pose_vector, positive
+from vedette.speaking import Speaking
 
 BeliefT = TypeVar("BeliefT", bound=Labelled)
 
@@ -64,7 +65,7 @@ NO_SCAN = np.empty((0, 2))
 NO_POSE = np.zeros(3)
 
 
-class WithBirths:
+class WithBirths(Speaking):
     """A filter whose labels may begin at birth sites."""
 
     __slots__ = ()
@@ -75,7 +76,7 @@ class WithBirths:
         return births_for(self.targets.birth, dt, step, prior, births)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class SingleSensorFilter(WithBirths):
     """The parts of a filter of one sensor.
 
@@ -151,7 +152,7 @@ class OfKind(WithBirths, ABC, Generic[BeliefT]):
         """As they are given back, after updates with one report each. repeats: of each scan, the rows left out."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class LabelledFilter(SingleSensorFilter, OfKind[BeliefT]):
     """A filter of one sensor that labels its targets: what its step, its prediction and its update have in common.
 

@@ -139,7 +139,7 @@ class _OfFactors(OfKind[FactoredGLMB]):
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class FactoredGlmbFilter(_OfFactors, LabelledFilter[FactoredGLMB]):
     """delta-GLMB filter of one sensor whose density is a product of independent factors.
 
@@ -192,7 +192,7 @@ class FactoredGlmbFilter(_OfFactors, LabelledFilter[FactoredGLMB]):
         return _OfFactors._stepped(self, prior, step._replace(num_scans=self.scans_together))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class SequentialFactoredFilter(_OfFactors, InTurn[FactoredGLMB]):
     """Factored GLMB filter of several sensors that takes their scans in turn.
 

@@ -75,7 +75,7 @@ def _sources(reports: Sequence[StepReport], repeats: Sequence[Ints]) -> Ints | N
     return sources
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class DeltaGlmbFilter(_OfGlmb, LabelledFilter[GLMB]):
     """delta-GLMB filter of one sensor (Vo, Vo, Hoang 2017; paper, Algorithm 1, local prediction and update).
 
@@ -112,7 +112,7 @@ class DeltaGlmbFilter(_OfGlmb, LabelledFilter[GLMB]):
         return step_ranked(prior, *step.inputs)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class MultiSensorGlmbFilter(_OfGlmb, InTurn[GLMB]):
     """delta-GLMB filter of several sensors: one prediction, then an update by each sensor's scan in turn.
 

@@ -56,7 +56,7 @@ class OfLmb(OfKind[LMB]):
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class LmbFilter(OfLmb, LabelledFilter[LMB]):
     """LMB filter of one sensor (Reuter, Vo, Vo, Dietmayer 2014), cheaper than the delta-GLMB filter.
 
@@ -88,7 +88,7 @@ class LmbFilter(OfLmb, LabelledFilter[LMB]):
         return step_lmb(prior, *step.inputs, step.limits.reduction(), association)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class SequentialLmbFilter(OfLmb, InTurn[LMB]):
     """LMB filter of several sensors that takes their scans in turn ("iterated corrector").
 

@@ -46,7 +46,7 @@ class SensorScans(NamedTuple):
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class MultiSensorFilter(OfKind[BeliefT]):
     """The parts of a filter of several sensors.
 
@@ -147,7 +147,7 @@ class MultiSensorFilter(OfKind[BeliefT]):
         return taken if taken.names else SensorScans(["no sensor"], [blind_sensor()], [NO_SCAN], [NO_POSE], [])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class InTurn(MultiSensorFilter[BeliefT]):
     """One prediction, then an update by each sensor's scan in turn.
 

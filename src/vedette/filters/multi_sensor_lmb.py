@@ -18,7 +18,7 @@ from vedette.kernels.steps.multi_sensor_combinations import (
 from vedette.kernels.steps.multi_sensor_lmb import lmb_of_combinations
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class MultiSensorLmbFilter(OfLmb, MultiSensorFilter[LMB]):
     """LMB filter of several sensors: the existences and densities of the exact posterior given all scans of a time.
 

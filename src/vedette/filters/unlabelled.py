@@ -22,7 +22,7 @@ from vedette.models.arguments import generator
 _Density = TypeVar("_Density", Poisson, IidCluster, MultiBernoulli)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class UnlabelledFilter(SingleSensorFilter, ABC, Generic[_Density]):
     """A filter of one sensor without labels: what they have in common.
 
@@ -71,7 +71,7 @@ class UnlabelledFilter(SingleSensorFilter, ABC, Generic[_Density]):
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class PhdFilter(UnlabelledFilter[Poisson]):
     """Gaussian-mixture PHD filter of one sensor (Vo and Ma 2006).
 
@@ -90,7 +90,7 @@ class PhdFilter(UnlabelledFilter[Poisson]):
         return Poisson.from_kernel(posterior), self._info(report, num, most, log_likelihood, 0.0)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class CphdFilter(UnlabelledFilter[IidCluster]):
     """Gaussian-mixture CPHD filter of one sensor (Vo, Vo and Cantoni 2007).
 
@@ -114,7 +114,7 @@ class CphdFilter(UnlabelledFilter[IidCluster]):
         return IidCluster.from_kernel(cardinality, posterior), info
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class CbMemberFilter(UnlabelledFilter[MultiBernoulli]):
     """Gaussian-mixture cardinality-balanced multi-target multi-Bernoulli filter (Vo, Vo and Cantoni 2009).
 

@@ -207,7 +207,7 @@ def _central_filter(scenario: Scenario, filters: tuple[Filter, ...]) -> CentralF
     targets, sensors, own = shared_targets(filters), tuple(local.sensor for local in filters), model.fusion.filter
     if own is not None:
         made: CentralFilter = own.made(
-            scenario.folder, targets=targets, sensors=sensors, scene=partial(_told, scenario)
+            scenario.folder, targets=targets, sensors=sensors, scene=partial(told_of, scenario)
         )
         return made
     in_turn = model.fusion.kind == "sequential"
@@ -294,7 +294,7 @@ def build_parts(
         (control.lookahead or Lookahead()).build(),
         model.estimator.build(folder),
         {"timetable": _timetable(scenario), "cutoff": model.ospa.cutoff},
-        partial(_told, scenario),
+        partial(told_of, scenario),
     )
 
 
@@ -302,7 +302,7 @@ def build_parts(
 _TOLD = {"name", "time", "region", "motion", "survival", "birth", "control", "ospa"}
 
 
-def _told(scenario: Scenario) -> dict[str, Any]:
+def told_of(scenario: Scenario) -> dict[str, Any]:
     """What a program is told of a scenario: its sections as plain data, and the horizon."""
     model, (horizon_steps, horizon_period) = scenario.model, scenario.model.horizon
     told = model.model_dump(mode="json", include=_TOLD)

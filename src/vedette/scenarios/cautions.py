@@ -31,6 +31,7 @@ from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.targets import RecordedTargets
 from vedette.scenarios.sections.tracking import LABELS_CAPPED, Filter
 from vedette.scenarios.sections.world import grouped_order
+from vedette.scenarios.start_cautions import start_cautions
 
 # Sensors whose probabilities of detection of one place differ by more than this do not see the same.
 MAX_DIFFERENCE = 0.5
@@ -47,7 +48,7 @@ def cautions(scenario: Scenario) -> tuple[str, ...]:
     found = [*_records(scenario), *_views(scenario), *_births(scenario), *_late_beliefs(scenario)]
     found += [*_many_sensors(scenario), *_cells(scenario.model), *_labels(scenario.model)]
     found += coverage_cautions(scenario.model)
-    found += _undetected_births(scenario.model)
+    found += [*_undetected_births(scenario.model), *start_cautions(scenario)]
     found += [*implausible(scenario.model), *coastline_cautions(scenario.model, scenario.folder)]
     if not found:
         return ()

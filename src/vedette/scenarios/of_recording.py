@@ -14,6 +14,7 @@ from vedette.kernels.base.types import Floats
 from vedette.reading import read_text
 from vedette.recorded import Conventions, RecordedScans
 from vedette.scenarios.extents import measured_region, reached_region, region_in_words
+from vedette.scenarios.faults import Fault
 from vedette.scenarios.loading import Scenario, diagnose
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.yaml_reader import MOST_BYTES, Document, read_yaml
@@ -59,6 +60,9 @@ def scenario_of_recording(
         InputError: a file that is not there, or rows that cannot be read.
         ScenarioError: with every fault of the file about sensors.
     """
+    for file, what in ((scans, "scans"), (truth, "the targets' reports")):
+        if file is not None and not file.is_file():
+            raise InputError(f"{file}: no such file; expected a file of {what}")
     document = _document(sensors)
     said = {key: value for key, value in document.data.items() if key not in ("control", "planners", "time")}
     control, own = document.data.get("control"), said.get("recording")
@@ -178,8 +182,19 @@ def _model(document: Document, data: Mapping[str, Any], sensors: FilePath) -> Sc
     """The scenario of a document with other data; raises for its faults."""
     model, faults = diagnose(replace(document, data=data), sensors.parent)
     if model is None:
-        raise ScenarioError([fault.message(str(sensors)) for fault in faults])
+        raise ScenarioError([_in_words_of_user(fault, document, sensors) for fault in faults])
     return model
+
+
+def _in_words_of_user(fault: Fault, document: Document, sensors: FilePath) -> str:
+    """The message of a fault, without fields and places that the file about sensors does not have."""
+    path = fault.told.path
+    if path == ("recording",):
+        return fault.told.got  # names the file of scans
+    if path[:1] == ("sensors",) and path[-2:] == ("measurement", "kind") and "birth" not in document.data:
+        wanted = "a measurement that says where a target is, or births at sites: give one wide site in birth.sites"
+        fault = Fault(fault.place, fault.told._replace(expected=wanted))
+    return fault.message(str(sensors))
 
 
 def _are_recorded(targets: Any) -> bool:

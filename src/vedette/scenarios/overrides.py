@@ -31,7 +31,8 @@ def with_fields(scenario: Scenario, fields: Mapping[str, Any]) -> Scenario:
     if not fields:
         return scenario
     data = scenario.model.model_dump(mode="json")
-    faults = [fault for path, value in fields.items() for fault in _set(data, path, value)]
+    said = scenario.model.model_dump(mode="json", exclude_defaults=True)
+    faults = [fault for path, value in fields.items() for fault in _set(data, said, path, value)]
     if faults:
         raise ScenarioError(faults)
     model, found = diagnose(Document(scenario.name, data, {}, {}, []), scenario.folder)
@@ -40,8 +41,8 @@ def with_fields(scenario: Scenario, fields: Mapping[str, Any]) -> Scenario:
     return Scenario(model, scenario.path)
 
 
-def _set(data: Any, path: str, value: Any) -> Iterator[str]:
-    """Set the value everywhere the path leads, in place; what is wrong with the path."""
+def _set(data: Any, said: Any, path: str, value: Any) -> Iterator[str]:
+    """Set the value everywhere the path leads, in place; what is wrong with the path. said: what is no default."""
     *parents, last = path.split(".")
     places: list[tuple[Path, Any]] = [((), data)]
     for part in parents:
@@ -59,7 +60,7 @@ def _set(data: Any, path: str, value: Any) -> Iterator[str]:
             yield fault
             return
         for key in keys:
-            missing = _left_out(holder[key], value)
+            missing = _left_out(_at((*place, key), said), value)
             if missing:
                 one = f"{named(path)}.{named(str(next(iter(value), missing[0])))}"
                 yield (
@@ -70,10 +71,20 @@ def _set(data: Any, path: str, value: Any) -> Iterator[str]:
             holder[key] = value
 
 
+def _at(path: Path, said: Any) -> Any:
+    """What stands at a path; None where it is left at its default."""
+    for part in path:
+        if isinstance(said, dict):
+            said = said.get(part)
+        else:
+            said = said[part] if isinstance(said, list) and isinstance(part, int) and part < len(said) else None
+    return said
+
+
 def _left_out(present: Any, value: Any) -> list[str]:
     """Keys of a section without which a new one would fall back on defaults unseen; one of another kind may.
 
-    What is null falls back on nothing.
+    present: the section, of what is no default. What is null falls back on nothing.
     """
     if not isinstance(present, dict) or not isinstance(value, dict) or "kind" in value:
         return []

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import platform
 import shlex
 import shutil
@@ -196,7 +197,12 @@ def _read(path: Path) -> bytes:
 
 
 def check_free(target: Path, overwrite: bool) -> None:
-    """`InputError` unless a run may be saved there: nothing is there, or a run that may be overwritten."""
+    """`InputError` unless a run may be saved there: nothing is there, or a run that may be overwritten; and the folder
+    around it may be written to.
+    """
+    around = next(folder for folder in (target, *target.absolute().parents) if folder.exists())
+    if not around.is_dir() or not os.access(around, os.W_OK):
+        raise InputError(f"directory: expected a folder that may be written to; got {target}, as {around} is none")
     if not target.exists() or (target.is_dir() and not any(target.iterdir())):
         return
     if not overwrite:

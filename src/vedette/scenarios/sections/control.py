@@ -16,6 +16,7 @@ from vedette.scenarios.sections.base import (
     Numbers,
     Positive,
     Share,
+    Step,
     Steps,
     check,
 )
@@ -39,8 +40,10 @@ _LIMITS = (
 )
 # Of the settings, those that no file gives or gives otherwise.
 _ELSEWHERE = (*_LIMITS, "horizon_steps", "horizon_period", "end", "limits", "num_threads")
+# Of which at most one says when the sensors decide.
+_SCHEDULES = ("decision_steps", "decision_times", "decision_every")
 _FIRST = (
-    *("decision_steps", "decision_times", "horizon_steps", "horizon_period"),
+    *("decision_steps", "decision_times", "decision_every", "horizon_steps", "horizon_period"),
     *("num_samples", "confidence", "indifference", "max_samples", "max_seconds"),
     *("ideal_measurements", "detection_threshold", "association", "reward"),
 )
@@ -73,6 +76,11 @@ class Control(Derived):
     decision_times: Numbers | None = Field(
         default=None, description="The same as times, instead of decision_steps; each the time of a scan [s]."
     )
+    decision_every: Step | None = Field(
+        default=None,
+        description="Scans from one decision to the next, the first after as many and none after the last scan; "
+        "instead of decision_steps [-].",
+    )
     horizon_steps: Count | None = Field(
         default=None, description="Pseudo-updates over the horizon, H; none: up to the next decision, at most 100 [-]."
     )
@@ -103,8 +111,9 @@ class Control(Derived):
 
     @check
     def _one_schedule(self) -> Iterator[Finding]:
-        if self.decision_steps is not None and self.decision_times is not None:
-            yield (), "either decision_steps or decision_times", "both"
+        given = [name for name in _SCHEDULES if getattr(self, name) is not None]
+        if len(given) > 1:
+            yield (), f"one of {', '.join(_SCHEDULES)}", " and ".join(given)
 
     @check
     def _steps_in_order(self) -> Iterator[Finding]:

@@ -167,6 +167,9 @@ class ScenarioModel(Section):
     @property
     def decision_steps(self) -> tuple[int, ...]:
         """The scans after which the sensors decide, however the scenario says it."""
+        every = self.control.decision_every
+        if every is not None:
+            return tuple(range(every, self.time.num_steps, every))
         if self.control.decision_times is None:
             return self.control.decision_steps or ()
         time = self.time
