@@ -17,13 +17,14 @@ from vedette.cli.running import Approval
 from vedette.errors import InputError
 from vedette.evaluation.runs import run_scenario
 from vedette.evaluation.scans import scans_of_record
-from vedette.programs import MOST_BYTES
+from vedette.programs import MOST_BYTES, Program
 from vedette.scenarios import Scenario, load_scenario
 from vedette.scenarios.build import build_sensors
 from vedette.scenarios.overrides import with_fields
 from vedette.simulation.loop import RunStopped
 from vedette.simulation.records import RunRecord
 from vedette.tracking.program import UNKNOWN_VARIANCE
+from waiting import PATIENCE
 
 PAGE = (Path(__file__).resolve().parents[1] / "docs/benchmark.md").read_text("utf-8")
 SHOWN = dict(re.findall(r'^```\w+ title="([^"]+)"\n(.*?)^```$', PAGE, re.DOTALL | re.MULTILINE))
@@ -115,6 +116,7 @@ BAD_PLANS = {
     "raise KeyError('lost')": r"got its end, with status 1; it said last: Traceback.*KeyError: 'lost'",
     "print('{', end='', flush=True); sys.exit()": r"expected a line; got { and its end, with status 0",
     "sys.stdout.write('x' * (2**24 + 9)); sys.stdout.flush()": rf"a line of at most {MOST_BYTES} bytes; got a longer",
+    'print(\'{"actions": [0, 0], "actions": [1, 1]}\', flush=True)': r"the key 'actions' stands there twice",
     "print('[' * 100000, flush=True)": r"expected a JSON object; got \[\[\[",
 }
 
@@ -279,3 +281,17 @@ def test_a_program_ends_with_the_process_that_asks_it(tmp_path: Path) -> None:
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     # The pipe of its standard error is held by the program alone: had it not ended, this would wait for ever.
     assert (ended.returncode, ended.stdout.strip().isdigit()) == (1, True)
+
+
+@pytest.mark.skipif(not hasattr(os, "getpgid"), reason="process groups are POSIX's")
+def test_what_a_program_started_ends_with_it_though_it_has_ended(tmp_path: Path) -> None:
+    """The child holds the pipe of standard error: had it not ended, this would wait for ever."""
+    code = (
+        "import subprocess; input(); subprocess.Popen(['sleep', '600'], stdin=-3, stdout=-3); print('{}', flush=True)"
+    )
+    program = Program([sys.executable, "-c", code], tmp_path)
+    program.ask({"role": "planner"}, 20.0)
+    program._child.wait(PATIENCE)
+    program._end()
+    program._listener.join(PATIENCE)
+    assert not program._listener.is_alive()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import sqlite3
 import uuid
 from collections.abc import Callable
 from pathlib import Path
@@ -49,3 +50,21 @@ def sync_folder(folder: Path) -> None:
             os.fsync(handle)
         finally:
             os.close(handle)
+
+
+def lock_beside(path: Path) -> sqlite3.Connection:
+    """A lock of a file that one process may write, as an open transaction on `PATH.lock`: it ends with the process.
+
+    Raises `InputError` where another process has it, or the folder cannot be written.
+    """
+    lock = None
+    try:
+        lock = sqlite3.connect(path.with_name(f"{path.name}.lock"), timeout=0.0, isolation_level=None)
+        lock.execute("BEGIN EXCLUSIVE")
+    except sqlite3.Error as error:
+        if lock is not None:
+            lock.close()
+        if getattr(error, "sqlite_errorcode", 0) & 0xFF == sqlite3.SQLITE_BUSY:
+            raise InputError(f"{path}: expected to write alone; another process is writing it") from None
+        raise InputError(f"{path}: expected a file in a folder that can be written; {error}") from error
+    return lock

@@ -18,6 +18,7 @@ from typing import IO, Any, NoReturn, TypeAlias
 import numpy as np
 
 from vedette.errors import InputError, VedetteError
+from vedette.reading import parse_json
 from vedette.text import elided, printable
 
 PROTOCOL = "vedette 1"
@@ -78,9 +79,9 @@ class Program:
         if not line.endswith(b"\n"):
             self.refuse("a line", f"{_shown(line)} and {self._ended()}" if line else self._ended())
         try:
-            answer = json.loads(line, parse_constant=_no_number)
-        except (ValueError, RecursionError):
-            self.refuse("a JSON object", _shown(line))
+            answer = parse_json(line)
+        except ValueError as error:
+            self.refuse("a JSON object", f"{_shown(line)} ({error})")
         if not isinstance(answer, dict):
             self.refuse("a JSON object", _shown(line))
         return answer
@@ -115,10 +116,6 @@ def greeted(
     if program.ask(told, seconds).get("ready") is not True:
         program.refuse('"ready": true, in answer to its first line', "another answer")
     return program
-
-
-def _no_number(text: str) -> NoReturn:
-    raise ValueError(text)
 
 
 def _shown(line: bytes) -> str:
@@ -156,10 +153,10 @@ def _end(child: subprocess.Popen[bytes], questions: _Questions) -> None:
 
 
 def _kill(child: subprocess.Popen[bytes]) -> None:
-    """End it, where it has not ended, with what it has started."""
+    """End it, where it has not ended, and what it has started, in any case."""
+    if hasattr(os, "killpg"):
+        with suppress(ProcessLookupError, PermissionError):
+            os.killpg(child.pid, signal.SIGKILL)
     if child.poll() is None:
-        if hasattr(os, "killpg"):
-            with suppress(ProcessLookupError, PermissionError):
-                os.killpg(child.pid, signal.SIGKILL)
         child.kill()
         child.wait()

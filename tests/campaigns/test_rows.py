@@ -45,6 +45,13 @@ def test_other_bytes_are_no_run(spoil) -> None:
     assert verified(tuple(row)) is None
 
 
+def test_a_small_row_does_not_unpack_to_a_large_one() -> None:
+    packed = pack("cell", 0, bytes(2**27)).content
+    assert len(packed) < 2**14
+    with pytest.raises(ValueError, match="it unpacks to more than"):
+        unpack(packed)
+
+
 def test_what_would_unpack_to_too_much_is_refused_before_it_does() -> None:
     before = pa.total_allocated_bytes()
     for packed in (pack("cell", 1, bytes(3_000_000)).content, zlib.compress(bytes(3_000_000))):

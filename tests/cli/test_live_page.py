@@ -148,10 +148,10 @@ def test_a_page_from_elsewhere_gets_no_socket(browser: Browser, folder: Path) ->
 
 
 def test_the_page_wants_the_token_and_passes_it_on(browser: Browser, folder: Path) -> None:
-    loop = Loop(folder, 0, "--token", "secret")
+    loop = Loop(folder, 0, "--token", "a-secret-of-words")
     try:
         assert browser.open(loop.page).evaluate("document.querySelector('#replay')") is None
-        page = browser.open(loop.page, query="token=secret")
+        page = browser.open(loop.page, query="token=a-secret-of-words")
         told(page, "Connected", "link")
     finally:
         loop.kill()

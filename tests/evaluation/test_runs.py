@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from vedette.errors import InputError
+from vedette.evaluation import track_table
 from vedette.evaluation.comparison import scored, typical_run
 from vedette.evaluation.ensembles import ensemble_of
 from vedette.evaluation.runs import run_scenario
@@ -81,3 +82,9 @@ def test_a_scenario_may_be_named() -> None:
     assert named.ospa.tobytes() == run_scenario(load_scenario("paper-a"), "still", seed=3).ospa.tobytes()
     with pytest.raises(InputError, match="paper-z"):
         run_scenario("paper-z", "still", seed=3)
+
+
+def test_a_text_that_a_spreadsheet_would_take_for_a_formula_is_written_with_an_apostrophe() -> None:
+    cells = ["=1+cmd", "+A1", "-2+3", "@x", "-12.5", "MMSI 1", None, 2.0]
+    written = track_table._csv({"target": cells}).decode().splitlines()[1:]
+    assert written == ["'=1+cmd", "'+A1", "'-2+3", "'@x", "-12.5", "MMSI 1", '""', "2.0"]

@@ -467,6 +467,13 @@ def test_more_targets_than_caps(kind: Any) -> None:
 
 
 @every_kind
+@pytest.mark.parametrize("number", [0, -3, 1.5])
+def test_a_step_of_no_time_has_a_number_too(kind: Any, number: Any) -> None:
+    with pytest.raises(InputError, match="step: expected"):
+        step(make(kind), NEAR, dt=0.0, number=number)
+
+
+@every_kind
 def test_a_filter_prints_in_a_line(kind: Any) -> None:
     printed = repr(make(kind))
     assert printed.startswith(type(make(kind)).__name__)

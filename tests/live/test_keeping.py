@@ -38,7 +38,8 @@ def test_it_goes_on_from_what_it_left(tmp_path: Path, live: Live, end: int, kept
     every = 4.0 if "record" in kept else 0.0
     before = Keeping(live, **files, every=every, clock=lambda: float(next(ticks)))
     first = sent(before, LINES[:end])
-    if "record" in kept:  # the system closes the file of whom it ends
+    before._locks.close()  # the system closes the files of whom it ends
+    if "record" in kept:
         before._record.close()  # type: ignore[union-attr]
         with (tmp_path / "record").open("ab") as file:
             file.write(b'{"sensor": 1, "ti')
@@ -87,3 +88,29 @@ def test_a_snapshot_that_cannot_be_written_is_told_and_ends_nothing(tmp_path: Pa
     assert sent(keeping, LINES[:3]) == answered(live, LINES[:3])
     assert len(told) == 3
     assert "expected a file that can be written" in told[0]
+
+
+@pytest.mark.parametrize("name", ["record", "snapshot"])
+def test_two_loops_do_not_write_one_file(name: str, tmp_path: Path, live: Live) -> None:
+    files: dict[str, Any] = {name: tmp_path / "kept"}
+    first = Keeping(live, **files)
+    with pytest.raises(InputError, match="kept: expected to write alone; another process is writing it"):
+        Keeping(live, **files)
+    first.close()
+    Keeping(live, **files).close()
+
+
+def test_a_full_disk_is_named_and_a_device_is_no_record(tmp_path: Path, live: Live) -> None:
+    if Path("/dev/full").exists():
+        with pytest.raises(InputError, match="/dev/full: expected a file for the record; got something else"):
+            Keeping(live, record=Path("/dev/full"))
+    keeping = Keeping(live, record=tmp_path / "record")
+
+    class Full:
+        def write(self, _: bytes) -> None:
+            raise OSError(28, "No space left on device")
+
+    keeping.close()
+    keeping._record = Full()  # type: ignore[assignment]
+    with pytest.raises(InputError, match="record: expected room for the record; No space left on device"):
+        keeping.take(LINES[0])

@@ -143,9 +143,73 @@ def test_who_does_not_read_is_put_out(monkeypatch: pytest.MonkeyPatch) -> None:
     assert any("does not read its answers, and was put out" in text for text in served(scene))
 
 
-@pytest.mark.parametrize(("host", "token"), [("0.0.0.0", None), ("::", None), ("no.such.host.invalid", "secret")])
+@pytest.mark.parametrize("token", ["", " " * 20, "x" * 15, f" {'x' * 15} "])
+def test_a_token_that_can_be_guessed_is_refused(token: str) -> None:
+    with pytest.raises(InputError, match="--token: expected at least 16 letters; got"):
+        serving.check_address("127.0.0.1", token)
+
+
+def test_silent_clients_that_have_not_entered_have_a_limit_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(serving, "MOST_WAITING", 2)
+
+    async def scene(client: Callable[[], Awaitable[Client]]) -> None:
+        known = await client()
+        await known.send(b'{"token": "secret"}\nword\n')
+        assert await known.answer() == {"line": "word"}
+        for _ in range(2):
+            await client()
+        fault = "expected at most 2 clients that have not entered; got one more"
+        assert await (await client()).answer() == {"error": fault}
+        await known.send(b"again\n")
+        assert await known.answer() == {"line": "again"}
+
+    served(scene, "secret")
+
+
+@pytest.mark.parametrize("limit", ["MOST_CLIENTS", "MOST_OF_ADDRESS"])
+def test_the_client_that_is_silent_for_longest_makes_way(limit: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(serving, limit, 2)
+    monkeypatch.setattr(serving, "IDLE_SECONDS", 0.0)
+
+    async def scene(client: Callable[[], Awaitable[Client]]) -> None:
+        first, second = await client(), await client()
+        for each in (second, first):
+            await each.send(b"word\n")
+            await each.hears({"line": "word"})
+        third = await client()
+        await third.send(b"mine\n")
+        assert await third.answer() == {"line": "mine"}
+        assert first.writer.transport is not None
+
+    assert [text.split(" was ")[1].split(" for ")[0] for text in served(scene)] == ["silent"]
+
+
+def test_who_guesses_waits_and_is_told_of_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    waited = list[float]()
+
+    async def scene(client: Callable[[], Awaitable[Client]]) -> None:
+        monkeypatch.setattr(serving.asyncio, "sleep", slept)
+        for _ in range(3):
+            stranger = await client()
+            await stranger.send(b'{"token": "guess"}\n')
+            assert "token" in (await stranger.answer())["error"]
+        monkeypatch.undo()
+
+    rest = asyncio.sleep
+
+    async def slept(seconds: float) -> None:
+        waited.append(seconds)
+        await rest(0.0)
+
+    assert ["had no token" in text for text in served(scene, "secret")] == [True]
+    assert waited.count(serving.WRONG_SECONDS) == 3
+
+
+@pytest.mark.parametrize(
+    ("host", "token"), [("0.0.0.0", None), ("::", None), ("no.such.host.invalid", "a secret of words")]
+)
 def test_only_a_token_opens_it_to_others(host: str, token: str | None) -> None:
     with pytest.raises(InputError, match="--listen: expected a"):
         serving.check_address(host, token)
     serving.check_address("127.0.0.1", None)
-    serving.check_address("0.0.0.0", "secret")
+    serving.check_address("0.0.0.0", "a secret of words")

@@ -183,7 +183,6 @@ def test_who_does_not_read_is_put_out(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_one_client_too_many_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(web, "MOST_CLIENTS", 1)
     monkeypatch.setattr(serving, "MOST_CLIENTS", 1)
 
     async def scene(address: str, client: Connect) -> None:

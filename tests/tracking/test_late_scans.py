@@ -18,6 +18,7 @@ from vedette.scenarios.build import build_experiment
 from vedette.scenarios.overrides import with_fields
 from vedette.simulation import simulate_scan
 from vedette.tracking import Distributed, LateScans, SensorScan, Timeline, Tracker, load_snapshot, save_snapshot
+from vedette.tracking.late import _check_same
 
 MEASURED = {
     "birth.sites": [],
@@ -167,6 +168,13 @@ def test_a_scan_that_comes_again_is_counted_and_one_that_differs_is_refused() ->
         late.take(timeline, [scan(time=1.0, measurements=[[9.0, 9.0]])])
     with pytest.raises(InputError, match="got a second one that differs"):
         late.take(late.initial(), [scan(), scan(pose=(1.0, 0.0, 0.0))])
+
+
+def test_rows_that_come_again_in_another_order_are_the_same_scan() -> None:
+    there = SensorScan(0, 1.0, np.array([[3.0, 1.0], [1.0, 2.0], [1.0, -2.0]]), np.zeros(3))
+    _check_same(there, replace(there, measurements=there.measurements[[2, 0, 1]]))
+    with pytest.raises(InputError, match="got a second one that differs"):
+        _check_same(there, replace(there, measurements=there.measurements[:, ::-1]))
 
 
 def test_scans_of_one_time_are_one_step_however_they_come() -> None:

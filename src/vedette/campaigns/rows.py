@@ -14,6 +14,8 @@ import pyarrow as pa
 from vedette.reading import MOST_BYTES, inflate, said
 
 _ZSTD = pa.Codec("zstd", compression_level=-1)  # to a third of the size; 4 % less takes a third longer
+# Bytes of a row are packed to a third; those that unpack to more than this are no row.
+_MOST_TIMES, _SMALL = 1000, 2**20
 _MAGIC = b"\x28\xb5\x2f\xfd"  # that its frames begin with
 
 
@@ -34,6 +36,7 @@ def unpack(packed: bytes, most: int = MOST_BYTES) -> bytes:
 
     A frame of zstd says what it unpacks to (RFC 8878, 3.1.1.1); it is that, or refused before it takes the memory.
     """
+    most = min(most, _SMALL + _MOST_TIMES * len(packed))
     if packed[: len(_MAGIC)] != _MAGIC:
         return inflate(packed, most)
     descriptor = int.from_bytes(packed[4:5], "little")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -120,8 +121,14 @@ def _csv(table: Mapping[str, Sequence[Any]]) -> bytes:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(table)
-    writer.writerows(zip(*table.values(), strict=True))
+    writer.writerows(map(_harmless, cells) for cells in zip(*table.values(), strict=True))
     return text.getvalue().encode()
+
+
+def _harmless(cell: Any) -> Any:
+    """The cell with an apostrophe before it, where a spreadsheet would take a text for a formula."""
+    is_formula = isinstance(cell, str) and cell.startswith(("=", "+", "-", "@", "\t", "\r"))
+    return f"'{cell}" if is_formula and not _NUMBER.fullmatch(cell) else cell
 
 
 def _parquet(table: Mapping[str, Sequence[Any]]) -> bytes:
@@ -136,5 +143,6 @@ def _parquet(table: Mapping[str, Sequence[Any]]) -> bytes:
     return content.getvalue()
 
 
+_NUMBER = re.compile(r"[-+]?[0-9.]+(e[-+]?[0-9]+)?", re.IGNORECASE)
 _MAKERS = {".csv": _csv, ".parquet": _parquet, ".geojson": geojson, ".czml": czml, ".mcap": mcap}
 ENDINGS = tuple(_MAKERS)

@@ -26,7 +26,7 @@ from vedette.models import (
     measurement_space_clutter,
     position,
 )
-from vedette.models.arguments import generator, pose_vector, positive
+from vedette.models.arguments import generator, pose_vector, positive, step_number
 from vedette.speaking import Speaking
 
 BeliefT = TypeVar("BeliefT", bound=Labelled)
@@ -117,6 +117,7 @@ class SingleSensorFilter(WithBirths):
     ) -> StepInputs:
         """As `_inputs`; at the prior's own time those of an update."""
         if no_time(dt):
+            step_number(step)
             return self._update_inputs(scan, pose)
         return self._inputs(scan, pose, dt, step, prior, births)
 

@@ -17,7 +17,7 @@ from vedette.filters.limits import Limits
 from vedette.filters.protocols import FilterInfo
 from vedette.kernels.base.types import Bools, Floats, Ints, Lmb, Motion, ScanInput
 from vedette.models import SensorModel, TargetModel, kernel_motion
-from vedette.models.arguments import generator, one_a_sensor, pose_vector, positive, reject
+from vedette.models.arguments import generator, one_a_sensor, pose_vector, positive, reject, step_number
 
 
 class SensorScans(NamedTuple):
@@ -110,6 +110,7 @@ class MultiSensorFilter(OfKind[BeliefT]):
         taken = self._checked_scans(scans, poses, rng)
         prior = check_belief(belief, self.kind, self.targets.state_dim)
         if no_time(dt):
+            step_number(step)
             before = self._before_scan(prior, 0.0, step, births)
             return self._updated(before, nobody(self.targets.state_dim), taken, 0.0, f"step {step}")
         period = positive("dt", dt)

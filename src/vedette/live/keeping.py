@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import time
 from collections.abc import Callable, Iterator
@@ -10,6 +11,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from vedette.errors import InputError
+from vedette.files import lock_beside
 from vedette.live.lines import CHUNK, LineSplitter
 from vedette.live.loop import Answer, Live, LiveState
 from vedette.live.messages import MOST_BYTES
@@ -33,7 +35,7 @@ class Keeping:
         tell: is told of a snapshot that could not be written; the loop goes on.
 
     Raises:
-        InputError: a file that cannot be read or written, or is of another loop.
+        InputError: a file that cannot be read or written, is of another loop, or is written by another process.
     """
 
     def __init__(
@@ -50,10 +52,16 @@ class Keeping:
         self.live, self.state = live, live.initial()
         self._of, self._snapshot, self._every, self._clock, self._tell = of, snapshot, every, clock, tell
         self._saved_at, self._saved_lines = clock(), 0
-        if snapshot is not None and os.path.lexists(snapshot):
-            self.state = _state_of(load_snapshot(snapshot), snapshot, of)
-            self._saved_lines = self.state.num_lines
-        self._path, self._record = record, None if record is None else _opened(record)
+        self._path = record
+        with contextlib.ExitStack() as locks:
+            for file in (snapshot, record):
+                if file is not None and file.parent.is_dir():
+                    locks.callback(lock_beside(file).close)
+            if snapshot is not None and os.path.lexists(snapshot):
+                self.state = _state_of(load_snapshot(snapshot), snapshot, of)
+                self._saved_lines = self.state.num_lines
+            self._record = None if record is None else _opened(record)
+            self._locks = locks.pop_all()
 
     def resume(self) -> Iterator[tuple[Answer, ...]]:
         """Take the lines that the record has beyond the snapshot; the answers to each."""
@@ -73,8 +81,11 @@ class Keeping:
     def take(self, line: bytes) -> tuple[Answer, ...]:
         """Write a line down, take it, and save the state when it is time."""
         if self._record is not None:
-            self._record.write(line + b"\n")
-            self._record.flush()
+            try:
+                self._record.write(line + b"\n")
+                self._record.flush()
+            except OSError as error:
+                raise InputError(f"{self._path}: expected room for the record; {error.strerror}") from error
         self.state, answers = self.live.take(self.state, line)
         if self._snapshot is not None and self._clock() - self._saved_at >= self._every:
             self.save()
@@ -97,6 +108,7 @@ class Keeping:
         self.save()
         if self._record is not None:
             self._record.close()
+        self._locks.close()
 
 
 def _state_of(parts: dict[str, Any], path: Path, of: str) -> LiveState:
@@ -108,6 +120,8 @@ def _state_of(parts: dict[str, Any], path: Path, of: str) -> LiveState:
 
 
 def _opened(path: Path) -> BinaryIO:
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path}: expected a file for the record; got something else")
     try:
         return path.open("r+b" if path.exists() else "w+b")
     except OSError as error:

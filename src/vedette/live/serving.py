@@ -7,8 +7,11 @@ import contextlib
 import hmac
 import ipaddress
 import json
+import math
 import socket
+from collections import Counter
 from collections.abc import Callable, Iterable
+from operator import itemgetter
 from typing import Protocol
 
 from vedette.errors import InputError
@@ -17,6 +20,11 @@ from vedette.live.loop import Answer, encoded
 from vedette.live.messages import MOST_BYTES
 
 MOST_CLIENTS = 128  # pages, too
+MOST_OF_ADDRESS = 64  # of these
+MOST_WAITING = 32  # of these, that have not entered
+IDLE_SECONDS = 60.0  # after which a silent client makes way where there is no room
+WRONG_SECONDS = 1.0  # that the answer to a wrong token takes
+LEAST_TOKEN = 16  # letters
 MOST_UNREAD = 8_000_000  # bytes of answers that a client leaves lying
 TOKEN_WITHIN = 10.0  # s
 _LONGEST_TOKEN = 4096  # bytes of its line
@@ -31,7 +39,11 @@ def is_loopback(address: str) -> bool:
 
 
 def check_address(host: str, token: str | None) -> None:
-    """`InputError` for an address that others can reach, without a token; or that there is not."""
+    """`InputError` for an address that others can reach, without a token; or that there is not; or for a token that can
+    be guessed.
+    """
+    if token is not None and len(token.strip()) < LEAST_TOKEN:
+        raise InputError(f"--token: expected at least {LEAST_TOKEN} letters; got {len(token.strip())}")
     try:
         found = {str(info[4][0]) for info in socket.getaddrinfo(host, None)}
     except (OSError, UnicodeError) as error:
@@ -44,6 +56,11 @@ class Client(Protocol):
     """Who sends lines and gets answers."""
 
     name: str
+
+    @property
+    def address(self) -> str:
+        """Where it comes from, without the port."""
+        ...
 
     def send(self, text: bytes) -> None:
         """Without waiting; what is not read lies in a buffer."""
@@ -62,7 +79,8 @@ class Exchange:
     """Takes lines of many clients in turn, and answers: estimates and plans to all, an error to who caused it.
 
     A client that sends faster than lines are taken is made to wait, by the flow control of TCP, while the others have
-    their turns; nothing is piled up. One that does not read its answers is put out.
+    their turns; nothing is piled up. One that does not read its answers is put out. Where there is no room, the client
+    that has been silent for longest makes way, if that is `IDLE_SECONDS` or more.
 
     Args:
         take: what is done with a line; its answers.
@@ -74,8 +92,10 @@ class Exchange:
         self, take: Callable[[bytes], Iterable[Answer]], token: str | None, tell: Callable[[str], object]
     ) -> None:
         self._take, self._token, self.tell = take, token, tell
-        self._clients: set[Client] = set()
-        self._num_open, self.num_taken = 0, 0
+        self._clients: dict[Client, float] = {}  # when each sent its last line
+        self._open: Counter[str] = Counter()  # by address
+        self._refused: dict[str, float] = {}  # when an address was last told of
+        self._num_waiting, self.num_taken = 0, 0
         self.changed = asyncio.Event()
 
     @property
@@ -91,23 +111,65 @@ class Exchange:
             given.encode("utf-8", "replace"), self._token.encode("utf-8", "replace")
         )
 
-    def open(self) -> bool:
-        """Count one that comes, and whether there is room for it; each is to `leave`."""
-        self._num_open += 1
-        return self._num_open <= MOST_CLIENTS
+    def open(self, address: str) -> str:
+        """Count one that comes, and say why there is no room for it, or nothing; each is to `leave`."""
+        self._open[address] += 1
+        self._num_waiting += 1
+        if self._num_waiting > MOST_WAITING:
+            return f"expected at most {MOST_WAITING} clients that have not entered; got one more"
+        if self._open[address] > MOST_OF_ADDRESS and not self._make_way(address):
+            return f"expected at most {MOST_OF_ADDRESS} clients of one address; got one more"
+        if self._open.total() > MOST_CLIENTS and not self._make_way(None):
+            return f"expected at most {MOST_CLIENTS} clients; got one more"
+        return ""
 
-    def leave(self, client: Client | None = None) -> None:
-        """One that came has gone."""
-        self._num_open -= 1
-        if client is not None:
-            self._clients.discard(client)
+    def _make_way(self, address: str | None) -> bool:
+        """Put out the client, of an address or of any, that has been silent for longest; false where none has."""
+        now = asyncio.get_running_loop().time()
+        silent = [
+            (since, own)
+            for own, since in self._clients.items()
+            if now - since >= IDLE_SECONDS and address in (None, own.address)
+        ]
+        if not silent:
+            return False
+        since, client = min(silent, key=itemgetter(0))
+        self.tell(f"{client.name} was silent for {now - since:.0f} s, and made way")
+        del self._clients[client]
+        client.abort()
+        return True
+
+    def leave(self, client: Client, *, entered: bool) -> None:
+        """One that came has gone. entered: whether it was let in."""
+        self._open[client.address] -= 1
+        if not self._open[client.address]:
+            del self._open[client.address]
+        if not entered:
+            self._num_waiting -= 1
+        self._clients.pop(client, None)
+
+    def let_in(self) -> None:
+        """One that came waits no longer; it is `entered` for `leave`."""
+        self._num_waiting -= 1
 
     def enter(self, client: Client) -> None:
         """From now on it has the answers."""
-        self._clients.add(client)
+        self._clients[client] = asyncio.get_running_loop().time()
+
+    async def refuse_token(self, name: str) -> None:
+        """Tell of a wrong token, of an address once in a while, and let who guesses wait."""
+        now, address = asyncio.get_running_loop().time(), name.rpartition(":")[0]
+        if now - self._refused.get(address, -math.inf) >= IDLE_SECONDS:
+            self.tell(f"{name} had no token")
+            if len(self._refused) >= MOST_CLIENTS:
+                self._refused.clear()
+            self._refused[address] = now
+        await asyncio.sleep(WRONG_SECONDS)
 
     async def answer(self, line: bytes, sender: Client | None) -> None:
         """Take a line, and let the others have their turn."""
+        if sender in self._clients:
+            self._clients[sender] = asyncio.get_running_loop().time()
         for answer in self._take(line):
             text = encoded(answer)
             for client in ([sender] if sender else []) if "error" in answer else list(self._clients):
@@ -120,13 +182,14 @@ class Exchange:
         client.send(text)
         if client.unread() > MOST_UNREAD:
             self.tell(f"{client.name} does not read its answers, and was put out")
-            self._clients.discard(client)
+            self._clients.pop(client, None)
             client.abort()
 
 
 class _TcpClient:
     def __init__(self, writer: asyncio.StreamWriter) -> None:
         self.name = "{}:{}".format(*writer.get_extra_info("peername")[:2])
+        self.address = self.name.rpartition(":")[0]
         self.send, self.abort = writer.write, writer.transport.abort
         self.unread = writer.transport.get_write_buffer_size
 
@@ -145,20 +208,22 @@ class TcpServer:
             raise taken(error) from None
 
     async def _meet(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        client, exchange = _TcpClient(writer), self._exchange
+        client, exchange, entered = _TcpClient(writer), self._exchange, False
         try:
-            if not exchange.open():
-                await _refuse(writer, f"expected at most {MOST_CLIENTS} clients; got one more")
+            if fault := exchange.open(client.address):
+                await _refuse(writer, fault)
             elif not await self._may_enter(reader):
+                await exchange.refuse_token(client.name)
                 await _refuse(writer, 'expected {"token": ...} first; got none, or another')
-                exchange.tell(f"{client.name} had no token")
             else:
+                entered = True
+                exchange.let_in()
                 exchange.enter(client)
                 await self._serve(reader, client, writer)
         except (ConnectionError, asyncio.CancelledError):  # it is gone, or the server is
             pass
         finally:
-            exchange.leave(client)
+            exchange.leave(client, entered=entered)
             writer.close()
             with contextlib.suppress(OSError):
                 await writer.wait_closed()

@@ -21,7 +21,7 @@ from websockets.http11 import Request, Response
 
 from vedette.live.lines import LineSplitter
 from vedette.live.messages import MOST_BYTES
-from vedette.live.serving import MOST_CLIENTS, Exchange, is_loopback, taken
+from vedette.live.serving import Exchange, is_loopback, taken
 from vedette.simulation.loop import cause_of
 
 FRAMES_PER_SECOND = 10.0
@@ -49,6 +49,7 @@ class Screen(Protocol):
 class _WebClient:
     def __init__(self, socket: ServerConnection) -> None:
         self._socket, self.name = socket, _name(socket)
+        self.address = self.name.rpartition(":")[0]
         self.unread, self.abort = socket.transport.get_write_buffer_size, socket.transport.abort
 
     def send(self, text: bytes) -> None:
@@ -90,14 +91,14 @@ class WebServer:
         self._drawing = asyncio.create_task(self._draw())
         return server
 
-    def _refused_or_page(self, socket: ServerConnection, request: Request) -> Response | None:
+    async def _refused_or_page(self, socket: ServerConnection, request: Request) -> Response | None:
         """What is answered in place of opening a socket."""
         address = urlsplit(request.path)
         if (fault := self._foreign(request)) is not None:
             self._exchange.tell(f"{_name(socket)} was refused: {fault}")
             return socket.respond(HTTPStatus.FORBIDDEN, f"{fault}\n")
         if not self._exchange.is_token(_token(request, address.query)):
-            self._exchange.tell(f"{_name(socket)} had no token")
+            await self._exchange.refuse_token(_name(socket))
             return socket.respond(HTTPStatus.UNAUTHORIZED, "expected ?token=... in the address; got none, or another\n")
         if address.path not in ("/", "/page"):
             return socket.respond(HTTPStatus.NOT_FOUND, "expected /; got another address\n")
@@ -122,10 +123,14 @@ class WebServer:
     async def _meet(self, socket: ServerConnection) -> None:
         assert socket.request is not None
         client, is_page = _WebClient(socket), urlsplit(socket.request.path).path == "/page"
+        entered = False
         try:
-            if not self._exchange.open():
-                await socket.close(1013, f"expected at most {MOST_CLIENTS} clients; got one more")
-            elif is_page:
+            if fault := self._exchange.open(client.address):
+                await socket.close(1013, fault)
+                return
+            entered = True
+            self._exchange.let_in()
+            if is_page:
                 await self._show(socket)
             else:
                 self._exchange.enter(client)
@@ -136,7 +141,7 @@ class WebServer:
         except Exception as error:  # such as a record that cannot be written
             self._exchange.tell(f"{client.name} was put out: {cause_of(error)}")
         finally:
-            self._exchange.leave(client)
+            self._exchange.leave(client, entered=entered)
 
     async def _serve(self, socket: ServerConnection, client: _WebClient) -> None:
         async for message in socket:

@@ -321,7 +321,16 @@ def _scans_at(timeline: Timeline, time: float) -> dict[int, SensorScan]:
 
 
 def _check_same(there: SensorScan, again: SensorScan) -> None:
-    """Raise `InputError` where a sensor has scanned at a time already, and measured something else."""
-    if not np.array_equal(there.measurements, again.measurements) or not np.array_equal(there.pose, again.pose):
+    """Raise `InputError` where a sensor has scanned at a time already, and measured something else, in any order."""
+    if not np.array_equal(_in_order(there.measurements), _in_order(again.measurements)) or not np.array_equal(
+        there.pose, again.pose
+    ):
         place = f"scan of sensor {again.sensor} at {again.time:g} s"
         raise InputError(f"{place}: expected one scan of a sensor at a time; got a second one that differs")
+
+
+def _in_order(measurements: Floats) -> Floats:
+    """The rows by their first number, then the second, and so on."""
+    return (
+        measurements[np.lexsort(measurements.T[::-1])] if measurements.ndim == 2 and measurements.size else measurements
+    )
