@@ -10,7 +10,7 @@ import pytest
 from evaluation.synthetic import make_record
 from vedette.errors import InputError
 from vedette.evaluation import Comparison, compare, decision_rows, holm, strategy_csv, strategy_markdown, strategy_rows
-from vedette.evaluation.tables import header, strategy_latex, told_apart
+from vedette.evaluation.tables import header, strategy_latex, tails, told_apart
 from vedette.simulation.records import RunRecord
 
 NUM_RUNS = 6
@@ -140,6 +140,7 @@ def test_whole_states_have_no_unit_in_the_table(runs: dict[str, list[RunRecord]]
 def test_table_of_a_single_run_claims_no_error(runs: dict[str, list[RunRecord]]) -> None:
     rows = strategy_rows(compare({name: runs[name][:1] for name in STRATEGIES}))
     assert "±" not in "".join(rows[1])
+    assert tails(compare({name: runs[name][:1] for name in STRATEGIES})) == ""
     assert rows[1][5] == "unknown"
 
 
@@ -148,7 +149,19 @@ def test_markdown_is_a_table_with_a_caption(comparison: Comparison) -> None:
     table = [line for line in lines if line.startswith("|")]
     assert len(table) == 2 + len(STRATEGIES)
     assert len({line.count("|") for line in table}) == 1
-    assert "6 paired runs, mean over t = 11 to 40 s" in lines[-1]
+    assert "6 paired runs, mean over t = 11 to 40 s" in lines[-2]
+    assert lines[-1] == tails(comparison)
+
+
+def test_tails_stand_beside_means(comparison: Comparison) -> None:
+    means = comparison.run_means("jdm")
+    assert tails(comparison).startswith(f"Median and worst run (m): jdm {np.median(means):.2f}, {means.max():.2f}; idm")
+    lost = np.zeros((6, len(comparison.times)))
+    lost[2, -1] = lost[3, 0] = lost[4, -1] = 2.0
+    ensembles = tuple(replace(own, measures={"num_missed": lost}) for own in comparison.ensembles)
+    told = tails(replace(comparison, ensembles=ensembles))
+    assert told.startswith("Median and worst run (m), share of runs that end with a lost target: jdm ")
+    assert told.count(", 33 %") == len(STRATEGIES)
 
 
 def test_csv_holds_the_unrounded_numbers(comparison: Comparison) -> None:

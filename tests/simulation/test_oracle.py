@@ -155,6 +155,16 @@ def test_what_is_lost_is_given_up_where_nothing_is_born() -> None:
     assert covs[0].shape == (3, 4, 4)
 
 
+def test_a_target_whose_label_is_held_but_not_estimated_is_kept() -> None:
+    """Two labels near the first target: the one that is estimated counts; the second target's is improbable."""
+    labels, means = [(1, 0), (1, 1), (1, 2)], np.array([STARTS[0], STARTS[1] + 3.0, STARTS[0]])
+    belief = LMB.from_bernoullis(labels, [0.99, 0.05, 0.02], means, COVS)
+    planner = OraclePlanner(SENSORS, timetable(one_belief=True), truth=truth())
+    ids, covs = planner._tracked(replace(state(), fused=belief), *truth().at(0))
+    assert ids.tolist() == [0, 1]
+    np.testing.assert_allclose(covs[0], COVS[:2], rtol=1e-12)
+
+
 @pytest.mark.parametrize("step", [1, 4, 6])
 def test_where_nobody_can_be_helped_each_takes_its_first_course(step: int) -> None:
     """No target is tracked; after the last scan there is nothing to follow either."""

@@ -32,13 +32,13 @@ _MOST_DECISIONS = 6  # times of them; the tables and the report have all
 def print_comparison(comparison: Comparison) -> None:
     """The table of the strategies, what its numbers are, and what each strategy decided."""
     from vedette.evaluation import decision_rows, strategy_rows
-    from vedette.evaluation.tables import caption, told_apart
+    from vedette.evaluation.tables import caption, tails, told_apart
 
     console = new_console()
     names = (named_in("OSPA", comparison.unit), *_SHORT_HEADER)
     numbers = [row[1:] for row in strategy_rows(comparison)]
     _print_rows(console, comparison.strategies, names, numbers)
-    for line in filter(None, (caption(comparison), told_apart(comparison))):
+    for line in filter(None, (caption(comparison), tails(comparison), told_apart(comparison))):
         console.print(line, style="dim")
     labels = elided_apart(comparison.strategies, _LONGEST_LABEL)
     for label, strategy in zip(labels, comparison.strategies, strict=True):

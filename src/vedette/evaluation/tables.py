@@ -57,16 +57,17 @@ def decision_rows(comparison: Comparison, strategy: str, *, at_most: int = 3) ->
 def strategy_markdown(comparison: Comparison) -> str:
     """The table as Markdown, with a line that says what was averaged."""
     table = markdown_table(header(comparison), strategy_rows(comparison))
-    return f"{table}\n{caption(comparison)}\n"
+    return "\n".join([table, *filter(None, (caption(comparison), tails(comparison))), ""])
 
 
 def strategy_latex(comparison: Comparison) -> str:
     """The table as LaTeX (package booktabs), with its caption; an environment `table` of its own."""
     rows = [tuple(map(_latex, row)) for row in (header(comparison), *strategy_rows(comparison))]
     lines = [f"{' & '.join(row)} \\\\" for row in rows]
+    told = " ".join(filter(None, (caption(comparison), tails(comparison))))
     body = "\n".join(["\\toprule", lines[0], "\\midrule", *lines[1:], "\\bottomrule"])
     return (
-        f"\\begin{{table}}\n\\centering\n\\caption{{{_latex(caption(comparison))}}}\n"
+        f"\\begin{{table}}\n\\centering\n\\caption{{{_latex(told)}}}\n"
         f"\\begin{{tabular}}{{l{'r' * (len(rows[0]) - 1)}}}\n{body}\n\\end{{tabular}}\n\\end{{table}}\n"
     )
 
@@ -160,6 +161,24 @@ def caption(comparison: Comparison) -> str:
         f"Scenario {comparison.scenario}, {comparison.num_runs} paired runs, {over}, ± one standard error. Difference: "
         f"strategy minus {first}, run by run; runs won: by {first}.{_intervals(comparison)}"
     )
+
+
+def tails(comparison: Comparison) -> str:
+    """Median and worst run of each strategy, and the share of runs that end with a lost target; empty of a single run.
+
+    A target is lost at the end where it has no estimate within the cutoff at the last scan that counts.
+    """
+    if comparison.num_runs == 1:
+        return ""
+    last, found = int(np.flatnonzero(comparison.counted)[-1]), []
+    for name in comparison.strategies:
+        means = comparison.run_means(name)
+        told = f"{name} {np.nanmedian(means):.2f}, {np.nanmax(means):.2f}" if not np.isnan(means).all() else name
+        if "num_missed" in comparison.measures:
+            told += f", {np.mean(comparison.values(name, 'num_missed')[:, last] > 0.0):.0%}".replace("%", " %")
+        found.append(told)
+    lost = ", share of runs that end with a lost target" if "num_missed" in comparison.measures else ""
+    return f"{named_in('Median and worst run', comparison.unit)}{lost}: {'; '.join(found)}."
 
 
 def _intervals(comparison: Comparison) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -22,6 +21,7 @@ from vedette.platforms.compass import Compass, courses_of
 from vedette.recorded import Origin
 from vedette.scenarios import Scenario
 from vedette.simulation.records import RunRecord
+from vedette.text import spreadsheet_text
 
 
 def track_table(
@@ -126,9 +126,7 @@ def _csv(table: Mapping[str, Sequence[Any]]) -> bytes:
 
 
 def _harmless(cell: Any) -> Any:
-    """The cell with an apostrophe before it, where a spreadsheet would take a text for a formula."""
-    is_formula = isinstance(cell, str) and cell.startswith(("=", "+", "-", "@", "\t", "\r"))
-    return f"'{cell}" if is_formula and not _NUMBER.fullmatch(cell) else cell
+    return spreadsheet_text(cell) if isinstance(cell, str) else cell
 
 
 def _parquet(table: Mapping[str, Sequence[Any]]) -> bytes:
@@ -143,6 +141,5 @@ def _parquet(table: Mapping[str, Sequence[Any]]) -> bytes:
     return content.getvalue()
 
 
-_NUMBER = re.compile(r"[-+]?[0-9.]+(e[-+]?[0-9]+)?", re.IGNORECASE)
 _MAKERS = {".csv": _csv, ".parquet": _parquet, ".geojson": geojson, ".czml": czml, ".mcap": mcap}
 ENDINGS = tuple(_MAKERS)

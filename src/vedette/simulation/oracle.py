@@ -18,7 +18,7 @@ from vedette.control import (
 )
 from vedette.control.constraints import Mask, repaired
 from vedette.control.inputs import check_poses, check_steering, mask_of_decision, options_of
-from vedette.densities import Estimator, best_estimate
+from vedette.densities import Estimator, Labelled, best_estimate
 from vedette.errors import InputError
 from vedette.filters import shared_targets
 from vedette.kernels.base.types import Bools, Floats, Ints
@@ -140,19 +140,34 @@ class OraclePlanner:
         return ids[kept], tuple(self._covs(own, state.step, states)[0][kept] for own in state.local)
 
     def _covs(self, belief: object, step: int, states: Floats) -> tuple[Floats, Bools]:
-        """(num, dim, dim) of the estimates nearest to targets, and whether there is one within the cutoff."""
-        from scipy.optimize import linear_sum_assignment  # a third of a second that nobody else has to wait for
+        """(num, dim, dim) of the tracks nearest to targets, and whether there is one within the cutoff.
 
+        Estimates come first; targets without one go by the labels that the belief holds beside these, however
+        improbable: the next scans may confirm them.
+        """
         estimate = self.estimate(belief, step)
         stds = np.full(states.shape[1], _LOST * self.cutoff)
         stds[:2] = self.cutoff
         covs, found = np.tile(np.diag(stds**2), (len(states), 1, 1)), np.zeros(len(states), bool)
-        offsets = states[:, np.newaxis, :2] - estimate.means[:, :2]
+        self._match(estimate.means, estimate.covs, states, covs, found)
+        if isinstance(belief, Labelled) and not found.all():
+            estimated = {(step, index) for step, index in estimate.labels.tolist()}
+            held = [own for own in belief.targets() if own.label not in estimated]
+            if held:
+                means, others = (np.array([getattr(own, name) for own in held]) for name in ("mean", "cov"))
+                self._match(means, others, states, covs, found)
+        return covs, found
+
+    def _match(self, means: Floats, covs: Floats, states: Floats, out: Floats, found: Bools) -> None:
+        """Give each target that has none yet the covariance of the track assigned to it, within the cutoff."""
+        from scipy.optimize import linear_sum_assignment  # a third of a second that nobody else has to wait for
+
+        open_ = np.flatnonzero(~found)
+        offsets = states[open_, np.newaxis, :2] - means[:, :2]
         gaps = np.minimum(np.hypot(offsets[..., 0], offsets[..., 1]), self.cutoff)
         for target, track in zip(*linear_sum_assignment(gaps), strict=True):
             if gaps[target, track] < self.cutoff:
-                covs[target], found[target] = estimate.covs[track], True
-        return covs, found
+                out[open_[target]], found[open_[target]] = covs[track], True
 
     def _decide(
         self, moment: _Moment, truth: Truth, ids: Ints, depth: int, mask: Mask | None, rng: np.random.Generator
