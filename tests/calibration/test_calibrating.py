@@ -132,6 +132,7 @@ def calibrated(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, OfRecord
 def test_biases_of_two_radars_are_found(calibrated: tuple[Path, OfRecording, Calibration]) -> None:
     _, _, calibration = calibrated
     assert calibration.log_likelihood > calibration.before + 300.0
+    assert calibration.converged
     assert not any(each.why for each in calibration.found)
     for each in calibration.found:
         name = each.parameter.sensor, each.parameter.name

@@ -20,6 +20,7 @@ _FAR = {"range": 300.0, "bearing": math.radians(3.0), "x": 300.0, "y": 300.0}  #
 _NEARER = 3.0  # times the noise that was found, in the second round
 _QUANTILE = 1.959964  # of the normal distribution, 97.5 %
 _COMPARED = ("clock", "x", "y")  # with those of the first sensor
+_SHORT = 1.0  # of log likelihood, by which a search that holds parameters at most exceeds one that does not
 _PART = 0.1  # of a parameter that lies where nothing is known: it cannot be found
 
 
@@ -85,8 +86,15 @@ def calibrate(
     together = linked(pairs, len(problem.sites))
     apart = np.flatnonzero(~together | (together.sum() == 1)).tolist()  # with nobody else, the first one is, too
     found, directions, own = dict[int, Found](), list[int](), asked
+    highest, again = math.inf, False
     while True:
         maximum, judged, rank = _found(problem, own, partial(terms, own=own), start[own], apart)
+        if not again and maximum.log_likelihood > highest + _SHORT:
+            # With some held it is higher: the search of all ended short of its maximum, and starts from here, once.
+            start[own], own, again = maximum.at, asked, True
+            directions.clear()
+            continue
+        highest = maximum.log_likelihood
         found |= zip(own, judged, strict=True)
         directions.append(rank)
         told = [i for i in own if not found[i].why]
