@@ -242,3 +242,18 @@ def test_a_job_array_needs_a_time_and_has_no_shard_of_its_own(place: Path) -> No
     script = call("campaign", "spec.toml", "--runs", "5", "--slurm", "3", "--time", "4h").stdout
     assert script.startswith("#!/bin/bash\n")
     assert "vedette campaign spec.toml --out trial-shards --runs=5 --workers=1 --shard" in script
+
+
+def test_an_interruption_while_the_program_is_imported_is_no_traceback() -> None:
+    code = (
+        "import sys\n"
+        "class Interrupting:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name == 'vedette.cli':\n"
+        "            raise KeyboardInterrupt\n"
+        "sys.meta_path.insert(0, Interrupting())\n"
+        "from vedette.__main__ import main\n"
+        "main()\n"
+    )
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (130, "", "\ninterrupted\n")
