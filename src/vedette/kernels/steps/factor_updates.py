@@ -34,10 +34,11 @@ _NUM_SUMS = 8
 # A component of a label alone is dropped where it holds less of an existing target than this times the least share.
 _WORTH = 10.0
 
-# A posterior of more hypotheses than this share of the most that a group may have is condensed: the next scan has many
-# times as many, and of those cut off most hold more targets than those kept. The L1 error up to which versions of
-# labels are made one then grows by a factor, until it is above the most.
-_FULL, _GROWTH, _MOST_MERGED = 0.25, 3.0, 0.3
+# A posterior is condensed where the hypotheses behind this share of the most that a group may have weigh more than
+# that: the next scan has many times as many, and of those cut off most hold more targets than those kept. The L1 error
+# up to which versions of labels are made one then grows by a factor, until it is above the most.
+_KEPT_APART, _MOST_BEHIND = 0.25, 0.05
+_GROWTH, _MOST_MERGED = 3.0, 0.3
 
 
 class Factoring(NamedTuple):
@@ -208,7 +209,8 @@ def _append_label(
 def _merged(glmb: Glmb, caps: MixtureCaps, max_error: float, most: int) -> tuple[Glmb, float]:
     """The posterior with versions of labels made one, and a bound on its L1 change. most: hypotheses of a group."""
     glmb, total = merge_versions(glmb, caps, max_error)
-    while len(glmb.hyp_log_weights) > _FULL * most and 0.0 < max_error < _MOST_MERGED:
+    apart = int(_KEPT_APART * most)
+    while 0.0 < max_error < _MOST_MERGED and np.exp(glmb.hyp_log_weights[apart:]).sum() > _MOST_BEHIND:
         max_error *= _GROWTH
         glmb, error = merge_versions(glmb, caps, max_error)
         total += error
