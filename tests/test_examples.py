@@ -77,7 +77,7 @@ SHOWN = {
     "docs/live.md": ['"line": 12, "time": 5.0, "tracks": [{"label":'],
     "docs/lost-tracks.md": [
         "OSPA, m",
-        "up to 1.8 targets were dropped with their labels",
+        "up to 2.1 targets were dropped with their labels",
         "covariances are too small at",
         "covariances are too large at",
         "standard deviations from the nearest birth site",

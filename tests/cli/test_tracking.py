@@ -28,7 +28,7 @@ def test_scans_become_tracks_results_and_a_picture(place: Path) -> None:
     assert result.exit_code == 0, result.output
     assert "mean OSPA" in result.stdout
     assert "tracks, 3 of them of 10 estimates or more" in result.stdout
-    assert "not said, so birth: of measurements" in result.stderr
+    assert "not said, so birth: 0.5 a scan, anywhere in the region" in result.stderr
     assert {path.name for path in (place / "out").iterdir()} >= {"tracks", "figures", "manifest.json", "scenario.yaml"}
     assert {path.name for path in (place / "out/tracks").iterdir()} == {"tracks.csv", "tracks.geojson"}
     assert load_run(place / "out").planner == "recorded"

@@ -73,7 +73,7 @@ def test_recorded_targets_of_a_parquet_file(tmp_path: Path) -> None:
     [
         (
             "  {kind: recorded, path: ships.csv}",
-            "10:1: targets.columns: expected the names of the columns of time, id, longitude, latitude among "
+            "10:1: targets.columns: expected the names of the columns of time, id among "
             "when, ship, lon, lat, got nothing",
         ),
         (

@@ -299,7 +299,7 @@ def test_what_is_said_is_not_assumed(folder: Path) -> None:
     ("old", "new", "message"),
     [
         ("sensors:\n", "sensors: []\nmore:\n", r"sensors: expected a list of at least 1"),
-        ("name: Calshot", "name: Cowes", r"recording: expected scans that can be read, got .*'Calshot'"),
+        ("name: Calshot", "name: Cowes", r"row 2, column 'radar': expected a sensor among 'Cowes', .*'Calshot'"),
         ("sigma_range: 20.0", "sigma_range: far", r"sigma_range: expected a number, got \"far\""),
         (
             "kind: bearing_range",

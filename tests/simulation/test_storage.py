@@ -169,7 +169,7 @@ def test_an_empty_folder_is_used(tmp_path: Path) -> None:
 
 def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="expected a place to write a run"):
+    with pytest.raises(InputError, match="expected a folder that may be written to"):
         save_run(make_record(), tmp_path / "file" / "run")
 
 
