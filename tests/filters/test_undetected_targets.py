@@ -174,22 +174,22 @@ def test_labels_that_are_dropped_are_undetected_targets_again(limits: Limits) ->
     assert numbers[1] == pytest.approx(numbers[0], rel=0.01, abs=0.02)
 
 
-def test_an_intensity_that_bends_and_a_track_that_does_not_share_a_scan() -> None:
-    """A wide birth site about a radar that tracks a near target well."""
+def test_a_first_detection_that_does_not_bend_beside_an_intensity_that_does() -> None:
+    """A wide birth site close to a radar, and a narrow one far away, where alone something is measured."""
     radar = models.SensorModel(
         models.bearing_range(),
         models.constant_noise([math.radians(0.5), 5.0]),
         models.constant_detection(0.9),
-        models.region_clutter(5.0, models.Region(0.0, 3000.0, -1500.0, 1500.0), "bearing_range"),
+        models.region_clutter(5.0, models.Region(-500.0, 3000.0, -1500.0, 1500.0), "bearing_range"),
     )
-    tracker = FactoredGlmbFilter(targets(sites([0.05], [[900.0, 0.0]], [200.0, 200.0, 5.0, 5.0]), 0.999), radar)
-    belief = tracker.initial()
-    for step in range(1, 7):
-        belief, _ = tracker.step(belief, [[0.1, 880.0]], POSE, 1.0, step, rng=RNG)
-    belief, _ = tracker.step(belief, [[0.1, 880.0], [-0.15, 1100.0]], POSE, 1.0, 7, rng=RNG)
-    assert number(belief) > 1.0
-    likeliest = max(belief.targets(), key=lambda target: target.existence)
-    assert likeliest.existence > 0.95
+    means = np.array([[150.0, 0.0, 0.0, 0.0], [2500.0, 0.0, 0.0, 0.0]])
+    covs = np.array([np.diag([std, std, 5.0, 5.0]) ** 2 for std in (60.0, 1.0)])
+    birth = models.BirthModel(np.array([0.05, 0.05]), means, covs)
+    tracker = FactoredGlmbFilter(targets(birth, 0.999), radar)
+    belief, _ = tracker.step(tracker.initial(), [[0.0, 2500.0]], POSE, 1.0, 1, rng=RNG)
+    [label], [existence] = existence_probabilities(belief)
+    assert label.tolist() == [1, 2]
+    assert existence > 0.9
 
 
 def test_labels_of_steps_in_the_past_are_refused() -> None:

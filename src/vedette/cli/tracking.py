@@ -126,7 +126,7 @@ def track(
 def read_recording(
     sensors: Path, scans: Path, truth: Path | None, *, speed: float, bad_rows: str, trust: bool
 ) -> tuple[OfRecording, list[str]]:
-    """The scenario of recorded scans, and warnings; tells what was left out, what is assumed, which code it runs."""
+    """Return the scenario of recorded scans and its warnings; print skipped rows, assumptions and code that runs."""
     from vedette.scenarios.of_recording import scenario_of_recording
 
     if bad_rows not in BAD_ROWS:

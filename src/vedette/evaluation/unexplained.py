@@ -18,7 +18,7 @@ from vedette.text import counted
 
 _GATE = 4.0  # standard deviations of what a course of two measurements predicts of the third
 _FASTEST = 1500.0  # m/s
-_FASTER = 1.5  # times the speed that births assume, from which on a course is told of
+_FASTER = 1.5  # times the speed that births assume; faster courses are reported
 _SHORTEST = 5  # measurements of a course
 _BY_CHANCE = 0.01  # courses of a recording that may be
 _MOST = 100  # unexplained measurements of a scan, of more of which nothing can be told
@@ -26,7 +26,7 @@ _COURSES = 20
 
 
 class _Left(NamedTuple):
-    """What a scan has that no track explains: s, (num, 2) places and (num,) standard deviations in m."""
+    """Measurements of a scan that no track explains: time [s], (num, 2) positions and (num,) stds [m]."""
 
     time: float
     places: Floats

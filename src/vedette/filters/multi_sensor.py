@@ -123,7 +123,7 @@ class MultiSensorFilter(OfKind[BeliefT]):
 
     @abstractmethod
     def _updated(self, prior: Any, born: Lmb, taken: SensorScans, dt: float, place: str) -> tuple[BeliefT, FilterInfo]:
-        """The prediction of the prior (as of `_before_scan`) with the births, after all scans. place: of errors."""
+        """Update the predicted prior (see `_before_scan`), births added, with all scans. place: begins messages."""
 
     def _checked_scans(self, scans: Any, poses: Any, rng: Any) -> SensorScans:
         """What each sensor that scanned saw and from where.

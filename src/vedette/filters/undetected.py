@@ -125,7 +125,7 @@ def named_at(undetected: UndetectedTargets, step: Any, num_sites: int) -> Undete
 def seen_by(
     undetected: UndetectedTargets, error: float, birth: BirthModel, sensor: SensorModel, scan: Floats, pose: Floats
 ) -> Undetected:
-    """The undetected targets as the kernel of a scan takes them. error: as of `predicted_undetected`."""
+    """Return the undetected targets in the form that `step_factored` needs. error: see `predicted_undetected`."""
     intensity = undetected.intensity.to_kernel()
     local, measured = Poisson.empty(intensity.means.shape[1]).to_kernel(), birth.from_measurements
     if undetected.cells is not None and measured is not None and len(scan):
