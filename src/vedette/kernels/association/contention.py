@@ -167,3 +167,34 @@ def leave_to_others(options: Options, group_of: Ints, presence: Floats, componen
             break
     _weigh(options, components, meetings)
     return _log_counted_twice(meetings, totals)
+
+
+@kernel
+def log_unclaimed(options: Options, labels: Ints, presence: Floats) -> Floats:
+    """(num_measurements,) log probability that no track takes each measurement, if labels took them independently.
+
+    labels: (num_rows, 2) of the rows; versions of a label follow each other. presence: as of `leave_to_others`.
+    """
+    claims, unclaimed = np.zeros(options.num_measurements), np.zeros(options.num_measurements)
+    first, num_rows = 0, len(labels)
+    while first < num_rows:
+        last, there, peak = first, 0.0, 0.0
+        while last < num_rows and labels[last, 0] == labels[first, 0] and labels[last, 1] == labels[first, 1]:
+            there += presence[last]
+            if options.offsets[last + 1] > options.offsets[last]:
+                peak = max(peak, options.log_weights[options.offsets[last]])
+            last += 1
+        total = max(0.0, 1.0 - there) * math.exp(-peak)
+        for row in range(first, last):
+            for option in range(options.offsets[row], options.offsets[row + 1]):
+                weight = presence[row] * math.exp(options.log_weights[option] - peak)
+                total += weight
+                if options.columns[option] >= 0:
+                    claims[options.columns[option]] += weight
+        for option in range(options.offsets[first], options.offsets[last]):
+            j = options.columns[option]
+            if j >= 0 and claims[j] > 0.0:
+                unclaimed[j] += math.log(max(_LEAST_MISSED, 1.0 - claims[j] / total))
+                claims[j] = 0.0
+        first = last
+    return unclaimed

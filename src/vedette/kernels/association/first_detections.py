@@ -31,6 +31,9 @@ from vedette.kernels.gaussian.relinearisation import make_pair_work
 from vedette.kernels.gaussian.scratch import make_scratch
 
 _LEAST_SHARE = math.log(1e-5)  # of a candidate's density, below which a component of the intensity is not in it
+# Where tracks leave less than this of a measurement, a candidate must be so many times likelier than elsewhere: it
+# would stay for good as the unlikely other name of a target that is tracked already.
+_LOG_CLAIMED, _LOG_WORTH = math.log(0.05), math.log(10.0)
 
 
 class Undetected(NamedTuple):
@@ -53,7 +56,7 @@ class Candidates(NamedTuple):
     rows: Rows
     options: Options
     log_left_out: float  # log of the factor of the total weight that candidates below the least odds would have made
-    left_out: float  # their expected number, if no track took their measurements
+    left_out: float  # their expected number
 
 
 class _Pairs(NamedTuple):
@@ -125,27 +128,37 @@ class _Chosen(NamedTuple):
 
 
 @kernel
-def _chosen(pairs: _Pairs, num_measurements: int, least_logit: float) -> tuple[_Chosen, float, float]:
-    """The candidates, and `log_left_out` and `left_out` of `Candidates`."""
+def _chosen(pairs: _Pairs, unclaimed: Floats, least_logit: float) -> tuple[_Chosen, float, float]:
+    """The candidates, and `log_left_out` and `left_out` of `Candidates`. unclaimed: as of `log_unclaimed`."""
+    num_measurements = len(unclaimed)
     offsets, members = group_members(pairs.measurements, num_measurements)
     log_odds, kept = np.full(num_measurements, -math.inf), np.empty(num_measurements, np.int64)
     num_kept, num_pairs, log_left_out, left_out = 0, 0, 0.0, 0.0
     for j in range(num_measurements):
         for i in range(offsets[j], offsets[j + 1]):
             log_odds[j] = log_add(log_odds[j], pairs.log_odds[members[i]])
-        if log_odds[j] >= least_logit and log_odds[j] > -math.inf:
+        left = log_odds[j] + unclaimed[j]
+        least = least_logit + (_LOG_WORTH if unclaimed[j] < _LOG_CLAIMED else 0.0)
+        if left >= least and left > -math.inf:
             kept[num_kept] = j
             num_kept += 1
             num_pairs += offsets[j + 1] - offsets[j]
-        elif log_odds[j] > -math.inf:
-            log_left_out += log_add(0.0, log_odds[j])
-            left_out += 1.0 / (1.0 + math.exp(-log_odds[j]))
+        elif left > -math.inf:
+            log_left_out += log_add(0.0, left)
+            left_out += 1.0 / (1.0 + math.exp(-left))
     return _Chosen(kept[:num_kept], num_pairs, offsets, members, log_odds), log_left_out, left_out
 
 
 @kernel
 def candidates_of(
-    seen: Rows, scan: ScanInput, sensor: Sensor, log_clutter: Floats, gate: float, least_logit: float, label: Undetected
+    seen: Rows,
+    scan: ScanInput,
+    sensor: Sensor,
+    log_clutter: Floats,
+    unclaimed: Floats,
+    gate: float,
+    least_logit: float,
+    label: Undetected,
 ) -> Candidates:
     """The candidate labels of a scan, in the order of its measurements.
 
@@ -154,13 +167,15 @@ def candidates_of(
         scan: whose measurements are asked about.
         sensor: that took it.
         log_clutter: (num_measurements,) log clutter intensity at each measurement.
+        unclaimed: (num_measurements,) log probability that no track takes each, as of `log_unclaimed`. Of a target with
+            one track that claims the measurement, the candidate then exists with the odds rho / kappa times this.
         gate: squared Mahalanobis distance beyond which a component does not explain a measurement.
-        least_logit: log odds rho / kappa below which a candidate is left out.
+        least_logit: log odds, as far as they are unclaimed, below which a candidate is left out.
         label: by which candidates are named.
     """
     sight = Sight(sensor, scan.pose, make_pair_work(seen.means.shape[1], len(sensor.angular)))
     pairs = _gated_pairs(seen, len(label.local.log_weights), scan.measurements, log_clutter, sight, gate)
-    chosen, log_left_out, left_out = _chosen(pairs, len(scan.measurements), least_logit)
+    chosen, log_left_out, left_out = _chosen(pairs, unclaimed, least_logit)
     num, meas_dim = len(chosen.measurements), len(sensor.angular)
     rows = make_rows(num, chosen.num_pairs, seen.means.shape[1], meas_dim)
     bent = room_for_bent(seen, chosen.num_pairs)

@@ -10,6 +10,7 @@ docs/devdocs/ranked-search.md.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from vedette.kernels.association.assignment import DualWork, Options, solve_assignment
 from vedette.kernels.association.children import (
@@ -43,6 +44,13 @@ from vedette.kernels.base.types import Ints
 # how many children are thought of at most when room for them is made.
 _NODES_A_CHILD = 16
 _MOST_CHILDREN = 2048
+
+
+class Ranking(NamedTuple):
+    """What a ranking works in, and what it has found."""
+
+    search: Search
+    children: Children
 
 
 @inlined
@@ -192,12 +200,19 @@ def rank_children(options: Options, parents: Parents, caps: SearchCaps) -> tuple
     num, widest = min(caps.max_hypotheses, _most_children(options, parents)), widest_parent(parents)
     # Made as large as they are likely to become: growing them took a third of the search.
     search = make_search(_NODES_A_CHILD * num + len(parents.log_weights) + 2 * widest + 4)
-    children = make_children(num, num * widest)
+    ranking, cut = ranked(options, parents, caps, Ranking(search, make_children(num, num * widest)))
+    return ranking.children, cut
+
+
+@kernel
+def ranked(options: Options, parents: Parents, caps: SearchCaps, ranking: Ranking) -> tuple[Ranking, bool]:
+    """As `rank_children`, in the arrays of an earlier ranking, which are grown where they must be."""
+    search, children = ranking.search, ranking.children
     while not start_search(options, parents, search, children):
         search = grown_search(search)
     while not run_search(options, parents, caps, search, children):
         search, children = grown_search(search), grown_children(children, search.sizes[WIDEST])
-    return children, search.sizes[HEAP] > 0 and children.filled[0] < caps.max_hypotheses
+    return Ranking(search, children), search.sizes[HEAP] > 0 and children.filled[0] < caps.max_hypotheses
 
 
 @borrowing

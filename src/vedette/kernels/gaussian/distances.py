@@ -11,6 +11,7 @@ from vedette.kernels.base.arrays import grown_ints
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, Mixture
 from vedette.kernels.gaussian.linalg import cholesky, log_det_from_factor, log_sum, solve_lower
+from vedette.kernels.gaussian.mixtures import ReductionWork
 
 _SLACK = 1.0 + 1e-9  # for what rounding does to a distance
 
@@ -100,18 +101,20 @@ def _distance(
     return squared, log_det_from_factor(factor)
 
 
-@kernel
-def reduction_bound(mixture: Mixture, width: int, reduced: Mixture, first: int, last: int) -> float:
+@borrowing
+def reduction_bound(
+    mixture: Mixture, width: int, reduced: Mixture, first: int, last: int, work: ReductionWork
+) -> float:
     """Upper bound on the L1 distance of the first `width` components, of any scale, from `reduced[first:last]`.
 
     Each component counts for the nearest of the reduced ones: with weights w_c, v_k and k(c) it is
 
         sum_c w_c |N_c - M_k(c)| + sum_k |v_k - sum of the w_c with k(c) = k|.
     """
-    num, dim, total = last - first, mixture.means.shape[1], log_sum(mixture.log_weights[:width])
+    num, total, left = last - first, log_sum(mixture.log_weights[:width]), work.weights
     if num == width or total == -math.inf:
         return 0.0  # nothing was dropped or merged
-    factor, offset, left, error = np.empty((dim, dim)), np.empty(dim), np.empty(num), 0.0
+    error = 0.0
     for k in range(num):
         left[k] = math.exp(reduced.log_weights[first + k])
     for c in range(width):
@@ -119,8 +122,8 @@ def reduction_bound(mixture: Mixture, width: int, reduced: Mixture, first: int, 
         if weight == 0.0:
             continue
         for k in range(num):
-            at = first + k
-            apart = l1_bound(mixture.means[c], mixture.covs[c], reduced.means[at], reduced.covs[at], factor, offset)
+            mean, cov = reduced.means[first + k], reduced.covs[first + k]
+            apart = l1_bound(mixture.means[c], mixture.covs[c], mean, cov, work.factor, work.difference)
             if apart < least:
                 nearest, least = k, apart
         left[nearest] -= weight

@@ -12,6 +12,8 @@ from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, Mixture
 from vedette.kernels.gaussian.linalg import cholesky, log_sum, solve_lower
 
+_RUN = 16  # values that are sorted by insertion before runs are merged
+
 
 class MixtureCaps(NamedTuple):
     """How a mixture is kept small."""
@@ -70,11 +72,17 @@ def require_gaussians(means: Floats, covs: Floats) -> None:
 @kernel
 def descending_order(values: Floats) -> Ints:
     """Indices that sort `values` from the largest down; equal values keep their order. NaN is not allowed."""
-    count = len(values)
-    order = np.empty(count, np.int64)
+    order = np.empty(len(values), np.int64)
+    sort_descending(values, len(values), order, np.empty(len(values) if len(values) > _RUN else 0, np.int64))
+    return order
+
+
+@borrowing
+def sort_descending(values: Floats, count: int, order: Ints, buffer: Ints) -> None:
+    """Write the order of the first `count` values. buffer: as many places, or none for up to `_RUN` values."""
     for i in range(count):
         order[i] = i
-    run = 16
+    run = _RUN
     for low in range(0, count, run):
         for i in range(low + 1, min(low + run, count)):
             item, j = order[i], i
@@ -83,14 +91,14 @@ def descending_order(values: Floats) -> Ints:
                 j -= 1
             order[j] = item
     while run < count:
-        source = order.copy()
+        for i in range(count):
+            buffer[i] = order[i]
         for low in range(0, count, 2 * run):
-            _merge_runs(values, source, low, min(low + run, count), min(low + 2 * run, count), order)
+            _merge_runs(values, buffer, low, min(low + run, count), min(low + 2 * run, count), order)
         run *= 2
-    return order
 
 
-@kernel
+@borrowing
 def _merge_runs(values: Floats, source: Ints, low: int, middle: int, high: int, out: Ints) -> None:
     i, j = low, middle
     for k in range(low, high):
@@ -158,7 +166,21 @@ def moment_match(log_weights: Floats, means: Floats, covs: Floats, out_mean: Flo
     covs: (num, state_dim, state_dim). out_mean: (state_dim,). out_cov: (state_dim, state_dim), symmetric.
     """
     count = len(log_weights)
-    components, weights = np.empty(count, np.int64), np.empty(count)
+    _match_all(log_weights, means, covs, count, np.empty(count, np.int64), np.empty(count), out_mean, out_cov)
+
+
+@borrowing
+def _match_all(
+    log_weights: Floats,
+    means: Floats,
+    covs: Floats,
+    count: int,
+    components: Ints,
+    weights: Floats,
+    out_mean: Floats,
+    out_cov: Floats,
+) -> None:
+    """`moment_match` of the first `count` components. components, weights: (count,) to work in."""
     peak = -math.inf
     for c in range(count):
         peak = max(peak, log_weights[c])
@@ -168,18 +190,46 @@ def moment_match(log_weights: Floats, means: Floats, covs: Floats, out_mean: Flo
     match_components(components, weights, count, means, covs, out_mean, out_cov)
 
 
+class ReductionWork(NamedTuple):
+    """Arrays to reduce mixtures of so many components in."""
+
+    left: Floats  # (num,) log weights of the components that are still in play
+    order: Ints  # (num,)
+    buffer: Ints  # (num,) to sort in
+    near: Ints  # (num,)
+    weights: Floats  # (num,)
+    merged: Mixture  # of num components
+    factor: Floats  # (state_dim, state_dim)
+    difference: Floats  # (state_dim,)
+
+
 @kernel
-def _near(heaviest: int, log_weights: Floats, means: Floats, covs: Floats, merge_distance: float, out: Ints) -> int:
-    """Components (-> out, `heaviest` first) still in play within `merge_distance` of `heaviest`; their number."""
-    n = means.shape[1]
-    factor, difference = np.empty((n, n)), np.empty(n)
-    out[0] = heaviest
+def make_reduction_work(num: int, state_dim: int) -> ReductionWork:
+    """For mixtures of up to `num` components."""
+    return ReductionWork(
+        np.empty(num),
+        np.empty(num, np.int64),
+        np.empty(num, np.int64),
+        np.empty(num, np.int64),
+        np.empty(num),
+        make_components(num, state_dim),
+        np.empty((state_dim, state_dim)),
+        np.empty(state_dim),
+    )
+
+
+@borrowing
+def _near(heaviest: int, wide: Mixture, width: int, merge_distance: float, work: ReductionWork) -> int:
+    """Components (-> work.near, `heaviest` first) in play within `merge_distance` of `heaviest`; their number."""
+    means, covs, near = wide.means, wide.covs, work.near
+    factor, difference, n = work.factor, work.difference, wide.means.shape[1]
+    near[0] = heaviest
     count = 1
     # Distances are measured under the heaviest component's covariance, as its neighbours are to fit into it.
     if not merge_distance > 0.0 or not cholesky(covs[heaviest], factor):
         return count
-    for c in range(len(log_weights)):
-        if c == heaviest or log_weights[c] == -math.inf:
+    for c in range(width):
+        if c == heaviest or work.left[c] == -math.inf:
             continue
         for i in range(n):
             difference[i] = means[c, i] - means[heaviest, i]
@@ -188,70 +238,76 @@ def _near(heaviest: int, log_weights: Floats, means: Floats, covs: Floats, merge
         for i in range(n):
             squared += difference[i] * difference[i]
         if squared < merge_distance * merge_distance:
-            out[count] = c
+            near[count] = c
             count += 1
     return count
 
 
-@kernel
-def _merge(
-    log_weights: Floats, means: Floats, covs: Floats, log_floor: float, merge_distance: float
-) -> tuple[Floats, Floats, Floats]:
-    """Greedy merging, heaviest component first, of those of at least `log_floor` (the heaviest always stays)."""
-    num, n = means.shape
-    left, order = log_weights.copy(), descending_order(log_weights)
-    for c in range(num):
-        if c != order[0] and left[c] < log_floor:
-            left[c] = -math.inf
-    near, weights = np.empty(num, np.int64), np.empty(num)
-    merged_log_weights, merged_means, merged_covs = np.empty(num), np.empty((num, n)), np.empty((num, n, n))
-    merged = 0
-    for heaviest in order:
+@borrowing
+def _merge(wide: Mixture, width: int, log_floor: float, merge_distance: float, work: ReductionWork) -> int:
+    """Greedy merging (-> work.merged), heaviest component first, of those of at least `log_floor` (the heaviest always
+    stays); how many there are then.
+    """
+    log_weights, left, order, merged = wide.log_weights, work.left, work.order, 0
+    sort_descending(log_weights, width, order, work.buffer)
+    for c in range(width):
+        left[c] = log_weights[c] if c == order[0] or log_weights[c] >= log_floor else -math.inf
+    for i in range(width):
+        heaviest = order[i]
         if left[heaviest] == -math.inf:
             continue
-        count = _near(heaviest, left, means, covs, merge_distance, near)
+        count = _near(heaviest, wide, width, merge_distance, work)
         total = 0.0
         for k in range(count):
-            weights[k] = math.exp(left[near[k]] - log_weights[heaviest])
-            total += weights[k]
-            left[near[k]] = -math.inf
-        merged_log_weights[merged] = log_weights[heaviest] + math.log(total)
-        match_components(near, weights, count, means, covs, merged_means[merged], merged_covs[merged])
+            work.weights[k] = math.exp(left[work.near[k]] - log_weights[heaviest])
+            total += work.weights[k]
+            left[work.near[k]] = -math.inf
+        out = work.merged
+        out.log_weights[merged] = log_weights[heaviest] + math.log(total)
+        match_components(work.near, work.weights, count, wide.means, wide.covs, out.means[merged], out.covs[merged])
         merged += 1
-    return merged_log_weights[:merged], merged_means[:merged], merged_covs[:merged]
+    return merged
+
+
+@borrowing
+def reduce_into(wide: Mixture, width: int, caps: MixtureCaps, work: ReductionWork, out: Mixture, filled: int) -> int:
+    """Append the first `width` components within the caps, heaviest first, with the same total weight; the new end.
+
+    Light components are dropped; then, greedily from the heaviest, all components within the merging distance of it
+    (under its covariance) are merged by moment matching; then the heaviest stay.
+    """
+    total = log_sum(wide.log_weights[:width])
+    if caps.max_components == 1 or width <= 1 or total == -math.inf:
+        if width == 0:
+            return filled
+        out.log_weights[filled] = total
+        _match_all(
+            wide.log_weights, wide.means, wide.covs, width, work.near, work.weights, out.means[filled], out.covs[filled]
+        )
+        return filled + 1
+    num_merged = _merge(wide, width, total + caps.log_min_weight, caps.merge_distance, work)
+    sort_descending(work.merged.log_weights, num_merged, work.order, work.buffer)
+    kept = min(num_merged, caps.max_components)
+    for k in range(kept):
+        out.log_weights[filled + k] = work.merged.log_weights[work.order[k]]
+        copy_component(work.merged.means, work.merged.covs, work.order[k], out.means, out.covs, filled + k)
+    # What was dropped is shared out, so that reducing does not lose a target.
+    shift = total - log_sum(out.log_weights[filled : filled + kept])
+    for k in range(kept):
+        out.log_weights[filled + k] += shift
+    return filled + kept
 
 
 @kernel
 def reduce_mixture(
     log_weights: Floats, means: Floats, covs: Floats, caps: MixtureCaps
 ) -> tuple[Floats, Floats, Floats]:
-    """A mixture within the caps, heaviest component first, of the same total weight.
-
-    Light components are dropped; then, greedily from the heaviest, all components within the merging distance of it
-    (under its covariance) are merged by moment matching; then the heaviest stay.
-    """
+    """A mixture within the caps, as of `reduce_into`, in arrays of its own."""
     num, n = means.shape
-    total = log_sum(log_weights)
-    if caps.max_components == 1 or num <= 1 or total == -math.inf:
-        kept = min(num, 1)
-        one_mean, one_cov, one_log_weight = np.empty((kept, n)), np.empty((kept, n, n)), np.full(kept, total)
-        if kept == 1:
-            moment_match(log_weights, means, covs, one_mean[0], one_cov[0])
-        return one_log_weight, one_mean, one_cov
-    merged_log_weights, merged_means, merged_covs = _merge(
-        log_weights, means, covs, total + caps.log_min_weight, caps.merge_distance
-    )
-    order = descending_order(merged_log_weights)
-    kept = min(len(order), caps.max_components)
-    out_log_weights, out_means, out_covs = np.empty(kept), np.empty((kept, n)), np.empty((kept, n, n))
-    for k in range(kept):
-        out_log_weights[k] = merged_log_weights[order[k]]
-        copy_component(merged_means, merged_covs, order[k], out_means, out_covs, k)
-    # What was dropped is shared out, so that reducing does not lose a target.
-    shift = total - log_sum(out_log_weights)
-    for k in range(kept):
-        out_log_weights[k] += shift
-    return out_log_weights, out_means, out_covs
+    most = min(num, max(1, caps.max_components))
+    out = make_components(most, n)
+    last = reduce_into(Mixture(log_weights, means, covs), num, caps, make_reduction_work(num, n), out, 0)
+    return out.log_weights[:last], out.means[:last], out.covs[:last]
 
 
 @kernel

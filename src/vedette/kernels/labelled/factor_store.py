@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.kernels.base.arrays import filled_ints, grown_floats, grown_ints
-from vedette.kernels.base.compile import inlined, kernel
+from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import FactoredGlmb, Floats, Glmb, Ints, Mixture, Tracks
 from vedette.kernels.gaussian.linalg import log_add, log_sum
 from vedette.kernels.gaussian.mixtures import copy_component, descending_order
@@ -65,19 +65,35 @@ def _grown_mixture(mixture: Mixture, filled: int, needed: int) -> Mixture:
 
 
 @kernel
-def with_room(store: FactorStore, tracks: int, components: int, hyps: int, entries: int) -> FactorStore:
-    """The same factors with room for so much more, in one factor."""
+def with_room(store: FactorStore, factors: int, tracks: int, components: int, hyps: int, entries: int) -> FactorStore:
+    """The same factors with room for so many more, of so many tracks, components, hypotheses and entries in all."""
     filled = store.filled
     return FactorStore(
         filled,
         grown_ints(store.labels, 2 * (filled[_TRACKS] + tracks)),
         grown_ints(store.offsets, filled[_TRACKS] + tracks + 1),
         _grown_mixture(store.components, filled[_COMPONENTS], filled[_COMPONENTS] + components),
-        grown_ints(store.track_offsets, filled[_FACTORS] + 2),
+        grown_ints(store.track_offsets, filled[_FACTORS] + factors + 1),
         grown_ints(store.hyp_offsets, filled[_HYPS] + hyps + 1),
         grown_ints(store.hyp_tracks, filled[_ENTRIES] + entries),
         grown_floats(store.hyp_log_weights, filled[_HYPS] + hyps),
-        grown_ints(store.factor_offsets, filled[_FACTORS] + 2),
+        grown_ints(store.factor_offsets, filled[_FACTORS] + factors + 1),
+    )
+
+
+@inlined
+def has_room_for_single(store: FactorStore, components: int) -> bool:
+    """Whether one more factor of one label and so many components has room."""
+    filled = store.filled
+    return (
+        2 * filled[_TRACKS] + 2 <= len(store.labels)
+        and filled[_TRACKS] + 2 <= len(store.offsets)
+        and filled[_COMPONENTS] + components <= len(store.components.log_weights)
+        and filled[_FACTORS] + 2 <= len(store.factor_offsets)
+        and filled[_FACTORS] + 2 <= len(store.track_offsets)
+        and filled[_HYPS] + 3 <= len(store.hyp_offsets)
+        and filled[_HYPS] + 2 <= len(store.hyp_log_weights)
+        and filled[_ENTRIES] + 1 <= len(store.hyp_tracks)
     )
 
 
@@ -118,15 +134,12 @@ def append_single(store: FactorStore, step: int, index: int, end: int, logit: fl
 
 
 @kernel
-def append_part(store: FactorStore, glmb: Glmb, choices: Choices, part_of: Ints, part: int) -> FactorStore:
-    """Enter the marginal of a GLMB over the labels of a part as a factor, heaviest hypothesis first."""
+def append_part(store: FactorStore, glmb: Glmb, choices: Choices, part_of: Ints, part: int) -> None:
+    """Enter the marginal of a GLMB over the labels of a part as a factor, heaviest hypothesis first, where is room."""
     groups = np.empty(len(glmb.hyp_log_weights), np.int64)
     firsts = group_choices(choices.symbols, part_of, part, groups)
     log_weights = group_log_sums(glmb.hyp_log_weights, groups, len(firsts))
     log_total, number = log_sum(log_weights), filled_ints(len(glmb.tracks.labels), -1)
-    store = with_room(
-        store, len(glmb.tracks.labels), len(glmb.tracks.log_weights), len(firsts), len(firsts) * len(part_of)
-    )
     for g in descending_order(log_weights):
         for k in range(len(part_of)):
             track = choices.symbols[firsts[g], k]
@@ -142,10 +155,9 @@ def append_part(store: FactorStore, glmb: Glmb, choices: Choices, part_of: Ints,
         store.filled[_HYPS] = hyp + 1
         store.hyp_offsets[hyp + 1] = store.filled[_ENTRIES]
     _close_factor(store)
-    return store
 
 
-@kernel
+@borrowing
 def _append_track(store: FactorStore, tracks: Tracks, track: int) -> None:
     end, out = next_component(store), store.components
     for c in range(tracks.offsets[track], tracks.offsets[track + 1]):

@@ -211,7 +211,8 @@ def _by_dependence(parts: _Parts, weights: Floats) -> tuple[Ints, Ints]:
 
 
 @kernel
-def _existences(choices: Choices) -> Floats:
+def existences_of(choices: Choices) -> Floats:
+    """(num_labels,) existence probability of each label."""
     existences = np.zeros(len(choices.labels))
     for h in range(len(choices.weights)):
         for k in range(len(existences)):
@@ -236,8 +237,8 @@ def independent_parts(choices: Choices, max_error: float, max_labels: int, min_e
     error = _product_error(parts, weights)
     if error <= enough:
         return part_of, error
-    existences = _existences(choices)
-    firsts, seconds = _by_dependence(parts, weights)
+    existences = existences_of(choices)
+    firsts, seconds = _by_dependence(parts, weights) if num_parts > 2 else (filled_ints(1, 0), filled_ints(1, 1))
     for pair in range(len(firsts)):
         a, b = part_of[firsts[pair]], part_of[seconds[pair]]
         improbable = existences[firsts[pair]] < min_existence or existences[seconds[pair]] < min_existence

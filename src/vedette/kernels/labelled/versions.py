@@ -143,8 +143,10 @@ def _pooling_error(glmb: Glmb, merged: Tracks, leader: Ints, number: Ints, weigh
 
 
 @kernel
-def merge_versions(glmb: Glmb, caps: MixtureCaps, max_error: float) -> tuple[Glmb, float]:
-    """The GLMB with versions of a label made one track, and a bound on the L1 change of the density.
+def merge_versions(glmb: Glmb, choices: Choices, caps: MixtureCaps, max_error: float) -> tuple[Glmb, Choices, float]:
+    """The GLMB with versions of a label made one track, its choices, and a bound on the L1 change of the density.
+
+    choices: of the GLMB as it is given.
 
     Only versions within `caps.merge_distance` of a heavier one, under its covariance, and those first by which the
     density changes least, while all together change it by `max_error` at most before mixtures are reduced. A merged
@@ -152,14 +154,14 @@ def merge_versions(glmb: Glmb, caps: MixtureCaps, max_error: float) -> tuple[Glm
     then equal are one. Heaviest first.
     """
     if not (caps.merge_distance > 0.0 and max_error > 0.0):
-        return glmb, 0.0
-    choices, weights = choices_of(glmb), np.zeros(len(glmb.tracks.labels))
+        return glmb, choices, 0.0
+    weights = np.zeros(len(glmb.tracks.labels))
     for h in range(len(choices.weights)):
         for e in range(glmb.hyp_offsets[h], glmb.hyp_offsets[h + 1]):
             weights[glmb.hyp_tracks[e]] += choices.weights[h]
     leader, num_leaders = _leaders(glmb, choices, weights, caps.merge_distance, max_error)
     if num_leaders == len(leader):
-        return glmb, 0.0
+        return glmb, choices, 0.0
     number, tracks = _merged_tracks(glmb.tracks, leader, num_leaders, weights, caps)
     num_labels, filled = len(choices.labels), 0
     symbols, groups = np.empty(choices.symbols.shape, np.int64), np.empty(len(choices.weights), np.int64)
@@ -179,7 +181,8 @@ def merge_versions(glmb: Glmb, caps: MixtureCaps, max_error: float) -> tuple[Glm
                 filled += 1
         offsets[i + 1], sorted_weights[i] = filled, log_weights[order[i]] - log_total
     error = _pooling_error(glmb, tracks, leader, number, weights)
-    return Glmb(tracks, offsets, members[:filled].copy(), sorted_weights), error
+    merged = Glmb(tracks, offsets, members[:filled].copy(), sorted_weights)
+    return merged, choices_of(merged), error
 
 
 @kernel

@@ -18,7 +18,7 @@ from vedette.kernels.base.arrays import group_members
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Ints, Lmb, Motion, ScanInput, Sensor, Tracks
 from vedette.kernels.gaussian.linalg import log_add
-from vedette.kernels.gaussian.mixtures import MixtureCaps, make_components, require_gaussians
+from vedette.kernels.gaussian.mixtures import MixtureCaps, make_components, make_reduction_work, require_gaussians
 from vedette.kernels.steps.assembly import write_updated
 from vedette.kernels.steps.lmb import Reduction, append_reduced, labels_to_keep, weigh_by_existence
 
@@ -118,7 +118,7 @@ def posterior_mixtures(sources: Ints, rows: Rows, options: Options, choices: Cho
     num_rows, dim = len(rows.log_absent), rows.means.shape[1]
     widest, total = _most_components(sources, rows, choices)
     offsets, labels = np.zeros(len(sources) + 1, np.int64), np.full((len(sources), 2), -1, np.int64)
-    out, wide = make_components(total, dim), make_components(widest, dim)
+    out, wide, work = make_components(total, dim), make_components(widest, dim), make_reduction_work(widest, dim)
     filled = 0
     for k in range(len(sources)):
         width, source = 0, sources[k]
@@ -134,7 +134,7 @@ def posterior_mixtures(sources: Ints, rows: Rows, options: Options, choices: Cho
                     # r / (1 - r): the odds of a row are its weight over that of being absent.
                     wide.log_weights[c] -= rows.log_absent[row]
                 width = end
-        filled = append_reduced(wide, width, caps, out, filled)
+        filled = append_reduced(wide, width, caps, work, out, filled)
         offsets[k + 1] = filled
     return Tracks(labels, offsets, out.log_weights[:filled], out.means[:filled], out.covs[:filled])
 

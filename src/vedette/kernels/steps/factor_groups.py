@@ -89,13 +89,14 @@ def weigh_singles(prior: FactoredGlmb, rows: Rows) -> None:
 
 
 @kernel
-def presence_of_rows(factors: Factors, num_rows: int) -> Floats:
+def presence_of_rows(prior: FactoredGlmb, num_rows: int) -> Floats:
     """(num_rows,) probability of each row in its factor; 1 of a single row, whose options say whether it is there."""
-    prior, presence = factors.prior, np.ones(num_rows)
+    presence = np.ones(num_rows)
     for factor in range(len(prior.factor_offsets) - 1):
-        if is_single(factors, factor):
+        first, last = prior.track_offsets[factor], prior.track_offsets[factor + 1]
+        if last - first == 1:
             continue
-        for row in range(factors.row_offsets[factor], factors.row_offsets[factor + 1]):
+        for row in range(first, last):
             presence[row] = 0.0
         for h in range(prior.factor_offsets[factor], prior.factor_offsets[factor + 1]):
             weight = math.exp(prior.hyp_log_weights[h])

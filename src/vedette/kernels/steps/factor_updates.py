@@ -8,9 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.kernels.association.assignment import ABSENT, Options
-from vedette.kernels.association.children import Children
+from vedette.kernels.association.children import Children, make_children
 from vedette.kernels.association.predicted import Rows
-from vedette.kernels.association.ranked import rank_children
+from vedette.kernels.association.ranked import Ranking, ranked
+from vedette.kernels.association.search import make_search
 from vedette.kernels.association.totals import ROUNDING, log_heaviest_left, log_weight_bound
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.arrays import filled_ints
@@ -18,8 +19,16 @@ from vedette.kernels.base.compile import borrowing, kernel
 from vedette.kernels.base.types import Floats, Glmb, Ints, Mixture
 from vedette.kernels.gaussian.distances import reduction_bound
 from vedette.kernels.gaussian.linalg import log_add, log_sum
-from vedette.kernels.gaussian.mixtures import MixtureCaps, copy_component, make_components, moment_match
+from vedette.kernels.gaussian.mixtures import (
+    MixtureCaps,
+    ReductionWork,
+    copy_component,
+    make_components,
+    make_reduction_work,
+    reduce_into,
+)
 from vedette.kernels.labelled.factor_store import FactorStore, append_part, append_single, next_component, with_room
+from vedette.kernels.labelled.renaming import with_known_names
 from vedette.kernels.labelled.splitting import Choices, choices_of, independent_parts
 from vedette.kernels.labelled.versions import merge_versions
 from vedette.kernels.steps.assembly import assemble
@@ -33,6 +42,10 @@ _NUM_SUMS = 8
 
 # A component of a label alone is dropped where it holds less of an existing target than this times the least share.
 _WORTH = 10.0
+
+# Of the labels that are dropped, those return to the undetected targets that exist with a tenth of the least existence
+# and more: what is below would be a component for every false measurement of the scans before.
+_LOG_RETURNED = math.log(10.0)
 
 # A posterior is condensed where the hypotheses behind this share of the most that a group may have weigh more than
 # that: the next scan has many times as many, and of those cut off most hold more targets than those kept. The L1 error
@@ -59,6 +72,7 @@ class Work(NamedTuple):
     columns: Ints  # (num_measurements,) -1 between groups
     claimed: Floats  # (num_measurements,) expected number of groups that take each
     sums: Floats  # (_NUM_SUMS,)
+    reducing: ReductionWork  # for as many components as `wide` has
     faint: Mixture  # one Gaussian of each label that is dropped, weighed by its existence
     num_faint: Ints  # (1,) how many there are
 
@@ -76,6 +90,7 @@ def make_work(rows: Rows, options: Options) -> Work:
         filled_ints(options.num_measurements, -1),
         np.zeros(options.num_measurements),
         np.zeros(_NUM_SUMS),
+        make_reduction_work(widest, dim),
         make_components(len(rows.log_absent), dim),
         np.zeros(1, np.int64),
     )
@@ -88,42 +103,45 @@ def found_faint(work: Work) -> Mixture:
     return Mixture(faint.log_weights[:num], faint.means[:num], faint.covs[:num])
 
 
-@kernel
+@borrowing
 def _append_mixture(
-    store: FactorStore, label: Ints, wide: Mixture, width: int, logit: float, reduction: Reduction, work: Work
-) -> FactorStore:
-    """Enter a label as a factor of its own, unless it is too improbable."""
+    store: FactorStore,
+    label: Ints,
+    wide: Mixture,
+    width: int,
+    logit: float,
+    reduction: Reduction,
+    reducing: ReductionWork,
+    work: Work,
+) -> None:
+    """Enter a label as a factor of its own, where is room, unless it is too improbable. reducing: to work in."""
     existence = 1.0 / (1.0 + math.exp(-logit))
+    start, caps = next_component(store), reduction.mixture
     if logit < reduction.min_existence_logit:
         work.sums[DROPPED] += existence
-        if existence > 0.0:
+        if logit > reduction.min_existence_logit - _LOG_RETURNED:
             k, faint = work.num_faint[0], work.faint
+            one = MixtureCaps(caps.log_min_weight, caps.merge_distance, 1)
+            reduce_into(wide, width, one, reducing, faint, k)
             faint.log_weights[k] = math.log(existence)
-            moment_match(wide.log_weights[:width], wide.means[:width], wide.covs[:width], faint.means[k], faint.covs[k])
             work.num_faint[0] += 1
-        return store
-    store = with_room(store, 1, width, 2, 1)
-    start = next_component(store)
-    caps = reduction.mixture
+        return
     # Of a label that hardly exists few components are worth their time.
     log_least = min(0.0, caps.log_min_weight + math.log(_WORTH / existence))
     caps = MixtureCaps(log_least, caps.merge_distance, caps.max_components)
-    end = append_reduced(wide, width, caps, store.components, start)
-    work.sums[REDUCED] += existence * reduction_bound(wide, width, store.components, start, end)
+    end = append_reduced(wide, width, caps, reducing, store.components, start)
+    work.sums[REDUCED] += existence * reduction_bound(wide, width, store.components, start, end, reducing)
     append_single(store, label[0], label[1], end, logit)
-    return store
 
 
-@kernel
-def update_alone(
-    row: int, rows: Rows, options: Options, reduction: Reduction, store: FactorStore, work: Work
-) -> FactorStore:
-    """A single track that contends with nobody: the update of its Bernoulli is exact."""
+@borrowing
+def update_alone(row: int, rows: Rows, options: Options, reduction: Reduction, store: FactorStore, work: Work) -> None:
+    """A single track that contends with nobody, entered where is room: the update of its Bernoulli is exact."""
     start, stop, marginals = options.offsets[row], options.offsets[row + 1], work.marginals
     log_total, absent, present = log_sum(options.log_weights[start:stop]), -math.inf, -math.inf
     work.sums[TOTAL] += log_total
     if log_total == -math.inf:
-        return store
+        return
     for option in range(start, stop):
         column = options.columns[option]
         marginals[option] = options.log_weights[option] - log_total
@@ -136,7 +154,7 @@ def update_alone(
             work.sums[TWICE] += work.claimed[column] * claim
             work.claimed[column] += claim
     width = write_mixture(row, rows, options, marginals, work.wide)
-    return _append_mixture(store, rows.labels[row], work.wide, width, present - absent, reduction, work)
+    _append_mixture(store, rows.labels[row], work.wide, width, present - absent, reduction, work.reducing, work)
 
 
 @borrowing
@@ -158,10 +176,17 @@ def _claim_jointly(group: Group, children: Children, kept: Ints, log_total: floa
 
 
 @kernel
-def update_group(group: Group, truncation: Truncation, work: Work) -> Glmb:
-    """The posterior of a group; of one in which no joint choice was found it is empty and the log total -inf."""
+def make_ranking() -> Ranking:
+    """What the groups of a scan are ranked in, one after the other."""
+    return Ranking(make_search(0), make_children(0, 0))
+
+
+@kernel
+def update_group(group: Group, truncation: Truncation, ranking: Ranking, work: Work) -> tuple[Glmb, Ranking]:
+    """The posterior of a group, empty with a log total of -inf where no joint choice was found; and its ranking."""
     found, sums = Associated(group.rows, group.options, group.parents, 0.0, 0), work.sums
-    children, cut = rank_children(group.options, group.parents, truncation.search)
+    ranking, cut = ranked(group.options, group.parents, truncation.search, ranking)
+    children = ranking.children
     log_next = log_heaviest_left(children, truncation.search, cut)
     log_bound = log_weight_bound(group.options, group.parents, children, log_next, group.log_bound)
     # A search that ran dry has left nothing out.
@@ -171,18 +196,18 @@ def update_group(group: Group, truncation: Truncation, work: Work) -> Glmb:
     sums[TOTAL] += log_total
     sums[CUT] += 1.0 if cut else 0.0
     if len(kept) == 0:
-        return posterior
+        return posterior, ranking
     _claim_jointly(group, children, kept, log_total, work)
     sums[KEPT] -= log_bound - log_total if log_bound - log_total > ROUNDING else 0.0
     sums[FULL] += 1.0 if len(kept) >= truncation.search.max_hypotheses else 0.0
-    return posterior
+    return posterior, ranking
 
 
 @kernel
 def _append_label(
     store: FactorStore, glmb: Glmb, choices: Choices, label: int, reduction: Reduction, work: Work
-) -> FactorStore:
-    """Enter the marginal of one label: the mixture of its versions."""
+) -> None:
+    """Enter the marginal of one label, where is room: the mixture of its versions."""
     tracks, absent = glmb.tracks, -math.inf
     log_versions = np.empty(len(tracks.labels))
     for track in range(len(log_versions)):
@@ -194,7 +219,7 @@ def _append_label(
         else:
             log_versions[track] = log_add(log_versions[track], glmb.hyp_log_weights[h])
     num, dim = len(tracks.log_weights), tracks.means.shape[1]
-    wide, width = Mixture(np.empty(num), np.empty((num, dim)), np.empty((num, dim, dim))), 0
+    wide, width, reducing = make_components(num, dim), 0, make_reduction_work(num, dim)
     for track in range(len(log_versions)):
         if log_versions[track] == -math.inf:
             continue
@@ -202,19 +227,25 @@ def _append_label(
             wide.log_weights[width] = log_versions[track] + tracks.log_weights[c]
             copy_component(tracks.means, tracks.covs, c, wide.means, wide.covs, width)
             width += 1
-    return _append_mixture(store, choices.labels[label], wide, width, log_sum(log_versions) - absent, reduction, work)
+    logit = log_sum(log_versions) - absent
+    _append_mixture(store, choices.labels[label], wide, width, logit, reduction, reducing, work)
 
 
 @kernel
-def _merged(glmb: Glmb, caps: MixtureCaps, max_error: float, most: int) -> tuple[Glmb, float]:
-    """The posterior with versions of labels made one, and a bound on its L1 change. most: hypotheses of a group."""
-    glmb, total = merge_versions(glmb, caps, max_error)
+def _merged(glmb: Glmb, caps: MixtureCaps, max_error: float, most: int) -> tuple[Glmb, Choices, float]:
+    """The posterior with names and versions of targets made one, its choices, and a bound on its L1 change.
+
+    most: hypotheses that a group may have.
+    """
+    glmb, choices, renaming_error = with_known_names(glmb, choices_of(glmb), max_error)
+    glmb, choices, total = merge_versions(glmb, choices, caps, max_error)
+    total += renaming_error
     apart = int(_KEPT_APART * most)
-    while 0.0 < max_error < _MOST_MERGED and np.exp(glmb.hyp_log_weights[apart:]).sum() > _MOST_BEHIND:
+    while 0.0 < max_error < _MOST_MERGED and choices.weights[apart:].sum() > _MOST_BEHIND:
         max_error *= _GROWTH
-        glmb, error = merge_versions(glmb, caps, max_error)
+        glmb, choices, error = merge_versions(glmb, choices, caps, max_error)
         total += error
-    return glmb, total
+    return glmb, choices, total
 
 
 @kernel
@@ -222,18 +253,20 @@ def append_parts(
     store: FactorStore, glmb: Glmb, factoring: Factoring, reduction: Reduction, most: int, work: Work
 ) -> FactorStore:
     """Split the posterior of a group and enter its parts. most: hypotheses that the group may have."""
-    glmb, merging_error = _merged(glmb, reduction.mixture, factoring.max_error, most)
-    choices = choices_of(glmb)
+    glmb, choices, merging_error = _merged(glmb, reduction.mixture, factoring.max_error, most)
     min_existence = 1.0 / (1.0 + math.exp(-reduction.min_existence_logit))
     part_of, error = independent_parts(choices, factoring.max_error, factoring.max_labels, min_existence)
     work.sums[SPLIT] += error
     work.sums[REDUCED] += merging_error
-    for part in range(len(part_of)):
+    num, num_labels, tracks = len(choices.weights), len(part_of), glmb.tracks
+    entries = (num + 1) * num_labels
+    store = with_room(store, num_labels, len(tracks.labels), len(tracks.log_weights), entries + num_labels, entries)
+    for part in range(num_labels):
         size = 0
         for k in range(len(part_of)):
             size += 1 if part_of[k] == part else 0
         if size == 1:
-            store = _append_label(store, glmb, choices, part, reduction, work)
+            _append_label(store, glmb, choices, part, reduction, work)
         elif size > 1:
-            store = append_part(store, glmb, choices, part_of, part)
+            append_part(store, glmb, choices, part_of, part)
     return store

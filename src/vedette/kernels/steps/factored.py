@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.kernels.association.contention import leave_to_others
+from vedette.kernels.association.contention import leave_to_others, log_unclaimed
 from vedette.kernels.association.first_detections import (
     Undetected,
     candidates_of,
@@ -29,7 +29,7 @@ from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import FactoredGlmb, Mixture, Motion, ScanInput, Sensor
 from vedette.kernels.gaussian.intensities import stacked_mixtures
 from vedette.kernels.gaussian.mixtures import require_gaussians
-from vedette.kernels.labelled.factor_store import make_store, stored
+from vedette.kernels.labelled.factor_store import has_room_for_single, make_store, stored, with_room
 from vedette.kernels.steps.factor_groups import (
     factors_of,
     gathered_group,
@@ -50,6 +50,7 @@ from vedette.kernels.steps.factor_updates import (
     Factoring,
     append_parts,
     found_faint,
+    make_ranking,
     make_work,
     update_alone,
     update_group,
@@ -94,16 +95,23 @@ def step_factored(
     log_levels = np.empty(len(scan.measurements))
     options, log_clutter, num_raised = weighed_options_at(rows, scan, sensor, truncation, log_levels)
     seen = seen_intensity(stacked_mixtures(undetected.intensity, undetected.local), scan, sensor)
-    new = candidates_of(seen, scan, sensor, log_levels, truncation.gate, reduction.min_existence_logit, undetected)
+    presence = presence_of_rows(prior, len(rows.log_absent) + len(scan.measurements))
+    unclaimed = np.zeros(len(scan.measurements))
+    if len(seen.log_absent) > 0:
+        unclaimed = log_unclaimed(options, rows.labels, presence)
+    least = reduction.min_existence_logit
+    new = candidates_of(seen, scan, sensor, log_levels, unclaimed, truncation.gate, least, undetected)
     if len(new.rows.log_absent) > 0:
         rows, options = joined_rows(rows, options, new.rows, new.options)
     factors = factors_of(prior, len(rows.log_absent) - len(prior.tracks.labels))
-    presence = presence_of_rows(factors, len(rows.log_absent))
     sizes = factors.num_labels.copy()
     leaders = linked_factors(options, factors.row_offsets, sizes, factoring.max_cut, factoring.max_together)
-    log_twice = leave_to_others(options, groups_of_rows(factors, leaders), presence, rows.offsets)
+    log_twice = leave_to_others(
+        options, groups_of_rows(factors, leaders), presence[: len(rows.log_absent)], rows.offsets
+    )
     offsets, members = group_members(leaders, len(leaders))
-    work, most_labels = make_work(rows, options), 0
+    work, ranking, most_labels = make_work(rows, options), make_ranking(), 0
+    widest = len(work.wide.log_weights)
     store = make_store(len(rows.log_absent), 2 * len(rows.log_weights), rows.means.shape[1])
     for leader in range(len(leaders)):
         together = members[offsets[leader] : offsets[leader + 1]]
@@ -111,11 +119,13 @@ def step_factored(
             continue
         most_labels = max(most_labels, sizes[leader])
         if len(together) == 1 and is_single(factors, leader):
-            store = update_alone(factors.row_offsets[leader], rows, options, reduction, store, work)
+            if not has_room_for_single(store, widest):
+                store = with_room(store, 1, 1, widest, 2, 1)
+            update_alone(factors.row_offsets[leader], rows, options, reduction, store, work)
             continue
         most = truncation.search.max_hypotheses
         group = gathered_group(factors, together, rows, options, most, work.place, work.columns)
-        posterior = update_group(group, truncation, work)
+        posterior, ranking = update_group(group, truncation, ranking, work)
         if len(posterior.hyp_log_weights) > 0:
             store = append_parts(store, posterior, factoring, reduction, most, work)
     sums, density = work.sums, stored(store)

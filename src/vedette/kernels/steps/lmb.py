@@ -25,10 +25,12 @@ from vedette.kernels.base.types import Floats, Ints, Lmb, Mixture, Motion, ScanI
 from vedette.kernels.gaussian.linalg import log_add, normalise_logs
 from vedette.kernels.gaussian.mixtures import (
     MixtureCaps,
+    ReductionWork,
     copy_component,
     descending_order,
     make_components,
-    reduce_mixture,
+    make_reduction_work,
+    reduce_into,
     require_gaussians,
 )
 from vedette.kernels.steps.assembly import write_updated
@@ -134,7 +136,7 @@ def _matched_tracks(kept: Ints, rows: Rows, options: Options, marginals: Floats)
     return Tracks(labels, offsets, log_weights, means, covs)
 
 
-@kernel
+@borrowing
 def write_mixture(row: int, rows: Rows, options: Options, marginals: Floats, wide: Mixture) -> int:
     """Write a row's components over all its options but absence, weighed by their log probabilities; their number."""
     width = 0
@@ -160,34 +162,28 @@ def _reduced_tracks(kept: Ints, rows: Rows, options: Options, marginals: Floats,
     dim = rows.means.shape[1]
     widest, total = _most_components(kept, rows, options)
     labels, offsets = np.empty((len(kept), 2), np.int64), np.zeros(len(kept) + 1, np.int64)
-    out, wide = make_components(total, dim), make_components(widest, dim)
+    out, wide, work = make_components(total, dim), make_components(widest, dim), make_reduction_work(widest, dim)
     filled = 0
     for i in range(len(kept)):
         row = kept[i]
         labels[i, 0], labels[i, 1] = rows.labels[row, 0], rows.labels[row, 1]
         width = write_mixture(row, rows, options, marginals, wide)
-        filled = append_reduced(wide, width, caps, out, filled)
+        filled = append_reduced(wide, width, caps, work, out, filled)
         offsets[i + 1] = filled
     return Tracks(labels, offsets, out.log_weights[:filled], out.means[:filled], out.covs[:filled])
 
 
-@kernel
-def append_reduced(wide: Mixture, width: int, caps: MixtureCaps, out: Mixture, filled: int) -> int:
+@borrowing
+def append_reduced(wide: Mixture, width: int, caps: MixtureCaps, work: ReductionWork, out: Mixture, filled: int) -> int:
     """Append the first `width` components, reduced and their weights normalised to one; returns the new end."""
     if width == 1 and wide.log_weights[0] > -math.inf:
         # Of one there is nothing to reduce: most births, which nothing was measured of.
         out.log_weights[filled] = 0.0
         copy_component(wide.means, wide.covs, 0, out.means, out.covs, filled)
         return filled + 1
-    few_weights, few_means, few_covs = reduce_mixture(
-        wide.log_weights[:width], wide.means[:width], wide.covs[:width], caps
-    )
-    normalise_logs(few_weights)
-    for c in range(len(few_weights)):
-        out.log_weights[filled] = few_weights[c]
-        copy_component(few_means, few_covs, c, out.means, out.covs, filled)
-        filled += 1
-    return filled
+    end = reduce_into(wide, width, caps, work, out, filled)
+    normalise_logs(out.log_weights[filled:end])
+    return end
 
 
 @kernel

@@ -12,7 +12,13 @@ from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Ints, Lmb, ScanInput, Sensor, Tracks
 from vedette.kernels.gaussian.linalg import log_add, log_sum
-from vedette.kernels.gaussian.mixtures import MixtureCaps, copy_component, make_components, require_gaussians
+from vedette.kernels.gaussian.mixtures import (
+    MixtureCaps,
+    copy_component,
+    make_components,
+    make_reduction_work,
+    require_gaussians,
+)
 from vedette.kernels.steps.lmb import LmbReport, Reduction, append_reduced, labels_to_keep
 from vedette.kernels.steps.multi_sensor_choices import Choices
 from vedette.kernels.steps.multi_sensor_combinations import Combinations, extend_combinations
@@ -84,7 +90,7 @@ def _reduced_tracks(
     dim = rows.means.shape[1]
     widest, total = _widths(chosen, rows, choices, sources)
     labels, offsets = np.empty((len(chosen), 2), np.int64), np.zeros(len(chosen) + 1, np.int64)
-    out, wide = make_components(total, dim), make_components(widest, dim)
+    out, wide, work = make_components(total, dim), make_components(widest, dim), make_reduction_work(widest, dim)
     filled = 0
     for i in range(len(chosen)):
         width = 0
@@ -97,7 +103,7 @@ def _reduced_tracks(
                     copy_component(rows.means, rows.covs, c, wide.means, wide.covs, width)
                     wide.log_weights[width] = weight
                     width += 1
-        filled = append_reduced(wide, width, caps, out, filled)
+        filled = append_reduced(wide, width, caps, work, out, filled)
         offsets[i + 1] = filled
     return Tracks(labels, offsets, out.log_weights[:filled], out.means[:filled], out.covs[:filled])
 

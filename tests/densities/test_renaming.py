@@ -1,0 +1,63 @@
+"""Labels that are only the improbable other name of a target."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from vedette.kernels.base.types import Glmb, Tracks
+from vedette.kernels.labelled.renaming import with_known_names
+from vedette.kernels.labelled.splitting import choices_of
+
+LABELS = np.array([[1, 0], [2, 0], [2, 1]])
+
+
+def glmb(hypotheses: dict[tuple[int, ...], float]) -> Glmb:
+    """Of three labels with one track each. hypotheses: weights of sets of tracks."""
+    tracks = Tracks(LABELS, np.arange(4), np.zeros(3), np.arange(12.0).reshape(3, 4), np.tile(np.eye(4), (3, 1, 1)))
+    sizes = [len(held) for held in hypotheses]
+    members = np.array([track for held in hypotheses for track in held], np.int64)
+    return Glmb(tracks, np.cumsum([0, *sizes]), members, np.log(list(hypotheses.values())))
+
+
+def listed(density: Glmb) -> dict[tuple[tuple[int, int, float], ...], float]:
+    """The weight of each set of labels, each with the first number of its track's mean."""
+    found = {}
+    for h, log_weight in enumerate(density.hyp_log_weights):
+        held = density.hyp_tracks[density.hyp_offsets[h] : density.hyp_offsets[h + 1]]
+        key = tuple((*map(int, density.tracks.labels[t]), float(density.tracks.means[t, 0])) for t in held)
+        found[key] = math.exp(log_weight)
+    return found
+
+
+def test_an_improbable_other_name_takes_the_known_one_and_keeps_its_track() -> None:
+    before = glmb({(0,): 0.992, (1,): 0.004, (): 0.004})
+    after, choices, error = with_known_names(before, choices_of(before), 0.01)
+    assert listed(after) == pytest.approx({((1, 0, 0.0),): 0.992, ((1, 0, 4.0),): 0.004, (): 0.004}, rel=1e-12)
+    assert choices.labels.tolist() == [[1, 0]]
+    assert error == pytest.approx(0.008, rel=1e-12)
+
+
+def test_another_target_keeps_its_name() -> None:
+    before = glmb({(0,): 0.992, (0, 1): 0.004, (): 0.004})
+    after, _, error = with_known_names(before, choices_of(before), 0.01)
+    assert error == 0.0
+    assert listed(after) == listed(before)
+
+
+def test_the_least_probable_names_go_first_and_no_more_than_the_error_allows() -> None:
+    before = glmb({(0,): 0.99, (1,): 0.006, (2,): 0.004})
+    after, choices, error = with_known_names(before, choices_of(before), 0.01)
+    assert error == pytest.approx(0.008, rel=1e-12)
+    assert choices.labels.tolist() == [[1, 0], [2, 0]]
+    assert listed(after)[((1, 0, 8.0),)] == pytest.approx(0.004, rel=1e-12)
+
+
+def test_hypotheses_that_hold_both_names_are_left_out() -> None:
+    before = glmb({(0,): 0.99, (1,): 0.0038, (0, 1): 0.0002, (): 0.006})
+    after, _, _ = with_known_names(before, choices_of(before), 0.01)
+    assert listed(after) == pytest.approx(
+        {((1, 0, 0.0),): 0.99 / 0.9998, ((1, 0, 4.0),): 0.0038 / 0.9998, (): 0.006 / 0.9998}, rel=1e-12
+    )
