@@ -12,7 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vedette.errors import InputError
-from vedette.live import Exchange, LineSplitter, TcpServer, serving
+from vedette.live import Exchange, LineSplitter, TcpServer, remarks, serving
+
+
+@pytest.fixture(autouse=True)
+def soon(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(serving, "WRONG_SECONDS", 0.001)
 
 
 @given(st.lists(st.binary(max_size=12).map(lambda b: b.replace(b"\n", b"x")), max_size=8), st.data())
@@ -49,12 +54,14 @@ def take(line: bytes) -> tuple[dict[str, Any], ...]:
     return ({"error": "bad"},) if line == b"bad" else ({"line": line.decode()},)
 
 
-def served(scene: Callable[[Callable[[], Awaitable[Client]]], Awaitable[None]], token: str | None = None) -> list[str]:
+def served(
+    scene: Callable[[Callable[[], Awaitable[Client]]], Awaitable[None]], token: str | None = None, answers: Any = take
+) -> list[str]:
     """What was told in a scene of clients of one server."""
     told, came = list[str](), list[Client]()
 
     async def play() -> None:
-        server = await TcpServer(Exchange(take, token, told.append)).listen("127.0.0.1", 0)
+        server = await TcpServer(Exchange(answers, token, told.append)).listen("127.0.0.1", 0)
 
         async def client() -> Client:
             came.append(Client(*await asyncio.open_connection(*server.sockets[0].getsockname()[:2])))
@@ -149,21 +156,121 @@ def test_a_token_that_can_be_guessed_is_refused(token: str) -> None:
         serving.check_address("127.0.0.1", token)
 
 
-def test_silent_clients_that_have_not_entered_have_a_limit_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_of_too_many_that_have_not_entered_the_first_makes_way(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(serving, "MOST_WAITING", 2)
 
     async def scene(client: Callable[[], Awaitable[Client]]) -> None:
+        silent = [await client() for _ in range(2)]
         known = await client()
         await known.send(b'{"token": "secret"}\nword\n')
         assert await known.answer() == {"line": "word"}
-        for _ in range(2):
-            await client()
-        fault = "expected at most 2 clients that have not entered; got one more"
-        assert await (await client()).answer() == {"error": fault}
+        silent += [await client() for _ in range(3)]
+        for each in silent[:3]:
+            assert not await each.reader.read()
         await known.send(b"again\n")
         assert await known.answer() == {"line": "again"}
 
-    served(scene, "secret")
+    assert served(scene, "secret")[0].endswith("had not entered, and made way")
+
+
+def test_the_address_with_most_that_have_not_entered_makes_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(serving, "MOST_WAITING", 2)
+    exchange = Exchange(take, "secret", str)
+    honest, *others = (Counted(f"{address}:{port}") for address, port in (("a", 1), ("b", 2), ("b", 3), ("b", 4)))
+    for each in (honest, *others):
+        exchange.open(each)
+    assert [each.gone for each in (honest, *others)] == [False, True, True, False]
+
+
+class Counted:
+    """A client that is not there: what it was sent, and whether it was put out."""
+
+    def __init__(self, name: str) -> None:
+        self.name, self.address = name, name.rpartition(":")[0]
+        self.sent, self.gone = list[bytes](), False
+
+    def send(self, text: bytes) -> None:
+        self.sent.append(text)
+
+    def unread(self) -> int:
+        return 0
+
+    def is_gone(self) -> bool:
+        return self.gone
+
+    def abort(self) -> None:
+        self.gone = True
+
+
+def test_one_that_is_gone_is_sent_nothing() -> None:
+    """To write to it is a line of asyncio's log each time."""
+
+    async def play() -> list[int]:
+        exchange = Exchange(take, None, str)
+        clients = Counted("a:1"), Counted("a:2")
+        for each in clients:
+            exchange.enter(each)
+        clients[0].abort()
+        await exchange.answer(b"word", clients[0])
+        await exchange.answer(b"bad", clients[0])
+        return [len(each.sent) for each in clients]
+
+    assert asyncio.run(play()) == [0, 1]
+
+
+def test_the_end_of_a_server_is_no_traceback_while_clients_close() -> None:
+    faults = list[dict[str, Any]]()
+
+    async def play() -> None:
+        asyncio.get_running_loop().set_exception_handler(lambda loop, context: faults.append(context))
+        server = await TcpServer(Exchange(take, None, str)).listen("127.0.0.1", 0)
+        deaf = Client(*await asyncio.open_connection(*server.sockets[0].getsockname()[:2]))
+        deaf.reader._transport.pause_reading()  # type: ignore[attr-defined]
+        for _ in range(200):
+            await deaf.send(b"w" * 50_000 + b"\n")
+        deaf.writer.write_eof()
+        while asyncio.all_tasks() - {asyncio.current_task()} and len(faults) < 1:
+            await asyncio.sleep(0.01)
+            for task in asyncio.all_tasks() - {asyncio.current_task()}:
+                task.cancel()
+        server.close()
+        deaf.writer.transport.abort()
+        await asyncio.sleep(0.0)
+
+    asyncio.run(play())
+    assert faults == []
+
+
+def test_what_cannot_be_taken_at_all_is_told() -> None:
+    def fail(line: bytes) -> tuple[dict[str, Any], ...]:
+        raise OSError("no space left")
+
+    async def scene(client: Callable[[], Awaitable[Client]]) -> None:
+        one = await client()
+        await one.send(b"word\n")
+        assert await one.answer() is None
+
+    (text,) = served(scene, answers=fail)
+    assert "was put out: OSError: no space left" in text
+
+
+def test_of_many_remarks_of_a_kind_one_a_minute_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    told, now = list[str](), [100.0]
+    monkeypatch.setattr(remarks.time, "monotonic", lambda: now[0])
+    remark = remarks.Remarks(told.append)
+    for port in range(1000):
+        remark(Counted(f"a:{port}"), "had no token")
+    remark(Counted("a:1"), "was put out", ": a full disk")
+    remark(Counted("b:1"), "had no token")
+    now[0] += 60.0
+    remark(Counted("a:7"), "had no token")
+    assert told == [
+        "a:0 had no token", "a:1 was put out: a full disk", "b:1 had no token",
+        "a:7 had no token (and 999 more such lines were left out)",
+    ]  # fmt: skip
+    for number in range(1000):
+        remark(Counted(f"{number}:1"), "had no token")
+    assert len(told) < 30
 
 
 @pytest.mark.parametrize("limit", ["MOST_CLIENTS", "MOST_OF_ADDRESS"])
@@ -185,7 +292,7 @@ def test_the_client_that_is_silent_for_longest_makes_way(limit: str, monkeypatch
 
 
 def test_who_guesses_waits_and_is_told_of_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    waited = list[float]()
+    waited, wrong = list[float](), serving.WRONG_SECONDS
 
     async def scene(client: Callable[[], Awaitable[Client]]) -> None:
         monkeypatch.setattr(serving.asyncio, "sleep", slept)
@@ -202,7 +309,7 @@ def test_who_guesses_waits_and_is_told_of_once(monkeypatch: pytest.MonkeyPatch) 
         await rest(0.0)
 
     assert ["had no token" in text for text in served(scene, "secret")] == [True]
-    assert waited.count(serving.WRONG_SECONDS) == 3
+    assert waited.count(wrong) == 3
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from websockets.http11 import Request, Response
 
 from vedette.live.lines import LineSplitter
 from vedette.live.messages import MOST_BYTES
-from vedette.live.serving import Exchange, is_loopback, taken
+from vedette.live.serving import BACKLOG, ENTER_WITHIN, Exchange, is_loopback, name_of, taken
 from vedette.simulation.loop import cause_of
 
 FRAMES_PER_SECOND = 10.0
@@ -48,12 +48,30 @@ class Screen(Protocol):
 
 class _WebClient:
     def __init__(self, socket: ServerConnection) -> None:
-        self._socket, self.name = socket, _name(socket)
-        self.address = self.name.rpartition(":")[0]
+        self._socket = socket
+        self.name, self.address = name_of(socket.transport)
         self.unread, self.abort = socket.transport.get_write_buffer_size, socket.transport.abort
+        self.is_gone, self.is_page = socket.transport.is_closing, False
 
     def send(self, text: bytes) -> None:
-        broadcast([self._socket], text, text=True)
+        if not self.is_page:
+            broadcast([self._socket], text, text=True)
+
+
+class _Socket(ServerConnection):
+    """A connection that the exchange counts from its start, before its handshake."""
+
+    exchange: Exchange
+    client: _WebClient
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        super().connection_made(transport)
+        self.client = _WebClient(self)
+        self.exchange.open(self.client)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        super().connection_lost(exc)
+        self.exchange.leave(self.client)
 
 
 class WebServer:
@@ -75,12 +93,19 @@ class WebServer:
 
     async def listen(self, port: int) -> Server:
         """Raises `InputError` for an address that cannot be had."""
+
+        class Counted(_Socket):
+            exchange = self._exchange
+
         try:
             server = await serve(
                 self._meet,
                 self._host,
                 port,
                 process_request=self._refused_or_page,
+                create_connection=Counted,
+                backlog=BACKLOG,
+                open_timeout=ENTER_WITHIN,
                 max_size=MOST_BYTES,
                 max_queue=4,
                 compression=None,
@@ -93,12 +118,13 @@ class WebServer:
 
     async def _refused_or_page(self, socket: ServerConnection, request: Request) -> Response | None:
         """What is answered in place of opening a socket."""
+        assert isinstance(socket, _Socket)
         address = urlsplit(request.path)
         if (fault := self._foreign(request)) is not None:
-            self._exchange.tell(f"{_name(socket)} was refused: {fault}")
+            self._exchange.remark(socket.client, "was refused", f": {fault}")
             return socket.respond(HTTPStatus.FORBIDDEN, f"{fault}\n")
         if not self._exchange.is_token(_token(request, address.query)):
-            await self._exchange.refuse_token(_name(socket))
+            await self._exchange.refuse_token(socket.client)
             return socket.respond(HTTPStatus.UNAUTHORIZED, "expected ?token=... in the address; got none, or another\n")
         if address.path not in ("/", "/page"):
             return socket.respond(HTTPStatus.NOT_FOUND, "expected /; got another address\n")
@@ -121,27 +147,22 @@ class WebServer:
         return None if page in (None, host) else f"expected no page but the one from here; got one of {origin!r}"
 
     async def _meet(self, socket: ServerConnection) -> None:
+        assert isinstance(socket, _Socket)
         assert socket.request is not None
-        client, is_page = _WebClient(socket), urlsplit(socket.request.path).path == "/page"
-        entered = False
+        client, exchange = socket.client, self._exchange
+        client.is_page = urlsplit(socket.request.path).path == "/page"
         try:
-            if fault := self._exchange.open(client.address):
+            if fault := exchange.enter(client, is_page=client.is_page):
                 await socket.close(1013, fault)
-                return
-            entered = True
-            self._exchange.let_in()
-            if is_page:
+            elif client.is_page:
                 await self._show(socket)
             else:
-                self._exchange.enter(client)
                 await self._serve(socket, client)
         except ConnectionClosed as error:
             if error.sent is not None and error.sent.code == 1009:
-                self._exchange.tell(f"{client.name} sent a message of more than {MOST_BYTES} bytes, and was put out")
+                exchange.remark(client, f"sent a message of more than {MOST_BYTES} bytes, and was put out")
         except Exception as error:  # such as a record that cannot be written
-            self._exchange.tell(f"{client.name} was put out: {cause_of(error)}")
-        finally:
-            self._exchange.leave(client, entered=entered)
+            exchange.remark(client, "was put out", f": {cause_of(error)}")
 
     async def _serve(self, socket: ServerConnection, client: _WebClient) -> None:
         async for message in socket:
@@ -185,10 +206,6 @@ class WebServer:
                 self._num_drawn, self._num_lines = self._num_drawn + 1, self._exchange.num_taken
                 self._drawn.notify_all()
             await asyncio.sleep(1.0 / FRAMES_PER_SECOND)
-
-
-def _name(socket: ServerConnection) -> str:
-    return "{}:{}".format(*socket.remote_address[:2])
 
 
 def _token(request: Request, query: str) -> str | None:
