@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from test_processes import is_there
 from vedette.campaigns import CampaignSpec, open_results, resolve, run_campaign
 from vedette.cli.running import Approval
 from vedette.errors import InputError
@@ -24,7 +25,7 @@ from vedette.scenarios.overrides import with_fields
 from vedette.simulation.loop import RunStopped
 from vedette.simulation.records import RunRecord
 from vedette.tracking.program import UNKNOWN_VARIANCE
-from waiting import PATIENCE
+from waiting import PATIENCE, wait_until
 
 PAGE = (Path(__file__).resolve().parents[1] / "docs/benchmark.md").read_text("utf-8")
 SHOWN = dict(re.findall(r'^```\w+ title="([^"]+)"\n(.*?)^```$', PAGE, re.DOTALL | re.MULTILINE))
@@ -295,3 +296,27 @@ def test_what_a_program_started_ends_with_it_though_it_has_ended(tmp_path: Path)
     program._end()
     program._listener.join(PATIENCE)
     assert not program._listener.is_alive()
+
+
+PARENT = """
+import sys
+from pathlib import Path
+from vedette.programs import Program
+
+program = Program([sys.executable, "-c", "import time; time.sleep(3600)"], Path())
+print(program._child.pid, flush=True)
+sys.stdin.read()
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="there are no groups of processes")
+def test_a_program_that_reads_nothing_ends_with_a_parent_that_is_killed() -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", PARENT], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as parent:
+        assert parent.stdout is not None
+        program = int(parent.stdout.readline())
+        assert is_there(program)
+        parent.kill()
+        parent.wait(timeout=PATIENCE)
+    wait_until(lambda: not is_there(program), "the end of the program")

@@ -28,6 +28,9 @@ _FAREWELL_SECONDS = 1.0  # that a program has to end once its input has ended
 # As many runs as there are processors share the work already.
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "JULIA_NUM_THREADS")
 
+# Waits for a line, and kills a group of processes where its input ends without one: whoever held it was killed.
+_GUARD = ("/bin/sh", "-c", 'read line || kill -s KILL -- "-$0"')
+
 _Questions: TypeAlias = "SimpleQueue[bytes | None]"
 
 
@@ -56,12 +59,12 @@ class Program:
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or error
             raise InputError(f"command: expected a program that can be started; got {self.name}: {reason}") from None
-        self._child = child
+        self._child, self._guard = child, _guard_of(child)
         Thread(target=_talk, args=(child, self._questions, self._answers), daemon=True).start()
         assert child.stderr is not None
         self._listener = Thread(target=_listen, args=(child.stderr, self._said), daemon=True)
         self._listener.start()
-        self._end = weakref.finalize(self, _end, child, self._questions)
+        self._end = weakref.finalize(self, _end, child, self._guard, self._questions)
 
     def ask(self, question: Mapping[str, Any], seconds: float) -> dict[str, Any]:
         """The answer to a question. One that does not come in time, or is no JSON object, ends the program.
@@ -90,7 +93,7 @@ class Program:
         """End the program for its last answer, and say why. Raises `VedetteError`."""
         self._end.detach()
         self._questions.put(None)
-        _kill(self._child)
+        _kill(self._child, self._guard)
         self._listener.join(_FAREWELL_SECONDS)
         words = printable(self._said.decode(errors="replace").strip()[-_LAST_WORDS:])
         said = f"; it said last: {words}" if words else ""
@@ -144,17 +147,29 @@ def _listen(stream: IO[bytes], said: bytearray) -> None:
             del said[:-_LAST_WORDS]
 
 
-def _end(child: subprocess.Popen[bytes], questions: _Questions) -> None:
+def _guard_of(child: subprocess.Popen[bytes]) -> subprocess.Popen[bytes] | None:
+    """What kills a program, and what it has started, when this process is killed and can no longer do so."""
+    if not hasattr(os, "killpg"):
+        return None
+    nothing = subprocess.DEVNULL
+    return subprocess.Popen(
+        [*_GUARD, str(child.pid)], stdin=subprocess.PIPE, stdout=nothing, stderr=nothing, start_new_session=True
+    )
+
+
+def _end(child: subprocess.Popen[bytes], guard: subprocess.Popen[bytes] | None, questions: _Questions) -> None:
     """Say by the end of its input that nothing more will be asked; kill what does not end by itself."""
     questions.put(None)
     with suppress(subprocess.TimeoutExpired):
         child.wait(_FAREWELL_SECONDS)
-    _kill(child)
+    _kill(child, guard)
 
 
-def _kill(child: subprocess.Popen[bytes]) -> None:
+def _kill(child: subprocess.Popen[bytes], guard: subprocess.Popen[bytes] | None) -> None:
     """End it, where it has not ended, and what it has started, in any case."""
-    if hasattr(os, "killpg"):
+    if guard is not None:
+        with suppress(OSError):
+            guard.communicate(b"\n")
         with suppress(ProcessLookupError, PermissionError):
             os.killpg(child.pid, signal.SIGKILL)
     if child.poll() is None:
