@@ -168,6 +168,14 @@ class _Cache(FunctionCache):  # type: ignore[misc]
         source = Path(function.__code__.co_filename).resolve()
         self._cache_file = _EntryFile(places, self._impl.filename_base, stamp, source)
 
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        """As Numba's, without the bytecode of this package's functions: their sources are in the stamp.
+
+        Python's bytecode is another one without docstrings (`PYTHONOPTIMIZE=2`), the compiled code is the same.
+        """
+        signature, target, (code, closure) = super()._index_key(sig, codegen)
+        return signature, target, ("" if isinstance(self._impl.locator, _PackageLocator) else code, closure)
+
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """As Numba's, but all of its own functions are loaded only where one is compiled: half a second."""
         rtsys.initialize(target_context)
