@@ -22,12 +22,12 @@ def glmb(hypotheses: dict[tuple[int, ...], float]) -> Glmb:
     return Glmb(tracks, np.cumsum([0, *sizes]), members, np.log(list(hypotheses.values())))
 
 
-def listed(density: Glmb) -> dict[tuple[tuple[int, int, float], ...], float]:
+def listed(density: Glmb) -> dict[tuple[tuple[float, ...], ...], float]:
     """The weight of each set of labels, each with the first number of its track's mean."""
-    found = {}
+    found: dict[tuple[tuple[float, ...], ...], float] = {}
     for h, log_weight in enumerate(density.hyp_log_weights):
         held = density.hyp_tracks[density.hyp_offsets[h] : density.hyp_offsets[h + 1]]
-        key = tuple((*map(int, density.tracks.labels[t]), float(density.tracks.means[t, 0])) for t in held)
+        key = tuple((*map(float, density.tracks.labels[t]), float(density.tracks.means[t, 0])) for t in held)
         found[key] = math.exp(log_weight)
     return found
 
