@@ -86,6 +86,10 @@ class TimedFilter:
     def sensor(self) -> SensorModel:
         return self.inner.sensor
 
+    @property
+    def starts_tracks(self) -> bool:
+        return getattr(self.inner, "starts_tracks", False)
+
     def initial(self) -> Any:
         return self.inner.initial()
 

@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from vedette import models
-from vedette.densities import cardinality_distribution, existence_probabilities
+from vedette.densities import LMB, cardinality_distribution, existence_probabilities
 from vedette.errors import InputError
 from vedette.filters import FactoredGlmbFilter, Limits, SequentialFactoredFilter
 
@@ -190,6 +190,17 @@ def test_a_first_detection_that_does_not_bend_beside_an_intensity_that_does() ->
     [label], [existence] = existence_probabilities(belief)
     assert label.tolist() == [1, 2]
     assert existence > 0.9
+
+
+def test_births_that_are_given_are_instead_of_those_anywhere() -> None:
+    """Else a filter inside one of a user's, whose tracker gives births from measurements, would count them twice."""
+    measured = models.MeasurementBirth(2.0, 0.03, STD, REGION)
+    birth = models.BirthModel(np.empty(0), np.empty((0, 4)), np.empty((0, 4, 4)), from_measurements=measured)
+    tracker = FactoredGlmbFilter(targets(birth), sensor())
+    belief, _ = tracker.step(tracker.initial(), [[0.0, 0.0]], POSE, 1.0, 1, rng=RNG, births=LMB.empty(4))
+    assert number(belief) == 0.0
+    belief, _ = tracker.step(tracker.initial(), [[0.0, 0.0]], POSE, 1.0, 1, rng=RNG)
+    assert number(belief) > 0.2
 
 
 def test_labels_of_steps_in_the_past_are_refused() -> None:

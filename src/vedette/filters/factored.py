@@ -14,7 +14,6 @@ from vedette.densities.checks import offsets_of
 from vedette.densities.label_sets import take_factors
 from vedette.errors import InputError, NumericalError
 from vedette.filters.base import LabelledFilter, OfKind, SensorStep, blind_sensor
-from vedette.filters.inputs import nobody
 from vedette.filters.limits import Limits
 from vedette.filters.multi_sensor import InTurn, MultiSensorFilter
 from vedette.filters.protocols import FilterInfo
@@ -83,9 +82,8 @@ class _OfFactors(OfKind[FactoredGLMB]):
             return _Before(prior.to_kernel(), None)
         undetected, error = self._none() if prior.undetected is None else prior.undetected, 0.0
         if dt > 0.0:
-            born = nobody(self.targets.state_dim)
-            if births is None:
-                born = split_births(OfKind._births(self, dt, step, None, None))[1]
+            # Births that a caller gives are instead of the model's, anywhere as at sites.
+            born = split_births(OfKind._births(self, dt, step, None, None))[1] if births is None else None
             undetected, error = predicted_undetected(undetected, self.targets, born, dt, self.limits)
         if step is not None:
             undetected = named_at(undetected, step, self.targets.birth.num_sites)

@@ -66,30 +66,31 @@ def split_births(born: Lmb) -> tuple[Lmb, Lmb]:
 
 
 def predicted_undetected(
-    before: UndetectedTargets, targets: TargetModel, births: Lmb, dt: float, limits: Limits
+    before: UndetectedTargets, targets: TargetModel, births: Lmb | None, dt: float, limits: Limits
 ) -> tuple[UndetectedTargets, float]:
     """The undetected targets `dt` seconds later, and the L1 error of taking births at sites as Poisson.
 
     Args:
         before: at the time of the last scan.
         targets: how they move, live on, and appear anywhere.
-        births: at sites, which have appeared since.
+        births: at sites, which have appeared since; None: nobody has, anywhere.
         dt: s, above 0.
         limits: of which `max_intensity_components` counts.
     """
     birth, error = targets.birth, 0.0
     motion = kernel_motion(targets.motion, targets.survival)
     intensity = predict_intensity_by(before.intensity.to_kernel(), motion, dt)
-    if len(births.existence_logit):
+    if births is not None and len(births.existence_logit):
         existence = expit(births.existence_logit)
         intensity = stacked_mixtures(intensity, _intensity_of(births))
         error = float((2.0 * existence * -np.expm1(-existence)).sum())
     intensity, _ = condensed(intensity, max(limits.max_intensity_components, _COMPONENTS_A_SITE * birth.num_sites))
     cells, places = before.cells, appearing(birth)
-    if places is not None and birth.from_measurements is not None:
+    if places is not None and birth.from_measurements is not None and not (births is None and cells is None):
         known = np.zeros(places.model.grid.num_cells) if cells is None else cells.expected
         survival = targets.survival.prob(places.states[:, 0], dt)
-        share = birth.from_measurements.expected * (1.0 if birth.period is None else dt / birth.period) / len(known)
+        expected = 0.0 if births is None else birth.from_measurements.expected
+        share = expected * (1.0 if birth.period is None else dt / birth.period) / len(known)
         cells = UndetectedIntensity(places.model.grid, places.model.predict(known, dt, survival) + share)
     return UndetectedTargets(Poisson.from_kernel(intensity), before.next_label, cells), error
 
