@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from densities.examples import plain_moments, random_mixture
-from vedette.kernels.gaussian.mixtures import MixtureCaps, descending_order, moment_match, reduce_mixture
+from vedette.kernels.gaussian.mixtures import descending_order, moment_match
+from vedette.kernels.gaussian.reduction import MixtureCaps, reduce_mixture
 
 pytestmark = pytest.mark.lanes
 

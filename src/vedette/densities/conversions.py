@@ -18,7 +18,7 @@ from vedette.densities.tracks import TrackTable, reduced_tracks, single_gaussian
 from vedette.errors import InputError
 from vedette.kernels.association.names import settled_names
 from vedette.kernels.base.types import Lmb
-from vedette.kernels.gaussian.mixtures import MixtureCaps
+from vedette.kernels.gaussian.reduction import MixtureCaps
 from vedette.kernels.labelled import conversions as kernels
 from vedette.probabilities import log_expit
 

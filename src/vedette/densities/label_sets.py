@@ -16,7 +16,7 @@ from vedette.densities.glmb import GLMB
 from vedette.densities.labelled import LMB, Labelled
 from vedette.densities.tracks import take_tracks
 from vedette.kernels.base.types import Bools, Ints
-from vedette.kernels.gaussian.mixtures import MixtureCaps
+from vedette.kernels.gaussian.reduction import MixtureCaps
 from vedette.kernels.labelled.conversions import glmb_to_lmb
 from vedette.kernels.labelled.labels import group_by_label_set
 

@@ -15,8 +15,9 @@ from vedette.densities.containers import Container, for_kernel, kernel_arrays, u
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats, Ints
-from vedette.kernels.gaussian.mixtures import MixtureCaps, heaviest_of_runs
+from vedette.kernels.gaussian.mixtures import heaviest_of_runs
 from vedette.kernels.gaussian.pooling import pooled_tracks
+from vedette.kernels.gaussian.reduction import MixtureCaps
 from vedette.models.arguments import no_gaussians
 from vedette.text import counted
 

@@ -14,7 +14,7 @@ from vedette.densities.label_sets import without_labels
 from vedette.kernels.association.search import SearchCaps
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.types import Bools, Ints
-from vedette.kernels.gaussian.mixtures import MixtureCaps
+from vedette.kernels.gaussian.reduction import MixtureCaps
 from vedette.kernels.steps.lmb import Reduction
 from vedette.models.fields import (
     Chance,

@@ -33,8 +33,8 @@ from vedette.fusion.powers import (
 )
 from vedette.fusion.views import AlignedLmbs, Views, align_lmbs, require_views, sum_over_sensors, weights_by_view
 from vedette.kernels.base.types import Bools, Floats, Ints, Lmb
-from vedette.kernels.gaussian.mixtures import MixtureCaps
 from vedette.kernels.gaussian.pooling import pooled_tracks
+from vedette.kernels.gaussian.reduction import MixtureCaps
 from vedette.models.arguments import chance, flag
 from vedette.probabilities import expit, log_expit, logit
 

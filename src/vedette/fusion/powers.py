@@ -12,7 +12,7 @@ from vedette.densities import TrackTable
 from vedette.densities.tracks import reduced_tracks
 from vedette.errors import InputError, NumericalError
 from vedette.kernels.base.types import Floats, Ints, Tracks
-from vedette.kernels.gaussian.mixtures import MixtureCaps
+from vedette.kernels.gaussian.reduction import MixtureCaps
 from vedette.kernels.labelled.gci import fuse_tracks
 from vedette.models.arguments import instance, one_of, real
 from vedette.models.fields import Count, NonNegative, check_fields

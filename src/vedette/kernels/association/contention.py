@@ -171,9 +171,9 @@ def leave_to_others(options: Options, group_of: Ints, presence: Floats, componen
 
 @kernel
 def log_unclaimed(options: Options, labels: Ints, presence: Floats) -> Floats:
-    """(num_measurements,) log probability that no track takes each measurement, if labels took them independently.
+    """(num_measurements,) log probability that no track takes each measurement, with labels independent of each other.
 
-    labels: (num_rows, 2) of the rows; versions of a label follow each other. presence: as of `leave_to_others`.
+    labels: (num_rows, 2) of the rows; versions of a label are adjacent. presence: see `leave_to_others`.
     """
     claims, unclaimed = np.zeros(options.num_measurements), np.zeros(options.num_measurements)
     first, num_rows = 0, len(labels)

@@ -31,8 +31,8 @@ from vedette.kernels.gaussian.relinearisation import make_pair_work
 from vedette.kernels.gaussian.scratch import make_scratch
 
 _LEAST_SHARE = math.log(1e-5)  # of a candidate's density, below which a component of the intensity is not in it
-# Where tracks leave less than this of a measurement, a candidate must be so many times likelier than elsewhere: it
-# would stay for good as the unlikely other name of a target that is tracked already.
+# A candidate at a measurement that is unclaimed with less than this probability needs ten times the usual odds:
+# else it stays for good as an improbable second label of a tracked target.
 _LOG_CLAIMED, _LOG_WORTH = math.log(0.05), math.log(10.0)
 
 
@@ -129,7 +129,7 @@ class _Chosen(NamedTuple):
 
 @kernel
 def _chosen(pairs: _Pairs, unclaimed: Floats, least_logit: float) -> tuple[_Chosen, float, float]:
-    """The candidates, and `log_left_out` and `left_out` of `Candidates`. unclaimed: as of `log_unclaimed`."""
+    """The candidates, and `log_left_out` and `left_out` of `Candidates`. unclaimed: see `log_unclaimed`."""
     num_measurements = len(unclaimed)
     offsets, members = group_members(pairs.measurements, num_measurements)
     log_odds, kept = np.full(num_measurements, -math.inf), np.empty(num_measurements, np.int64)
@@ -167,10 +167,10 @@ def candidates_of(
         scan: whose measurements are asked about.
         sensor: that took it.
         log_clutter: (num_measurements,) log clutter intensity at each measurement.
-        unclaimed: (num_measurements,) log probability that no track takes each, as of `log_unclaimed`. Of a target with
-            one track that claims the measurement, the candidate then exists with the odds rho / kappa times this.
+        unclaimed: (num_measurements,) log probability that no track takes each, see `log_unclaimed`. The candidate's
+            odds are rho / kappa times it, exactly if one track alone claims the measurement.
         gate: squared Mahalanobis distance beyond which a component does not explain a measurement.
-        least_logit: log odds, as far as they are unclaimed, below which a candidate is left out.
+        least_logit: log of the least odds of a candidate.
         label: by which candidates are named.
     """
     sight = Sight(sensor, scan.pose, make_pair_work(seen.means.shape[1], len(sensor.angular)))

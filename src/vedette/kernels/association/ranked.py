@@ -47,7 +47,7 @@ _MOST_CHILDREN = 2048
 
 
 class Ranking(NamedTuple):
-    """What a ranking works in, and what it has found."""
+    """Work arrays of a ranking and the children that it found."""
 
     search: Search
     children: Children
@@ -206,7 +206,7 @@ def rank_children(options: Options, parents: Parents, caps: SearchCaps) -> tuple
 
 @kernel
 def ranked(options: Options, parents: Parents, caps: SearchCaps, ranking: Ranking) -> tuple[Ranking, bool]:
-    """As `rank_children`, in the arrays of an earlier ranking, which are grown where they must be."""
+    """`rank_children` in the arrays of an earlier ranking, which grow if needed."""
     search, children = ranking.search, ranking.children
     while not start_search(options, parents, search, children):
         search = grown_search(search)

@@ -11,7 +11,7 @@ from vedette.kernels.base.arrays import grown_ints
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, Mixture
 from vedette.kernels.gaussian.linalg import cholesky, log_det_from_factor, log_sum, solve_lower
-from vedette.kernels.gaussian.mixtures import ReductionWork
+from vedette.kernels.gaussian.reduction import ReductionWork
 
 _SLACK = 1.0 + 1e-9  # for what rounding does to a distance
 

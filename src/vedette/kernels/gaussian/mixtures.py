@@ -1,26 +1,16 @@
-"""Gaussian mixtures: moment matching, and reduction by pruning, merging and capping."""
+"""Gaussian mixtures: their moments, the order of their weights, and whether their covariances are valid."""
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from vedette.errors import NumericalError
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, Mixture
-from vedette.kernels.gaussian.linalg import cholesky, log_sum, solve_lower
 
 _RUN = 16  # values that are sorted by insertion before runs are merged
-
-
-class MixtureCaps(NamedTuple):
-    """How a mixture is kept small."""
-
-    log_min_weight: float  # components below this, relative to the mixture's total weight, are dropped
-    merge_distance: float  # Mahalanobis distance within which components are merged; 0 merges none
-    max_components: int  # kept; 1 is one Gaussian of the moments of all components, the light ones too
 
 
 @kernel
@@ -166,11 +156,11 @@ def moment_match(log_weights: Floats, means: Floats, covs: Floats, out_mean: Flo
     covs: (num, state_dim, state_dim). out_mean: (state_dim,). out_cov: (state_dim, state_dim), symmetric.
     """
     count = len(log_weights)
-    _match_all(log_weights, means, covs, count, np.empty(count, np.int64), np.empty(count), out_mean, out_cov)
+    match_all(log_weights, means, covs, count, np.empty(count, np.int64), np.empty(count), out_mean, out_cov)
 
 
 @borrowing
-def _match_all(
+def match_all(
     log_weights: Floats,
     means: Floats,
     covs: Floats,
@@ -188,126 +178,6 @@ def _match_all(
         components[c] = c
         weights[c] = math.exp(log_weights[c] - peak) if peak > -math.inf else 0.0
     match_components(components, weights, count, means, covs, out_mean, out_cov)
-
-
-class ReductionWork(NamedTuple):
-    """Arrays to reduce mixtures of so many components in."""
-
-    left: Floats  # (num,) log weights of the components that are still in play
-    order: Ints  # (num,)
-    buffer: Ints  # (num,) to sort in
-    near: Ints  # (num,)
-    weights: Floats  # (num,)
-    merged: Mixture  # of num components
-    factor: Floats  # (state_dim, state_dim)
-    difference: Floats  # (state_dim,)
-
-
-@kernel
-def make_reduction_work(num: int, state_dim: int) -> ReductionWork:
-    """For mixtures of up to `num` components."""
-    return ReductionWork(
-        np.empty(num),
-        np.empty(num, np.int64),
-        np.empty(num, np.int64),
-        np.empty(num, np.int64),
-        np.empty(num),
-        make_components(num, state_dim),
-        np.empty((state_dim, state_dim)),
-        np.empty(state_dim),
-    )
-
-
-@borrowing
-def _near(heaviest: int, wide: Mixture, width: int, merge_distance: float, work: ReductionWork) -> int:
-    """Components (-> work.near, `heaviest` first) in play within `merge_distance` of `heaviest`; their number."""
-    means, covs, near = wide.means, wide.covs, work.near
-    factor, difference, n = work.factor, work.difference, wide.means.shape[1]
-    near[0] = heaviest
-    count = 1
-    # Distances are measured under the heaviest component's covariance, as its neighbours are to fit into it.
-    if not merge_distance > 0.0 or not cholesky(covs[heaviest], factor):
-        return count
-    for c in range(width):
-        if c == heaviest or work.left[c] == -math.inf:
-            continue
-        for i in range(n):
-            difference[i] = means[c, i] - means[heaviest, i]
-        solve_lower(factor, difference, difference)
-        squared = 0.0
-        for i in range(n):
-            squared += difference[i] * difference[i]
-        if squared < merge_distance * merge_distance:
-            near[count] = c
-            count += 1
-    return count
-
-
-@borrowing
-def _merge(wide: Mixture, width: int, log_floor: float, merge_distance: float, work: ReductionWork) -> int:
-    """Greedy merging (-> work.merged), heaviest component first, of those of at least `log_floor` (the heaviest always
-    stays); how many there are then.
-    """
-    log_weights, left, order, merged = wide.log_weights, work.left, work.order, 0
-    sort_descending(log_weights, width, order, work.buffer)
-    for c in range(width):
-        left[c] = log_weights[c] if c == order[0] or log_weights[c] >= log_floor else -math.inf
-    for i in range(width):
-        heaviest = order[i]
-        if left[heaviest] == -math.inf:
-            continue
-        count = _near(heaviest, wide, width, merge_distance, work)
-        total = 0.0
-        for k in range(count):
-            work.weights[k] = math.exp(left[work.near[k]] - log_weights[heaviest])
-            total += work.weights[k]
-            left[work.near[k]] = -math.inf
-        out = work.merged
-        out.log_weights[merged] = log_weights[heaviest] + math.log(total)
-        match_components(work.near, work.weights, count, wide.means, wide.covs, out.means[merged], out.covs[merged])
-        merged += 1
-    return merged
-
-
-@borrowing
-def reduce_into(wide: Mixture, width: int, caps: MixtureCaps, work: ReductionWork, out: Mixture, filled: int) -> int:
-    """Append the first `width` components within the caps, heaviest first, with the same total weight; the new end.
-
-    Light components are dropped; then, greedily from the heaviest, all components within the merging distance of it
-    (under its covariance) are merged by moment matching; then the heaviest stay.
-    """
-    total = log_sum(wide.log_weights[:width])
-    if caps.max_components == 1 or width <= 1 or total == -math.inf:
-        if width == 0:
-            return filled
-        out.log_weights[filled] = total
-        _match_all(
-            wide.log_weights, wide.means, wide.covs, width, work.near, work.weights, out.means[filled], out.covs[filled]
-        )
-        return filled + 1
-    num_merged = _merge(wide, width, total + caps.log_min_weight, caps.merge_distance, work)
-    sort_descending(work.merged.log_weights, num_merged, work.order, work.buffer)
-    kept = min(num_merged, caps.max_components)
-    for k in range(kept):
-        out.log_weights[filled + k] = work.merged.log_weights[work.order[k]]
-        copy_component(work.merged.means, work.merged.covs, work.order[k], out.means, out.covs, filled + k)
-    # What was dropped is shared out, so that reducing does not lose a target.
-    shift = total - log_sum(out.log_weights[filled : filled + kept])
-    for k in range(kept):
-        out.log_weights[filled + k] += shift
-    return filled + kept
-
-
-@kernel
-def reduce_mixture(
-    log_weights: Floats, means: Floats, covs: Floats, caps: MixtureCaps
-) -> tuple[Floats, Floats, Floats]:
-    """A mixture within the caps, as of `reduce_into`, in arrays of its own."""
-    num, n = means.shape
-    most = min(num, max(1, caps.max_components))
-    out = make_components(most, n)
-    last = reduce_into(Mixture(log_weights, means, covs), num, caps, make_reduction_work(num, n), out, 0)
-    return out.log_weights[:last], out.means[:last], out.covs[:last]
 
 
 @kernel

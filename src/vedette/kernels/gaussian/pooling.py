@@ -9,14 +9,8 @@ import numpy as np
 
 from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, Tracks
-from vedette.kernels.gaussian.mixtures import (
-    MixtureCaps,
-    copy_component,
-    match_components,
-    moment_match,
-    reduce_mixture,
-    require_gaussians,
-)
+from vedette.kernels.gaussian.mixtures import copy_component, match_components, moment_match, require_gaussians
+from vedette.kernels.gaussian.reduction import MixtureCaps, reduce_mixture
 
 
 class Moments(NamedTuple):

@@ -9,7 +9,8 @@ import numpy as np
 
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Glmb, Ints, Tracks
-from vedette.kernels.gaussian.mixtures import MixtureCaps, copy_component
+from vedette.kernels.gaussian.mixtures import copy_component
+from vedette.kernels.gaussian.reduction import MixtureCaps
 from vedette.kernels.labelled.conversions import glmb_to_lmb
 from vedette.kernels.labelled.power_integrals import SensorCases
 

@@ -10,8 +10,9 @@ from vedette.kernels.base.arrays import group_members
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import FactoredGlmb, Floats, Glmb, Ints, Lmb
 from vedette.kernels.gaussian.linalg import log_sum
-from vedette.kernels.gaussian.mixtures import MixtureCaps, descending_order
+from vedette.kernels.gaussian.mixtures import descending_order
 from vedette.kernels.gaussian.pooling import add_to_pool, pooled_tracks
+from vedette.kernels.gaussian.reduction import MixtureCaps
 from vedette.kernels.labelled.labels import group_by_label_set, increasing_labels, label_place
 from vedette.kernels.labelled.subsets import smallest_sums
 

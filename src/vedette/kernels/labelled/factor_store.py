@@ -66,7 +66,7 @@ def _grown_mixture(mixture: Mixture, filled: int, needed: int) -> Mixture:
 
 @kernel
 def with_room(store: FactorStore, factors: int, tracks: int, components: int, hyps: int, entries: int) -> FactorStore:
-    """The same factors with room for so many more, of so many tracks, components, hypotheses and entries in all."""
+    """The same factors with room for more: so many factors, tracks, components, hypotheses and entries in all."""
     filled = store.filled
     return FactorStore(
         filled,
@@ -83,7 +83,7 @@ def with_room(store: FactorStore, factors: int, tracks: int, components: int, hy
 
 @inlined
 def has_room_for_single(store: FactorStore, components: int) -> bool:
-    """Whether one more factor of one label and so many components has room."""
+    """Whether a factor of one label and `components` components fits."""
     filled = store.filled
     return (
         2 * filled[_TRACKS] + 2 <= len(store.labels)
@@ -135,7 +135,7 @@ def append_single(store: FactorStore, step: int, index: int, end: int, logit: fl
 
 @kernel
 def append_part(store: FactorStore, glmb: Glmb, choices: Choices, part_of: Ints, part: int) -> None:
-    """Enter the marginal of a GLMB over the labels of a part as a factor, heaviest hypothesis first, where is room."""
+    """Enter the marginal over the labels of a part, heaviest hypothesis first. The store must have room."""
     groups = np.empty(len(glmb.hyp_log_weights), np.int64)
     firsts = group_choices(choices.symbols, part_of, part, groups)
     log_weights = group_log_sums(glmb.hyp_log_weights, groups, len(firsts))

@@ -9,11 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from vedette.kernels.base.arrays import filled_ints
 from vedette.kernels.base.compile import borrowing, kernel
 from vedette.kernels.base.types import Floats, Glmb, Ints, Tracks
-from vedette.kernels.gaussian.linalg import log_sum
-from vedette.kernels.gaussian.mixtures import copy_component, descending_order
+from vedette.kernels.gaussian.linalg import normalise_logs
+from vedette.kernels.gaussian.mixtures import descending_order
 from vedette.kernels.labelled.splitting import Choices, choices_of, existences_of
 
 # A label is another's name where it exists beside that one in less than this share of its own probability, and the
@@ -38,8 +37,11 @@ def _known_name(choices: Choices, existences: Floats, label: int) -> int:
 
 
 @borrowing
-def _rename(choices: Choices, existences: Floats, label: int, known: int, name_of: Ints) -> None:
-    """Give the tracks of a label to another. Hypotheses that hold both lose their weight."""
+def _rename(choices: Choices, existences: Floats, label: int, known: int, labels: Ints) -> None:
+    """Give the tracks of a label to another. Hypotheses that hold both lose their weight.
+
+    labels: (num_tracks, 2) of the tracks; written.
+    """
     for h in range(len(choices.weights)):
         track = choices.symbols[h, label]
         if track < 0:
@@ -48,8 +50,8 @@ def _rename(choices: Choices, existences: Floats, label: int, known: int, name_o
             choices.weights[h] = 0.0
         else:
             choices.symbols[h, known] = track
+            labels[track, 0], labels[track, 1] = choices.labels[known, 0], choices.labels[known, 1]
         choices.symbols[h, label] = -1
-        name_of[track] = known
     existences[label] = 0.0
 
 
@@ -58,77 +60,43 @@ def with_known_names(glmb: Glmb, choices: Choices, max_error: float) -> tuple[Gl
     """The GLMB in which improbable other names of targets are given up, its choices, and the L1 change of the density.
 
     choices: of the GLMB, heaviest first; written. max_error: of the labelled density, twice the existence of the labels
-    that are given up; the least probable ones first.
+    that are given up; the least probable ones first. Tracks that no hypothesis holds any more stay in the table.
     """
     num_labels, spent = len(choices.labels), 0.0
     if num_labels < 2:
         return glmb, choices, 0.0
-    existences, name_of = existences_of(choices), filled_ints(len(glmb.tracks.labels), -1)
+    existences, labels = existences_of(choices), glmb.tracks.labels.copy()
     for label in descending_order(-existences):
         error = 2.0 * existences[label]
         if spent + error > max_error:
             break
         known = _known_name(choices, existences, label)
         if known >= 0:
-            _rename(choices, existences, label, known, name_of)
+            _rename(choices, existences, label, known, labels)
             spent += error
     if spent == 0.0:
         return glmb, choices, 0.0
-    renamed = _rebuilt(glmb, choices, name_of)
+    tracks = glmb.tracks
+    relabelled = Tracks(labels, tracks.offsets, tracks.log_weights, tracks.means, tracks.covs)
+    renamed = _with_weight(relabelled, choices, glmb.hyp_log_weights)
     return renamed, choices_of(renamed), spent
 
 
 @kernel
-def _rebuilt(glmb: Glmb, choices: Choices, name_of: Ints) -> Glmb:
-    """The hypotheses that have a weight, and the tracks that these hold. name_of: (num_tracks,) -1: its own name."""
-    num, num_labels, tracks = len(choices.weights), len(choices.labels), glmb.tracks
-    number, kept, num_kept = filled_ints(len(name_of), -1), np.empty(len(name_of), np.int64), 0
+def _with_weight(tracks: Tracks, choices: Choices, log_weights: Floats) -> Glmb:
+    """The hypotheses that still have a weight, normalised."""
+    num, num_labels = choices.symbols.shape
     offsets, members, filled = np.zeros(num + 1, np.int64), np.empty(num * num_labels, np.int64), 0
-    log_weights, num_hyps = np.empty(num), 0
+    kept, num_kept = np.empty(num), 0
     for h in range(num):
         if choices.weights[h] == 0.0:
             continue
         for k in range(num_labels):
-            track = choices.symbols[h, k]
-            if track < 0:
-                continue
-            if number[track] < 0:
-                number[track], kept[num_kept] = num_kept, track
-                num_kept += 1
-            members[filled] = number[track]
-            filled += 1
-        log_weights[num_hyps] = glmb.hyp_log_weights[h]
-        num_hyps += 1
-        offsets[num_hyps] = filled
-    taken = _taken_tracks(tracks, kept[:num_kept])
-    for i in range(num_kept):
-        name = name_of[kept[i]]
-        if name >= 0:
-            taken.labels[i, 0], taken.labels[i, 1] = choices.labels[name, 0], choices.labels[name, 1]
-    log_total = log_sum(log_weights[:num_hyps])
-    for h in range(num_hyps):
-        log_weights[h] -= log_total
-    return Glmb(taken, offsets[: num_hyps + 1].copy(), members[:filled].copy(), log_weights[:num_hyps].copy())
-
-
-@kernel
-def _taken_tracks(tracks: Tracks, kept: Ints) -> Tracks:
-    """Some tracks, in the order given."""
-    num_components, dim, end = 0, tracks.means.shape[1], 0
-    for track in kept:
-        num_components += tracks.offsets[track + 1] - tracks.offsets[track]
-    out = Tracks(
-        np.empty((len(kept), 2), np.int64),
-        np.zeros(len(kept) + 1, np.int64),
-        np.empty(num_components),
-        np.empty((num_components, dim)),
-        np.empty((num_components, dim, dim)),
-    )
-    for i in range(len(kept)):
-        out.labels[i, 0], out.labels[i, 1] = tracks.labels[kept[i], 0], tracks.labels[kept[i], 1]
-        for c in range(tracks.offsets[kept[i]], tracks.offsets[kept[i] + 1]):
-            out.log_weights[end] = tracks.log_weights[c]
-            copy_component(tracks.means, tracks.covs, c, out.means, out.covs, end)
-            end += 1
-        out.offsets[i + 1] = end
-    return out
+            if choices.symbols[h, k] >= 0:
+                members[filled] = choices.symbols[h, k]
+                filled += 1
+        kept[num_kept] = log_weights[h]
+        num_kept += 1
+        offsets[num_kept] = filled
+    normalise_logs(kept[:num_kept])
+    return Glmb(tracks, offsets[: num_kept + 1].copy(), members[:filled].copy(), kept[:num_kept].copy())

@@ -238,7 +238,7 @@ def independent_parts(choices: Choices, max_error: float, max_labels: int, min_e
     if error <= enough:
         return part_of, error
     existences = existences_of(choices)
-    firsts, seconds = _by_dependence(parts, weights) if num_parts > 2 else (filled_ints(1, 0), filled_ints(1, 1))
+    firsts, seconds = _by_dependence(parts, weights)
     for pair in range(len(firsts)):
         a, b = part_of[firsts[pair]], part_of[seconds[pair]]
         improbable = existences[firsts[pair]] < min_existence or existences[seconds[pair]] < min_existence

@@ -16,8 +16,9 @@ from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Glmb, Ints, Tracks
 from vedette.kernels.gaussian.distances import l1_bound
 from vedette.kernels.gaussian.linalg import cholesky, log_sum, solve_lower
-from vedette.kernels.gaussian.mixtures import MixtureCaps, descending_order
+from vedette.kernels.gaussian.mixtures import descending_order
 from vedette.kernels.gaussian.pooling import Moments, moments_of, pooled_tracks
+from vedette.kernels.gaussian.reduction import MixtureCaps
 from vedette.kernels.labelled.groups import group_log_sums
 from vedette.kernels.labelled.splitting import Choices, choices_of, group_choices
 

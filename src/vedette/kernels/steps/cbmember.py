@@ -18,7 +18,8 @@ from vedette.kernels.base.arrays import group_members
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Ints, Lmb, Motion, ScanInput, Sensor, Tracks
 from vedette.kernels.gaussian.linalg import log_add
-from vedette.kernels.gaussian.mixtures import MixtureCaps, make_components, make_reduction_work, require_gaussians
+from vedette.kernels.gaussian.mixtures import make_components, require_gaussians
+from vedette.kernels.gaussian.reduction import MixtureCaps, make_reduction_work
 from vedette.kernels.steps.assembly import write_updated
 from vedette.kernels.steps.lmb import Reduction, append_reduced, labels_to_keep, weigh_by_existence
 

@@ -17,7 +17,7 @@ from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, Lmb, Mixture, Motion, ScanInput, Sensor
 from vedette.kernels.gaussian.linalg import log_add, log_sum, normalise_logs
-from vedette.kernels.gaussian.mixtures import MixtureCaps
+from vedette.kernels.gaussian.reduction import MixtureCaps
 from vedette.kernels.steps.phd import IntensityReport, corrected_intensity, predict_intensity
 
 

@@ -19,14 +19,8 @@ from vedette.kernels.base.compile import borrowing, kernel
 from vedette.kernels.base.types import Floats, Glmb, Ints, Mixture
 from vedette.kernels.gaussian.distances import reduction_bound
 from vedette.kernels.gaussian.linalg import log_add, log_sum
-from vedette.kernels.gaussian.mixtures import (
-    MixtureCaps,
-    ReductionWork,
-    copy_component,
-    make_components,
-    make_reduction_work,
-    reduce_into,
-)
+from vedette.kernels.gaussian.mixtures import copy_component, make_components
+from vedette.kernels.gaussian.reduction import MixtureCaps, ReductionWork, make_reduction_work, reduce_into
 from vedette.kernels.labelled.factor_store import FactorStore, append_part, append_single, next_component, with_room
 from vedette.kernels.labelled.renaming import with_known_names
 from vedette.kernels.labelled.splitting import Choices, choices_of, independent_parts
@@ -43,8 +37,8 @@ _NUM_SUMS = 8
 # A component of a label alone is dropped where it holds less of an existing target than this times the least share.
 _WORTH = 10.0
 
-# Of the labels that are dropped, those return to the undetected targets that exist with a tenth of the least existence
-# and more: what is below would be a component for every false measurement of the scans before.
+# Dropped labels return to the undetected targets if they exist with at least a tenth of the least existence: fainter
+# ones would add a component for every recent false measurement.
 _LOG_RETURNED = math.log(10.0)
 
 # A posterior is condensed where the hypotheses behind this share of the most that a group may have weigh more than
@@ -114,7 +108,7 @@ def _append_mixture(
     reducing: ReductionWork,
     work: Work,
 ) -> None:
-    """Enter a label as a factor of its own, where is room, unless it is too improbable. reducing: to work in."""
+    """Enter a label as a factor unless it is too improbable. The store must have room. reducing: work arrays."""
     existence = 1.0 / (1.0 + math.exp(-logit))
     start, caps = next_component(store), reduction.mixture
     if logit < reduction.min_existence_logit:
@@ -136,7 +130,7 @@ def _append_mixture(
 
 @borrowing
 def update_alone(row: int, rows: Rows, options: Options, reduction: Reduction, store: FactorStore, work: Work) -> None:
-    """A single track that contends with nobody, entered where is room: the update of its Bernoulli is exact."""
+    """Enter the exact update of a single track whose measurements no group shares. The store must have room."""
     start, stop, marginals = options.offsets[row], options.offsets[row + 1], work.marginals
     log_total, absent, present = log_sum(options.log_weights[start:stop]), -math.inf, -math.inf
     work.sums[TOTAL] += log_total
@@ -177,7 +171,7 @@ def _claim_jointly(group: Group, children: Children, kept: Ints, log_total: floa
 
 @kernel
 def make_ranking() -> Ranking:
-    """What the groups of a scan are ranked in, one after the other."""
+    """Empty work arrays, which the groups of a scan share."""
     return Ranking(make_search(0), make_children(0, 0))
 
 
@@ -207,7 +201,7 @@ def update_group(group: Group, truncation: Truncation, ranking: Ranking, work: W
 def _append_label(
     store: FactorStore, glmb: Glmb, choices: Choices, label: int, reduction: Reduction, work: Work
 ) -> None:
-    """Enter the marginal of one label, where is room: the mixture of its versions."""
+    """Enter the marginal of one label, the mixture of its versions. The store must have room."""
     tracks, absent = glmb.tracks, -math.inf
     log_versions = np.empty(len(tracks.labels))
     for track in range(len(log_versions)):

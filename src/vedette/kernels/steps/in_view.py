@@ -16,7 +16,8 @@ from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import Bools, Ints, Lmb, ScanInput, Sensor, Tracks
 from vedette.kernels.gaussian.detection import detection_probability
 from vedette.kernels.gaussian.linalg import LOG_2PI, cholesky, log_det_from_factor, normalise_logs
-from vedette.kernels.gaussian.mixtures import MixtureCaps, copy_component, make_components, reduce_mixture
+from vedette.kernels.gaussian.mixtures import copy_component, make_components
+from vedette.kernels.gaussian.reduction import MixtureCaps, reduce_mixture
 from vedette.kernels.gaussian.scratch import Scratch, make_scratch
 
 _NOTHING = 2.0**-54  # beside 1

@@ -23,16 +23,8 @@ from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, Lmb, Mixture, Motion, ScanInput, Sensor, Tracks
 from vedette.kernels.gaussian.linalg import log_add, normalise_logs
-from vedette.kernels.gaussian.mixtures import (
-    MixtureCaps,
-    ReductionWork,
-    copy_component,
-    descending_order,
-    make_components,
-    make_reduction_work,
-    reduce_into,
-    require_gaussians,
-)
+from vedette.kernels.gaussian.mixtures import copy_component, descending_order, make_components, require_gaussians
+from vedette.kernels.gaussian.reduction import MixtureCaps, ReductionWork, make_reduction_work, reduce_into
 from vedette.kernels.steps.assembly import write_updated
 from vedette.kernels.steps.matching import make_mixture, match_rows
 

@@ -12,13 +12,8 @@ from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Ints, Lmb, ScanInput, Sensor, Tracks
 from vedette.kernels.gaussian.linalg import log_add, log_sum
-from vedette.kernels.gaussian.mixtures import (
-    MixtureCaps,
-    copy_component,
-    make_components,
-    make_reduction_work,
-    require_gaussians,
-)
+from vedette.kernels.gaussian.mixtures import copy_component, make_components, require_gaussians
+from vedette.kernels.gaussian.reduction import MixtureCaps, make_reduction_work
 from vedette.kernels.steps.lmb import LmbReport, Reduction, append_reduced, labels_to_keep
 from vedette.kernels.steps.multi_sensor_choices import Choices
 from vedette.kernels.steps.multi_sensor_combinations import Combinations, extend_combinations

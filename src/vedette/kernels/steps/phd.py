@@ -18,7 +18,8 @@ from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Mixture, Motion, ScanInput, Sensor, Tracks
 from vedette.kernels.gaussian.linalg import log_add
-from vedette.kernels.gaussian.mixtures import MixtureCaps, make_components, reduce_mixture, require_gaussians
+from vedette.kernels.gaussian.mixtures import make_components, require_gaussians
+from vedette.kernels.gaussian.reduction import MixtureCaps, reduce_mixture
 from vedette.kernels.steps.assembly import write_updated
 
 
