@@ -7,7 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from vedette.kernels.base.types import Glmb, Tracks
+from vedette import models
+from vedette.densities import FactoredGLMB, existence_probabilities
+from vedette.filters import FactoredGlmbFilter
+from vedette.kernels.base.types import FactoredGlmb, Glmb, Tracks
 from vedette.kernels.labelled.renaming import with_known_names
 from vedette.kernels.labelled.splitting import choices_of
 
@@ -61,3 +64,24 @@ def test_hypotheses_that_hold_both_names_are_left_out() -> None:
     assert listed(after) == pytest.approx(
         {((1, 0, 0.0),): 0.99 / 0.9998, ((1, 0, 4.0),): 0.0038 / 0.9998, (): 0.006 / 0.9998}, rel=1e-12
     )
+
+
+def test_a_prediction_keeps_improbable_names() -> None:
+    """A parallel update needs the same labels, one Gaussian each, in the prediction and in what sensors made of it."""
+    pair = glmb({(0,): 0.992, (1,): 0.004, (): 0.004})
+    tracks = Tracks(LABELS[:2], np.arange(3), np.zeros(2), pair.tracks.means[:2], pair.tracks.covs[:2])
+    factor = np.array([0, 2]), pair.hyp_offsets, pair.hyp_tracks, pair.hyp_log_weights, np.array([0, 3])
+    belief = FactoredGLMB.from_kernel(FactoredGlmb(tracks, *factor))
+    targets = models.TargetModel(
+        models.constant_velocity(1.0), models.constant_survival(1.0), models.BirthModel.none(4)
+    )
+    sensor = models.SensorModel(
+        models.position(),
+        models.constant_noise([1.0, 1.0]),
+        models.constant_detection(0.9),
+        models.region_clutter(1.0, models.Region(0.0, 1.0, 0.0, 1.0), "position"),
+    )
+    predicted = FactoredGlmbFilter(targets, sensor, births="labelled").predict(belief, 1.0, 3)[0]
+    labels, existence = existence_probabilities(predicted)
+    assert labels.tolist() == LABELS[:2].tolist()
+    assert existence == pytest.approx([0.992, 0.004], rel=1e-9)

@@ -226,12 +226,14 @@ def _append_label(
 
 
 @kernel
-def _merged(glmb: Glmb, caps: MixtureCaps, max_error: float, most: int) -> tuple[Glmb, Choices, float]:
+def _merged(glmb: Glmb, reduction: Reduction, max_error: float, most: int) -> tuple[Glmb, Choices, float]:
     """The posterior with names and versions of targets made one, its choices, and a bound on its L1 change.
 
     most: hypotheses that a group may have.
     """
-    glmb, choices, renaming_error = with_known_names(glmb, choices_of(glmb), max_error)
+    caps, choices, renaming_error = reduction.mixture, choices_of(glmb), 0.0
+    if reduction.min_existence_logit > -math.inf:  # a prediction keeps all labels
+        glmb, choices, renaming_error = with_known_names(glmb, choices, max_error)
     glmb, choices, total = merge_versions(glmb, choices, caps, max_error)
     total += renaming_error
     apart = int(_KEPT_APART * most)
@@ -247,7 +249,7 @@ def append_parts(
     store: FactorStore, glmb: Glmb, factoring: Factoring, reduction: Reduction, most: int, work: Work
 ) -> FactorStore:
     """Split the posterior of a group and enter its parts. most: hypotheses that the group may have."""
-    glmb, choices, merging_error = _merged(glmb, reduction.mixture, factoring.max_error, most)
+    glmb, choices, merging_error = _merged(glmb, reduction, factoring.max_error, most)
     min_existence = 1.0 / (1.0 + math.exp(-reduction.min_existence_logit))
     part_of, error = independent_parts(choices, factoring.max_error, factoring.max_labels, min_existence)
     work.sums[SPLIT] += error
