@@ -102,6 +102,8 @@ def test_a_task_that_was_done_when_its_worker_died_is_not_done_again(
         for process in worker.processes:
             process.kill()
         wait_until(lambda: not active_children(), "the end of the worker")
+        # A thread of the pool sees it later; a task that the pool takes until then is one that its worker died of.
+        wait_until(lambda: bool(worker.pool._broken), "the pool's notice of it")
         workers.submit(second)
         ended = workers.next()
         while len(ended) < 2:
