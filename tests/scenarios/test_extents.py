@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from vedette.errors import InputError
 from vedette.evaluation.runs import run_scenario
 from vedette.live import live_of
 from vedette.recorded.extents import box_of, wild
@@ -143,3 +144,17 @@ def test_a_live_loop_takes_nothing_from_beyond(tmp_path: Path) -> None:
     assert [k for k, answer in enumerate(told[1]) if answer.pop("beyond", 0) == 1] == [9]
     assert told[0] == told[1]
     assert len(told[0][-1]["tracks"]) == 3
+
+
+def test_ranges_of_another_unit_are_blamed_on_the_scans(tmp_path: Path) -> None:
+    """Not on a region that nobody wrote."""
+    (tmp_path / "radar.yaml").write_text("origin: {lon: -1.1, lat: 50.8}\n" + SENSORS % ENDLESS, "utf-8")
+    lines = [f"{time},{name},{bearing},{1852.0 * float(far)}" for time, name, far, bearing in map(_cells, rows())]
+    (tmp_path / "scans.csv").write_text("time,sensor,bearing_deg,range_m\n" + "\n".join(lines), "utf-8")
+    wanted = r"scans.csv: expected measurements within 1000 km of the origin; got one of R at t = 0 s, \d+ km away"
+    with pytest.raises(InputError, match=wanted):
+        scenario_of_recording(tmp_path / "radar.yaml", tmp_path / "scans.csv")
+
+
+def _cells(row: str) -> list[str]:
+    return row.split(",")

@@ -78,7 +78,9 @@ def test_times_of_ais_logs_without_tag_blocks_are_read(tmp_path: Path, pattern: 
 
 def test_ais_without_any_time_is_refused_with_the_lines_that_are_read(tmp_path: Path) -> None:
     (tmp_path / "a.nmea").write_text(ais(None, mmsi="235000001", lon=-1.1, lat=50.8), "ascii")
-    with pytest.raises(InputError, match=r"2016-01-12T13:02:21Z !AIVDM.*got 1 positions without a time"):
+    with pytest.raises(
+        InputError, match=r"2016-01-12T13:02:21Z !AIVDM.*got 1 line with a position but no time \(first: row 1\)"
+    ):
         read_table(tmp_path / "a.nmea")
 
 
@@ -89,11 +91,31 @@ def test_ships_report_themselves(tmp_path: Path) -> None:
     (tmp_path / "ships.nmea").write_text("\n".join(lines) + "\n", "ascii")
     table = read_table(tmp_path / "ships.nmea")
     assert table.rows == [1, 2, 3, 4, 5, 6]
+    left = "left out: 2 lines damaged (first: row 7), 1 line with a position but no time (first: row 9)"
+    assert table.notes == (left,)
     np.testing.assert_allclose(table.columns["vx"], 10.0 * KNOT)
     targets = RecordedTargets.from_file(tmp_path / "ships.nmea", origin_deg=(-1.11, 50.79))
     truth = targets.truth([0.0, 25.0], rng=np.random.default_rng(0))
     expected = Origin(-1.11, 50.79).to_plane([-1.11 + 2.5e-4], [50.79])
     np.testing.assert_allclose(truth.states[1:, :2], expected, atol=8.0)  # AIS rounds to a few metres
+
+
+@pytest.mark.parametrize("place", [12, 30, -3], ids=["time", "position", "checksum"])
+def test_a_damaged_message_is_left_out_and_told(place: int, tmp_path: Path) -> None:
+    lines = [ais(1452603741 + 10 * k, mmsi="235000001", lon=-1.11 + 1e-4 * k, lat=50.79) for k in range(6)]
+    letters = list(lines[2])
+    letters[place] = "7" if letters[place] != "7" else "5"
+    (tmp_path / "ships.nmea").write_text("\n".join([*lines[:2], "".join(letters), *lines[3:]]), "ascii")
+    assert read_table(tmp_path / "ships.nmea").rows == [1, 2, 4, 5, 6]
+    targets = RecordedTargets.from_file(tmp_path / "ships.nmea")
+    assert targets.reports.notes == ("left out: 1 line damaged (first: row 3)",)
+
+
+def test_records_without_a_place_are_told(tmp_path: Path) -> None:
+    category = CATS[48][-1]
+    record = category.cv_record.create({"010": (("SAC", 1), ("SIC", 2)), "140": ((4.0, "s"))})
+    (tmp_path / "radar.ast").write_bytes(plot(0.0, 5.0, 45.0) + category.create([record]).unparse().to_bytes())
+    assert read_table(tmp_path / "radar.ast").notes[1] == "left out: 1 record of category 048 without a time or place"
 
 
 def test_a_ship_without_a_speed_has_none_for_all(tmp_path: Path) -> None:
@@ -216,7 +238,7 @@ def test_plots_are_tracked(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("a.nmea", b"nothing\n", "got 0 positions without a time"),
+        ("a.nmea", b"nothing\n", "got 1 line damaged (first: row 1)"),
         ("a.pcap", b"\xd4\xc3\xb2\xa1", "got a capture; write it by `tshark -r a.pcap -T fields -e udp.payload | xxd"),
         ("a.ast", b"\x30\x00", "a.ast: expected ASTERIX data blocks; got other bytes"),
         ("a.ast", b"\x3e\x00\x05\xff\xff", "a.ast: expected records of category 062 in data block 1"),

@@ -76,6 +76,7 @@ def test_aircraft_are_where_they_were_last_heard(tmp_path: Path) -> None:
     rows.insert(3, {**rows[0], "lat": "", "lon": "NULL", "lastposupdate": ""})  # a state vector without a position
     targets = RecordedTargets.from_file(write(tmp_path / "states.csv", rows), origin_deg=ORIGIN_DEG)
     assert [(track.name, len(track.times)) for track in targets.tracks] == [("4ca123", 3), ("a1b2c3", 3)]
+    assert targets.reports.notes == ("left out: 1 row without a position",)
     south, east = targets.tracks
     np.testing.assert_allclose(east.times, START - 0.25 + np.array([0.0, 2.0, 4.0]))
     np.testing.assert_allclose(east.positions, [[0.0, 0.0], [120.0, 160.0], [240.0, 320.0]], atol=1e-3)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
@@ -10,12 +11,14 @@ from typing import Any
 
 from vedette.errors import InputError
 from vedette.extras import need
-from vedette.text import shown
+from vedette.text import counted, shown
 
 AIS_ENDINGS = (".nmea", ".ais")
 ASTERIX_ENDINGS = (".ast", ".asterix", ".raw")
 CAPTURE_ENDINGS = (".pcap", ".pcapng")
 _FIRST_TIME = 3e8  # s; numbers below are no times since 1970 of an AIS message
+_MILLISECONDS = 1e11  # greater times are milliseconds
+_PART = re.compile(rb"(?:\\[^\\]*\\)?!\w{5},[2-9],")  # a message of several sentences
 _KNOT = 1852.0 / 3600.0  # m/s
 _HALF_DAY = 43_200.0  # s
 _NO_SPEED, _NO_COURSE = 102.3, 360.0  # what AIS says where a ship does not know
@@ -26,38 +29,42 @@ _DEGREE = "\N{DEGREE SIGN}"
 Columns = dict[str, list[Any]]
 
 
-def read_ais(file: Path) -> tuple[Columns, list[int]]:
+def read_ais(file: Path) -> tuple[Columns, list[int], tuple[str, ...]]:
     """Positions of ships: `time`, `id` (MMSI), `longitude`, `latitude`; `vx`, `vy` where every ship says them.
 
     Times are those of the receiver: in tag blocks (`\\c:1452603741*..\\`), before the message (`2016-01-12T13:02:21Z
-    !AIVDM,...`, or seconds since 1970), or after it (`...*5C,r003669930,1452603741`). Lines without one, and messages
-    that are no positions, are passed over. Returns the columns and the line of each row.
+    !AIVDM,...`, or seconds since 1970), or after it (`...*5C,r003669930,1452603741`). Messages that are no positions
+    are passed over. Lines that are damaged (their checksums say so), and positions without a time, are left out.
+    Returns the columns, the line of each row, and a warning that counts what was left out.
 
     Raises:
         MissingPackageError: pyais is not installed.
         InputError: no position with a time in it.
     """
     need(f"{file}, which is a file of AIS messages,", "pyais")
-    from pyais.stream import IterMessages
-
-    rows, lines, untimed = list[tuple[Any, ...]](), list[int](), 0
+    rows, lines, lost = list[tuple[Any, ...]](), list[int](), dict[str, list[int]]()
     with file.open("rb") as source:
         for number, line in enumerate(source, start=1):
-            sentence, time = _sentence(line.strip())
-            for message in IterMessages([sentence]):
-                found = _position(message, time)
-                untimed += found is not None and found[0] is None
-                if found is not None and found[0] is not None:
+            try:
+                found = _position(line.strip())
+            except ValueError as fault:
+                lost.setdefault(str(fault), []).append(number)
+            else:
+                if found is not None:
                     rows.append(found)
                     lines.append(number)
     if not rows:
         wanted = r"AIS positions with times: `\c:1452603741*54\!AIVDM,...`, `2016-01-12T13:02:21Z !AIVDM,...` or "
-        raise InputError(f"{file}: expected {wanted}`!AIVDM,...*5C,1452603741`; got {untimed} positions without a time")
+        raise InputError(f"{file}: expected {wanted}`!AIVDM,...*5C,1452603741`; got {_lost_in_words(lost) or 'none'}")
     names = ("time", "id", "longitude", "latitude")
     columns: Columns = {name: [row[place] for row in rows] for place, name in enumerate(names)}
     if all(row[4] is not None for row in rows):
         columns |= {"vx": [row[4][0] for row in rows], "vy": [row[4][1] for row in rows]}
-    return columns, lines
+    return columns, lines, (f"left out: {_lost_in_words(lost)}",) if lost else ()
+
+
+def _lost_in_words(lost: dict[str, list[int]]) -> str:
+    return ", ".join(f"{counted(len(at), 'line')} {what} (first: row {at[0]})" for what, at in lost.items())
 
 
 def _sentence(line: bytes) -> tuple[bytes, float | None]:
@@ -82,23 +89,37 @@ def _clock(cell: bytes) -> float | None:
     return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
 
 
-def _position(message: Any, time: float | None) -> tuple[Any, ...] | None:
-    """Time, MMSI, longitude, latitude and velocity of a message, the time None if there is none; None of any other."""
-    from pyais.exceptions import AISBaseException
+def _position(line: bytes) -> tuple[Any, ...] | None:
+    """Time, MMSI, longitude, latitude and velocity of a line; None of a line that is no position.
 
+    Raises `ValueError` with what the line is where it is damaged, or a position without a time.
+    """
+    from pyais.exceptions import AISBaseException
+    from pyais.stream import IterMessages
+
+    sentence, time = _sentence(line)
     try:
+        message = next(iter(IterMessages([sentence])), None)
+        if message is None:
+            is_other = line.startswith((b"$", b"#")) and b"!" not in line
+            if not line or is_other or _PART.match(sentence):
+                return None
+            raise ValueError
         if message.tag_block is not None:
             message.tag_block.init()
-            time = float(message.tag_block.receiver_timestamp)
+            stamp = message.tag_block.receiver_timestamp
+            time = None if stamp is None else float(stamp)
+        if not message.is_valid or (message.tag_block is not None and not message.tag_block.is_valid):
+            raise ValueError
         said = message.decode().asdict()
     except (AISBaseException, TypeError, ValueError):
+        raise ValueError("damaged") from None
+    lon, lat = said.get("lon"), said.get("lat")
+    if not (isinstance(lon, float) and isinstance(lat, float) and abs(lon) <= 180.0 and abs(lat) <= 90.0):
         return None
-    place = said.get("lon"), said.get("lat")
-    if not all(isinstance(number, float) for number in place) or abs(place[0]) > 180.0 or abs(place[1]) > 90.0:
-        return None
-    if time is not None and time > 1e11:  # milliseconds
-        time /= 1000.0
-    return time, str(said["mmsi"]), *place, _velocity(said)
+    if time is None or not math.isfinite(time):
+        raise ValueError("with a position but no time")
+    return time / 1000.0 if time > _MILLISECONDS else time, str(said["mmsi"]), lon, lat, _velocity(said)
 
 
 def _velocity(said: dict[str, Any]) -> tuple[float, float] | None:
@@ -117,8 +138,8 @@ def read_asterix(file: Path, *, reports: bool = False) -> tuple[Columns, list[in
     valid flight level, which is taken as the height above the radar; others are slant. Of tracks, where there are no
     plots or `reports` are asked for, `time`, `sensor`, `longitude`, `latitude`, and what targets have: `id` (the number
     of the track), and `vx`, `vy` where every one says them. Times are seconds from midnight UTC of the first one's day.
-    Other categories, and records without a time and place, are passed over. Returns the columns, the number of each
-    record, and a warning of plots without a flight level.
+    Other categories are passed over, records without a time and place left out. Returns the columns, the number of each
+    record, and warnings of plots without a flight level and of what was left out.
 
     Raises:
         MissingPackageError: libasterix is not installed.
@@ -126,17 +147,19 @@ def read_asterix(file: Path, *, reports: bool = False) -> tuple[Columns, list[in
     """
     need(f"{file}, which is an ASTERIX file,", "asterix")
     found: dict[int, tuple[list[dict[str, Any]], list[int]]] = {_PLOTS: ([], []), _TRACKS: ([], [])}
-    days = dict.fromkeys(found, 0.0)
+    days, without = dict.fromkeys(found, 0.0), list[int]()
     for number, (category, record) in enumerate(_records(file), start=1):
         row = _plot(record) if category == _PLOTS else _track(record)
         if row is None:
+            without.append(category)
             continue
         rows, numbers = found[category]
         if rows and row["time"] + days[category] < rows[-1]["time"] - _HALF_DAY:  # midnight
             days[category] += 2.0 * _HALF_DAY
         rows.append({**row, "time": row["time"] + days[category]})
         numbers.append(number)
-    rows, numbers = found[_TRACKS if reports or not found[_PLOTS][0] else _PLOTS]
+    read = _TRACKS if reports or not found[_PLOTS][0] else _PLOTS
+    rows, numbers = found[read]
     if not numbers:
         raise InputError(
             f"{file}: expected {'' if reports else 'plots of category 048 or '}tracks of category 062; got none"
@@ -144,6 +167,8 @@ def read_asterix(file: Path, *, reports: bool = False) -> tuple[Columns, list[in
     columns: Columns = {name: [row[name] for row in rows] for name in rows[0]}
     slant = sum(columns.pop("is_slant", []))
     notes = () if not slant else (_of_slant_ranges(slant, len(numbers)),)
+    if left := without.count(read):
+        notes = (*notes, f"left out: {counted(left, 'record')} of category {read:03} without a time or place")
     kept = {name: cells for name, cells in columns.items() if name not in ("vx", "vy") or None not in cells}
     return kept, numbers, notes
 

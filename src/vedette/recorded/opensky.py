@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from vedette.recorded.tables import FARTHEST, Table, is_empty
+from vedette.text import counted
 
 _POSITION = ("icao24", "lat", "lon")
 _VELOCITY = ("velocity", "heading")
@@ -23,20 +24,23 @@ def of_opensky(table: Table) -> tuple[Table, dict[str, str]]:
     """State vectors as reports of aircraft, and which of the columns are what `parse_reports` asks for.
 
     State vectors say every second what was last heard: rows without a position, and those that repeat one, are left
-    out, and the time is that of the position (`lastposupdate`) where every row has one. Velocities are `velocity`
-    (m/s over ground) along `heading` (degrees clockwise from the north) where every row has both.
+    out (the former are counted in `notes`), and the time is that of the position (`lastposupdate`) where every row has
+    one. Velocities are `velocity` (m/s over ground) along `heading` (degrees clockwise from the north) where every row
+    has both.
 
     Raises:
         InputError: names the file, row, column, what was expected and what came.
     """
     kept = [i for i in range(len(table.rows)) if all(_is_there(table, name, i) for name in _POSITION)]
+    without = len(table.rows) - len(kept)
+    notes = (f"left out: {counted(without, 'row')} without a position",) if without else ()
     time = "lastposupdate" if _are_there(table, ("lastposupdate",), kept) else "time"
     first: dict[tuple[str, str], int] = {}
     for i in kept:
         first.setdefault((str(table.columns["icao24"][i]), str(table.columns[time][i])), i)
     kept = list(first.values())
     columns = {name: [cells[i] for i in kept] for name, cells in table.columns.items()}
-    found = Table(columns, [table.rows[i] for i in kept], table.source)
+    found = Table(columns, [table.rows[i] for i in kept], table.source, notes=notes)
     names = {"time": time, "id": "icao24", "longitude": "lon", "latitude": "lat"}
     if not _are_there(table, _VELOCITY, kept):
         return found, names

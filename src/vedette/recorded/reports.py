@@ -33,6 +33,7 @@ class Reports:
         bounds_deg: its least and greatest longitude and latitude where it was geographic, else None.
         repeats: rows of the table, (kept, left out), where a target has a second report at one time: the first is kept.
         unused: columns of the table that were not read.
+        notes: of the table, what may mislead.
     """
 
     times: Floats
@@ -44,6 +45,7 @@ class Reports:
     bounds_deg: tuple[tuple[float, float], tuple[float, float]] | None = None
     repeats: tuple[tuple[int, int], ...] = ()
     unused: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 def parse_reports(
@@ -90,7 +92,16 @@ def parse_reports(
     used = {given.get(name, name) for name in _USED} - ({"x", "y"} if origin is not None else set())
     unused = () if is_known else tuple(name for name in table.columns if name not in used)
     return Reports(
-        times[order], tracks, positions[order], velocities, tuple(map(str, names)), origin, bounds, repeats, unused
+        times[order],
+        tracks,
+        positions[order],
+        velocities,
+        tuple(map(str, names)),
+        origin,
+        bounds,
+        repeats,
+        unused,
+        table.notes,
     )
 
 

@@ -193,7 +193,8 @@ def read_table(path: str | Path, *, reports: bool = False) -> Table:
     if (size := file.stat().st_size) > _MOST_BYTES:
         raise InputError(f"{named}: expected a file of at most {_MOST_BYTES} bytes; got {size}")
     if file.suffix.lower() in AIS_ENDINGS:
-        return Table(*read_ais(file), str(file))
+        columns, rows, notes = read_ais(file)
+        return Table(columns, rows, str(file), notes=notes)
     if file.suffix.lower() in ASTERIX_ENDINGS:
         columns, rows, notes = read_asterix(file, reports=reports)
         return Table(columns, rows, str(file), "north", notes)

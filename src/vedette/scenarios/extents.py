@@ -11,6 +11,7 @@ from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.recorded import RecordedScans
 from vedette.recorded.extents import box_of, places_of
+from vedette.recorded.geography import PLANE_REACH
 from vedette.scenarios.faults import Path
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.field_of_view import field_of_view
@@ -21,8 +22,19 @@ _NAMED = 3  # measurements beyond the region, in a warning
 
 
 def measured_region(model: ScenarioModel, recording: RecordedScans) -> dict[str, float]:
-    """The rectangle around the sensors and all that they measured; raises where their measurements are no places."""
-    places = [own for _, _, own in _measured(model, recording)]
+    """The rectangle around the sensors and all that they measured.
+
+    Raises `InputError` where their measurements are no places, or lie beyond the plane of the scenario's origin.
+    """
+    measured = list(_measured(model, recording))
+    for k, s, own in measured if model.origin is not None else ():
+        if (far := np.abs(own).max(axis=1, initial=0.0) > PLANE_REACH).any():
+            away = float(np.hypot(*(own[np.argmax(far)] - recording.poses[k, s, :2])))
+            name, path = model.sensor_names[s], "" if model.recording is None else f"{model.recording.path}: "
+            wanted = f"{path}expected measurements within {PLANE_REACH / 1000.0:g} km of the origin"
+            got = f"one of {name} at t = {recording.times[k]:g} s, {away / 1000.0:.0f} km away from it"
+            raise InputError(f"{wanted}; got {got} (is its unit right?)")
+    places = [own for _, _, own in measured]
     corners = np.concatenate([*places, recording.poses[:, :, :2].reshape(-1, 2)])
     if np.ptp(corners, axis=0).max() <= 0.0:
         raise InputError("region: expected it in the file about sensors, as what they measure says no places; got none")

@@ -38,6 +38,7 @@ def record_cautions(scenario: Scenario) -> Iterator[tuple[Path, str]]:
     yield from _repeats(model.targets, source)
     yield from _single_reports(model.targets, source)
     yield from _unused(("targets", "path"), model.targets.path, source.reports.unused)
+    yield from ((("targets", "path"), f"targets.path: {model.targets.path}: {note}") for note in source.reports.notes)
     for index, sensor in enumerate(model.sensors):
         path: Path = ("sensors", index, "position")
         place = f"{format_path(path)}: expected metres from the origin"
