@@ -33,7 +33,7 @@ from vedette.densities.samples import (
 from vedette.densities.statistics import cardinality_distribution, existence_probabilities
 from vedette.densities.telling import Hypothesis, Target
 from vedette.densities.tracks import TrackTable, mixture_moments, track_moments
-from vedette.densities.undetected import UndetectedIntensity, UndetectedTargets
+from vedette.densities.undetected import LearntRate, UndetectedIntensity, UndetectedTargets
 from vedette.densities.unlabelled import IidCluster, Poisson
 
 __all__ = [
@@ -45,6 +45,7 @@ __all__ = [
     "Hypothesis",
     "IidCluster",
     "Labelled",
+    "LearntRate",
     "MultiBernoulli",
     "MultiTargetSamples",
     "Poisson",

@@ -16,7 +16,7 @@ from vedette.densities.glmb import GLMB
 from vedette.densities.labelled import LMB, Labelled
 from vedette.densities.multi_bernoulli import MultiBernoulli
 from vedette.densities.tracks import TrackTable
-from vedette.densities.undetected import UndetectedIntensity, UndetectedTargets
+from vedette.densities.undetected import LearntRate, UndetectedIntensity, UndetectedTargets
 from vedette.densities.unlabelled import IidCluster, Poisson
 from vedette.errors import InputError, VedetteError
 from vedette.files import write_file
@@ -111,15 +111,20 @@ def _arrays_of_undetected(undetected: UndetectedTargets) -> dict[str, Any]:
         grid = undetected.cells.grid
         parts |= {"expected": undetected.cells.expected, "region": grid.region.bounds}
         parts["cells"] = np.array([grid.columns, grid.rows])
+    if (learnt := undetected.birth_rate) is not None:
+        parts |= {f"birth_rate.{field.name}": getattr(learnt, field.name) for field in fields(LearntRate)}
     return {f"{_UNDETECTED}.{name}": part for name, part in parts.items()}
 
 
 def _undetected_of(arrays: Mapping[str, Any]) -> UndetectedTargets:
     own = {name.removeprefix(f"{_UNDETECTED}."): part for name, part in arrays.items() if _UNDETECTED in name}
-    cells = None
+    cells = learnt = None
+    if "birth_rate.rate" in own:
+        numbers = [own[f"birth_rate.{field.name}"] for field in fields(LearntRate)]
+        learnt = LearntRate(*(part.item() if part.ndim == 0 else part for part in numbers))
     if "cells" in own:
         x_min, x_max, y_min, y_max = own["region"].tolist()
         grid = CellGrid(Region(x_min, x_max, y_min, y_max), *own["cells"].tolist())
         cells = UndetectedIntensity(grid, own["expected"])
     step, index = own["next_label"].tolist()
-    return UndetectedTargets(Poisson(*(own[name] for name in _names(Poisson))), (step, index), cells)
+    return UndetectedTargets(Poisson(*(own[name] for name in _names(Poisson))), (step, index), cells, learnt)

@@ -9,7 +9,7 @@ import numpy as np
 from vedette.densities import checks
 from vedette.densities.unlabelled import Poisson, poisson_numbers
 from vedette.errors import InputError
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import Floats, Ints
 from vedette.models import CellGrid, Region
 from vedette.models.arguments import instance, non_negative, reject
 from vedette.speaking import Speaking
@@ -23,14 +23,16 @@ class UndetectedTargets(Speaking):
         intensity: expected number of undetected targets by state, of those from birth sites and of dropped labels.
         next_label: birth step and index of the label that the next measurement may begin.
         cells: expected number of those that appeared anywhere in a region, by place; None: there are none.
+        birth_rate: what is known of the birth rate of these, where it is learnt; None: it is given.
 
     Raises:
-        InputError: a part of another kind, or no label.
+        InputError: a part of another kind, no label, or a birth rate of another number of cells.
     """
 
     intensity: Poisson
     next_label: tuple[int, int]
     cells: UndetectedIntensity | None = None
+    birth_rate: LearntRate | None = None
 
     def __post_init__(self) -> None:
         instance("UndetectedTargets.intensity", self.intensity, Poisson)
@@ -40,6 +42,11 @@ class UndetectedTargets(Speaking):
         object.__setattr__(self, "next_label", label)
         if self.cells is not None:
             instance("UndetectedTargets.cells", self.cells, UndetectedIntensity)
+        if self.birth_rate is not None:
+            instance("UndetectedTargets.birth_rate", self.birth_rate, LearntRate)
+            num = 0 if self.cells is None else self.cells.num_cells
+            if len(self.birth_rate.unit) != num:
+                raise reject("UndetectedTargets.birth_rate.unit", f"{num} cells", f"{len(self.birth_rate.unit)}")
 
     def _summary(self) -> str:
         return f"{self.expected_number:.4g} expected"
@@ -57,6 +64,49 @@ class UndetectedTargets(Speaking):
     def none(cls, state_dim: int) -> UndetectedTargets:
         """No target, before the first scan."""
         return cls(Poisson.empty(state_dim), (0, 0))
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class LearntRate(Speaking):
+    """Posterior of the rate of Poisson births, a gamma density, given the first detections of the targets.
+
+    Of births at a rate of 1/s, scans are expected to have detected `exposure` targets; the number of first detections
+    is then Poisson with mean rate times exposure.
+
+    Attributes:
+        rate: posterior mean of the birth rate, by which targets are predicted [1/s].
+        exposure: expected number of first detections per unit of the rate [s].
+        unit: (num_cells,) expected number of undetected targets in each cell per unit of the rate [s].
+        past: expected number of first detections of targets whose labels have ended.
+        labels: (num, 2) labels that may be of targets born after the first scan.
+        shares: (num,) probability that each is one, if it exists.
+
+    Raises:
+        InputError: an array of another shape, or a number that is negative or not finite.
+    """
+
+    rate: float
+    exposure: float
+    unit: Floats
+    past: float
+    labels: Ints
+    shares: Floats
+
+    def __post_init__(self) -> None:
+        for name in ("rate", "exposure", "past"):
+            object.__setattr__(self, name, non_negative(f"LearntRate.{name}", getattr(self, name)))
+        labels = np.array(self.labels, np.int64)
+        checks.check_array("LearntRate.labels", labels, np.int64, (None, 2))
+        for name, shape in (("unit", (None,)), ("shares", (len(labels),))):
+            values = checks.as_floats(f"LearntRate.{name}", getattr(self, name), shape)
+            checks.check_finite(f"LearntRate.{name}", values, InputError)
+            if (values < 0.0).any():
+                raise reject(f"LearntRate.{name}", "numbers of at least 0", values.tolist())
+            object.__setattr__(self, name, values)
+        object.__setattr__(self, "labels", labels)
+
+    def _summary(self) -> str:
+        return f"of {self.rate:.3g} births a second"
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -13,12 +13,12 @@ from vedette.densities import LMB, FactoredGLMB, Labelled, UndetectedTargets
 from vedette.densities.checks import offsets_of
 from vedette.densities.label_sets import take_factors
 from vedette.errors import InputError, NumericalError
+from vedette.filters.appearing import appearing, with_deaths, with_faint_candidates, with_learnt_rate
 from vedette.filters.base import LabelledFilter, OfKind, SensorStep, blind_sensor
 from vedette.filters.limits import Limits
 from vedette.filters.multi_sensor import InTurn, MultiSensorFilter
 from vedette.filters.protocols import FilterInfo
 from vedette.filters.undetected import (
-    appearing,
     named_at,
     no_undetected,
     predicted_undetected,
@@ -84,22 +84,24 @@ class _OfFactors(OfKind[FactoredGLMB]):
         if dt > 0.0:
             # Births that a caller gives are instead of the model's, anywhere as at sites.
             born = split_births(OfKind._births(self, dt, step, None, None))[1] if births is None else None
+            undetected = with_deaths(undetected, prior, self.targets.survival, dt)
             undetected, error = predicted_undetected(undetected, self.targets, born, dt, self.limits)
         if step is not None:
             undetected = named_at(undetected, step, self.targets.birth.num_sites)
         return _Before(prior.to_kernel(), undetected, error)
 
     def _stepped(self, prior: _Before, step: SensorStep) -> tuple[_Before, FactoredReport]:
-        scan, _, sensor, _ = step.inputs
+        scan, reduction = step.inputs[0], step.limits.reduction()
         factoring = _factoring(self.max_split_error, self.max_factor_labels, step.num_scans)
         birth, at = self.targets.birth, (scan.measurements, scan.pose)
         seen = no_undetected(self.targets.state_dim)
         if prior.undetected is not None:
             seen = seen_by(prior.undetected, prior.error, birth, step.sensor, *at)
-        density, missed, report = step_factored(prior.density, seen, *step.inputs, step.limits.reduction(), factoring)
+            reduction = with_faint_candidates(reduction, prior.undetected, birth)
+        density, missed, report = step_factored(prior.density, seen, *step.inputs, reduction, factoring)
         if prior.undetected is None:
             return prior._replace(density=density), report
-        undetected, log_missed = undetected_after(prior.undetected, missed, birth, sensor, *at)
+        undetected, log_missed = undetected_after(prior.undetected, missed, birth, step.sensor, *at)
         return _Before(density, undetected, prior.error), report._replace(log_total=report.log_total + log_missed)
 
     def _check(self, posterior: Any, report: FactoredReport, place: str) -> float:
@@ -117,7 +119,7 @@ class _OfFactors(OfKind[FactoredGLMB]):
         # Where undetected targets are an intensity, dropped labels return to it: the caps' are counted as dropped all
         # the same, those below `min_existence` are not.
         if undetected is not None:
-            undetected = with_dropped(undetected, whole, found)
+            undetected = with_learnt_rate(with_dropped(undetected, whole, found), whole, found, self.targets.birth)
         lost = "dropped_existence" if undetected is None else "left_out"
         dropped += sum(float(getattr(report, lost)) for report in reports)
         factoring = posterior.error + sum(float(report.split_error + 4.0 * report.taken_twice) for report in reports)

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache, lru_cache
-from typing import Any, NamedTuple
+from functools import cache
+from typing import Any
 
 import numpy as np
 
-from vedette.densities import LMB, FactoredGLMB, Poisson, UndetectedIntensity, UndetectedTargets, as_lmb
+from vedette.densities import LMB, FactoredGLMB, Poisson, UndetectedTargets, as_lmb
 from vedette.densities.label_sets import without_labels
+from vedette.filters.appearing import cells_after, density_at, predicted_cells
 from vedette.filters.limits import Limits
 from vedette.kernels.association.first_detections import Undetected
-from vedette.kernels.base.types import Floats, Lmb, Mixture, Sensor
+from vedette.kernels.base.types import Floats, Lmb, Mixture
 from vedette.kernels.gaussian.intensities import condensed, predict_intensity_by, stacked_mixtures
-from vedette.kernels.steps.undetected import take_out_detected
-from vedette.models import BirthModel, CellGrid, SensorModel, TargetModel, UndetectedModel, kernel_motion
+from vedette.models import BirthModel, SensorModel, TargetModel, kernel_motion
 from vedette.models.arguments import reject, step_number
 from vedette.probabilities import expit
 
@@ -23,18 +23,8 @@ from vedette.probabilities import expit
 FROM_THE_START = 0.15
 # Components of the intensity that a birth site may have, where these are more than `Limits.max_intensity_components`.
 _COMPONENTS_A_SITE = 3
-# Cells along each side of a region in which targets appear anywhere, and nodes a side by which P_D is averaged in each.
-_CELLS, _NODES = 16, 2
 # Standard deviations of a birth's position that stand for "anywhere" about a measurement: wide beside the noise.
 _WIDE = 3.0
-
-
-class Appearing(NamedTuple):
-    """Targets that appear anywhere in a region, by cells."""
-
-    model: UndetectedModel  # of those that are there; births are added apart
-    states: Floats  # (num_cells, num_nodes, state_dim) nodes of the cells
-    node_weights: Floats  # (num_nodes,)
 
 
 @cache
@@ -42,17 +32,6 @@ def no_undetected(state_dim: int) -> Undetected:
     """No undetected targets, as kernels take them."""
     none = Poisson.empty(state_dim).to_kernel()
     return Undetected(none, none, 0, 0, 0.0)
-
-
-@lru_cache(maxsize=100)
-def appearing(birth: BirthModel) -> Appearing | None:
-    """The cells of targets that appear anywhere; None where the births have no region."""
-    measured = birth.from_measurements
-    if measured is None or measured.region is None:
-        return None
-    grid = CellGrid(measured.region, _CELLS, _CELLS)
-    model = UndetectedModel(grid, 0.0, speed=float(measured.std[2]) if len(measured.std) > 2 else 0.0)
-    return Appearing(model, grid.states(birth.state_dim, _NODES), grid.node_weights(_NODES))
 
 
 def split_births(born: Lmb) -> tuple[Lmb, Lmb]:
@@ -77,22 +56,18 @@ def predicted_undetected(
         dt: s, above 0.
         limits: of which `max_intensity_components` counts.
     """
-    birth, error = targets.birth, 0.0
+    error = 0.0
     motion = kernel_motion(targets.motion, targets.survival)
     intensity = predict_intensity_by(before.intensity.to_kernel(), motion, dt)
     if births is not None and len(births.existence_logit):
         existence = expit(births.existence_logit)
         intensity = stacked_mixtures(intensity, _intensity_of(births))
         error = float((2.0 * existence * -np.expm1(-existence)).sum())
-    intensity, _ = condensed(intensity, max(limits.max_intensity_components, _COMPONENTS_A_SITE * birth.num_sites))
-    cells, places = before.cells, appearing(birth)
-    if places is not None and birth.from_measurements is not None and not (births is None and cells is None):
-        known = np.zeros(places.model.grid.num_cells) if cells is None else cells.expected
-        survival = targets.survival.prob(places.states[:, 0], dt)
-        expected = 0.0 if births is None else birth.from_measurements.expected
-        share = expected * (1.0 if birth.period is None else dt / birth.period) / len(known)
-        cells = UndetectedIntensity(places.model.grid, places.model.predict(known, dt, survival) + share)
-    return UndetectedTargets(Poisson.from_kernel(intensity), before.next_label, cells), error
+    intensity, _ = condensed(
+        intensity, max(limits.max_intensity_components, _COMPONENTS_A_SITE * targets.birth.num_sites)
+    )
+    cells = predicted_cells(before, targets, dt, appear=births is not None)
+    return UndetectedTargets(Poisson.from_kernel(intensity), before.next_label, *cells), error
 
 
 def with_dropped(undetected: UndetectedTargets, before: FactoredGLMB, kept: FactoredGLMB) -> UndetectedTargets:
@@ -134,29 +109,22 @@ def seen_by(
         std[:2] *= _WIDE
         means = np.zeros((len(scan), len(std)))
         means[:, :2] = places
+        cells = undetected.cells
         with np.errstate(divide="ignore"):
-            log_weights = np.log(_density_at(undetected.cells, places)) + np.log(2.0 * np.pi * std[0] * std[1])
+            density = density_at(cells.grid.cells_at(places), cells.expected, cells)
+            log_weights = np.log(density) + np.log(2.0 * np.pi * std[0] * std[1])
         local = Mixture(log_weights, means, np.tile(np.diag(std**2), (len(scan), 1, 1)))
     return Undetected(intensity, local, *undetected.next_label, error)
 
 
-def _density_at(cells: UndetectedIntensity, places: Floats) -> Floats:
-    """(num,) undetected targets per square metre at each place; 0 outside of the region."""
-    at, (width, height) = cells.grid.cells_at(places), cells.grid.cell_size
-    return np.where(at >= 0, cells.expected[at], 0.0) / (width * height)
-
-
 def undetected_after(
-    before: UndetectedTargets, missed: Mixture, birth: BirthModel, sensor: Sensor, scan: Floats, pose: Floats
+    before: UndetectedTargets, missed: Mixture, birth: BirthModel, sensor: SensorModel, scan: Floats, pose: Floats
 ) -> tuple[UndetectedTargets, float]:
     """The undetected targets after a scan, and the log probability that it detected none of those anywhere.
 
     missed: the intensity that the scan's kernel has left.
     """
     step, index = before.next_label
-    cells, places, log_missed = before.cells, appearing(birth), 0.0
-    if cells is not None and places is not None:
-        left = take_out_detected(sensor, pose, places.states, places.node_weights, cells.expected)
-        log_missed = float(left.sum() - cells.expected.sum())
-        cells = UndetectedIntensity(cells.grid, left)
-    return UndetectedTargets(Poisson.from_kernel(missed), (step, index + len(scan)), cells), log_missed
+    cells, learnt = cells_after(before, birth, sensor, scan, pose)
+    log_missed = 0.0 if cells is None or before.cells is None else cells.total - before.cells.total
+    return UndetectedTargets(Poisson.from_kernel(missed), (step, index + len(scan)), cells, learnt), log_missed

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import float_array, instance, no_gaussians, positive, positive_definite, real, reject
+from vedette.models.grid import CellGrid
 from vedette.models.region import Region
+from vedette.models.undetected import LEARNT, UndetectedModel
+
+# Cells along each side of a region in which targets appear anywhere.
+_CELLS = 16
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,7 +29,8 @@ class MeasurementBirth:
     measured (Reuter, Vo, Vo, Dietmayer 2014, section IV-C).
 
     Attributes:
-        expected: expected number of targets that appear between two scans, or within the `period` of the births.
+        expected: expected number of targets that appear between two scans, or within the `period` of the births;
+            learnt: estimated from the first detections, in filters whose undetected targets are an intensity.
         max_existence: largest existence of a label that starts at the next scan, in (0, 1).
         std: (state_dim,) standard deviation of the state of a new label; of the position about twice that of the noise.
         region: where targets appear; None: anywhere that is measured.
@@ -32,7 +39,7 @@ class MeasurementBirth:
         InputError: names the field, what was expected and what came.
     """
 
-    expected: float
+    expected: float | Literal["learnt"]
     max_existence: float
     std: Floats
     region: Region | None = None
@@ -40,7 +47,8 @@ class MeasurementBirth:
     def __post_init__(self) -> None:
         if self.region is not None:
             instance("MeasurementBirth.region", self.region, Region)
-        object.__setattr__(self, "expected", positive("MeasurementBirth.expected", self.expected))
+        if not self.is_learnt:
+            object.__setattr__(self, "expected", positive("MeasurementBirth.expected", self.expected))
         if not 0.0 < real("MeasurementBirth.max_existence", self.max_existence) < 1.0:
             raise reject("MeasurementBirth.max_existence", "a probability above 0 and below 1", self.max_existence)
         std = float_array("MeasurementBirth.std", self.std, (None,))
@@ -53,6 +61,24 @@ class MeasurementBirth:
     def cov(self) -> Floats:
         """(state_dim, state_dim) covariance of a birth."""
         return np.diag(self.std**2)
+
+    @property
+    def is_learnt(self) -> bool:
+        """Whether the expected number of births is learnt."""
+        return isinstance(self.expected, str) and self.expected == LEARNT
+
+    def uniform(self) -> UndetectedModel | None:
+        """The targets that appear anywhere in the region alike, on cells; None without a region.
+
+        Births of a known rate are not among them, as they may be so many a scan. Where the rate is learnt, one target
+        is expected before the first scan.
+        """
+        if self.region is None:
+            return None
+        grid, speed = CellGrid(self.region, _CELLS, _CELLS), float(self.std[2]) if len(self.std) > 2 else 0.0
+        if self.is_learnt:
+            return UndetectedModel(grid, 1.0, birth_rate=LEARNT, speed=speed)
+        return UndetectedModel(grid, 0.0, speed=speed)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,6 +96,9 @@ class BirthModel:
         steps: the filter steps at which births at the sites may happen; None: every step.
         from_measurements: births where a tracker finds measurements that no track explains, beside the sites; None:
             there are none.
+        anywhere: the targets that appear anywhere, where more is known of them than `from_measurements` says: how many
+            there are at first, their birth rate and where they enter. Filters whose undetected targets are an
+            intensity then hold these; None: what `from_measurements` says.
         period: s; the stretch of time within which births have these probabilities, those from measurements too; None:
             each step, whatever its length (the paper).
         num_sites: number of birth sites.
@@ -85,6 +114,7 @@ class BirthModel:
     steps: frozenset[int] | None = None
     from_measurements: MeasurementBirth | None = None
     period: float | None = None
+    anywhere: UndetectedModel | None = None
     num_sites: int = field(init=False)
     state_dim: int = field(init=False)
 
@@ -104,6 +134,8 @@ class BirthModel:
             raise reject("BirthModel.from_measurements", "a MeasurementBirth or None", measured)
         if measured is not None and len(measured.std) != state_dim:
             raise reject("BirthModel.from_measurements.std", f"{state_dim} numbers", measured.std.tolist())
+        if self.anywhere is not None:
+            instance("BirthModel.anywhere", self.anywhere, UndetectedModel)
         if self.period is not None:
             object.__setattr__(self, "period", positive("BirthModel.period", self.period))
         for name, value in (("existence", existence), ("means", means), ("covs", covs), ("steps", _steps(self.steps))):

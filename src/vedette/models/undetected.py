@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import float_array, non_negative, probability, reject
-from vedette.models.fields import NonNegative, Probability
+from vedette.models.arguments import float_array, non_negative, positive, probability, reject
+from vedette.models.fields import NonNegative, Positive, Probability
 from vedette.models.grid import CellGrid
 
 # Standard deviations beyond which a Gaussian is taken as 0: what lies there is below the rounding of a sum.
 _REACH = 8.5
+LEARNT: Literal["learnt"] = "learnt"  # in place of a birth rate that nobody knows
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,11 +30,13 @@ class UndetectedModel:
         grid: the cells.
         expected: mean number of undetected targets in the region at the first scan, before it, spread evenly; or
             (num_cells,) that in each cell.
-        birth_rate: mean number of targets that appear in the region in a second [1/s].
+        birth_rate: mean number of targets that appear in the region in a second; learnt: estimated from the first
+            detections, in beliefs that have an intensity of undetected targets [1/s].
         enters: where they appear: anywhere alike, or along the border of the region, in the cells there.
         speed: standard deviation of each of the two components of the velocity [m/s].
         survival: probability of living through a second; none: as survival says of a scan, at the middle of a cell and
             at rest.
+        prior_rate: where the birth rate is learnt, the mean of its prior density, a gamma of shape 1/2 [1/s].
 
     Raises:
         InputError: names the field, what was expected and what came.
@@ -41,16 +44,19 @@ class UndetectedModel:
 
     grid: CellGrid
     expected: float | Floats
-    birth_rate: NonNegative = 0.0
+    birth_rate: NonNegative | Literal["learnt"] = 0.0
     enters: Literal["anywhere", "border"] = "anywhere"
     speed: float = 0.0
     survival: Probability | None = None
+    prior_rate: Positive = 0.1
 
     def __post_init__(self) -> None:
         if not isinstance(self.grid, CellGrid):
             raise reject("UndetectedModel.grid", "a CellGrid", self.grid)
-        for name in ("birth_rate", "speed"):
-            object.__setattr__(self, name, non_negative(f"UndetectedModel.{name}", getattr(self, name)))
+        if not self.is_learnt:
+            object.__setattr__(self, "birth_rate", non_negative("UndetectedModel.birth_rate", self.birth_rate))
+        object.__setattr__(self, "prior_rate", positive("UndetectedModel.prior_rate", self.prior_rate))
+        object.__setattr__(self, "speed", non_negative("UndetectedModel.speed", self.speed))
         if self.enters not in ("anywhere", "border"):
             raise reject("UndetectedModel.enters", "anywhere or border", self.enters)
         if self.survival is not None:
@@ -69,12 +75,23 @@ class UndetectedModel:
         num = self.grid.num_cells
         return np.full(num, self.expected / num) if np.ndim(self.expected) == 0 else np.array(self.expected)
 
-    def births(self, dt: float) -> Floats:
-        """(num_cells,) mean number of targets that appear within `dt` seconds."""
-        shares = np.ones(self.grid.num_cells) if self.enters == "anywhere" else self.grid.border
-        return np.asarray(self.birth_rate * non_negative("dt", dt) * shares / shares.sum())
+    @property
+    def is_learnt(self) -> bool:
+        """Whether the birth rate is learnt."""
+        return isinstance(self.birth_rate, str) and self.birth_rate == LEARNT
 
-    def predict(self, expected: Floats, dt: float, survival: Floats | float) -> Floats:
+    @property
+    def first_rate(self) -> float:
+        """Birth rate before anything was measured, 1/s."""
+        return self.prior_rate if isinstance(self.birth_rate, str) else self.birth_rate
+
+    def births(self, dt: float, rate: float | None = None) -> Floats:
+        """(num_cells,) mean number of targets that appear within `dt` seconds. rate: 1/s; None: `first_rate`."""
+        shares = np.ones(self.grid.num_cells) if self.enters == "anywhere" else self.grid.border
+        number = (self.first_rate if rate is None else rate) * non_negative("dt", dt)
+        return np.asarray(number * shares / shares.sum())
+
+    def predict(self, expected: Floats, dt: float, survival: Floats | float, rate: float | None = None) -> Floats:
         """(num_cells,) mean number of undetected targets `dt` seconds after `expected`: who lives moves, others appear.
 
         out_j = births_j + sum over cells i of P(j | i) survival_i expected_i, with P(j | i) the probability that a
@@ -84,11 +101,12 @@ class UndetectedModel:
             expected: (num_cells,) mean number in each cell.
             dt: s, from 0.
             survival: probability of living through `dt`: one number, or (num_cells,).
+            rate: of births, 1/s; None: `first_rate`.
         """
         step, sizes = self.speed * non_negative("dt", dt), self.grid.cell_size
         living = (expected * survival).reshape(self.grid.rows, self.grid.columns)
         along = _moved(living.T, cell_shares(step, sizes[0], self.grid.columns)).T
-        return _moved(along, cell_shares(step, sizes[1], self.grid.rows)).ravel() + self.births(dt)
+        return _moved(along, cell_shares(step, sizes[1], self.grid.rows)).ravel() + self.births(dt, rate)
 
 
 def cell_shares(step: float, size: float, num: int) -> Floats:

@@ -92,10 +92,11 @@ def _born_at_once(targets: TargetModel, times: Floats) -> TargetModel:
     Of births within a period there are the more the later it comes, and it would make clocks likelier for that.
     """
     birth = targets.birth
-    if birth.period is None or birth.from_measurements is None or len(times) < 2:
+    measured = birth.from_measurements
+    if birth.period is None or measured is None or isinstance(measured.expected, str) or len(times) < 2:
         return targets
     share = float(times[-1] - times[0]) / (len(times) - 1) / birth.period
-    measured = replace(birth.from_measurements, expected=share * birth.from_measurements.expected)
+    measured = replace(measured, expected=share * measured.expected)
     return replace(targets, birth=replace(birth, period=None, from_measurements=measured))
 
 

@@ -50,8 +50,16 @@ def check_measured_births(birth: BirthModel, sensors: Sequence[SensorModel]) -> 
 
 
 def births_of_tracker(birth: BirthModel, local: Any) -> BirthModel:
-    """The births without those from measurements where a filter has these itself (`starts_tracks`)."""
-    return replace(birth, from_measurements=None) if getattr(local, "starts_tracks", False) else birth
+    """The births without those from measurements where a filter has these itself (`starts_tracks`).
+
+    Raises `InputError` where a tracker must start tracks, and the number of births is to be learnt.
+    """
+    if getattr(local, "starts_tracks", False):
+        return replace(birth, from_measurements=None)
+    if birth.from_measurements is not None and birth.from_measurements.is_learnt:
+        wanted = f"a number, as the beliefs of {type(local).__name__} have no intensity of undetected targets"
+        raise reject("MeasurementBirth.expected", wanted, birth.from_measurements.expected)
+    return birth
 
 
 def births_due(birth: BirthModel, step: int, dt: float, measured: LMB | None) -> LMB | None:
