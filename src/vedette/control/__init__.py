@@ -12,6 +12,7 @@ from vedette.control.constraints import (
     VoidProbability,
     WithReach,
     WithViolations,
+    WithZone,
     mask_of,
     void_probability,
 )
@@ -103,6 +104,7 @@ __all__ = [
     "WithReach",
     "WithUnitVolume",
     "WithViolations",
+    "WithZone",
     "mask_of",
     "planning_limits",
     "void_probability",

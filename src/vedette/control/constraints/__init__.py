@@ -2,12 +2,14 @@
 
 from vedette.control.constraints.mask import Mask, opened, repaired
 from vedette.control.constraints.masks import courses_allowed, mask_of, pairs_allowed, violated, without_course
+from vedette.control.constraints.paths import Paths, VisibilityGraph, visibility_graph
 from vedette.control.constraints.protocol import (
     Constraint,
     Situation,
     Timeless,
     WithReach,
     WithViolations,
+    WithZone,
     reach_of,
 )
 from vedette.control.constraints.regions import KeepOut, StayInside
@@ -18,13 +20,16 @@ __all__ = [
     "Constraint",
     "KeepOut",
     "Mask",
+    "Paths",
     "Separation",
     "Situation",
     "StayInside",
     "Timeless",
+    "VisibilityGraph",
     "VoidProbability",
     "WithReach",
     "WithViolations",
+    "WithZone",
     "courses_allowed",
     "mask_of",
     "opened",
@@ -32,6 +37,7 @@ __all__ = [
     "reach_of",
     "repaired",
     "violated",
+    "visibility_graph",
     "void_probability",
     "without_course",
 ]

@@ -53,8 +53,8 @@ class Situation(NamedTuple):
 class Constraint(Protocol):
     """Says which courses a sensor may take, and which courses of two sensors go together.
 
-    It may have more members: those of `WithReach`, `Timeless` and `WithViolations`. Decisions over several periods show
-    it one sensor, or two, at a time: the others have no courses then.
+    It may have more members: those of `WithReach`, `Timeless`, `WithViolations` and `WithZone`. Decisions over several
+    periods show it one sensor, or two, at a time: the others have no courses then.
     """
 
     @property
@@ -105,6 +105,16 @@ class WithViolations(Protocol):
 
     def violations(self, situation: Situation) -> tuple[Floats, ...]:
         """(num_courses,) how much each course violates it, one array a sensor; above 0 where it is not allowed."""
+        ...
+
+
+@runtime_checkable
+class WithZone(Protocol):
+    """A constraint that forbids an area at all times, round which plans look for ways beyond their horizon."""
+
+    @property
+    def zone(self) -> tuple[Floats, ...]:
+        """Polygons (num_corners, 2), m: forbidden is what is inside of them by the even-odd rule, and their edges."""
         ...
 
 

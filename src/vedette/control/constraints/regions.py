@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -12,6 +13,9 @@ from vedette.kernels.base.types import Bools, Floats
 from vedette.models import Region
 from vedette.models.arguments import float_array, reject
 from vedette.models.region import tell_degrees
+
+# m; how far beyond a fence its zone begins, and how wide that is.
+_EDGE, _BEYOND = 1e-6, 1e7
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +37,13 @@ class StayInside(Alone):
     def __post_init__(self) -> None:
         if not isinstance(self.region, Region):
             raise reject("region", "a Region", self.region)
+
+    @property
+    def zone(self) -> tuple[Floats, ...]:
+        """What is outside of the rectangle, whose edge is allowed: a frame around it, wider than anything goes."""
+        (x_min, y_min), (x_max, y_max) = self.region.corners[0] - _EDGE, self.region.corners[2] + _EDGE
+        inner = np.array([[x_min, y_min], [x_max, y_min], [x_max, y_max], [x_min, y_max]])
+        return inner + _BEYOND * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]), inner
 
     def violations(self, situation: Situation) -> tuple[Floats, ...]:
         """m from it, the mean over the times. Between two places in a rectangle the straight way is in it, too."""
@@ -71,21 +82,29 @@ class KeepOut(Alone):
             object.__setattr__(self, "area", corners)
         holes = tuple(_polygon(f"holes[{i}]", hole) for i, hole in enumerate(self.holes))
         object.__setattr__(self, "holes", holes)
-        rings = (corners, *holes)
-        ends = np.concatenate([np.roll(ring, -1, axis=0) for ring in rings])
-        object.__setattr__(self, "_edges", (np.concatenate(rings), ends))
+        object.__setattr__(self, "_edges", edges_of((corners, *holes)))
+
+    @property
+    def zone(self) -> tuple[Floats, ...]:
+        """The polygon and its holes."""
+        return (self.area.corners if isinstance(self.area, Region) else self.area, *self.holes)
 
     def violations(self, situation: Situation) -> tuple[Floats, ...]:
         """m inside it, the mean over the way's corners; next to nothing where it is only crossed between two."""
         edges = self._edges
         ways = np.concatenate([situation.ways(s) for s in range(len(situation.courses))])
-        inside, crosses = _inside(ways, edges), _cross(ways, edges)
+        inside, crosses = inside_edges(ways, edges), _cross(ways, edges)
         if situation.poses is not None:
             crosses[:, 0] &= ~inside[:, 0]
             inside[:, 0] = False
         depths = np.where(inside, _distances(ways, edges), 0.0).mean(axis=1)
         touched = inside.any(axis=1) | crosses.any(axis=1)
         return situation.of_movable(np.where(touched, np.maximum(depths, np.finfo(float).tiny), 0.0))
+
+
+def edges_of(rings: Sequence[Floats]) -> tuple[Floats, Floats]:
+    """(num_edges, 2) where the edges of polygons begin and end."""
+    return np.concatenate(rings), np.concatenate([np.roll(ring, -1, axis=0) for ring in rings])
 
 
 def _polygon(name: str, given: Any) -> Floats:
@@ -95,7 +114,7 @@ def _polygon(name: str, given: Any) -> Floats:
     return corners
 
 
-def _inside(points: Floats, edges: tuple[Floats, Floats]) -> Bools:
+def inside_edges(points: Floats, edges: tuple[Floats, Floats]) -> Bools:
     """(...) whether points (..., 2) are inside: whether a ray to the east crosses the edges an odd number of times."""
     x, y = points[..., 0, np.newaxis], points[..., 1, np.newaxis]
     (x1, y1), (x2, y2) = edges[0].T, edges[1].T

@@ -1,0 +1,237 @@
+"""Shortest paths around the zones that constraints forbid, by a visibility graph over the corners of the zones.
+
+A shortest path among polygons is straight except for bends at their convex corners (T. Lozano-Perez and M. A. Wesley,
+An algorithm for planning collision-free paths among polyhedral obstacles, Communications of the ACM 22 (1979) 560-570).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from vedette.control.constraints.protocol import Constraint, WithZone
+from vedette.control.constraints.regions import edges_of, inside_edges
+from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.kernels.planning.lines import Edges, clear_lengths, first_touches
+
+# m; paths keep this distance from corners, as edges are forbidden. Straits narrower than twice this are closed.
+MARGIN = 1e-3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VisibilityGraph:
+    """Shortest paths in the plane outside of zones.
+
+    Attributes:
+        edges: of all zones.
+        nodes: (num_nodes, 2) m, the corners at which paths may bend, by `MARGIN` outside of the zones.
+        coast: (num_points, 2) m, where free space reaches farthest into the zones: at their other corners, and where
+            edges of two zones cross.
+        lengths: (num_nodes, num_nodes) m, of the shortest paths between nodes; inf where there is none.
+        before: (num_nodes, num_nodes) the node before the second one on the path from the first; below 0: none.
+    """
+
+    edges: Edges
+    nodes: Floats
+    coast: Floats
+    lengths: Floats
+    before: Ints
+
+    @classmethod
+    def of(cls, zones: Sequence[Sequence[Floats]]) -> VisibilityGraph:
+        """Build the graph of zones, each the area inside of polygons (num_corners, 2), m, by the even-odd rule."""
+        from scipy.sparse.csgraph import shortest_path
+
+        zones = [[_distinct(ring) for ring in rings] for rings in zones]
+        pairs = [edges_of(rings) for rings in zones]
+        starts, ends = (np.concatenate(each) for each in zip(*pairs, strict=True))
+        edges = Edges(starts, ends, np.repeat(np.arange(len(pairs)), [len(own) for own, _ in pairs]))
+        sides = [_beside_corners(ring) for rings in zones for ring in rings]
+        outer, inner = (np.concatenate(each) for each in zip(*sides, strict=True))
+        nodes, coast = (own[_is_free(edges, own)] for own in (outer, np.concatenate([inner, _crossings(edges)])))
+        straight = clear_lengths(nodes, nodes, edges)
+        if len(nodes) == 0:
+            return cls(edges, nodes, coast, straight, np.empty((0, 0), np.int64))
+        links = np.where(np.isinf(straight), 0.0, straight)
+        lengths, before = shortest_path(links, method="D", return_predecessors=True)
+        return cls(edges, nodes, coast, lengths, np.asarray(before, np.int64))
+
+    def to(self, goals: Floats, start: Floats) -> Paths:
+        """Return the paths from about a start (2,) to goals (num_goals, 2), m.
+
+        A goal inside a zone, or to which no path leads, is approached as near as paths from the start lead to it.
+        """
+        points, origin = np.array(goals, np.float64, order="C"), self.outside(start[np.newaxis])
+        from_origin = _added(clear_lengths(origin, self.nodes, self.edges), self.lengths)[0]
+        for goal in np.flatnonzero(~self._are_linked(points, origin, from_origin)).tolist():
+            near = (own for own in self._nearest(points[goal]) if self._are_linked(own, origin, from_origin)[0])
+            points[goal] = next(near, origin)[0]
+        last = clear_lengths(points, self.nodes, self.edges)
+        through = self.lengths[:, np.newaxis] + last
+        left = np.hypot(*(goals - points).T)
+        if len(self.nodes) == 0:
+            return Paths(self, points, left, np.empty((0, len(points))), np.empty((0, len(points)), np.int64))
+        return Paths(self, points, left, through.min(axis=2), through.argmin(axis=2))
+
+    def is_barred(self, start: Floats, courses: Floats) -> Bools:
+        """(num_courses,) whether courses (num_courses, num_times, 2) from `start` (2,) touch a zone.
+
+        Zones in which they begin do not count: a sensor may leave them.
+        """
+        points = np.concatenate([np.broadcast_to(start, (len(courses), 1, 2)), courses], axis=1)
+        ignored = np.repeat(_inside(self.edges, points[:, 0]), courses.shape[1], axis=0)
+        starts, ends = (np.ascontiguousarray(own.reshape(-1, 2)) for own in (points[:, :-1], points[:, 1:]))
+        touched = np.isfinite(first_touches(starts, ends, self.edges, ignored))
+        return np.asarray(touched.reshape(courses.shape[:2]).any(axis=1))
+
+    def until_barred(self, starts: Floats, ends: Floats) -> Floats:
+        """(num,) share of the line from each start to its end (num, 2) that is allowed, short of a zone; 1: all."""
+        shares = first_touches(starts, ends, self.edges, _inside(self.edges, starts))
+        length = np.maximum(np.hypot(*(ends - starts).T), MARGIN)
+        return np.where(np.isinf(shares), 1.0, np.maximum(shares - MARGIN / length, 0.0))
+
+    def outside(self, points: Floats) -> Floats:
+        """(num, 2) the points (num, 2) themselves, or the nearest ones outside of all zones for those inside one."""
+        found = np.array(points, np.float64, order="C")
+        for i in np.flatnonzero(~_is_free(self.edges, found)).tolist():
+            found[i] = next(self._nearest(found[i]), found[i : i + 1])[0]
+        return found
+
+    def _nearest(self, point: Floats) -> Iterator[Floats]:
+        """Yield points (1, 2) outside of all zones near a point (2,), the nearest first."""
+        along = self.edges.ends - self.edges.starts
+        length = np.hypot(*along.T)[:, np.newaxis]
+        share = ((point - self.edges.starts) * along).sum(axis=1, keepdims=True) / length**2
+        foot = self.edges.starts + np.clip(share, 0.0, 1.0) * along
+        normal = MARGIN * np.column_stack([-along[:, 1], along[:, 0]]) / length
+        near = np.concatenate([self.nodes, self.coast, foot + normal, foot - normal])
+        near = near[np.argsort(np.hypot(*(near - point).T), kind="stable")]
+        return (own[np.newaxis] for own in near if _is_free(self.edges, own[np.newaxis])[0])
+
+    def _are_linked(self, points: Floats, origin: Floats, from_origin: Floats) -> Bools:
+        """(num,) whether paths lead from the origin (1, 2) to points (num, 2) that are outside of all zones.
+
+        from_origin: (num_nodes,) m, path lengths from the origin to the nodes.
+        """
+        straight = np.isfinite(clear_lengths(origin, points, self.edges)[0])
+        bent = np.isfinite(clear_lengths(points, self.nodes, self.edges) + from_origin).any(axis=1)
+        return np.asarray((straight | bent) & _is_free(self.edges, points))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Paths:
+    """Shortest paths to some goals.
+
+    Attributes:
+        graph: of the zones that they keep out of.
+        points: (num_goals, 2) m, where the paths end: the goals, or the places that they may be approached to.
+        left: (num_goals,) m, from these points to the goals.
+        lengths: (num_nodes, num_goals) m, from each node to each point; inf where no path leads there.
+        last: (num_nodes, num_goals) the last node on that path.
+    """
+
+    graph: VisibilityGraph
+    points: Floats
+    left: Floats
+    lengths: Floats
+    last: Ints
+
+    def are_straight(self, starts: Floats) -> Bools:
+        """(num_starts, num_goals) whether the straight line from each start (num_starts, 2) to each point is free."""
+        return np.isfinite(clear_lengths(starts, self.points, self.graph.edges))
+
+    def distances(self, starts: Floats) -> Floats:
+        """(num_starts, num_goals) m, lengths of shortest paths from starts (num_starts, 2) and on to the goals.
+
+        The last part, from the points to the goals, and the first one out of a zone in which a start is, are straight.
+        inf: no path leads there.
+        """
+        graph, origins = self.graph, self.graph.outside(starts)
+        found = clear_lengths(origins, self.points, graph.edges)
+        if not np.isfinite(found).all():
+            around = _added(clear_lengths(origins, graph.nodes, graph.edges), self.lengths)
+            found = np.minimum(found, around)
+        return np.asarray(np.hypot(*(origins - starts).T)[:, np.newaxis] + found + self.left)
+
+    def path(self, start: Floats, goal: int) -> Floats:
+        """(num_corners, 2) m, the shortest path from a start (2,) to the point of a goal; there must be one."""
+        graph, origin = self.graph, self.graph.outside(start[np.newaxis])
+        begin = start[np.newaxis] if np.array_equal(origin[0], start) else np.stack([start, origin[0]])
+        if self.are_straight(origin)[0, goal]:
+            return np.concatenate([begin, self.points[goal][np.newaxis]])
+        first = int((clear_lengths(origin, graph.nodes, graph.edges)[0] + self.lengths[:, goal]).argmin())
+        chain = [int(self.last[first, goal])]
+        while chain[-1] != first:
+            chain.append(int(graph.before[first, chain[-1]]))
+        return np.concatenate([begin, graph.nodes[chain[::-1]], self.points[goal][np.newaxis]])
+
+
+def visibility_graph(constraints: Sequence[Constraint]) -> VisibilityGraph | None:
+    """Return the graph of the zones of constraints; None where they have none.
+
+    The graph of the same zones is built once, however many decisions, planners or runs ask for it.
+    """
+    zones = [own.zone for own in constraints if isinstance(own, WithZone)]
+    return _built(tuple(tuple(ring.tobytes() for ring in rings) for rings in zones)) if zones else None
+
+
+@lru_cache(maxsize=32)
+def _built(zones: tuple[tuple[bytes, ...], ...]) -> VisibilityGraph:
+    return VisibilityGraph.of([[np.frombuffer(ring).reshape(-1, 2) for ring in rings] for rings in zones])
+
+
+def _added(first: Floats, then: Floats) -> Floats:
+    """(num_starts, num_goals) m, the least sum over nodes of lengths to (num_starts, num_nodes) and on from them."""
+    columns = [(first + own).min(axis=1, initial=np.inf) for own in then.T]
+    return np.stack(columns, axis=1) if columns else np.empty((len(first), 0))
+
+
+def _inside(edges: Edges, points: Floats) -> Bools:
+    """(num_points, num_zones) which points are inside which zones."""
+    found = np.empty((len(points), int(edges.zones[-1]) + 1), np.bool_)
+    for zone in range(found.shape[1]):
+        own = edges.zones == zone
+        found[:, zone] = inside_edges(points, (edges.starts[own], edges.ends[own]))
+    return found
+
+
+def _is_free(edges: Edges, points: Floats) -> Bools:
+    """(num_points,) which points are in no zone and on no edge."""
+    inside = _inside(edges, points)
+    return ~inside.any(axis=1) & np.isinf(first_touches(points, points, edges, np.zeros_like(inside)))
+
+
+def _distinct(ring: Floats) -> Floats:
+    """A polygon without corners that repeat the one before."""
+    return ring[np.any(ring != np.roll(ring, 1, axis=0), axis=1)]
+
+
+def _beside_corners(corners: Floats) -> tuple[Floats, Floats]:
+    """(num, 2) points at `MARGIN` from the corners of a polygon, outside of their bends and in them."""
+    to, on = np.roll(corners, 1, axis=0) - corners, np.roll(corners, -1, axis=0) - corners
+    middle = to / np.hypot(*to.T)[:, np.newaxis] + on / np.hypot(*on.T)[:, np.newaxis]
+    size = np.hypot(*middle.T)
+    bent = size > 1e-9
+    step = MARGIN * middle[bent] / size[bent][:, np.newaxis]
+    return corners[bent] - step, corners[bent] + step
+
+
+def _crossings(edges: Edges) -> Floats:
+    """(num, 2) points at `MARGIN` from where edges of two zones cross, one on each of the four sides."""
+    found = [np.empty((0, 2))]
+    for start, end, zone in zip(*edges, strict=True):
+        others = edges.zones > zone
+        along, across = end - start, edges.ends[others] - edges.starts[others]
+        turn, gap = along[0] * across[:, 1] - along[1] * across[:, 0], edges.starts[others] - start
+        with np.errstate(divide="ignore", invalid="ignore"):
+            here = (gap[:, 0] * across[:, 1] - gap[:, 1] * across[:, 0]) / turn
+            there = (gap[:, 0] * along[1] - gap[:, 1] * along[0]) / turn
+        at = (turn != 0.0) & (here >= 0.0) & (here <= 1.0) & (there >= 0.0) & (there <= 1.0)
+        unit, units = along / np.hypot(*along), across[at] / np.hypot(*across[at].T)[:, np.newaxis]
+        for side in (unit + units, unit - units):
+            step = MARGIN * side / np.hypot(*side.T)[:, np.newaxis]
+            found += [start + here[at, np.newaxis] * along + step, start + here[at, np.newaxis] * along - step]
+    return np.concatenate(found)
