@@ -20,7 +20,8 @@ from vedette.control import (
     KullbackLeiblerReward,
     Plan,
 )
-from vedette.control.evaluator import at_all, continued, look_on
+from vedette.control.beyond import Beyond, continued, drawing
+from vedette.control.evaluator import at_all
 from vedette.control.evidence import Evidence
 from vedette.control.inputs import options_of
 from vedette.control.problem import best_values, bound_of
@@ -115,12 +116,13 @@ def test_a_camera_stays_as_it_was_at_the_end() -> None:
     np.testing.assert_array_equal(found[:, 1], own.courses[:, 0])
 
 
-# look_on
+# horizons
 
 
 def looks(belief: LMB, poses: Any, sensors: Any = None) -> Any:
     of = placed(belief, poses, sensors)
-    return look_on(of.sensors, options_of(of.sensors, of.poses, of.settings), belief, of.settings)
+    options = options_of(of.sensors, of.poses, of.settings)
+    return Beyond.of(of.sensors, options, *drawing(belief), None).horizons(of.settings)
 
 
 EAST, WEST = [0.0, 0.0, 0.0], [-3000.0, 0.0, math.pi]

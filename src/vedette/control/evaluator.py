@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -11,19 +10,18 @@ import numpy as np
 
 from vedette.control.additive.rewards import AdditiveRewards
 from vedette.control.additive.table import lay_out
+from vedette.control.beyond import Beyond, drawing
 from vedette.control.cases import CaseRewards, SampleRewards
+from vedette.control.constraints import VisibilityGraph
 from vedette.control.priors import predicted
 from vedette.control.rewards.base import LabelReward, PowerReward, Reward
 from vedette.control.rewards.power import ExpectedLossReward
 from vedette.control.settings import Belief, MobileSensor, PlanningSettings
-from vedette.densities import LMB
 from vedette.densities.checks import offsets_of
 from vedette.fusion import Fusion, LinearRule
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.planning.ascent import Cells
-from vedette.models.functions import numbers_at
 from vedette.platforms import Options
-from vedette.platforms.camera import line_of_sight
 from vedette.tracking import State
 
 
@@ -82,28 +80,35 @@ class Evaluator:
         state: State,
         *,
         horizons: tuple[PlanningSettings, ...] | None = (),
+        graph: VisibilityGraph | None = None,
         rng: np.random.Generator,
     ) -> Evaluator:
         """By sums over labels, each followed over every course that reaches it; beliefs are LMBs.
 
         horizons: further ones, at whose ends the expected loss is taken as well; None: those that are due
-        (`vedette.control.evaluator.look_on`). Raises as `JointPlanner.plan`.
+        (`vedette.control.beyond.Beyond.horizons`). graph: of the zones that constraints forbid, for paths beyond the
+        horizon; None: there are none. Raises as `JointPlanner.plan`.
         """
         motion = sensors[0].filter.targets.motion
         prediction: Any = predicted(state.fused, motion, settings.horizon_steps, settings.horizon_period)
         found = [lay_out(sensors, options, rule, settings, reward, state, prediction, rng=rng)]
+        due = isinstance(reward, ExpectedLossReward) if horizons is None else len(horizons) > 0
+        beyond = Beyond.of(sensors, options, *drawing(prediction), graph) if due else None
+        notes = () if beyond is None else beyond.notes()
         if horizons is None:
-            due = isinstance(reward, ExpectedLossReward)
-            horizons = look_on(sensors, options, prediction, settings) if due else ()
+            horizons = () if beyond is None else beyond.horizons(settings)
         for own in horizons:
-            later = [continued(each, settings.horizon_times(), own.horizon_times()) for each in options]
+            assert beyond is not None
+            later = beyond.continued(settings.horizon_times(), own.horizon_times())
             ahead = predicted(state.fused, motion, own.horizon_steps, own.horizon_period)
             found.append(lay_out(sensors, later, rule, own, reward, state, ahead, rng=rng))
         counts = {"filter_steps": 0, "rewards": 0}
         for each, own in zip(found, (settings, *horizons), strict=True):
             counts["filter_steps"] += len(each.table.labels) * each.num_samples * own.horizon_steps
         source = at_all(found) if horizons else found[0]
-        return cls(settings, tuple(options), prediction, source, source, counts, horizons=horizons)
+        return cls(
+            settings, tuple(options), prediction, source, source, counts, dict.fromkeys(notes), horizons=horizons
+        )
 
     def joint_shape(self) -> tuple[int, ...]:
         """Number of different courses of each sensor."""
@@ -130,65 +135,6 @@ class Evaluator:
             return found
 
         return evaluate
-
-
-# Targets that exist with less probability draw no sensor from afar.
-_LEAST_EXISTENCE = 0.1
-# A sensor goes so much longer than it takes to its target, to see it for a while.
-_STAY = 1.25
-# Where it is asked how far a sensor sees, m, and in how many directions.
-_DISTANCES, _DIRECTIONS = np.geomspace(1.0, 1e6, 121), 8
-# Pseudo-updates on the way. A step is no longer than a sensor sees, so that it does not pass a target unseen.
-_LEAST_STEPS, _MOST_STEPS = 4, 12
-
-
-def look_on(
-    sensors: Sequence[MobileSensor], options: Sequence[Options], prediction: LMB, settings: PlanningSettings
-) -> tuple[PlanningSettings, ...]:
-    """The settings of further horizons, half way and at the end; none where all see what there is to see.
-
-    Within the horizon, a sensor that sees 250 m and goes 20 m has nothing to gain from a target 300 m off, and of
-    courses worth the same the first is taken. So all sensors are taken to go on as they do, until each may have come to
-    a target and each target may be reached by one of them, and the loss is the mean of those at all these times.
-
-    prediction: at the end of the horizon.
-    """
-    horizon = settings.horizon_steps * settings.horizon_period
-    places = prediction.tracks.means[prediction.existence >= _LEAST_EXISTENCE, :2]
-    speeds = np.array([_speed(own, horizon) for own in options])
-    if len(places) == 0 or not (speeds > 0.0).all():
-        return ()
-    reaches = np.array([_sight(sensor, own.pose) for sensor, own in zip(sensors, options, strict=True)])
-    ends = [own.courses[:, -1, :2] for own in options]
-    gaps = np.stack([np.hypot(*(own[:, np.newaxis] - places).transpose(2, 0, 1)).min(axis=0) for own in ends])
-    seconds = np.maximum(gaps - reaches[:, np.newaxis], 0.0) / speeds[:, np.newaxis]
-    beyond = _STAY * max(float(seconds.min(axis=0).max()), float(seconds.min(axis=1).max()))
-    if beyond == 0.0:
-        return ()
-    rate = float((speeds / reaches).max())
-    total = min(horizon + beyond, max(_MOST_STEPS / rate, 2.0 * horizon))
-    num = min(max(_LEAST_STEPS, math.ceil(total * rate)), _MOST_STEPS)
-    return tuple(replace(settings, horizon_steps=steps, horizon_period=total / num) for steps in (num // 2, num))
-
-
-def continued(own: Options, horizon: Floats, times: Floats) -> Options:
-    """The options with courses (num_courses, num_times, pose_dim) at other times, s, from now on.
-
-    horizon: (num_steps,) s of the poses that there are. Between them a sensor goes straight; after the last it goes on
-    by as much as it went over the whole horizon, again and again, and what else its pose has stays.
-    """
-    start = np.broadcast_to(own.pose, (len(own.courses), 1, len(own.pose)))
-    known = np.concatenate([start, own.courses], axis=1)
-    ends = np.concatenate([[0.0], horizon])
-    rounds = np.maximum(np.ceil(times / ends[-1] - 1e-9) - 1.0, 0.0)
-    within = times - rounds * ends[-1]
-    after = np.searchsorted(ends, within - 1e-9).clip(1, len(horizon))
-    share = ((within - ends[after - 1]) / (ends[after] - ends[after - 1]))[:, np.newaxis]
-    courses = np.where(rounds[:, np.newaxis] > 0.0, known[:, -1:], known[:, after])
-    moved = known[:, -1:, :2] - known[:, :1, :2]
-    straight = known[:, after - 1, :2] * (1.0 - share) + known[:, after, :2] * share
-    courses[:, :, :2] = straight + rounds[:, np.newaxis] * moved
-    return own._replace(courses=np.ascontiguousarray(courses))
 
 
 def at_all(horizons: Sequence[AdditiveRewards]) -> AdditiveRewards:
@@ -231,20 +177,3 @@ def _in_turn(offsets: Sequence[Ints]) -> tuple[Ints, Ints]:
     num_lists, num_courses = counts.shape
     lists = np.repeat(np.tile(np.arange(num_courses), num_lists), counts.ravel())
     return np.argsort(lists, kind="stable"), offsets_of(counts.sum(axis=0))
-
-
-def _sight(sensor: MobileSensor, pose: Floats) -> float:
-    """m, the distance up to which it detects at least half as well as it does anywhere, in the best direction."""
-    model, dim = sensor.filter.sensor.detection, sensor.filter.targets.state_dim
-    states = np.zeros((len(_DISTANCES) * _DIRECTIONS, dim))
-    angles = line_of_sight(pose) + 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
-    around = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    states[:, :2] = pose[:2] + (_DISTANCES[:, np.newaxis, np.newaxis] * around).reshape(-1, 2)
-    chances = numbers_at(model.function, states, pose, model.params).reshape(-1, _DIRECTIONS).max(axis=1)
-    return float(_DISTANCES[np.flatnonzero(chances >= 0.5 * chances.max())[-1]])
-
-
-def _speed(own: Options, horizon: float) -> float:
-    """m/s of the course that goes farthest."""
-    offsets = own.courses[:, -1, :2] - own.pose[:2]
-    return float(np.hypot(offsets[:, 0], offsets[:, 1]).max()) / horizon

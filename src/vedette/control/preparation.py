@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from vedette.control.constraints import Constraint, Mask
+from vedette.control.constraints import Constraint, Mask, VisibilityGraph, visibility_graph
 from vedette.control.evaluator import Evaluator
 from vedette.control.inputs import check_state, mask_of_decision, options_of
 from vedette.control.plan import Certainty
@@ -53,6 +53,7 @@ class Preparation:
         planned: beliefs and fusion in the form in which they are planned on.
         options: of each sensor.
         mask: what constraints allow; None: everything.
+        graph: of the zones that they forbid; None: there are none.
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -61,6 +62,7 @@ class Preparation:
     planned: Planned
     options: tuple[Options, ...]
     mask: Mask | None
+    graph: VisibilityGraph | None
 
     @classmethod
     def of(
@@ -77,7 +79,7 @@ class Preparation:
         options = options_of(sensors, poses, settings)
         planned = planned_on(sensors, fusion, settings, reward, state)
         mask = mask_of_decision(constraints, sensors, options, state.fused, np.asarray(poses), settings)
-        return cls(tuple(sensors), settings, reward, planned, options, mask)
+        return cls(tuple(sensors), settings, reward, planned, options, mask, visibility_graph(constraints))
 
     @property
     def races(self) -> bool:
@@ -101,7 +103,9 @@ class Preparation:
             assert not isinstance(reward, ExpectedLossReward)
             evaluator = Evaluator.of_cases(sensors, own, fusion, settings, reward, state, rng=rng)
         else:
-            evaluator = Evaluator.of_sums(sensors, own, rule, settings, reward, state, horizons=None, rng=rng)
+            evaluator = Evaluator.of_sums(
+                sensors, own, rule, settings, reward, state, horizons=None, graph=self.graph, rng=rng
+            )
         told = (
             *notes_of_state(sensors, settings, state, sums=rule is not None),
             *(self.mask.notes if self.mask is not None else ()),

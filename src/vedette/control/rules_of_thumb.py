@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
-from vedette.control.constraints import Constraint, repaired
+from vedette.control.beyond import Beyond
+from vedette.control.constraints import Constraint, VisibilityGraph, repaired, visibility_graph
 from vedette.control.inputs import check_steering, mask_of_decision, options_of, single_mask
 from vedette.control.plan import Plan
 from vedette.control.search import first_best
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import Estimator, best_estimate
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import dimension, generator, instance, one_of, reject, sequence
 from vedette.platforms import Options
 from vedette.platforms.camera import HALF_WIDTH, POINTING
@@ -24,34 +24,18 @@ Rule: TypeAlias = Literal["nearest", "assigned", "centroid"]
 
 # Weight of how well it points, relative to distances: above rounding, below what tells places apart.
 _AIM = 1e-6
+# m, added to the distance of a course that goes nowhere, where the path to its place has bends.
+_WAITING = 1e6
 
 
-def _nearest(places: Floats, sensors: Floats) -> Floats:
+def _nearest(gaps: Floats) -> Ints:
     """The nearest target of each sensor that none before it took; when all are taken, again from all."""
-    gaps = np.hypot(*(sensors[:, np.newaxis] - places).transpose(2, 0, 1))
-    taken = np.zeros(len(places), np.int64)
+    taken = np.zeros(gaps.shape[1], np.int64)
     chosen = []
     for own in gaps:
         chosen.append(int(np.argmin(np.where(taken == taken.min(), own, np.inf))))
         taken[chosen[-1]] += 1
-    return np.asarray(places[chosen])
-
-
-def _assigned(places: Floats, sensors: Floats) -> Floats:
-    """The s-th target for sensor s, beginning again where there are fewer targets."""
-    return np.asarray(places[np.arange(len(sensors)) % len(places)])
-
-
-def _centroid(places: Floats, sensors: Floats) -> Floats:
-    """The middle of all targets, for all sensors."""
-    return np.tile(places.mean(axis=0), (len(sensors), 1))
-
-
-_GOALS: dict[str, Callable[[Floats, Floats], Floats]] = {
-    "nearest": _nearest,
-    "assigned": _assigned,
-    "centroid": _centroid,
-}
+    return np.array(chosen)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,7 +44,8 @@ class RulePlanner:
 
     Of its courses it takes the one that is nearest to that place on the mean over the horizon, which for courses of one
     speed is the one nearest in heading; a camera that stays where it is turns to it. Where no target is estimated, each
-    takes its first course.
+    takes its first course. Where constraints forbid zones, distances are lengths of shortest paths around them; a place
+    that no such path leads to is approached as near as they do, and plans name the targets that no sensor can see.
 
     Attributes:
         sensors: the sensors.
@@ -109,30 +94,47 @@ class RulePlanner:
         options = options_of(self.sensors, poses, self.settings)
         at = np.asarray(poses, np.float64)
         mask = mask_of_decision(self.constraints, self.sensors, options, state.fused, at, self.settings)
-        places = np.asarray(self.estimate(state.fused, state.step).means)[:, :2]
-        goals = self._goals(places, at[:, :2]) if len(places) else [None] * len(options)
+        estimate, graph = self.estimate(state.fused, state.step), visibility_graph(self.constraints)
+        places = np.ascontiguousarray(np.asarray(estimate.means)[:, :2])
+        beyond = Beyond.of(self.sensors, options, estimate.labels, places, graph) if graph is not None else None
+        goals = self._goals(places, at[:, :2], beyond) if len(places) else [None] * len(options)
         joint = tuple(
-            first_best(np.where(single_mask(mask, s, len(own.courses)), _merits(own, goal), -np.inf))
+            first_best(np.where(single_mask(mask, s, len(own.courses)), _merits(own, goal, graph), -np.inf))
             for s, (own, goal) in enumerate(zip(options, goals, strict=True))
         )
         if mask is not None:
             joint = repaired(mask, joint)
         chosen = tuple(own.first_action(course) for own, course in zip(options, joint, strict=True))
-        return Plan(self.name, tuple(own.actions for own in options), chosen, (), {}, mask.notes if mask else ())
+        notes = (*(mask.notes if mask else ()), *(beyond.notes() if beyond else ()))
+        return Plan(self.name, tuple(own.actions for own in options), chosen, (), {}, notes)
 
-    def _goals(self, places: Floats, sensors: Floats) -> Floats:
-        if self.targets is not None:
-            return np.asarray(places[(np.array(self.targets) - 1) % len(places)])
-        return _GOALS[self.rule](places, sensors)
+    def _goals(self, places: Floats, sensors: Floats, beyond: Beyond | None) -> Floats:
+        """(num_sensors, 2) m, where the sensors (num_sensors, 2) head for, of the places (num_targets, 2)."""
+        if self.rule == "centroid":
+            return np.tile(places.mean(axis=0), (len(sensors), 1))
+        if self.rule == "assigned":
+            numbers = np.arange(len(sensors)) if self.targets is None else np.array(self.targets) - 1
+            return np.asarray(places[numbers % len(places)])
+        if beyond is not None:
+            return np.asarray(places[_nearest(beyond.distances())])
+        return np.asarray(places[_nearest(np.hypot(*(sensors[:, np.newaxis] - places).transpose(2, 0, 1)))])
 
 
-def _merits(own: Options, goal: Floats | None) -> Floats:
+def _merits(own: Options, goal: Floats | None, graph: VisibilityGraph | None) -> Floats:
     """(num_courses,) less the mean distance to a place; of courses that are equal in it, how well a camera points."""
     if goal is None:
         return np.zeros(len(own.courses))
     offsets = goal - own.courses[..., :2]
-    near: Floats = -np.hypot(offsets[..., 0], offsets[..., 1]).mean(axis=1)
-    if own.courses.shape[2] <= HALF_WIDTH or not (own.courses[..., HALF_WIDTH] > 0.0).any():
-        return near
-    turn = np.arctan2(offsets[..., 1], offsets[..., 0]) - own.courses[..., POINTING]
-    return np.asarray(near + _AIM * max(1.0, float(-near.min())) * np.cos(turn).mean(axis=1))
+    gaps, waits = np.hypot(offsets[..., 0], offsets[..., 1]), np.zeros(len(own.courses))
+    if graph is not None:
+        paths, moves = graph.to(goal[np.newaxis], own.pose[:2]), (own.courses[..., :2] != own.pose[:2]).any(axis=(1, 2))
+        if not paths.are_straight(own.pose[np.newaxis, :2].copy())[0, 0]:  # It may have to step aside first.
+            waits[~moves] = _WAITING
+        free = moves & ~graph.is_barred(own.pose[:2], own.courses[..., :2])
+        around = paths.distances(own.courses[free, :, :2].reshape(-1, 2)).reshape(gaps[free].shape)
+        gaps[free] = np.where(np.isfinite(around), around, gaps[free])
+    near: Floats = -gaps.mean(axis=1)
+    if own.courses.shape[2] > HALF_WIDTH and (own.courses[..., HALF_WIDTH] > 0.0).any():
+        turn = np.arctan2(offsets[..., 1], offsets[..., 0]) - own.courses[..., POINTING]
+        near = near + _AIM * max(1.0, float(-near.min())) * np.cos(turn).mean(axis=1)
+    return np.asarray(near - waits)

@@ -11,7 +11,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from vedette.control.constraints import Constraint
+from vedette.control.constraints import Constraint, visibility_graph
 from vedette.control.deciding import plan_of
 from vedette.control.evaluator import Evaluator
 from vedette.control.evidence import Evidence, Part
@@ -199,7 +199,10 @@ class HorizonPlanner:
         rule, settings = given.planned.rule, replace(self.settings, horizon_steps=given.stages.num_steps(stage))
         assert rule is not None
         state = given.planned.state
-        return Evaluator.of_sums(self.sensors, options, rule, settings, self.reward, state, horizons=horizons, rng=rng)
+        graph = visibility_graph(self.constraints)
+        return Evaluator.of_sums(
+            self.sensors, options, rule, settings, self.reward, state, horizons=horizons, graph=graph, rng=rng
+        )
 
     def _plan(
         self, given: _Given, evidence: Evidence, choice: tuple[int, ...], problem: SequenceProblem | None

@@ -1,0 +1,243 @@
+"""Beyond the horizon: how long sensors take to the targets, and how their courses go on, around forbidden zones."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vedette.control.constraints import Paths, VisibilityGraph
+from vedette.control.settings import MobileSensor, PlanningSettings
+from vedette.densities import LMB
+from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.models.functions import numbers_at
+from vedette.platforms import Options
+from vedette.platforms.camera import line_of_sight
+
+# Targets that exist with less probability draw no sensor from afar.
+_LEAST_EXISTENCE = 0.1
+# A sensor goes so much longer than it takes to its target, to see it for a while.
+_STAY = 1.25
+# Where it is asked how far a sensor sees, m, and in how many directions.
+_DISTANCES, _DIRECTIONS = np.geomspace(1.0, 1e6, 121), 8
+# Pseudo-updates on the way. A step is no longer than a sensor sees, so that it does not pass a target unseen.
+_LEAST_STEPS, _MOST_STEPS = 4, 12
+# A course leads to the target of which it approaches the most, as a share of what the best course does; among targets
+# that differ in this share by no more than so much, to the nearest. What is less than so many metres is no approach.
+_SAME_PROGRESS, _LEAST_PROGRESS = 0.05, 1e-6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Beyond:
+    """What there is for sensors beyond their horizon.
+
+    Attributes:
+        options: of each sensor within the horizon.
+        reaches: (num_sensors,) m, how far each sensor sees.
+        labels: (num_targets, 2) of the targets that draw sensors from afar.
+        places: (num_targets, 2) m, where they are expected.
+        paths: of each sensor to these places; None: nothing is forbidden at all times.
+    """
+
+    options: tuple[Options, ...]
+    reaches: Floats
+    labels: Ints
+    places: Floats
+    paths: tuple[Paths, ...] | None
+
+    @classmethod
+    def of(
+        cls,
+        sensors: Sequence[MobileSensor],
+        options: Sequence[Options],
+        labels: Ints,
+        places: Floats,
+        graph: VisibilityGraph | None,
+    ) -> Beyond:
+        """Collect it. graph: of the zones that constraints forbid; None: there are none."""
+        reaches = np.array([sight(sensor, own.pose) for sensor, own in zip(sensors, options, strict=True)])
+        paths = None if graph is None else tuple(graph.to(places, own.pose[:2]) for own in options)
+        return cls(tuple(options), reaches, labels, places, paths)
+
+    def horizons(self, settings: PlanningSettings) -> tuple[PlanningSettings, ...]:
+        """The settings of further horizons, half way and at the end; none where all see what there is to see.
+
+        Within the horizon, a sensor that sees 250 m and goes 20 m has nothing to gain from a target 300 m off, and of
+        courses worth the same the first is taken. So all sensors are taken to go on as they do, until each may have
+        come to a target and each target may be reached by one of them, and the loss is the mean of those at all these
+        times. Targets that no allowed path brings into sight do not count.
+        """
+        horizon = settings.horizon_steps * settings.horizon_period
+        speeds = np.array([_speed(own, horizon) for own in self.options])
+        if len(self.places) == 0 or not (speeds > 0.0).all():
+            return ()
+        gaps = np.stack([self._gaps(s) for s in range(len(self.options))])
+        seconds = np.maximum(gaps - self.reaches[:, np.newaxis], 0.0) / speeds[:, np.newaxis]
+        beyond = _STAY * max(_longest(seconds.min(axis=0)), _longest(seconds.min(axis=1)))
+        if beyond == 0.0:
+            return ()
+        rate = float((speeds / self.reaches).max())
+        total = min(horizon + beyond, max(_MOST_STEPS / rate, 2.0 * horizon))
+        num = min(max(_LEAST_STEPS, math.ceil(total * rate)), _MOST_STEPS)
+        return tuple(replace(settings, horizon_steps=steps, horizon_period=total / num) for steps in (num // 2, num))
+
+    def continued(self, horizon: Floats, times: Floats) -> tuple[Options, ...]:
+        """The options with courses at `times` (num_times,) s, around what is forbidden; horizon: as of `continued`."""
+        later = tuple(continued(own, horizon, times) for own in self.options)
+        if self.paths is None:
+            return later
+        return tuple(self._around(s, own, horizon, times) for s, own in enumerate(later))
+
+    def notes(self) -> tuple[str, ...]:
+        """Notes on targets that no sensor can see from any place that allowed paths lead to."""
+        if self.paths is None:
+            return ()
+        moves = [bool((own.courses[:, :, :2] != own.pose[:2]).any()) for own in self.options]
+        visible = np.stack([self._in_sight(s) | (self._is_attainable(s) & can) for s, can in enumerate(moves)])
+        return tuple(
+            f"target {tuple(label)}: no path that the constraints allow brings a sensor within sight of it"
+            for label in self.labels[~visible.any(axis=0)].tolist()
+        )
+
+    def distances(self) -> Floats:
+        """(num_sensors, num_targets) m, from the sensors now to the targets, by allowed paths; there must be zones."""
+        assert self.paths is not None
+        rows = zip(self.paths, self.options, strict=True)
+        return np.concatenate([paths.distances(own.pose[np.newaxis, :2]) for paths, own in rows])
+
+    def _gaps(self, s: int) -> Floats:
+        """(num_targets,) m from the end of the best course of a sensor to the targets; straight where it sees them."""
+        own = self.options[s]
+        ends = np.ascontiguousarray(own.courses[:, -1, :2])
+        straight = np.hypot(*(ends[:, np.newaxis] - self.places).transpose(2, 0, 1))
+        if self.paths is None:
+            return np.asarray(straight.min(axis=0))
+        barred = self.paths[s].graph.is_barred(own.pose[:2], own.courses[:, :, :2])
+        allowed = np.ones_like(barred) if barred.all() else ~barred
+        around = np.where(self._is_attainable(s), self.paths[s].distances(ends), np.inf)
+        return np.asarray(np.where(straight <= self.reaches[s], straight, around)[allowed].min(axis=0))
+
+    def _in_sight(self, s: int) -> Bools:
+        """(num_targets,) which targets a sensor has in its sight from where it is now."""
+        return np.asarray(np.hypot(*(self.places - self.options[s].pose[:2]).T) <= self.reaches[s])
+
+    def _is_attainable(self, s: int) -> Bools:
+        """(num_targets,) which targets a sensor sees from where its paths to them end."""
+        assert self.paths is not None
+        return np.asarray(self.paths[s].left <= self.reaches[s])
+
+    def _around(self, s: int, later: Options, horizon: Floats, times: Floats) -> Options:
+        """The continued courses of one sensor where constraints forbid zones: around them to a target, or up to them.
+
+        A course whose continuation would touch a zone, or that approaches a target by a path with bends, goes on along
+        the shortest path to that target, as fast as it approaches it: the best course at its own speed, one that
+        approaches it half as much at half of this. At the target it stays. One that approaches none stops short of the
+        zone.
+        """
+        assert self.paths is not None
+        own, paths = self.options[s], self.paths[s]
+        here, ends = own.pose[np.newaxis, :2].copy(), np.ascontiguousarray(own.courses[:, -1, :2])
+        steps, rounds = ends - here, np.maximum(times - horizon[-1], 0.0) / horizon[-1]
+        open_share = paths.graph.until_barred(ends, ends + rounds[-1] * steps)
+        allowed = ~paths.graph.is_barred(own.pose[:2], own.courses[:, :, :2])
+        goals, advances = self._leads_to(s, ends, np.hypot(steps[:, 0], steps[:, 1]), allowed)
+        straight = paths.are_straight(ends) & paths.are_straight(here)
+        courses, after = later.courses.copy(), rounds > 0.0
+        for c in np.flatnonzero(steps.any(axis=1) & allowed).tolist():
+            if goals[c] >= 0 and not (straight[c, goals[c]] and open_share[c] == 1.0):
+                path = paths.path(ends[c], int(goals[c]))
+                _follow(courses[c], path, rounds * advances[c], own.courses[c, -1], steps[c])
+            elif open_share[c] < 1.0:
+                share = np.minimum(rounds, open_share[c] * rounds[-1])[after, np.newaxis]
+                courses[c, after, :2] = ends[c] + share * steps[c]
+        return later._replace(courses=courses)
+
+    def _leads_to(self, s: int, ends: Floats, lengths: Floats, allowed: Bools) -> tuple[Ints, Floats]:
+        """(num_courses,) the target that each course of a sensor leads to, and m that it goes on towards it a horizon.
+
+        It goes on by as much as it approaches the target, as a share of what the best allowed course does; where a step
+        to the side has to be made first, as none approaches it, by as little as it moves away. Of targets with about
+        the same share the nearest; -1: it leads to none that is not in its sight. ends: (num_courses, 2) m, where
+        courses end. lengths: (num_courses,) m, from the pose.
+        """
+        assert self.paths is not None
+        now, then = (self.paths[s].distances(own) for own in (self.options[s].pose[np.newaxis, :2], ends))
+        draws = self._is_attainable(s) & ~self._in_sight(s) & np.isfinite(then)
+        counts = draws & (allowed & (lengths > 0.0))[:, np.newaxis]
+        if not counts.any():
+            return np.full(len(ends), -1), lengths
+        progress = np.where(counts, now - np.where(counts, then, 0.0), -np.inf)
+        best, most = progress.argmax(axis=0), progress.max(axis=0)
+        longest = lengths.max()
+        with np.errstate(invalid="ignore"):
+            share = np.where(most > _LEAST_PROGRESS, progress / most, 1.0 + (progress - most) / longest)
+        share = np.where(counts, np.maximum(share, 0.0), 0.0)
+        largest = share.max(axis=1, keepdims=True)
+        goals = np.where((share >= largest - _SAME_PROGRESS) & (share > 0.0), then, np.inf).argmin(axis=1)
+        return np.where(largest[:, 0] > 0.0, goals, -1), largest[:, 0] * lengths[best[goals]]
+
+
+def drawing(prediction: LMB) -> tuple[Ints, Floats]:
+    """Labels (num, 2) and places (num, 2), m, of the targets that draw sensors from afar."""
+    draws = prediction.existence >= _LEAST_EXISTENCE
+    return prediction.tracks.labels[draws], np.ascontiguousarray(prediction.tracks.means[draws, :2])
+
+
+def continued(own: Options, horizon: Floats, times: Floats) -> Options:
+    """The options with courses (num_courses, num_times, pose_dim) at other times, s, from now on.
+
+    horizon: (num_steps,) s of the poses that there are. Between them a sensor goes straight; after the last it goes on
+    by as much as it went over the whole horizon, again and again, and what else its pose has stays.
+    """
+    start = np.broadcast_to(own.pose, (len(own.courses), 1, len(own.pose)))
+    known = np.concatenate([start, own.courses], axis=1)
+    ends = np.concatenate([[0.0], horizon])
+    rounds = np.maximum(np.ceil(times / ends[-1] - 1e-9) - 1.0, 0.0)
+    within = times - rounds * ends[-1]
+    after = np.searchsorted(ends, within - 1e-9).clip(1, len(horizon))
+    share = ((within - ends[after - 1]) / (ends[after] - ends[after - 1]))[:, np.newaxis]
+    courses = np.where(rounds[:, np.newaxis] > 0.0, known[:, -1:], known[:, after])
+    moved = known[:, -1:, :2] - known[:, :1, :2]
+    straight = known[:, after - 1, :2] * (1.0 - share) + known[:, after, :2] * share
+    courses[:, :, :2] = straight + rounds[:, np.newaxis] * moved
+    return own._replace(courses=np.ascontiguousarray(courses))
+
+
+def sight(sensor: MobileSensor, pose: Floats) -> float:
+    """m, the distance up to which it detects at least half as well as it does anywhere, in the best direction."""
+    model, dim = sensor.filter.sensor.detection, sensor.filter.targets.state_dim
+    states = np.zeros((len(_DISTANCES) * _DIRECTIONS, dim))
+    angles = line_of_sight(pose) + 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
+    around = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    states[:, :2] = pose[:2] + (_DISTANCES[:, np.newaxis, np.newaxis] * around).reshape(-1, 2)
+    chances = numbers_at(model.function, states, pose, model.params).reshape(-1, _DIRECTIONS).max(axis=1)
+    return float(_DISTANCES[np.flatnonzero(chances >= 0.5 * chances.max())[-1]])
+
+
+def _follow(course: Floats, corners: Floats, run: Floats, end: Floats, step: Floats) -> None:
+    """Write poses along a path into a course (num_times, pose_dim).
+
+    corners: (num_corners, 2) m, of the path. run: (num_times,) m from the end of the horizon on; 0 before. end: the
+    pose (pose_dim,) there. step: (2,) m, from the pose now to it. A sensor that heads where it goes does so on the
+    path.
+    """
+    legs = np.diff(corners, axis=0)
+    passed = np.concatenate([[0.0], np.cumsum(np.hypot(legs[:, 0], legs[:, 1]))])
+    after, run = run > 0.0, np.minimum(run, passed[-1])
+    course[after, 0], course[after, 1] = (np.interp(run[after], passed, corners[:, axis]) for axis in (0, 1))
+    if abs(math.remainder(end[2] - math.atan2(step[1], step[0]), 2.0 * math.pi)) < 1e-6:
+        leg = np.searchsorted(passed, run[after]).clip(1, len(legs)) - 1
+        course[after, 2] = np.arctan2(legs[leg, 1], legs[leg, 0])
+
+
+def _longest(seconds: Floats) -> float:
+    """The largest of those that are finite; 0 where none is."""
+    return float(np.where(np.isfinite(seconds), seconds, 0.0).max())
+
+
+def _speed(own: Options, horizon: float) -> float:
+    """m/s of the course that goes farthest."""
+    offsets = own.courses[:, -1, :2] - own.pose[:2]
+    return float(np.hypot(offsets[:, 0], offsets[:, 1]).max()) / horizon
