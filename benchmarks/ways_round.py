@@ -1,0 +1,136 @@
+"""Sensors and targets with a no-go zone between them: walls, a ring with one gap, two zones that overlap.
+
+    python benchmarks/ways_round.py                                       # all scenes, 10 runs, jdm
+    python benchmarks/ways_round.py wall-80 ring --planners jdm nearest --runs 20 --out after.jsonl
+    python benchmarks/ways_round.py --against before.jsonl --out after.jsonl
+
+Each run has a layout of its own, drawn from its number: two sensors that see 60 m and step 20 m after every scan, and
+three targets, on the two sides of the zone. Runs are paired: at the same number all planners and versions of the code
+meet the same layout, truth and random numbers. The table has the mean OSPA (cutoff 60 m, order 1) over scans and runs,
+and CPU seconds of a run, with one standard error. With `--against`, a file that another version of the code wrote by
+`--out`, it has the paired difference to that as well; negative is better.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vedette.evaluation.metrics import ospa_of_run
+from vedette.kernels.base.types import Floats
+from vedette.scenarios import Scenario, load_scenario, with_fields
+from vedette.scenarios.build import build_experiment, build_planner
+from vedette.simulation import simulate
+
+STEPS, STEP, DEEP, SEED = 60, 20.0, 20.0, 7  # scans, m, m
+Key = tuple[str, str, int]
+
+
+def box(x_min: float, x_max: float, y_min: float, y_max: float) -> dict[str, Any]:
+    """A rectangle that is forbidden."""
+    return {"kind": "keep_out", "region": {"x_min": x_min, "x_max": x_max, "y_min": y_min, "y_max": y_max}}
+
+
+def ring(inner: float, outer: float, gap: float) -> dict[str, Any]:
+    """A square ring with one gap, in the north, so wide."""
+    half = gap / 2.0
+    outside = [[-half, outer], [-outer, outer], [-outer, -outer], [outer, -outer], [outer, outer], [half, outer]]
+    inside = [[half, inner], [inner, inner], [inner, -inner], [-inner, -inner], [-inner, inner], [-half, inner]]
+    return {"kind": "keep_out", "polygon": outside + inside}
+
+
+# Of walls (length): how far from their middle, along them, sensors and targets are, and the farthest target beyond, m.
+SPREADS = {80: (10.0, 10.0, 90.0), 160: (20.0, 20.0, 105.0), 240: (20.0, 30.0, 150.0)}
+SCENES: dict[str, list[dict[str, Any]]] = {
+    **{f"wall-{size}": [box(0.0, DEEP, -size / 2.0, size / 2.0)] for size in SPREADS},
+    "ring": [ring(90.0, 110.0, 60.0)],
+    "overlap": [box(0.0, DEEP, -80.0, 80.0), box(-60.0, 10.0, 60.0, 80.0)],
+}
+
+
+def scenario_of(scene: str, run: int) -> Scenario:
+    """The scene with the layout of one run."""
+    rng = np.random.default_rng([SEED, run])
+    if scene == "ring":
+        targets, sensors = rng.uniform(-50.0, 50.0, (3, 2)), rng.uniform(-60.0, 60.0, (2, 2)) - [0.0, 180.0]
+    elif scene == "overlap":
+        targets = np.column_stack([rng.uniform(80.0, 140.0, 3), rng.uniform(-60.0, 60.0, 3)])
+        sensors = np.column_stack([rng.uniform(-70.0, -20.0, 2), rng.uniform(-30.0, 30.0, 2)])
+    else:
+        of_sensors, of_targets, farthest = SPREADS[int(scene.removeprefix("wall-"))]
+        targets = np.column_stack([rng.uniform(75.0, farthest, 3), rng.uniform(-of_targets, of_targets, 3)])
+        # Whole steps from 4 m before the wall.
+        before = -4.0 - STEP * rng.integers(1, 4, 2)
+        sensors = np.column_stack([before, rng.uniform(-of_sensors, of_sensors, 2)])
+    states = np.column_stack([targets, np.zeros((3, 2))]).tolist()
+    fields: dict[str, Any] = {
+        "name": f"{scene}-{run}",
+        "time.num_steps": STEPS,
+        "birth.sites": [{"existence": 0.9, "mean": own, "std": [10.0, 10.0, 1.0, 1.0]} for own in states],
+        "targets.tracks": [{"state": own, "process_noise": True} for own in states],
+        "sensors.*.platform": {"kind": "steps", "length": STEP, "speed": STEP},
+        **{f"sensors.{s}.position": own for s, own in enumerate(sensors.tolist())},
+        "control.constraints": SCENES[scene],
+    }
+    return with_fields(load_scenario("beyond-the-gap"), fields)
+
+
+def measured(scene: str, planner: str, run: int) -> tuple[float, float]:
+    """Mean OSPA, m, and CPU seconds of one run."""
+    scenario = scenario_of(scene, run)
+    experiment, ospa = build_experiment(scenario), scenario.model.ospa
+    score = partial(ospa_of_run, cutoff=ospa.cutoff, order=ospa.order, components=ospa.components)
+    began = time.process_time()
+    record = simulate(experiment, build_planner(scenario, planner, 1), seed=SEED, run=run, score=score)
+    return float(record.ospa[:, 0].mean()), time.process_time() - began
+
+
+def with_error(values: Floats) -> str:
+    """Mean and standard error."""
+    return f"{values.mean():.1f} +- {values.std(ddof=1) / np.sqrt(len(values)):.1f}"
+
+
+def kept(file: Path | None) -> dict[Key, tuple[float, float]]:
+    """What a file holds."""
+    if file is None or not file.exists():
+        return {}
+    rows = map(json.loads, file.read_text("utf-8").splitlines())
+    return {(row["scene"], row["planner"], row["run"]): (row["ospa"], row["seconds"]) for row in rows}
+
+
+def main() -> None:
+    """Run, and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenes", nargs="*", default=list(SCENES), help="of: " + ", ".join(SCENES))
+    parser.add_argument("--planners", nargs="+", default=["jdm"])
+    parser.add_argument("--runs", type=int, default=10)
+    parser.add_argument("--out", type=Path)
+    parser.add_argument("--against", type=Path)
+    given = parser.parse_args()
+    found, before = kept(given.out), kept(given.against)
+    print("| scene | planner | OSPA, m | CPU, s | difference, m |\n| --- | --- | ---: | ---: | ---: |")
+    for scene in given.scenes:
+        for planner in given.planners:
+            keys = [(scene, planner, run) for run in range(given.runs)]
+            for key in keys:
+                if key in found:
+                    continue
+                found[key] = measured(*key)
+                if given.out is not None:
+                    row = dict(zip(("scene", "planner", "run", "ospa", "seconds"), (*key, *found[key]), strict=True))
+                    with given.out.open("a", encoding="utf-8") as file:
+                        file.write(json.dumps(row) + "\n")
+            values = np.array([found[key] for key in keys])
+            pairs = np.array([found[key][0] - before[key][0] for key in keys if key in before])
+            gained = with_error(pairs) if len(pairs) > 1 else ""
+            print(f"| {scene} | {planner} | {with_error(values[:, 0])} | {values[:, 1].mean():.1f} | {gained} |")
+
+
+if __name__ == "__main__":
+    main()
