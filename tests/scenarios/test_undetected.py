@@ -55,7 +55,8 @@ def test_a_region_of_their_own() -> None:
     assert (tracker.model.birth_rate, tracker.model.enters, tracker.model.survival) == (0.0, "anywhere", None)
     told = dict(facts(scenario(own).model))["not yet found"]
     assert told == (
-        "cell 10 m, expected 1, birth_rate 0 1/s, enters anywhere, speed 0 m/s, in x 0 to 40 m, y 0 to 50 m"
+        "cell 10 m, expected 1, birth_rate 0 1/s, enters anywhere, speed 0 m/s, prior_rate 0.1 1/s, "
+        "in x 0 to 40 m, y 0 to 50 m"
     )
     assert "not yet found" not in dict(facts(parse_scenario(MINIMAL)))
 
