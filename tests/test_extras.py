@@ -164,6 +164,31 @@ def test_commands_that_need_an_extra_name_it_in_one_line(tmp_path: Path) -> None
     assert {path.name for path in tmp_path.iterdir()} == {"spec.toml", "there"}
 
 
+def test_what_a_format_needs_is_asked_for_before_anything_is_done(tmp_path: Path) -> None:
+    """Files that do not exist are not even looked for."""
+    track = ["track", "scans.csv", "--sensors", "radars.yaml", "--out", "run", "--format", "csv", "--format"]
+    commands = [[*track, "parquet"], [*track, "mcap"], ["results", "there", "--export", "files", "--format", "netcdf"]]
+    found = outcomes(commands[:2], tmp_path) + outcomes(commands[2:], tmp_path, ["xarray"])
+    assert [(status, output, error) for status, output, error, _ in found] == [
+        (1, "", "writing .parquet files needs pyarrow, which is not installed: pip install 'vedette[campaigns]'\n"),
+        (1, "", "writing .mcap files needs mcap, which is not installed: pip install 'vedette[formats]'\n"),
+        (
+            1,
+            "",
+            "vedette results --format netcdf needs xarray, which is not installed: pip install 'vedette[xarray]'\n",
+        ),
+    ]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_environment_asks_for_what_draws_it_when_it_is_made(tmp_path: Path) -> None:
+    pytest.importorskip("gymnasium")
+    pytest.importorskip("pettingzoo")
+    program = "import vedette.gym; vedette.gym.ScenarioEnv('no-such-scenario', render_mode='rgb_array')"
+    ran = without(["matplotlib"], program, tmp_path)
+    assert "MissingPackageError: a picture of an environment needs matplotlib" in ran.stderr.splitlines()[-1]
+
+
 def test_every_command_is_among_these() -> None:
     assert set(typer.main.get_command(app).commands) == {command[0] for command in (*LIGHT[1:], *HEAVY)}  # type: ignore[attr-defined]
 

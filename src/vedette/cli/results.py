@@ -172,6 +172,8 @@ def results(
     if formats and export is None:
         raise usage_error("expected with --export, which names the folder", "--format")
     need("vedette results", "pyarrow")
+    if "netcdf" in (formats or ()):
+        need("vedette results --format netcdf", "xarray")
     from vedette.campaigns.results import open_results
     from vedette.simulation.storage import holds_run, load_run
 

@@ -63,7 +63,7 @@ def track(
 ) -> None:
     """Track recorded scans: estimates, whole tracks, health, figures; with the targets' reports, errors too."""
     from vedette.evaluation.runs import run_scenario
-    from vedette.evaluation.track_table import table_of_run, write_tracks
+    from vedette.evaluation.track_table import check_format, table_of_run, write_tracks
     from vedette.scenarios.dumping import dump_kept
     from vedette.simulation.loop import RunInterrupted, RunStopped
     from vedette.simulation.storage import check_free, save_run
@@ -71,6 +71,7 @@ def track(
     for name in formats or ():
         if name not in FORMATS:
             raise usage_error(f"expected one of {', '.join(FORMATS)}; got {name}", "--format")
+        check_format(Path(f"tracks.{name}"))
     if formats and out is None:
         raise usage_error("expected with --out, which names the folder", "--format")
     if out is not None:

@@ -10,7 +10,6 @@ from datetime import UTC, datetime, timedelta
 from typing import Any, TypeAlias
 
 from vedette.errors import InputError
-from vedette.extras import need
 
 Table: TypeAlias = Mapping[str, Sequence[Any]]
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
@@ -84,7 +83,6 @@ def czml(table: Table) -> bytes:
 def mcap(table: Table) -> bytes:
     """A channel a track, `/tracks/LABEL`, of messages `foxglove.LocationFix` in JSON, with the existence beside."""
     tracks = _tracks("MCAP", table)
-    need("an MCAP file", "mcap")
     from mcap.writer import Writer
 
     content = io.BytesIO()

@@ -104,11 +104,21 @@ def write_tracks(path: Path, table: Mapping[str, Sequence[Any]]) -> None:
         InputError: another ending, a file that cannot be written, or tracks without longitudes in the last three.
         MissingPackageError: what writes the format is not installed.
     """
+    check_format(path)
+    content = _MAKERS[path.suffix.lower()](table)
+    write_file(path, lambda file: file.write(content), make_folder=True)
+
+
+def check_format(path: Path) -> None:
+    """Check that `write_tracks` knows the ending of a file, and that the package that writes it is installed.
+
+    Raises `InputError` for another ending, `MissingPackageError` for a missing package.
+    """
     ending = path.suffix.lower()
     if ending not in ENDINGS:
         raise InputError(f"{path}: expected a file that ends with {', '.join(ENDINGS)}; got {ending or 'none'}")
-    content = _MAKERS[ending](table)
-    write_file(path, lambda file: file.write(content), make_folder=True)
+    if package := _PACKAGES.get(ending):
+        need(f"writing {ending} files", package)
 
 
 def _name(target: int | None, names: Sequence[str]) -> str | None:
@@ -130,7 +140,6 @@ def _harmless(cell: Any) -> Any:
 
 
 def _parquet(table: Mapping[str, Sequence[Any]]) -> bytes:
-    need("a Parquet file", "pyarrow")
     import pyarrow as pa
     from pyarrow import parquet
 
@@ -143,3 +152,4 @@ def _parquet(table: Mapping[str, Sequence[Any]]) -> bytes:
 
 _MAKERS = {".csv": _csv, ".parquet": _parquet, ".geojson": geojson, ".czml": czml, ".mcap": mcap}
 ENDINGS = tuple(_MAKERS)
+_PACKAGES = {".parquet": "pyarrow", ".mcap": "mcap"}

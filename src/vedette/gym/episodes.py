@@ -85,6 +85,8 @@ class Episodes:
     def __init__(self, scenario: Scenarios, reward: AnyReward, num_labels: int, render_mode: str | None) -> None:
         if render_mode not in (None, *RENDER_MODES):
             raise reject("render_mode", f"{' or '.join(RENDER_MODES)} or None", render_mode)
+        if render_mode is not None:
+            need("a picture of an environment", "matplotlib")
         if not callable(reward) and reward not in ("ospa", "expected_loss"):
             raise reject("reward", "ospa, expected_loss or a function of moments and truth", reward)
         self._num_labels, self._reward, self.render_mode = num_labels, reward, render_mode
@@ -176,7 +178,6 @@ class Episodes:
         """(height, width, 3) picture of the last scan, as a frame of `vedette video`; or in a window, and None."""
         if self.render_mode is None:
             return None
-        need("a picture of an environment", "matplotlib")
         from vedette.evaluation.figures import scan_image
 
         image = scan_image(self.record(), self.built.scenario)

@@ -5,14 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from vedette.extras import need
-
 
 class Window:
     """One picture after another, where there is a display."""
 
     def __init__(self) -> None:
-        need("a window", "matplotlib")
         import matplotlib.pyplot as plt  # which looks for a display
 
         self._plt = plt
