@@ -32,7 +32,9 @@ def test_a_run_names_its_estimates_anew_at_each_scan_and_can_be_stored(kind, tmp
     assert again.ospa.tobytes() == record.ospa.tobytes()
     back = load_run(save_run(record, tmp_path / "run"))
     assert back.ospa.tobytes() == record.ospa.tobytes()
-    with pytest.raises(InputError, match=rf"filter\.kind: expected .*planner jdm needs labels; got {kind}"):
+    with pytest.raises(
+        InputError, match=rf"planner jdm: expected nearest, .*, as {kind} filters have no labels .*; got jdm"
+    ):
         run_scenario(scenario, "jdm", seed=3)
 
 

@@ -19,6 +19,7 @@ from vedette.evaluation.runs import measure_run, own_metrics, run_scenario
 from vedette.scenarios import Scenario, load_scenario
 from vedette.scenarios.build import build_planner
 from vedette.scenarios.dumping import dump_scenario
+from vedette.scenarios.strategy_cautions import strategy_cautions
 
 Check = Callable[[np.random.Generator], object]
 
@@ -45,14 +46,14 @@ def accepted(path: Path) -> bool:
 
 
 def strategies(scenario: Scenario) -> list[str]:
-    """Every strategy but those built in that are refused by name before the run; the scenario's own must go."""
-    found = []
+    """Every strategy but those of which the check warns that a run refuses them; the scenario's own must go."""
+    found, warned = [], "".join(text.partition(" is refused")[0] for _, text in strategy_cautions(scenario))
     for name in (*STRATEGIES, *scenario.model.planners):
         try:
             build_planner(scenario, name)
         except InputError as error:
             check_message(error)
-            if name in scenario.model.planners or f"planner {name}" not in str(error):
+            if name in scenario.model.planners or f"planner {name}" not in str(error) or name not in warned:
                 raise
         else:
             found.append(name)

@@ -231,7 +231,8 @@ def test_a_filter_without_labels_runs_alone_and_names_its_estimates_by_the_scan(
         made.plan(state, experiment.poses, rng=np.random.default_rng(0))
     for planner in ("jdm", "idm"):
         with pytest.raises(
-            InputError, match=rf"^filter\.kind: expected .*, as planner {planner} needs labels; got {kind}"
+            InputError,
+            match=rf"^planner {planner}: expected nearest, .*, as {kind} filters have no labels .*; got {planner}",
         ):
             build.build_planner(loaded, planner)
 

@@ -18,6 +18,7 @@ from vedette.models import BirthModel
 from vedette.scenarios import Scenario, load_scenario, parse_scenario
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.scenarios.record_cautions import record_cautions
+from vedette.scenarios.sections.planners import STRATEGIES
 
 TARGETS = MINIMAL[MINIMAL.index("targets:") : MINIMAL.index("sensor_defaults:")]
 SHIPS = "time,id,longitude,latitude\n" + "".join(
@@ -215,6 +216,53 @@ def test_late_scans_and_planners_of_labels_do_not_go_with_filters_without(kind: 
     ]
     assert all(wanted in fault for fault in error.value.faults[1:])
     assert f"as {kind} filters cannot predict without a scan" in error.value.faults[0]
+
+
+UNLABELLED = (
+    "jdm, idm or lookahead is refused: expected nearest, assigned, centroid, oracle or custom, as {} filters have"
+)
+
+
+@pytest.mark.parametrize(
+    ("control", "filters", "warned"),
+    [
+        ("", "phd", UNLABELLED.format("phd")),
+        ("", "cphd", UNLABELLED.format("cphd")),
+        ("", "cb_member", UNLABELLED.format("cb_member")),
+        ("", "lmb", ""),
+        (
+            ", association: full, reward: {kind: cauchy_schwarz}",
+            "lmb",
+            "lookahead is refused: expected joint or another, as with control.association full decisions are no sums",
+        ),
+        (", association: full", "lmb", ""),
+        (
+            ", reward: {kind: custom, function: 'own_parts.py:reward'}",
+            "lmb",
+            "lookahead is refused: expected a reward and a fusion of LMBs that are sums over labels",
+        ),
+    ],
+)
+def test_the_check_names_the_strategies_that_a_run_refuses(
+    control: str, filters: str, warned: str, tmp_path: Path
+) -> None:
+    """One says so before the run, with what would do; all others can be had."""
+    shutil.copy(Path(__file__).parent / "own_parts.py", tmp_path)
+    file = tmp_path / "scenario.yaml"
+    file.write_text(
+        one_sensor(("kind: lmb", f"kind: {filters}"), ("{decision_steps: [2]", f"{{decision_steps: [2]{control}"))
+    )
+    result = CliRunner().invoke(app, ["check", str(file)])
+    assert result.exit_code == 0
+    found = [line for line in result.stderr.splitlines() if "warning: " in line]
+    assert [f"{file}:17:10: warning: a run with --planner {warned}" in line for line in found] == [True] * bool(warned)
+    scenario = load_scenario(file)
+    for name in STRATEGIES:
+        if name in warned.partition(" is refused")[0]:
+            with pytest.raises(InputError, match=f"planner {name}: "):
+                build_planner(scenario, name)
+        else:
+            build_planner(scenario, name)
 
 
 @pytest.mark.parametrize("kind", ["clmb", "arithmetic_average", "cm_delta_glmb"])

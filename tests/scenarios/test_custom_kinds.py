@@ -118,7 +118,8 @@ def check(file: Path) -> tuple[int, str]:
 
 def test_the_check_makes_everything(folder: Path) -> None:
     code, text = check(folder / "scene.yaml")
-    assert (code, text.count("warning")) == (0, 0), text
+    assert (code, text.count("warning")) == (0, 1), text
+    assert "warning: a run with --planner lookahead is refused: expected a reward and a fusion of LMBs" in text
 
 
 def test_a_reward_of_power_integrals_is_one_too(folder: Path) -> None:

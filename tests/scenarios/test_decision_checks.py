@@ -78,7 +78,9 @@ def test_planners_refuse_it_when_they_are_made(settings: PlanningSettings, rewar
 
 
 def test_a_strategy_that_a_scenario_has_no_part_for_is_named_before_the_run() -> None:
-    with pytest.raises(InputError, match=r"planner lookahead: settings.association: expected known, for sequences of"):
+    with pytest.raises(
+        InputError, match=r"planner lookahead: expected joint or another, as with control.association full"
+    ):
         build_planner(scenario(f"association: full, {SAMPLED}"), "lookahead")
 
 

@@ -368,7 +368,7 @@ decision_steps: [4, 8] -> lookahead: {rollout: kept}
     22:32: control.lookahead.rollout: expected none, as it is of method tree, got "kept"
 decision_steps: [4, 8] -> lookahead: {period: 1.2}
     22:31: control.lookahead.period: expected a whole multiple of control.horizon_period, 0.5, got 1.2
-decision_steps: [4, 8] -> lookahead: {}, association: full
+decision_steps: [4, 8] -> lookahead: {}, association: full, reward: {kind: cauchy_schwarz}
     22:39: control.association: expected known, with a lookahead, got "full"
 decision_steps: [4, 8] -> lookahead: {exploration: -1}
     22:36: control.lookahead.exploration: expected a number of at least 0, got -1

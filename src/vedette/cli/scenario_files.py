@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -18,6 +19,7 @@ from vedette.errors import InputError, ScenarioError
 
 if TYPE_CHECKING:
     from vedette.scenarios import Scenario
+    from vedette.scenarios.faults import Path as Place
 
 SCHEMA_FILE = "vedette.schema.json"
 
@@ -176,6 +178,7 @@ def check(
     valid but costs accuracy or may not be meant, go to standard error and leave the exit status at 0.
     """
     from vedette.scenarios import load_scenario
+    from vedette.scenarios.strategy_cautions import strategy_cautions
     from vedette.scenarios.summary import one_line
 
     found: list[dict[str, object]] = []
@@ -187,7 +190,7 @@ def check(
                 raise ScenarioError(lacking)
             summary = one_line(scenario)
             say(f"{file}: {summary}")
-            warnings = warn(scenario)
+            warnings = warn(scenario, strategy_cautions(scenario))
         except (ScenarioError, InputError) as error:
             say(str(error), even_if_quiet=True)
             faults = error.faults if isinstance(error, ScenarioError) else [str(error)]
@@ -214,11 +217,11 @@ def code_faults(scenario: Scenario) -> list[str]:
         return code_checks.code_faults(scenario)
 
 
-def warn(scenario: Scenario) -> list[str]:
-    """Print the warnings of a scenario to standard error; returns them."""
+def warn(scenario: Scenario, further: Iterable[tuple[Place, str]] = ()) -> list[str]:
+    """Print the warnings of a scenario to standard error, as of `cautions`; returns them."""
     from vedette.scenarios.cautions import cautions
 
-    lines = list(cautions(scenario))
+    lines = list(cautions(scenario, further))
     for line in lines:
         note(line)
     return lines

@@ -260,11 +260,8 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
         raise InputError(f"planner: expected one of {', '.join((*STRATEGIES, *model.planners))}; got {name!r}")
     sensors = build_sensors(scenario)
     strategy = model.planners[name] if name in model.planners else STRATEGIES[name]
-    if strategy.needs_labels and not labels_targets(sensors[0].filter):
-        kinds = "delta_glmb, m_delta_glmb, lmb or factored_glmb"
-        raise InputError(f"filter.kind: expected {kinds}, as planner {name} needs labels; got {model.filter.kind}")
-    if fault := strategy.misfit(model):
-        raise InputError(f"planner {name}: expected {fault[0]}; got {fault[1]}")
+    if wanted := strategy.misfit(model, labels=labels_targets(sensors[0].filter)):
+        raise InputError(f"planner {name}: expected {wanted}; got {name}")
     parts = build_parts(scenario, sensors, strategy, num_threads)
     if name in model.planners:
         return Named(name, model.planners[name].planner(parts, folder))

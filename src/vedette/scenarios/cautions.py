@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import combinations
 
 import numpy as np
@@ -43,13 +43,16 @@ NEAR_SITES = 4.0
 _POINTS_A_SIDE = 21
 
 
-def cautions(scenario: Scenario) -> tuple[str, ...]:
-    """Warnings of a valid scenario, one line each, with file, line and column where it was read from a file."""
+def cautions(scenario: Scenario, further: Iterable[tuple[Path, str]] = ()) -> tuple[str, ...]:
+    """Warnings of a valid scenario, one line each, with file, line and column where it was read from a file.
+
+    further: places and texts of other warnings, which come last.
+    """
     found = [*_records(scenario), *_views(scenario), *_births(scenario), *_late_beliefs(scenario)]
     found += [*_many_sensors(scenario), *_cells(scenario.model), *_labels(scenario.model)]
     found += coverage_cautions(scenario.model)
     found += [*_undetected_births(scenario.model), *start_cautions(scenario)]
-    found += [*implausible(scenario.model), *coastline_cautions(scenario.model, scenario.folder)]
+    found += [*implausible(scenario.model), *coastline_cautions(scenario.model, scenario.folder), *further]
     if not found:
         return ()
     document = document_of(scenario)

@@ -215,7 +215,7 @@ def _scans_of_unlabelled(model: ScenarioModel) -> Iterator[Finding]:
 def _planners_fit(model: ScenarioModel) -> Iterator[Finding]:
     for name, planner in model.planners.items():
         if fault := planner.misfit(model):
-            yield ("planners", name, "kind"), *fault
+            yield ("planners", name, "kind"), fault, describe(planner.kind)
 
 
 def _first_scan(path: Path, sensor: Sensor, model: ScenarioModel) -> Iterator[Finding]:

@@ -191,7 +191,7 @@ def _joint(model: ScenarioModel) -> Iterator[tuple[Path, AnySearch, AnyReward]]:
 
 
 def longer_plans(model: ScenarioModel) -> Iterator[Finding]:
-    """Decisions over several periods are pseudo-updates apart, and sums over labels."""
+    """Decisions over several periods are whole pseudo-updates apart, and sums over labels."""
     control = model.control
     given: dict[Path, Lookahead | None] = {("control", "lookahead"): control.lookahead}
     given.update({("planners", name): own for name, own in model.planners.items() if own.kind == "lookahead"})
@@ -204,8 +204,8 @@ def longer_plans(model: ScenarioModel) -> Iterator[Finding]:
             if round(steps) < 1 or abs(steps - round(steps)) > 1e-9 * steps:
                 multiple = f"a whole multiple of control.horizon_period, {horizon_period:g}"
                 yield (*path, "period"), multiple, describe(own.period)
-        if control.association != "known":
-            yield ("control", "association"), "known, with a lookahead", describe(control.association)
+    if control.lookahead is not None and control.association != "known" and control.reward.kind != "expected_loss":
+        yield ("control", "association"), "known, with a lookahead", describe(control.association)
 
 
 def targets_of_rules(model: ScenarioModel) -> Iterator[Finding]:

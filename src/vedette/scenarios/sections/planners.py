@@ -60,9 +60,12 @@ class Strategy(Section):
 
     needs_labels: ClassVar[bool] = False
 
-    def misfit(self, model: ScenarioModel) -> tuple[str, str] | None:
-        """What was expected and what came, where a scenario's filters or targets do not suit the planner; else None."""
-        return None
+    def misfit(self, model: ScenarioModel, *, labels: bool | None = None) -> str:
+        """What is expected instead, and why, where the planner does not suit a scenario; "" where it does.
+
+        labels: whether the filter labels its targets, where it was made; None: as its kind says.
+        """
+        return ""
 
     def planner(self, parts: Parts, folder: Path) -> Planner | None:
         """Who decides; None: nobody."""
@@ -75,13 +78,12 @@ class _Valued(Strategy):
     reward: AnyReward | None = Field(default=None, description="In place of control.reward; none: that one [-].")
     needs_labels: ClassVar[bool] = True
 
-    def misfit(self, model: ScenarioModel) -> tuple[str, str] | None:
+    def misfit(self, model: ScenarioModel, *, labels: bool | None = None) -> str:
         """Unfit where filters have no labels, which its values are of."""
         kind = model.filter.kind
-        if kind not in UNLABELLED:
-            return None
-        wanted = f"nearest, assigned, centroid, oracle or custom, as {kind} filters have no labels ({LABELLING} do)"
-        return wanted, describe(getattr(self, "kind", None))
+        if kind not in UNLABELLED if labels is None else labels:
+            return ""
+        return f"nearest, assigned, centroid, oracle or custom, as {kind} filters have no labels ({LABELLING} do)"
 
     def shared(self, parts: Parts, folder: Path) -> dict[str, Any]:
         """What all planners that value densities are made of."""
@@ -122,6 +124,15 @@ class _Ahead(_Valued):
     def ahead(self, parts: Parts) -> dict[str, Any]:
         """How far, and by which search."""
         return parts.lookahead
+
+    def misfit(self, model: ScenarioModel, *, labels: bool | None = None) -> str:
+        """Unfit also where decisions are no sums over labels."""
+        reward = self.reward or model.control.reward
+        if unfit := super().misfit(model, labels=labels):
+            return unfit
+        if model.control.association == "known" or reward.kind == "expected_loss":
+            return ""
+        return "joint or another, as with control.association full decisions are no sums over labels (known has them)"
 
     def planner(self, parts: Parts, folder: Path) -> Planner:
         """With that search."""
@@ -169,16 +180,15 @@ class NamedOracle(Strategy, Derived):
 
     kind: Literal["oracle"] = Field(default="oracle", description="Kind of planner [-].")
 
-    def misfit(self, model: ScenarioModel) -> tuple[str, str] | None:
+    def misfit(self, model: ScenarioModel, *, labels: bool | None = None) -> str:
         """Unfit where recorded targets lack the components of a custom motion."""
         motion = model.motion
         if model.targets.kind != "recorded" or motion.kind != "custom" or motion.state_dim == RECORDED_DIM:
-            return None
-        wanted = (
+            return ""
+        return (
             f"another kind, as states have {motion.state_dim} components under motion and the recorded targets "
             f"{RECORDED_DIM} (a motion of {RECORDED_DIM} components, or targets that are simulated, would do)"
         )
-        return wanted, describe(self.kind)
 
     def planner(self, parts: Parts, folder: Path) -> Planner:
         """Who waits to be told of the targets."""

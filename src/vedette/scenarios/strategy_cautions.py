@@ -1,0 +1,37 @@
+"""Warnings of strategies that every scenario has and a run of this one refuses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from vedette.errors import InputError
+from vedette.scenarios.faults import Path
+from vedette.scenarios.loading import Scenario
+from vedette.scenarios.sections.planners import STRATEGIES
+from vedette.scenarios.trust import code_of, not_own
+from vedette.text import either
+
+
+def strategy_cautions(scenario: Scenario) -> Iterator[tuple[Path, str]]:
+    """A warning for each reason why strategies are refused, with their names and what would do.
+
+    Planners are made for it where the scenario names code of the user's own, which nothing else can tell of.
+    """
+    refused: dict[str, list[str]] = {}
+    makes = bool(code_of(scenario.model)) and not not_own(scenario)
+    for name, strategy in STRATEGIES.items():
+        if wanted := strategy.misfit(scenario.model) or (makes and _fault_of_planner(scenario, name)):
+            refused.setdefault(wanted, []).append(name)
+    for wanted, names in refused.items():
+        yield ("control",), f"a run with --planner {either(names)} is refused: expected {wanted}"
+
+
+def _fault_of_planner(scenario: Scenario, name: str) -> str:
+    """What making the planner of a strategy expects instead; "" where it can be made."""
+    from vedette.scenarios.build import build_planner  # with it comes the compiler
+
+    try:
+        build_planner(scenario, name)
+    except InputError as error:
+        return str(error).partition(": expected ")[2].partition("; got")[0]
+    return ""
