@@ -111,6 +111,51 @@ def test_a_damaged_message_is_left_out_and_told(place: int, tmp_path: Path) -> N
     assert targets.reports.notes == ("left out: 1 line damaged (first: row 3)",)
 
 
+def of_two_sentences(time: int | None, number: int, **said: Any) -> list[str]:
+    """A report of extended class B, cut in two: the second sentence has neither a time nor a place."""
+    whole = encode_dict({"type": 19, "speed": 10.0, "course": 90.0, **said}, talker_id="AI")[0].split(",")[5]
+    found = []
+    for part, payload in enumerate((whole[:28], whole[28:]), start=1):
+        body = f"AIVDM,2,{part},{number},A,{payload},0"
+        total = 0
+        for letter in body:
+            total ^= ord(letter)
+        found.append(f"!{body}*{total:02X}")
+    return found if time is None else [f"{time} {found[0]}", found[1]]
+
+
+def test_positions_in_messages_of_several_sentences_are_read(tmp_path: Path) -> None:
+    """Also where those of two ships come between each other."""
+    one = of_two_sentences(1452603741, 1, mmsi="235000001", lon=-1.11, lat=50.79)
+    two = of_two_sentences(1452603742, 2, mmsi="235000002", lon=-1.12, lat=50.78, course=0.0)
+    alone = ais(1452603743, mmsi="235000003", lon=-1.13, lat=50.77)
+    (tmp_path / "ships.nmea").write_text("\n".join([one[0], two[0], alone, *two[1:], *one[1:]]), "ascii")
+    table = read_table(tmp_path / "ships.nmea")
+    assert (table.rows, table.notes) == ([3, 4, 5], ())
+    assert table.columns["id"] == ["235000003", "235000002", "235000001"]
+    assert table.columns["time"] == [1452603743.0, 1452603742.0, 1452603741.0]
+    np.testing.assert_allclose(table.columns["longitude"], [-1.13, -1.12, -1.11], atol=1e-6)
+    np.testing.assert_allclose(table.columns["latitude"], [50.77, 50.78, 50.79], atol=1e-6)
+    np.testing.assert_allclose(table.columns["vx"], [10.0 * KNOT, 0.0, 10.0 * KNOT], atol=1e-9)
+
+
+def test_messages_that_are_not_complete_are_counted(tmp_path: Path) -> None:
+    """A first sentence before another first one, a second alone, and a first at the end."""
+    reports = [of_two_sentences(1452603741 + k, 1, mmsi="235000001", lon=-1.11, lat=50.79) for k in range(4)]
+    lines = [reports[0][0], *reports[1], reports[2][1], reports[3][0]]
+    (tmp_path / "ships.nmea").write_text("\n".join(lines), "ascii")
+    table = read_table(tmp_path / "ships.nmea")
+    assert (table.rows, table.columns["time"]) == ([3], [1452603742.0])
+    assert table.notes == ("left out: 3 lines of messages that are not complete (first: row 1)",)
+    (tmp_path / "ships.nmea").write_text(reports[0][0], "ascii")
+    with pytest.raises(InputError, match=r"got 1 line of messages that are not complete \(first: row 1\)"):
+        read_table(tmp_path / "ships.nmea")
+    whole = of_two_sentences(None, 1, mmsi="235000001", lon=-1.11, lat=50.79)
+    (tmp_path / "ships.nmea").write_text("\n".join(whole), "ascii")
+    with pytest.raises(InputError, match=r"got 1 line with a position but no time \(first: row 2\)"):
+        read_table(tmp_path / "ships.nmea")
+
+
 def test_records_without_a_place_are_told(tmp_path: Path) -> None:
     category = CATS[48][-1]
     record = category.cv_record.create({"010": (("SAC", 1), ("SIC", 2)), "140": ((4.0, "s"))})

@@ -18,8 +18,9 @@ import numpy as np
 from vedette.errors import InputError
 from vedette.extras import need
 from vedette.kernels.base.types import Floats
+from vedette.recorded.ais import AIS_ENDINGS, read_ais
+from vedette.recorded.asterix import ASTERIX_ENDINGS, CAPTURE_ENDINGS, read_asterix
 from vedette.recorded.bags import BAG_ENDINGS, read_bag
-from vedette.recorded.foreign import AIS_ENDINGS, ASTERIX_ENDINGS, CAPTURE_ENDINGS, read_ais, read_asterix
 from vedette.text import elided, printable, shown
 
 # Beyond these, differences and speeds of reports mean nothing.
@@ -169,7 +170,7 @@ def seconds(time: Any) -> float:
 
 
 def read_table(path: str | Path, *, reports: bool = False) -> Table:
-    """A .csv file with a header line, or a .parquet file; or as `foreign` and `bags` have it.
+    """A .csv file with a header line, or a .parquet file; or as `ais`, `asterix` and `bags` have it.
 
     These are AIS messages (.nmea, .ais), plots and tracks of radars (.ast, .asterix), and ROS 2 bags (.db3, .mcap).
 

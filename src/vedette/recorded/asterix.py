@@ -1,11 +1,9 @@
-"""Recordings in the formats of others, as tables: AIS messages of ships (NMEA 0183), plots and tracks (ASTERIX)."""
+"""Plots and tracks of radars (ASTERIX) as tables."""
 
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -13,125 +11,15 @@ from vedette.errors import InputError
 from vedette.extras import need
 from vedette.text import counted, shown
 
-AIS_ENDINGS = (".nmea", ".ais")
 ASTERIX_ENDINGS = (".ast", ".asterix", ".raw")
 CAPTURE_ENDINGS = (".pcap", ".pcapng")
-_FIRST_TIME = 3e8  # s; numbers below are no times since 1970 of an AIS message
-_MILLISECONDS = 1e11  # greater times are milliseconds
-_PART = re.compile(rb"(?:\\[^\\]*\\)?!\w{5},[2-9],")  # a message of several sentences
-_KNOT = 1852.0 / 3600.0  # m/s
 _HALF_DAY = 43_200.0  # s
-_NO_SPEED, _NO_COURSE = 102.3, 360.0  # what AIS says where a ship does not know
 _MILE, _FLIGHT_LEVEL, _EARTH = 1852.0, 30.48, 6_371_000.0  # m
 _PLOTS, _TRACKS = 48, 62  # categories of what a rotating radar sees, and of what a tracker has made of such
 _DEGREE = "\N{DEGREE SIGN}"
 
-Columns = dict[str, list[Any]]
 
-
-def read_ais(file: Path) -> tuple[Columns, list[int], tuple[str, ...]]:
-    """Positions of ships: `time`, `id` (MMSI), `longitude`, `latitude`; `vx`, `vy` where every ship says them.
-
-    Times are those of the receiver: in tag blocks (`\\c:1452603741*..\\`), before the message (`2016-01-12T13:02:21Z
-    !AIVDM,...`, or seconds since 1970), or after it (`...*5C,r003669930,1452603741`). Messages that are no positions
-    are passed over. Lines that are damaged (their checksums say so), and positions without a time, are left out.
-    Returns the columns, the line of each row, and a warning that counts what was left out.
-
-    Raises:
-        MissingPackageError: pyais is not installed.
-        InputError: no position with a time in it.
-    """
-    need(f"{file}, which is a file of AIS messages,", "pyais")
-    rows, lines, lost = list[tuple[Any, ...]](), list[int](), dict[str, list[int]]()
-    with file.open("rb") as source:
-        for number, line in enumerate(source, start=1):
-            try:
-                found = _position(line.strip())
-            except ValueError as fault:
-                lost.setdefault(str(fault), []).append(number)
-            else:
-                if found is not None:
-                    rows.append(found)
-                    lines.append(number)
-    if not rows:
-        wanted = r"AIS positions with times: `\c:1452603741*54\!AIVDM,...`, `2016-01-12T13:02:21Z !AIVDM,...` or "
-        raise InputError(f"{file}: expected {wanted}`!AIVDM,...*5C,1452603741`; got {_lost_in_words(lost) or 'none'}")
-    names = ("time", "id", "longitude", "latitude")
-    columns: Columns = {name: [row[place] for row in rows] for place, name in enumerate(names)}
-    if all(row[4] is not None for row in rows):
-        columns |= {"vx": [row[4][0] for row in rows], "vy": [row[4][1] for row in rows]}
-    return columns, lines, (f"left out: {_lost_in_words(lost)}",) if lost else ()
-
-
-def _lost_in_words(lost: dict[str, list[int]]) -> str:
-    return ", ".join(f"{counted(len(at), 'line')} {what} (first: row {at[0]})" for what, at in lost.items())
-
-
-def _sentence(line: bytes) -> tuple[bytes, float | None]:
-    """The sentence of a line, with its tag block if there is one, and the time that stands before or after it."""
-    if line.startswith(b"\\"):
-        return line, None
-    start, star = max(line.find(b"!"), 0), line.rfind(b"*")
-    end = star + 3 if star >= 0 else len(line)
-    times = [_clock(line[:start].strip(b" ,;\t[]()")), _clock(line[end:].rsplit(b",", 1)[-1].strip())]
-    return line[start:end], next((time for time in times if time is not None), None)
-
-
-def _clock(cell: bytes) -> float | None:
-    """Seconds since 1970 of an ISO 8601 time (UTC unless it names a zone) or of a number; None of anything else."""
-    text = cell.decode("ascii", "replace")
-    try:
-        if text.replace(".", "", 1).isdigit():
-            return float(text) if float(text) > _FIRST_TIME else None
-        moment = datetime.fromisoformat(text)
-    except ValueError:
-        return None
-    return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
-
-
-def _position(line: bytes) -> tuple[Any, ...] | None:
-    """Time, MMSI, longitude, latitude and velocity of a line; None of a line that is no position.
-
-    Raises `ValueError` with what the line is where it is damaged, or a position without a time.
-    """
-    from pyais.exceptions import AISBaseException
-    from pyais.stream import IterMessages
-
-    sentence, time = _sentence(line)
-    try:
-        message = next(iter(IterMessages([sentence])), None)
-        if message is None:
-            is_other = line.startswith((b"$", b"#")) and b"!" not in line
-            if not line or is_other or _PART.match(sentence):
-                return None
-            raise ValueError
-        if message.tag_block is not None:
-            message.tag_block.init()
-            stamp = message.tag_block.receiver_timestamp
-            time = None if stamp is None else float(stamp)
-        if not message.is_valid or (message.tag_block is not None and not message.tag_block.is_valid):
-            raise ValueError
-        said = message.decode().asdict()
-    except (AISBaseException, TypeError, ValueError):
-        raise ValueError("damaged") from None
-    lon, lat = said.get("lon"), said.get("lat")
-    if not (isinstance(lon, float) and isinstance(lat, float) and abs(lon) <= 180.0 and abs(lat) <= 90.0):
-        return None
-    if time is None or not math.isfinite(time):
-        raise ValueError("with a position but no time")
-    return time / 1000.0 if time > _MILLISECONDS else time, str(said["mmsi"]), lon, lat, _velocity(said)
-
-
-def _velocity(said: dict[str, Any]) -> tuple[float, float] | None:
-    """m/s to the east and north."""
-    speed, course = said.get("speed"), said.get("course")
-    if speed is None or course is None or speed >= _NO_SPEED or course >= _NO_COURSE:
-        return None
-    angle = math.radians(course)
-    return _KNOT * speed * math.sin(angle), _KNOT * speed * math.cos(angle)
-
-
-def read_asterix(file: Path, *, reports: bool = False) -> tuple[Columns, list[int], tuple[str, ...]]:
+def read_asterix(file: Path, *, reports: bool = False) -> tuple[dict[str, list[Any]], list[int], tuple[str, ...]]:
     """Plots of rotating radars, category 048, or tracks of a system, category 062; a sensor is "SAC/SIC".
 
     Of plots `time`, `sensor`, `range_nmi`, `bearing_deg` from the north. Ranges are along the ground where a plot has a
@@ -164,7 +52,7 @@ def read_asterix(file: Path, *, reports: bool = False) -> tuple[Columns, list[in
         raise InputError(
             f"{file}: expected {'' if reports else 'plots of category 048 or '}tracks of category 062; got none"
         )
-    columns: Columns = {name: [row[name] for row in rows] for name in rows[0]}
+    columns: dict[str, list[Any]] = {name: [row[name] for row in rows] for name in rows[0]}
     slant = sum(columns.pop("is_slant", []))
     notes = () if not slant else (_of_slant_ranges(slant, len(numbers)),)
     if left := without.count(read):

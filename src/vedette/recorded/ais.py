@@ -1,0 +1,177 @@
+"""AIS messages of ships (NMEA 0183) as tables of positions."""
+
+from __future__ import annotations
+
+import math
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from vedette.errors import InputError
+from vedette.extras import need
+from vedette.text import counted
+
+AIS_ENDINGS = (".nmea", ".ais")
+_FIRST_TIME = 3e8  # s; numbers below are no times since 1970 of an AIS message
+_MILLISECONDS = 1e11  # greater times are milliseconds
+_KNOT = 1852.0 / 3600.0  # m/s
+_NO_SPEED, _NO_COURSE = 102.3, 360.0  # what AIS says where a ship does not know
+
+
+def read_ais(file: Path) -> tuple[dict[str, list[Any]], list[int], tuple[str, ...]]:
+    """Positions of ships: `time`, `id` (MMSI), `longitude`, `latitude`; `vx`, `vy` where every ship says them.
+
+    Times are those of the receiver: in tag blocks (`\\c:1452603741*..\\`), before the message (`2016-01-12T13:02:21Z
+    !AIVDM,...`, or seconds since 1970), or after it (`...*5C,r003669930,1452603741`); of a message of several sentences
+    the first that is there. Messages that are no positions are passed over. Lines that are damaged (their checksums say
+    so), sentences of messages that are not complete, and positions without a time, are left out. Returns the columns,
+    the line of each row, and a warning that counts what was left out.
+
+    Raises:
+        MissingPackageError: pyais is not installed.
+        InputError: no position with a time in it.
+    """
+    need(f"{file}, which is a file of AIS messages,", "pyais")
+    rows, lines, lost, open_ones = list[tuple[Any, ...]](), list[int](), dict[str, list[int]](), _Open({}, [])
+    with file.open("rb") as source:
+        for number, line in enumerate(source, start=1):
+            try:
+                part = _part(line.strip(), number)
+                found = None if part is None else _position(open_ones.joined(part))
+            except ValueError as fault:
+                lost.setdefault(str(fault), []).append(number)
+            else:
+                if found is not None:
+                    rows.append(found)
+                    lines.append(number)
+    if incomplete := open_ones.left():
+        lost["of messages that are not complete"] = incomplete
+    if not rows:
+        wanted = r"AIS positions with times: `\c:1452603741*54\!AIVDM,...`, `2016-01-12T13:02:21Z !AIVDM,...` or "
+        raise InputError(f"{file}: expected {wanted}`!AIVDM,...*5C,1452603741`; got {_lost_in_words(lost) or 'none'}")
+    names = ("time", "id", "longitude", "latitude")
+    columns: dict[str, list[Any]] = {name: [row[place] for row in rows] for place, name in enumerate(names)}
+    if all(row[4] is not None for row in rows):
+        columns |= {"vx": [row[4][0] for row in rows], "vy": [row[4][1] for row in rows]}
+    return columns, lines, (f"left out: {_lost_in_words(lost)}",) if lost else ()
+
+
+def _lost_in_words(lost: dict[str, list[int]]) -> str:
+    return ", ".join(f"{counted(len(at), 'line')} {what} (first: row {at[0]})" for what, at in lost.items())
+
+
+def _sentence(line: bytes) -> tuple[bytes, float | None]:
+    """The sentence of a line, with its tag block if there is one, and the time that stands before or after it."""
+    if line.startswith(b"\\"):
+        return line, None
+    start, star = max(line.find(b"!"), 0), line.rfind(b"*")
+    end = star + 3 if star >= 0 else len(line)
+    times = [_clock(line[:start].strip(b" ,;\t[]()")), _clock(line[end:].rsplit(b",", 1)[-1].strip())]
+    return line[start:end], next((time for time in times if time is not None), None)
+
+
+def _clock(cell: bytes) -> float | None:
+    """Seconds since 1970 of an ISO 8601 time (UTC unless it names a zone) or of a number; None of anything else."""
+    text = cell.decode("ascii", "replace")
+    try:
+        if text.replace(".", "", 1).isdigit():
+            return float(text) if float(text) > _FIRST_TIME else None
+        moment = datetime.fromisoformat(text)
+    except ValueError:
+        return None
+    return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+
+
+class _Part(NamedTuple):
+    """A sentence of a message, the time in its line, and the number of that line."""
+
+    sentence: Any
+    time: float | None
+    line: int
+
+
+class _Open(NamedTuple):
+    """Messages of several sentences of which not all have come, by what their sentences have in common.
+
+    lost: lines of messages that will not be complete any more.
+    """
+
+    waiting: dict[tuple[Any, ...], list[_Part]]
+    lost: list[int]
+
+    def joined(self, part: _Part) -> list[_Part]:
+        """All parts of the message that this part completes, in order; none where others are to come."""
+        own = part.sentence
+        if own.frag_cnt == 1:
+            return [part]
+        key = (own.seq_id, own.channel, own.talker_id, own.type, own.frag_cnt)
+        parts = self.waiting.pop(key, [])
+        if own.frag_num != len(parts) + 1:
+            self.lost.extend(each.line for each in parts)
+            parts = []
+            if own.frag_num > 1:
+                self.lost.append(part.line)
+                return []
+        parts.append(part)
+        if len(parts) == own.frag_cnt:
+            return parts
+        self.waiting[key] = parts
+        return []
+
+    def left(self) -> list[int]:
+        """Lines of messages that were not completed, in order."""
+        return sorted([*self.lost, *(part.line for parts in self.waiting.values() for part in parts)])
+
+
+def _part(line: bytes, number: int) -> _Part | None:
+    """The AIS sentence of a line; None of an empty line or another sentence. Raises `ValueError` for a damaged one."""
+    from pyais.exceptions import AISBaseException
+    from pyais.messages import AISSentence, NMEASentenceFactory
+
+    if not line or (line.startswith((b"$", b"#")) and b"!" not in line):
+        return None
+    text, time = _sentence(line)
+    try:
+        sentence = NMEASentenceFactory.produce(text)
+        block = sentence.tag_block
+        if block is not None:
+            block.init()
+            stamp = block.receiver_timestamp
+            time = None if stamp is None else float(stamp)
+        if not sentence.is_valid or (block is not None and not block.is_valid):
+            raise ValueError
+    except (AISBaseException, TypeError, ValueError):
+        raise ValueError("damaged") from None
+    return _Part(sentence, time, number) if isinstance(sentence, AISSentence) else None
+
+
+def _position(parts: list[_Part]) -> tuple[Any, ...] | None:
+    """Time, MMSI, longitude, latitude and velocity of a message; None of one that is no position, or of no parts.
+
+    Raises `ValueError` with what the message is where it cannot be decoded, or is a position without a time.
+    """
+    from pyais.exceptions import AISBaseException
+    from pyais.messages import AISSentence
+
+    if not parts:
+        return None
+    try:
+        said = AISSentence.assemble_from_iterable([part.sentence for part in parts]).decode().asdict()
+    except (AISBaseException, TypeError, ValueError):
+        raise ValueError("damaged") from None
+    lon, lat = said.get("lon"), said.get("lat")
+    if not (isinstance(lon, float) and isinstance(lat, float) and abs(lon) <= 180.0 and abs(lat) <= 90.0):
+        return None
+    time = next((part.time for part in parts if part.time is not None), None)
+    if time is None or not math.isfinite(time):
+        raise ValueError("with a position but no time")
+    return time / 1000.0 if time > _MILLISECONDS else time, str(said["mmsi"]), lon, lat, _velocity(said)
+
+
+def _velocity(said: dict[str, Any]) -> tuple[float, float] | None:
+    """m/s to the east and north."""
+    speed, course = said.get("speed"), said.get("course")
+    if speed is None or course is None or speed >= _NO_SPEED or course >= _NO_COURSE:
+        return None
+    angle = math.radians(course)
+    return _KNOT * speed * math.sin(angle), _KNOT * speed * math.cos(angle)
