@@ -21,6 +21,7 @@ import numpy as np
 
 from vedette.campaigns import CampaignResults, load_spec
 from vedette.campaigns.results import GroupComparison
+from vedette.evaluation.tails import tails
 from vedette.text import named_in
 
 CAMPAIGNS = Path(__file__).parents[1] / "examples/campaigns"
@@ -46,7 +47,7 @@ def table(results: CampaignResults, group: GroupComparison) -> Iterator[str]:
         costs = (f"{scan_ms(results, cell.name):.1f}", f"{scan_kilobytes(results, cell.name):.1f}")
         yield "| " + " | ".join([label, error, *parts, bias, *tracked, *costs]) + " |"
     yield ""
-    yield f"{comparison.num_runs} paired runs of {comparison.scenario}."
+    yield f"{comparison.num_runs} paired runs of {comparison.scenario}. {tails(comparison)}"
 
 
 def scan_ms(results: CampaignResults, cell: str) -> float:

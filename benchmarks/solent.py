@@ -34,6 +34,7 @@ from vedette.evaluation import ospa
 from vedette.evaluation.figures import save_figure, scene_of, tracks_figure
 from vedette.evaluation.runs import run_scenario
 from vedette.evaluation.statistics import summarise
+from vedette.evaluation.tails import tails
 from vedette.evaluation.track_table import table_of_run, write_tracks
 from vedette.scenarios import Scenario, load_scenario
 from vedette.scenarios.build import build_experiment
@@ -209,7 +210,7 @@ def table_of(folder: Path, name: str) -> Iterator[str]:
         cells += ["" if more is None else f"{more.mean:+.2f} ± {more.standard_error:.2f}", f"{tracked.mean:.1%}"]
         yield "| " + " | ".join(cells) + " |"
     yield ""
-    yield f"{comparison.num_runs} paired runs."
+    yield f"{comparison.num_runs} paired runs. {tails(comparison)}"
 
 
 def peer_table(folder: Path, python: str, runs: int) -> Iterator[str]:

@@ -78,6 +78,10 @@ def test_an_entrant_is_paired_with_the_first_and_its_counts_are_told(tmp_path: P
     rows = list(csv.DictReader(io.StringIO(benchmark_csv([table]))))
     assert [each["strategy"] for each in rows] == ["nearest", "fixed", "mine"]
     assert float(rows[2]["ospa"]) == float(mine.ospa.mean)
+    assert float(rows[2]["median"]) == pytest.approx(float(mine.ospa.mean))  # of two runs
+    assert float(rows[2]["worst"]) == mine.tail.worst > mine.tail.median
+    assert float(rows[2]["share_lost"]) in (0.0, 0.5, 1.0)
+    assert "| Median run (m) | Worst run (m) | Runs that end with a lost target |" in page
 
 
 def test_lost_runs_count_as_the_cutoff_and_say_why(tmp_path: Path) -> None:
@@ -87,6 +91,7 @@ def test_lost_runs_count_as_the_cutoff_and_say_why(tmp_path: Path) -> None:
     assert table is not None
     first, _, mine = table.standings
     assert (float(mine.ospa.mean), mine.num_lost, mine.num_runs, mine.nees) == (100.0, 2, 2, None)
+    assert mine.tail == (100.0, 100.0, 1.0)
     assert mine.difference is not None
     assert float(mine.difference.mean) == pytest.approx(100.0 - float(first.ospa.mean))
     assert "expected actions[0] from 0 to" in mine.reason

@@ -107,4 +107,5 @@ def test_the_page_of_a_yardstick_has_a_table_for_each_setting_and_its_sources(tm
     page = yardstick_markdown(results, yardstick)
     assert page.startswith(f"# {yardstick.title}\n\n## sensors.*.clutter.rate 5.0\n\n| Strategy |")
     assert page.count("| published: FDCD |") == 2
+    assert page.count("\nMedian and worst run (m), share of runs that end with a lost target: ") == 2
     assert page.endswith(f"Published: {yardstick.source}.\n\n{yardstick.remark}\n")

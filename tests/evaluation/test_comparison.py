@@ -10,7 +10,8 @@ import pytest
 from evaluation.synthetic import make_record
 from vedette.errors import InputError
 from vedette.evaluation import Comparison, compare, decision_rows, holm, strategy_csv, strategy_markdown, strategy_rows
-from vedette.evaluation.tables import header, strategy_latex, tails, told_apart
+from vedette.evaluation.tables import header, strategy_latex, told_apart
+from vedette.evaluation.tails import tails
 from vedette.simulation.records import RunRecord
 
 NUM_RUNS = 6
@@ -162,6 +163,9 @@ def test_tails_stand_beside_means(comparison: Comparison) -> None:
     told = tails(replace(comparison, ensembles=ensembles))
     assert told.startswith("Median and worst run (m), share of runs that end with a lost target: jdm ")
     assert told.count(", 33 %") == len(STRATEGIES)
+    numbers = next(csv.DictReader(io.StringIO(strategy_csv(replace(comparison, ensembles=ensembles)))))
+    assert (float(numbers["median_m"]), float(numbers["worst_m"])) == (np.median(means), means.max())
+    assert float(numbers["share_lost"]) == 2 / 6
 
 
 def test_csv_holds_the_unrounded_numbers(comparison: Comparison) -> None:

@@ -9,6 +9,7 @@ from reports.examples import campaign_of, results_of
 from vedette.reports.drawings import group_drawings, sweep_drawings
 from vedette.reports.groups import axis_label, axis_unit, gather
 from vedette.reports.saving import run_errors
+from vedette.reports.tables import error_table
 
 
 @pytest.mark.parametrize(
@@ -37,6 +38,18 @@ def test_runs_that_not_every_strategy_has_are_left_out_of_a_comparison(tmp_path:
     assert [len(each.counted) for each in group.strategies] == [40, 40]
     assert group.strategies[1].record(2).run == 2
     assert {name: len(errors) for name, errors in run_errors(group).items()} == {"fixed": 2, "still": 2}
+
+
+def test_errors_have_their_tails_beside_them(tmp_path: Path) -> None:
+    (group,) = gather(results_of(tmp_path / "results", campaign_of(planners=["still", "random"], runs=3)))
+    table = error_table(group)
+    assert table is not None
+    assert group.comparison is not None
+    assert table.header[-3:] == ("Median run (m)", "Worst run (m)", "Runs that end with a lost target")
+    for row, name in zip(table.rows, group.comparison.strategies, strict=True):
+        means = group.comparison.run_means(name)
+        lost = group.comparison.values(name, "num_missed")[:, group.comparison.counted][:, -1] > 0
+        assert row[-3:] == (f"{np.median(means):.2f}", f"{means.max():.2f}", f"{100.0 * lost.mean():.0f} %")
 
 
 def test_groups_are_named_by_what_sets_them_apart(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from vedette.campaigns.results import CampaignResults, open_results
 from vedette.evaluation import Summary, paired_difference, summarise
 from vedette.evaluation.comparison import scored
 from vedette.evaluation.ensembles import Ensemble
+from vedette.evaluation.tails import Tail, lost_at_end, tail_header
 from vedette.kernels.base.types import Floats
 from vedette.scenarios.dumping import dump_scenario
 from vedette.simulation.storage import versions
@@ -37,6 +38,7 @@ class Standing:
         is_own: whether it is one of the library's own.
         num_runs, num_lost: runs, and of these the ones that could not be finished.
         ospa: mean over scans and runs, with its 95 % interval.
+        tail: of that, its median and worst run, and the share of runs that end with a lost target.
         difference: of that to the first strategy, run by run; None: it is the first.
         cardinality_error: mean number of estimates minus that of targets; NaN: no run was finished.
         nees: mean NEES of positions over 2, with its interval: 1 where covariances are right; None: it says nothing.
@@ -50,6 +52,7 @@ class Standing:
     num_runs: int
     num_lost: int
     ospa: Summary
+    tail: Tail
     difference: Summary | None
     cardinality_error: float
     nees: Summary | None
@@ -103,9 +106,11 @@ def _tried(scene: Scene, results: CampaignResults) -> Iterator[tuple[Standing, d
         ospa = dict.fromkeys(lost, float(cell.scenario.model.ospa.cutoff))
         ensemble = results.ensemble(cell.name) if results.finished(cell.name) else None
         cardinality = nees = seconds = np.empty(0)
+        lost_targets = np.ones(len(lost))
         if ensemble is not None:
             comparison = scored(cell.scenario, {label: ensemble})
             ospa |= dict(zip(ensemble.runs.tolist(), comparison.run_means(label).tolist(), strict=True))
+            lost_targets = np.append(lost_targets, lost_at_end(comparison, label))
             cardinality = comparison.run_means(label, "cardinality_error")
             nees = comparison.run_means(label, "position_nees_mean") / 2.0
             nees, seconds = nees[~np.isnan(nees)], _spent(scene, ensemble)
@@ -117,6 +122,7 @@ def _tried(scene: Scene, results: CampaignResults) -> Iterator[tuple[Standing, d
             len(ospa),
             len(lost),
             summarise([ospa[run] for run in sorted(ospa)]),
+            Tail(float(np.median(list(ospa.values()))), max(ospa.values()), _mean(lost_targets)),
             None,
             _mean(cardinality),
             summarise(nees) if len(nees) and nees.mean() > _SAYS_NOTHING else None,
@@ -151,7 +157,7 @@ def header(table: SceneTable) -> tuple[str, ...]:
     unit, first = table.unit, table.scene.beside[0]
     spent = "ms a decision" if table.scene.role == "planner" else "ms a scan"
     ours = named_in("OSPA", unit), named_in(f"More than {first}", unit), "95 %"
-    names = (*ours, "N error", "NEES", "NEES, 95 %", spent)
+    names = (*ours, *tail_header(unit), "N error", "NEES", "NEES, 95 %", spent)
     counts = ("Filter steps", "Fusions", "Rewards") if table.scene.role == "planner" else ()
     return (table.scene.role.capitalize(), *names, *counts, "Lost", "Runs")
 
@@ -165,6 +171,7 @@ def row(table: SceneTable, own: Standing) -> tuple[str, ...]:
         _known(float(own.ospa.mean), ".2f"),
         "" if more is None else _known(float(more.mean), "+.2f"),
         "" if more is None else _interval(more, "+.2f"),
+        *own.tail.cells(),
         _known(own.cardinality_error, "+.2f"),
         "" if nees is None else _known(float(nees.mean), ".2f"),
         "" if nees is None else _interval(nees, ".2f"),
@@ -210,7 +217,18 @@ def benchmark_markdown(tables: Sequence[SceneTable], facts: Mapping[str, str]) -
 def benchmark_csv(tables: Sequence[SceneTable]) -> str:
     """All standings as CSV, numbers in full, one row a scene and strategy."""
     out = io.StringIO()
-    names = ["ospa", "ospa_low", "ospa_high", "difference", "difference_low", "difference_high", "cardinality_error"]
+    names = [
+        "ospa",
+        "ospa_low",
+        "ospa_high",
+        "median",
+        "worst",
+        "share_lost",
+        "difference",
+        "difference_low",
+        "difference_high",
+        "cardinality_error",
+    ]
     names += ["nees", "nees_low", "nees_high", "seconds", *COUNTED, "num_lost", "num_runs"]
     write = csv.writer(out, lineterminator="\n").writerow
     write(("scene", "scene_sha256", "role", "strategy", "is_own", "unit", *names))
@@ -218,7 +236,15 @@ def benchmark_csv(tables: Sequence[SceneTable]) -> str:
         for own in table.standings:
             summaries = [own.ospa, own.difference, own.nees]
             parts = [["", "", ""] if each is None else [each.mean, each.low, each.high] for each in summaries]
-            numbers = [*parts[0], *parts[1], own.cardinality_error, *parts[2], own.seconds, *own.counts.values()]
+            numbers = [
+                *parts[0],
+                *own.tail,
+                *parts[1],
+                own.cardinality_error,
+                *parts[2],
+                own.seconds,
+                *own.counts.values(),
+            ]
             told = [("" if value == "" or np.isnan(value) else repr(float(value))) for value in numbers]
             start = [table.scene.name, table.digest, table.scene.role, own.label, int(own.is_own), table.unit]
             write([*start, *told, own.num_lost, own.num_runs])

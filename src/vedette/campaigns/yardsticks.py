@@ -10,6 +10,7 @@ from pathlib import Path
 from vedette.campaigns.results import CampaignResults
 from vedette.campaigns.scores import StrategyScore, score_markdown, score_strategies
 from vedette.campaigns.spec import CampaignSpec, load_spec
+from vedette.evaluation.tails import tails
 
 _PUBLISHED = Path(__file__).with_name("published.toml")
 
@@ -75,7 +76,7 @@ def yardstick_markdown(results: CampaignResults, yardstick: Yardstick) -> str:
         title = results.title(group)
         scores = (*score_strategies(group), *yardstick.published)
         table = score_markdown(scores, group.comparison.unit, group.labels[0])
-        lines += [*([f"## {title}", ""] if title else []), table]
+        lines += [*([f"## {title}", ""] if title else []), table, tails(group.comparison), ""]
     return "\n".join([*lines, "\n\n".join(provenance(yardstick)), ""])
 
 

@@ -32,7 +32,8 @@ _MOST_DECISIONS = 6  # times of them; the tables and the report have all
 def print_comparison(comparison: Comparison) -> None:
     """The table of the strategies, what its numbers are, and what each strategy decided."""
     from vedette.evaluation import decision_rows, strategy_rows
-    from vedette.evaluation.tables import caption, tails, told_apart
+    from vedette.evaluation.tables import caption, told_apart
+    from vedette.evaluation.tails import tails
 
     console = new_console()
     names = (named_in("OSPA", comparison.unit), *_SHORT_HEADER)
@@ -49,24 +50,31 @@ def print_comparison(comparison: Comparison) -> None:
             console.print(f"{label}: and at {counted(len(decisions) - _MOST_DECISIONS, 'other time')}")
 
 
-def print_scores(scores: Sequence[StrategyScore], unit: str) -> None:
+def print_scores(scores: Sequence[StrategyScore], comparison: Comparison) -> None:
     """What strategies brought and cost, beside what is published."""
     from vedette.campaigns.scores import score_row
+    from vedette.evaluation.tails import tails
 
     rows = [score_row(score)[1:] for score in scores]
-    names = (named_in("OSPA", unit), *_SHORT_SCORES)
+    names = (named_in("OSPA", comparison.unit), *_SHORT_SCORES)
     _print_rows(new_console(), [score.label for score in scores], names, rows)
+    if told := tails(comparison):
+        new_console().print(told, style="dim")
 
 
 def print_standings(table: SceneTable) -> None:
     """How entrants stand on a scene, as far as a terminal has room; the page has the rest."""
     from vedette.campaigns.standings import header, row
+    from vedette.evaluation.tails import tail_header, tails_in_words
 
     names, rows = header(table), [row(table, own) for own in table.standings]
-    shown = [place for place, name in enumerate(names) if place and name not in _LEFT_OUT]
+    left_out = (*_LEFT_OUT, *tail_header(table.unit))
+    shown = [place for place, name in enumerate(names) if place and name not in left_out]
     new_console().print(f"{table.scene.name}: {table.scene.about}")
     numbers = [tuple(each[place] for place in shown) for each in rows]
     _print_rows(new_console(), [each[0] for each in rows], (names[1], *_SHORT_STANDINGS), numbers)
+    told = tails_in_words({own.label: own.tail for own in table.standings}, table.unit)
+    new_console().print(told, style="dim")
     for own in table.standings:
         if own.reason:
             new_console().print(f"lost, {own.label}: {own.reason}", soft_wrap=True)

@@ -134,7 +134,7 @@ def _print_beside_published(opened: CampaignResults, groups: Sequence[GroupCompa
     for group in groups:
         if title := opened.title(group):
             say(f"{title}:")
-        print_scores((*score_strategies(group), *yardstick.published), group.comparison.unit)
+        print_scores((*score_strategies(group), *yardstick.published), group.comparison)
         say("")
     for line in provenance(yardstick):
         console().print(line)

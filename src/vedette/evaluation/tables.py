@@ -14,6 +14,7 @@ from vedette.evaluation.actions import choice_words
 from vedette.evaluation.comparison import Comparison
 from vedette.evaluation.ensembles import PARTS
 from vedette.evaluation.statistics import CONFIDENCE, PairedDifference, Summary, summarise
+from vedette.evaluation.tails import tail_of, tails
 from vedette.text import markdown_table, named_in, spreadsheet_text, with_error
 
 _ESCAPED = str.maketrans(
@@ -125,10 +126,14 @@ def strategy_numbers(comparison: Comparison, strategy: str) -> dict[str, str | f
     paired = difference.summary
     parts = [_means(comparison, strategy, part, f"{part}_mean_m", f"{part}_se_m") for part in PARTS]
     measures = [_means(comparison, strategy, name, f"{name}_mean", f"{name}_se") for name in comparison.measures]
+    tail = tail_of(comparison, strategy)
     return {
         "strategy": spreadsheet_text(strategy),
         "runs": comparison.num_runs,
         **dict(itertools.chain(*parts)),
+        "median_m": tail.median,
+        "worst_m": tail.worst,
+        "share_lost": tail.lost,
         "difference_m": float(paired.mean),
         "difference_se_m": float(paired.standard_error),
         "low_m": float(paired.low),
@@ -161,24 +166,6 @@ def caption(comparison: Comparison) -> str:
         f"Scenario {comparison.scenario}, {comparison.num_runs} paired runs, {over}, ± one standard error. Difference: "
         f"strategy minus {first}, run by run; runs won: by {first}.{_intervals(comparison)}"
     )
-
-
-def tails(comparison: Comparison) -> str:
-    """Median and worst run of each strategy, and the share of runs that end with a lost target; empty of a single run.
-
-    A target is lost at the end where it has no estimate within the cutoff at the last scan that counts.
-    """
-    if comparison.num_runs == 1:
-        return ""
-    last, found = int(np.flatnonzero(comparison.counted)[-1]), []
-    for name in comparison.strategies:
-        means = comparison.run_means(name)
-        told = f"{name} {np.nanmedian(means):.2f}, {np.nanmax(means):.2f}" if not np.isnan(means).all() else name
-        if "num_missed" in comparison.measures:
-            told += f", {np.mean(comparison.values(name, 'num_missed')[:, last] > 0.0):.0%}".replace("%", " %")
-        found.append(told)
-    lost = ", share of runs that end with a lost target" if "num_missed" in comparison.measures else ""
-    return f"{named_in('Median and worst run', comparison.unit)}{lost}: {'; '.join(found)}."
 
 
 def _intervals(comparison: Comparison) -> str:

@@ -16,6 +16,7 @@ from vedette.evaluation.figures.style import strategy_label
 from vedette.evaluation.health import percent
 from vedette.evaluation.metrics.run import COLUMNS
 from vedette.evaluation.tables import decision_rows, header, strategy_rows
+from vedette.evaluation.tails import tail_header, tail_of
 from vedette.kernels.base.types import Bools, Floats
 from vedette.reports.groups import Group, Strategy
 from vedette.text import elided_apart, with_error, with_minus
@@ -115,13 +116,17 @@ def error_table(group: Group) -> Table | None:
     """OSPA and its parts, and the paired differences; None without runs in common."""
     if group.comparison is None:
         return None
+    several = group.comparison.num_runs > 1
     rows = tuple(
-        (strategy_label(name), *(with_minus(cell) for cell in cells))
+        (
+            strategy_label(name),
+            *(with_minus(cell) for cell in cells),
+            *(tail_of(group.comparison, name).cells() if several else ()),
+        )
         for name, *cells in strategy_rows(group.comparison)
     )
     first = strategy_label(group.comparison.strategies[0])
     counted = group.comparison.times[group.comparison.counted]
-    several = group.comparison.num_runs > 1
     over = f"over t = {counted[0]:g} to {counted[-1]:g} s"
     caption = (
         f"Mean over {group.comparison.num_runs} paired runs and {over}, ± one standard error."
@@ -131,7 +136,10 @@ def error_table(group: Group) -> Table | None:
     if len(rows) > 1:
         won = f", run by run, so above 0 where {first} is better; runs won: by {first}." if several else "."
         caption += f" Difference: strategy minus {first}{won}"
-    return Table(caption, header(group.comparison), rows)
+    if several:
+        caption += " A target is lost at the end where it has no estimate within the cutoff at the last of these scans."
+    more = tail_header(group.comparison.unit) if several else ()
+    return Table(caption, (*header(group.comparison), *more), rows)
 
 
 def measure_table(group: Group) -> Table | None:

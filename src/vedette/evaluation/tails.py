@@ -1,0 +1,67 @@
+"""What a mean over runs hides: the median and the worst run, and the share of runs that end with a lost target."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.evaluation.comparison import Comparison
+from vedette.kernels.base.types import Floats
+from vedette.text import named_in
+
+
+class Tail(NamedTuple):
+    """Mean OSPA of the median and of the worst run, and the share of runs that end with a lost target.
+
+    A target is lost at the end where it has no estimate within the cutoff at the last scan that counts. NaN: not known.
+    """
+
+    median: float
+    worst: float
+    lost: float
+
+    def cells(self) -> tuple[str, str, str]:
+        """The three as text, empty where they are not known."""
+        numbers = ["" if np.isnan(each) else f"{each:.2f}" for each in (self.median, self.worst)]
+        return (numbers[0], numbers[1], "" if np.isnan(self.lost) else f"{100.0 * self.lost:.0f} %")
+
+
+def tail_header(unit: str) -> tuple[str, str, str]:
+    """Of the columns of `Tail.cells`."""
+    return named_in("Median run", unit), named_in("Worst run", unit), "Runs that end with a lost target"
+
+
+def tail_of(comparison: Comparison, strategy: str) -> Tail:
+    """Of the runs of a strategy."""
+    means, lost = comparison.run_means(strategy), lost_at_end(comparison, strategy)
+    known = not np.isnan(means).all()
+    return Tail(
+        float(np.nanmedian(means)) if known else np.nan,
+        float(np.nanmax(means)) if known else np.nan,
+        float(lost.mean()) if len(lost) else np.nan,
+    )
+
+
+def lost_at_end(comparison: Comparison, strategy: str) -> Floats:
+    """(num_runs,) 1 for a run that ends with a lost target, else 0; (0,) where runs have no such measure."""
+    if "num_missed" not in comparison.measures:
+        return np.empty(0)
+    last = int(np.flatnonzero(comparison.counted)[-1])
+    return np.asarray(comparison.values(strategy, "num_missed")[:, last] > 0.0, np.float64)
+
+
+def tails(comparison: Comparison) -> str:
+    """The tails of all strategies in a sentence; empty of a single run."""
+    if comparison.num_runs == 1:
+        return ""
+    return tails_in_words({name: tail_of(comparison, name) for name in comparison.strategies}, comparison.unit)
+
+
+def tails_in_words(found: Mapping[str, Tail], unit: str) -> str:
+    """Tails by strategy in a sentence. unit: of OSPA."""
+    told = [f"{name} {', '.join(filter(None, tail.cells()))}" for name, tail in found.items()]
+    known = any(not np.isnan(tail.lost) for tail in found.values())
+    lost = ", share of runs that end with a lost target" if known else ""
+    return f"{named_in('Median and worst run', unit)}{lost}: {'; '.join(told)}."
