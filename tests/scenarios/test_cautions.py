@@ -42,6 +42,11 @@ def of(folder: Path, *changes: tuple[str, str]) -> tuple[str, ...]:
         (COURSES, "{kind: stay_inside, region: {x_min: 5, x_max: 9, y_min: 0, y_max: 50}}", "keep it inside"),
         (COURSES, "{kind: keep_out, polygon: [[9, 30], [19, 30], [19, 50], [9, 50]]}", ""),
         ("{kind: still}", "{kind: keep_out, polygon: [[-9, 30], [9, 30], [9, 50], [-9, 50]]}", ""),
+        (COURSES, "{kind: keep_out, polygon: [[0, 30], [9, 30], [9, 50], [0, 50]]}", "on the edge of an area that"),
+        (COURSES, "{kind: keep_out, polygon: [[-9, 30], [0, 30], [0, 50], [-9, 50]]}", "on the edge of an area that"),
+        (COURSES, "{kind: keep_out, polygon: [[0, 40], [9, 40], [9, 50], [0, 50]]}", "on the edge of an area that"),
+        (COURSES, "{kind: stay_inside, region: {x_min: -5, x_max: 0, y_min: 0, y_max: 40}}", ""),
+        (COURSES, "{kind: stay_inside, region: {x_min: 0, x_max: 5, y_min: 40, y_max: 50}}", ""),
     ],
 )
 def test_a_boat_that_starts_on_land(platform: str, constraint: str, told: str, tmp_path: Path) -> None:

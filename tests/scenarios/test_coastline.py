@@ -23,6 +23,7 @@ from vedette.evaluation.runs import run_scenario
 from vedette.scenarios import Scenario, load_scenario
 from vedette.scenarios.cautions import cautions
 from vedette.scenarios.dumping import dump_scenario
+from vedette.scenarios.overrides import with_fields
 from vedette.scenarios.views import COAST, zones
 
 EDGE = [[-900.0, -3000.0], [-800.0, 0.0], [-900.0, 3000.0]]
@@ -172,3 +173,22 @@ def test_tracked_scans_keep_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         result = CliRunner().invoke(app, words)
         assert result.exit_code == 0, result.output
     assert "coastline" in (tmp_path / "deep/run/report.html").read_text("utf-8")
+
+
+@pytest.mark.parametrize(
+    ("place", "constraints", "told"),
+    [
+        ([180.0, 120.0], [], "inside a closed line of the coastline, which is only drawn"),
+        ([120.0, 180.0], [], ""),
+        ([180.0, 120.0], [{"kind": "keep_out", "geojson": "coast.geojson"}], "inside an area that control.constraints"),
+    ],
+)
+def test_a_boat_that_starts_on_drawn_land_is_warned_of(
+    place: list[float], constraints: list[Any], told: str, tmp_path: Path
+) -> None:
+    """Also where no constraint keeps boats off it."""
+    file = scene(tmp_path, world(feature("Polygon", [degrees(ISLAND)])))
+    given = with_fields(load_scenario(file), {"sensors.0.position": place, "control.constraints": constraints})
+    found = [line for line in cautions(given) if "position: expected a place where the sensor may be" in line]
+    assert len(found) == (told != "")
+    assert all(told in line for line in found)

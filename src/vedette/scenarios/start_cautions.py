@@ -9,26 +9,40 @@ import numpy as np
 from vedette.scenarios.faults import Path
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections.sensors import Sensor
-from vedette.scenarios.views import HOLE, INSIDE, NO_GO, zones
+from vedette.scenarios.views import COAST, HOLE, INSIDE, NO_GO, zones
 
 
 def start_cautions(scenario: Scenario) -> Iterator[tuple[Path, str]]:
-    """A warning for each sensor that can move and starts inside `keep_out` or outside `stay_inside`."""
+    """A warning for each sensor that can move and starts inside `keep_out`, outside `stay_inside`, or on drawn land."""
     areas = [(zone.kind, zone.corners) for zone in zones(scenario)]
     for i, sensor in enumerate(scenario.model.sensors):
-        if not _moves(sensor):
-            continue
-        x, y = sensor.position
-        found = {kind for kind, corners in areas if _is_inside(x, y, corners)}
-        outside = any(kind == INSIDE and not _is_inside(x, y, corners) for kind, corners in areas)
-        if NO_GO in found and HOLE not in found:
-            where = "inside an area that control.constraints keep it out of"
-        elif outside:
-            where = "outside the area that control.constraints keep it inside"
-        else:
-            continue
-        place = f"sensors[{i}].position: expected a place where the sensor may be; ({x:g}, {y:g}) is {where}"
-        yield ("sensors", i, "position"), f"{place}, and its first decisions lead it back as far as they can"
+        if _moves(sensor) and (where := _misplaced(sensor.position, areas)):
+            x, y = sensor.position
+            place = f"sensors[{i}].position: expected a place where the sensor may be; ({x:g}, {y:g}) is {where}"
+            yield ("sensors", i, "position"), place
+
+
+def _misplaced(place: tuple[float, float], areas: Sequence[tuple[str, Sequence[tuple[float, float]]]]) -> str:
+    """Where a place is that a moving sensor should not start at, and what follows; "" where it may.
+
+    The edges of `keep_out` and of its holes are forbidden, that of `stay_inside` is not.
+    """
+    found = {kind for kind, corners in areas if _is_inside(*place, corners)}
+    edges = {kind for kind, corners in areas if kind != COAST and _is_on_edge(*place, corners)}
+    outside = any(k == INSIDE and not (_is_inside(*place, c) or _is_on_edge(*place, c)) for k, c in areas)
+    follows = "and its first decisions lead it back as far as they can"
+    if edges & {NO_GO, HOLE}:
+        return f"on the edge of an area that control.constraints keep it out of, {follows}"
+    if NO_GO in found and HOLE not in found:
+        return f"inside an area that control.constraints keep it out of, {follows}"
+    if outside:
+        return f"outside the area that control.constraints keep it inside, {follows}"
+    rings = [corners for kind, corners in areas if kind == COAST and corners[0] == corners[-1]]
+    if NO_GO not in {kind for kind, _ in areas} and sum(_is_inside(*place, ring) for ring in rings) % 2:
+        return (
+            "inside a closed line of the coastline, which is only drawn: keep_out in control.constraints keeps it off"
+        )
+    return ""
 
 
 def _moves(sensor: Sensor) -> bool:
@@ -46,3 +60,13 @@ def _is_inside(x: float, y: float, corners: Sequence[tuple[float, float]]) -> bo
     with np.errstate(divide="ignore", invalid="ignore"):
         crossing = x1 + (y - y1) / (y2 - y1) * (x2 - x1)
     return bool((spans & (x < crossing)).sum() % 2)
+
+
+def _is_on_edge(x: float, y: float, corners: Sequence[tuple[float, float]]) -> bool:
+    """Whether a place is on an edge of a polygon, to within rounding."""
+    starts = np.array(corners)
+    along, off = np.roll(starts, -1, axis=0) - starts, np.array([x, y]) - starts
+    lengths = np.maximum((along**2).sum(axis=1), np.finfo(np.float64).tiny)
+    nearest = np.clip((off * along).sum(axis=1) / lengths, 0.0, 1.0)[:, np.newaxis] * along
+    size = float(np.abs(starts).max(initial=1.0))
+    return bool((np.hypot(*(off - nearest).T) <= 1e-12 * size).any())
