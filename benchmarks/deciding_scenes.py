@@ -72,7 +72,9 @@ def strategies(scenario: Scenario) -> dict[str, Fields]:
     for reward, fields in {**REWARDS, "loss": loss}.items():
         scaled = {**fields, "cutoff": cutoff} if fields["kind"] == "expected_gospa" else fields
         found[f"jdm {reward}"] = {"kind": "joint", "reward": scaled}
-        found[f"idm {reward}"] = {"kind": "independent", "reward": scaled}
+        found[f"idm {reward}"] = {"kind": "independent", "reward": scaled, "others": "absent"}
+    found["idm stay"] = {"kind": "independent", "reward": loss, "others": "stay"}
+    found["greedy loss"] = {"kind": "joint", "reward": loss, "search": {"kind": "sequential_greedy"}}
     given = scenario.model.control.lookahead
     own = {} if given is None else given.model_dump(mode="json", exclude={"depth"})
     for depth in DEPTHS:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from vedette import models
 from vedette.control import (
     CauchySchwarzReward,
     Evaluator,
+    IndependentPlanner,
     JointPlanner,
     MobileSensor,
     Plan,
@@ -184,6 +185,10 @@ def crowded(num_targets: int) -> Situation:
     sensors = tuple(mobile_sensor("lmb", platform=Courses(30.0, (-90.0, 30.0))) for _ in range(2))
     settings = replace(SETTINGS, limits=planning_limits(), num_samples=4)
     return Situation(sensors, fusion, settings, beliefs, fusion.fuse(beliefs)[0], POSES[:2])
+
+
+# As in the paper: sensors presume that there are no others.
+ABSENT: Any = partial(IndependentPlanner, others="absent")
 
 
 def decided(

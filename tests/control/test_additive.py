@@ -29,7 +29,7 @@ from control.examples import (
 )
 from control.known_association import followed, updated
 from vedette import models
-from vedette.control import CauchySchwarzReward, RenyiReward
+from vedette.control import CauchySchwarzReward, Evaluator, RenyiReward
 from vedette.control.problem import best_values
 from vedette.control.pseudo import draw_futures
 from vedette.control.rewards import (
@@ -213,31 +213,38 @@ def test_no_joint_action_is_better_than_the_bound(reward: Any) -> None:
             assert np.isinf(untried).all()
 
 
+def plain_loss(example: Situation, evaluator: Evaluator, joint: Any, order: float = 1.0) -> float:
+    """The expected loss with cutoff 60 m of a joint action, by plain NumPy: one scan of each sensor, at the last step.
+
+    With the detection of the model's own mean over the Gaussian.
+    """
+    prediction: Any = evaluator.prediction
+    total = 0.0
+    for i, (mean, cov) in enumerate(zip(prediction.tracks.means, prediction.tracks.covs, strict=True)):
+        missed, information = 1.0, np.zeros((4, 4))
+        for s, course in enumerate(joint):
+            own, pose = example.sensors[s].filter.sensor, evaluator.options[s].courses[course, -1]
+            detection = float(own.mean_detection(mean[None], cov[None], pose)[0])
+            centre = own.measurement.measure(mean[None], pose)[0]
+            _, measured, _ = updated(mean, cov, centre, pose, example.sensors[s])
+            missed *= 1.0 - detection
+            information += detection * (np.linalg.inv(measured) - np.linalg.inv(cov))
+        seen = np.linalg.inv(np.linalg.inv(cov) + information / (1.0 - missed))
+        losses = [min(np.sqrt(np.trace(each[:2, :2])), 60.0) ** order for each in (seen, cov)]
+        total -= prediction.existence[i] * ((1.0 - missed) * losses[0] + missed * losses[1])
+    return total
+
+
 @pytest.mark.parametrize("steps", [1, 2])
 @pytest.mark.parametrize(("order", "method"), [(1.0, "auto"), (2.0, "auto"), (0.7, "auto"), (1.0, "ekf")])
 def test_the_expected_loss_is_what_its_formula_says(steps: int, order: float, method: str) -> None:
-    """Plain NumPy of one scan, at the last step, with the detection of the model's own mean over the Gaussian."""
     settings = replace(KNOWN, horizon_steps=steps)
     example = replace(shared(2, 4, method=method), settings=settings)
     assert example.state.time is not None
     last = np.array([example.state.time + steps * settings.horizon_period])
     example = replace(example, sensors=tuple(replace(own, scan_times=last) for own in example.sensors))
     evaluator = additive_of(example, ExpectedLossReward(60.0, order))
-    prediction: Any = evaluator.prediction
     actions = all_joint_actions((3, 3))
     found = evaluator.joint()(actions)[:, 0]
     for joint, value in zip(actions.tolist(), found.tolist(), strict=True):
-        total = 0.0
-        for i, (mean, cov) in enumerate(zip(prediction.tracks.means, prediction.tracks.covs, strict=True)):
-            missed, information = 1.0, np.zeros((4, 4))
-            for s, course in enumerate(joint):
-                own, pose = example.sensors[s].filter.sensor, evaluator.options[s].courses[course, -1]
-                detection = float(own.mean_detection(mean[None], cov[None], pose)[0])
-                centre = own.measurement.measure(mean[None], pose)[0]
-                _, measured, _ = updated(mean, cov, centre, pose, example.sensors[s])
-                missed *= 1.0 - detection
-                information += detection * (np.linalg.inv(measured) - np.linalg.inv(cov))
-            seen = np.linalg.inv(np.linalg.inv(cov) + information / (1.0 - missed))
-            losses = [min(np.sqrt(np.trace(each[:2, :2])), 60.0) ** order for each in (seen, cov)]
-            total -= prediction.existence[i] * ((1.0 - missed) * losses[0] + missed * losses[1])
-        np.testing.assert_allclose(value, total, rtol=1e-9)
+        np.testing.assert_allclose(value, plain_loss(example, evaluator, joint, order), rtol=1e-9)

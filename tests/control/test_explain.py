@@ -12,6 +12,7 @@ import pytest
 from scipy.special import expit
 
 from control.examples import (
+    ABSENT,
     KNOWN,
     SETTINGS,
     Situation,
@@ -180,7 +181,7 @@ def test_targets_not_found_before_are_one_contribution() -> None:
     cells = Cells(offsets, np.tile(np.arange(4), 9), np.log(rng.uniform(0.2, 1.0, 36)), rng.uniform(1.0, 100.0, 4))
     searching = replace(additive, cells=cells)
     chosen = np.array([1, 2, 0])
-    shares = shares_of(searching, chosen)
+    shares = shares_of(searching, chosen, np.arange(3))
     reward, baseline = searching(np.array([chosen, [-1, -1, -1]]))[:, 0]
     assert shares.found > 1.0
     assert shares.existence is not None
@@ -240,7 +241,7 @@ def test_the_runner_up_is_the_second_of_all_joint_actions() -> None:
 
 
 def test_an_independent_decision_is_the_sum_of_the_sensors_own() -> None:
-    plan, additive = planned(shared(3, 2), CauchySchwarzReward("reference"), IndependentPlanner)
+    plan, additive = planned(shared(3, 2), CauchySchwarzReward("reference"), ABSENT)
     why = plan.explain()
     own = [additive.alone(s)(np.array([[0], [1], [2], [-1]])).mean(axis=1) for s in range(3)]
     alone = np.array([values[action] - values[3] for values, action in zip(own, plan.chosen, strict=True)])

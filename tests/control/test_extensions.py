@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from control.examples import SETTINGS, cases_of, decided, evaluator_of, sample_rewards, situation
+from control.examples import ABSENT, SETTINGS, cases_of, decided, evaluator_of, sample_rewards, situation
 from vedette.control import CauchySchwarzReward, ExpectedLossReward, IndependentPlanner, JointPlanner, RenyiReward
 from vedette.control.cases import warn_slow
 from vedette.densities import cardinality_distribution
@@ -33,7 +33,7 @@ def test_a_reward_of_the_users_own(kind: str) -> None:
     example = situation(kind)
     given = example.sensors, example.fusion, example.settings, minus_cardinality_variance
     joint = JointPlanner(*given).plan(*example.arguments, rng=np.random.default_rng(5))
-    alone = IndependentPlanner(*given).plan(*example.arguments, rng=np.random.default_rng(5))
+    alone = ABSENT(*given).plan(*example.arguments, rng=np.random.default_rng(5))
     evaluator = evaluator_of(example)
     densities = [
         [own.density(action * SETTINGS.num_samples + m) for action in range(3) for m in range(SETTINGS.num_samples)]

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from control.examples import (
+    ABSENT,
     HEADINGS,
     SETTINGS,
     A,
@@ -40,7 +41,7 @@ PAPER = Courses(30.0)
 
 def planners(example: Situation, reward: Any = None) -> tuple[JointPlanner, IndependentPlanner]:
     given = example.sensors, example.fusion, example.settings, reward or CauchySchwarzReward("reference")
-    return JointPlanner(*given), IndependentPlanner(*given)
+    return JointPlanner(*given), ABSENT(*given)
 
 
 def plans(example: Situation, reward: Any = None, seed: int = 5) -> tuple[Plan, Plan]:

@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
-from control.examples import SETTINGS, Situation, decided, situation
+from control.examples import ABSENT, SETTINGS, Situation, decided, situation
 from vedette.control import (
     CauchySchwarzReward,
     CoordinateAscent,
     ExpectedLossReward,
-    IndependentPlanner,
     deciding,
 )
 from vedette.control.preparation import Preparation
@@ -158,7 +157,7 @@ def test_tables_hold_means_over_the_samples_that_an_action_got(kind: str, associ
     while totals[-1] < 64:
         totals.append(next_total(totals[-1], 64))
     joint, *alone = sample_rewards(example, np.diff(totals).tolist())
-    joint_plan, own_plan = decided(example, seed=5), decided(example, IndependentPlanner, seed=5)
+    joint_plan, own_plan = decided(example, seed=5), decided(example, ABSENT, seed=5)
     tables = [*zip((joint_plan, *[own_plan] * 2), (*joint_plan.tables, *own_plan.tables), (joint, *alone), strict=True)]
     for plan, table, rewards in tables:
         assert plan.certainty is not None

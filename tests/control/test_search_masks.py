@@ -221,9 +221,9 @@ def test_best_first_is_greedy_over_all_sensors(shape: Joint, seed: int) -> None:
     assert found == tuple(at)
 
 
-def test_greedy_needs_rewards_of_some_of_the_sensors() -> None:
+def test_greedy_needs_rewards_of_undecided_sensors() -> None:
     problem = watched((2, 2), 1).problem()._replace(partial=None)
-    with pytest.raises(InputError, match="search: expected rewards of some of the sensors alone, for SequentialGreedy"):
+    with pytest.raises(InputError, match="search: expected rewards of sensors that have not decided"):
         SequentialGreedy().search(problem, rng=np.random.default_rng(1))
 
 

@@ -34,7 +34,7 @@ from vedette.filters import (
     Ranked,
 )
 from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb, Matched, ParallelUpdate
-from vedette.scenarios import Scenario, build, list_builtin, load_scenario, parse_scenario
+from vedette.scenarios import Scenario, build, list_builtin, load_scenario, parse_scenario, with_fields
 from vedette.scenarios.cautions import cautions
 from vedette.scenarios.sections.fusion import Fusion
 from vedette.scenarios.sections.planners import Named
@@ -370,6 +370,18 @@ def test_named_strategies_replace_their_own_parts_alone() -> None:
     searches = [planner.search for planner in inner.values() if isinstance(planner, JointPlanner)]
     assert searches == [CoordinateAscent(2), plain.search, plain.search]
     assert [planner.reward for planner in inner.values()] == [plain.reward, RenyiReward(), RenyiReward(), plain.reward]
+
+
+@pytest.mark.parametrize(("name", "presumed"), [("paper-a", "absent"), ("paper-e", "absent"), ("eight-mobile", "stay")])
+def test_only_in_the_paper_scenes_do_sensors_presume_that_there_are_no_others(name: str, presumed: str) -> None:
+    planners = {"own": {"kind": "independent"}, "paper": {"kind": "independent", "others": "absent"}}
+    scenario = with_fields(load_scenario(name), {"planners": planners})
+    found: dict[str, Any] = {own: build.build_planner(scenario, own) for own in ("idm", "own", "paper")}
+    assert [found["idm"].others, found["own"].planner.others, found["paper"].planner.others] == [
+        presumed,
+        presumed,
+        "absent",
+    ]
 
 
 def test_named_strategies_need_labels_too() -> None:

@@ -248,7 +248,7 @@ decision_steps: [4, 8] -> horizon_steps: 0, horizon_period: 0.0
     22:26: control.horizon_steps: expected a number of at least 1, got 0
     22:45: control.horizon_period: expected a number above 0, got 0.0
 decision_steps: [4, 8] -> actions_deg: [0, 90]
-    22:11: control.actions_deg: expected one of association, confidence, constraints, decision_every, decision_steps, decision_times, detection_threshold, explain, horizon_period, horizon_steps, ideal_measurements, indifference, limits, lookahead, max_samples, max_seconds, num_samples, reward, search, undetected_worth, got an unknown key (the platform of a sensor has it: `platform: {kind: courses, speed: 50.0, headings_deg: [0, 90]}`)
+    22:11: control.actions_deg: expected one of association, confidence, constraints, decision_every, decision_steps, decision_times, detection_threshold, explain, horizon_period, horizon_steps, ideal_measurements, indifference, limits, lookahead, max_samples, max_seconds, num_samples, others, reward, search, undetected_worth, got an unknown key (the platform of a sensor has it: `platform: {kind: courses, speed: 50.0, headings_deg: [0, 90]}`)
 decision_steps: [4, 8] -> reward: {kind: cauchy_schwarz, unit_volume: 0}
     22:55: control.reward.unit_volume: expected reference or a number above 0, got 0
 decision_steps: [4, 8] -> reward: {kind: renyi, order: 1}
@@ -376,16 +376,6 @@ decision_steps: [4, 8] -> lookahead: {exploration: -1}
 
 # What only some decisions can be made with.
 DECISIONS = r"""
-{decision_steps: [4, 8]} -> {decision_steps: [4, 8], search: {kind: sequential_greedy}, reward: {kind: cauchy_schwarz}}
-    22:50: control.search.kind: expected coordinate_ascent or another, as decisions on m_delta_glmb beliefs are no sums over labels, or control.limits.max_glmb_targets of 0, with which they are, got "sequential_greedy"
-{decision_steps: [4, 8]}
--> {decision_steps: [4, 8], search: {kind: sequential_greedy}, association: full, reward: {kind: cauchy_schwarz}}
-{kind: m_delta_glmb} -> {kind: lmb}
-{kind: cm_delta_glmb, weights: [0.5, 0.5]} -> {kind: clmb}
-    22:50: control.search.kind: expected coordinate_ascent or another, as with control.association full decisions are no sums over labels, got "sequential_greedy"
-{decision_steps: [4, 8]}
--> {decision_steps: [4, 8], reward: {kind: cauchy_schwarz}}\nplanners: {mine: {kind: joint, search: {kind: sequential_greedy}}}
-    23:47: planners.mine.search.kind: expected coordinate_ascent or another, as decisions on m_delta_glmb beliefs are no sums over labels, or control.limits.max_glmb_targets of 0, with which they are, got "sequential_greedy"
 {decision_steps: [4, 8]}
 -> {decision_steps: [4, 8], constraints: [{kind: void_probability, radius: 5, probability: 0.9}]}
 {kind: m_delta_glmb} -> {kind: phd}

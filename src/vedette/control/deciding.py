@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from vedette.control.evaluator import Evaluator
 from vedette.control.evidence import Evidence, Part
 from vedette.control.explaining import Questions
 from vedette.control.explanation import Bound
-from vedette.control.inputs import single_mask
+from vedette.control.inputs import single_mask, staying
 from vedette.control.plan import Certainty, Plan, RewardTable
 from vedette.control.preparation import Preparation
 from vedette.control.problem import beyond_cutoff, bound_of, searched
@@ -33,6 +33,10 @@ _SEARCHED = 2 * FIRST_ROUND
 
 # Samples are drawn at most so many at a time, to bound the memory of their pseudo-updates.
 _BLOCK = 250
+
+
+# What a sensor that decides by itself presumes of the others: that they stay as they are, or that there are none.
+Presumption: TypeAlias = Literal["stay", "absent"]
 
 
 @dataclass(slots=True)
@@ -59,6 +63,7 @@ class Rounds:
         num_samples: so many were drawn.
         rng: draws them.
         deadline: of searches and rounds.
+        others: (num_sensors,) courses that sensors which decide by themselves presume of the others; None: none.
     """
 
     preparation: Preparation
@@ -66,12 +71,20 @@ class Rounds:
     num_samples: int
     rng: np.random.Generator
     deadline: Deadline
+    others: tuple[int, ...] | None = None
 
     @classmethod
-    def begin(cls, preparation: Preparation, num_samples: int, *, rng: np.random.Generator) -> Rounds:
+    def begin(
+        cls,
+        preparation: Preparation,
+        num_samples: int,
+        others: tuple[int, ...] | None = None,
+        *,
+        rng: np.random.Generator,
+    ) -> Rounds:
         """With an evaluator of all courses on so many samples."""
         deadline = Deadline(time.perf_counter(), preparation.settings.max_seconds)
-        return cls(preparation, preparation.evaluator(num_samples, rng=rng), num_samples, rng, deadline)
+        return cls(preparation, preparation.evaluator(num_samples, rng=rng), num_samples, rng, deadline, others)
 
     def _run(self, races: Sequence[Race]) -> Literal["max_samples", "max_seconds"] | None:
         """Rounds until all races are over, or why they were stopped before; the first round is always run."""
@@ -98,11 +111,15 @@ class Rounds:
         """Of each race (num_left, num) rewards on samples drawn now, of the courses that are still wanted."""
         options = self.preparation.options
         wanted = [_wanted(going, s) for s in range(len(options))]
+        others = None
+        if self.others is not None:
+            wanted = [np.union1d(own, [other]) for own, other in zip(wanted, self.others, strict=True)]
+            others = [int(np.searchsorted(own, other)) for own, other in zip(wanted, self.others, strict=True)]
         few = tuple(_only(own, courses) for own, courses in zip(options, wanted, strict=True))
         evaluator = self.preparation.evaluator(num, few, rng=self.rng)
         rewards = []
         for race in going:
-            evaluate = evaluator.joint() if race.sensor is None else evaluator.alone(race.sensor)
+            evaluate = evaluator.joint() if race.sensor is None else evaluator.alone(race.sensor, others)
             those = wanted if race.sensor is None else [wanted[race.sensor]]
             columns = [np.searchsorted(own, race.candidates[:, axis]) for axis, own in enumerate(those)]
             rewards.append(evaluate(np.stack(columns, axis=1)))
@@ -160,20 +177,26 @@ def decide_jointly(
     return _raced_plan(name, (Part.together(evidence, race.best),), notes, certainty, curve=curve, bound=bound)
 
 
-def decide_alone(name: str, preparation: Preparation, notes: Sequence[str], *, rng: np.random.Generator) -> Plan:
-    """For every sensor its own best course of those it may take; that all are, has the confidence asked for."""
+def decide_alone(
+    name: str, preparation: Preparation, presume: Presumption, notes: Sequence[str], *, rng: np.random.Generator
+) -> Plan:
+    """For every sensor its own best course of those it may take; that all are, has the confidence asked for.
+
+    presume: what each sensor presumes of the others.
+    """
     settings, options, races = preparation.settings, preparation.options, preparation.races
-    rounds = Rounds.begin(preparation, FIRST_ROUND if races else settings.num_samples, rng=rng)
+    others = staying(options, preparation.mask) if presume == "stay" else None
+    rounds = Rounds.begin(preparation, FIRST_ROUND if races else settings.num_samples, others, rng=rng)
     each_sure = 1.0 - (1.0 - float(settings.confidence or 0.0)) / len(options)
     parts, entered = [], []
     for s, own in enumerate(options):
-        evidence = Evidence(rounds.evaluator, (s,), rounds.evaluator.alone(s))
+        evidence = Evidence(rounds.evaluator, (s,), rounds.evaluator.alone(s, others))
         allowed = all_joint_actions((len(own.courses),))[single_mask(preparation.mask, s, len(own.courses))]
         if races:
             entered.append(Race(allowed, each_sure, settings.indifference, s))
             entered[s].add(evidence.rewards(allowed))
         best = 0 if races else int(allowed[first_best(evidence.evaluate(allowed)), 0])
-        parts.append(Part.alone(evidence, best))
+        parts.append(Part.alone(evidence, best, others))
     if not races:
         return plan_of(name, parts, notes, certainty=preparation.certainty)
     certainty = rounds.certainty(entered)

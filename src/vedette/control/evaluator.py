@@ -121,9 +121,22 @@ class Evaluator:
         """
         return self._counted(self.source.joint())
 
-    def alone(self, sensor: int) -> SampleRewards:
-        """The same of one sensor's own density, actions (num, 1)."""
-        return self._counted(self.source.alone(sensor))
+    def alone(self, sensor: int, others: Sequence[int] | None = None) -> SampleRewards:
+        """The same of one sensor's actions (num, 1).
+
+        others: (num_sensors,) courses that the other sensors are presumed to take; None: they are absent, and the
+        rewards are those of the sensor's own density.
+        """
+        if others is None:
+            return self._counted(self.source.alone(sensor))
+        joint, presumed = self.joint(), np.array(others, np.int64)
+
+        def evaluate(actions: Ints) -> Floats:
+            rows = np.tile(presumed, (len(actions), 1))
+            rows[:, sensor] = actions[:, 0]
+            return joint(rows)
+
+        return evaluate
 
     def _counted(self, rewards: SampleRewards) -> SampleRewards:
         if self.additive is None:

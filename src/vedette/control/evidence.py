@@ -13,6 +13,7 @@ from vedette.control.additive.rewards import AdditiveRewards
 from vedette.control.cases import SampleRewards
 from vedette.control.evaluator import Evaluator
 from vedette.control.plan import RewardTable, SearchCurve
+from vedette.control.shares import Shares, shares_of
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
 
@@ -210,6 +211,7 @@ class Part(NamedTuple):
     evidence: Evidence
     chosen: tuple[int, ...]  # courses of its sensors
     additive: AdditiveRewards | None  # its rewards, where they are made of sums over labels
+    others: tuple[int, ...] | None = None  # courses that one sensor presumes of all; None: `additive` is of its own
 
     @classmethod
     def together(cls, evidence: Evidence, chosen: Sequence[int]) -> Part:
@@ -217,7 +219,18 @@ class Part(NamedTuple):
         return cls(evidence, tuple(chosen), evidence.evaluator.additive)
 
     @classmethod
-    def alone(cls, evidence: Evidence, course: int) -> Part:
-        """Of the one sensor of the evidence."""
+    def alone(cls, evidence: Evidence, course: int, others: tuple[int, ...] | None = None) -> Part:
+        """Of the one sensor of the evidence. others: as of `Evaluator.alone`."""
         additive, (sensor,) = evidence.evaluator.additive, evidence.which
-        return cls(evidence, (course,), None if additive is None else additive.alone(sensor))
+        own = additive if additive is None or others is not None else additive.alone(sensor)
+        return cls(evidence, (course,), own, others)
+
+    def shares(self) -> Shares | None:
+        """What contributes to its reward; None where rewards are no sums over labels."""
+        if self.additive is None:
+            return None
+        joint, which = np.array(self.chosen), np.arange(len(self.chosen))
+        if self.others is not None:
+            joint, which = np.array(self.others), np.array(self.evidence.which)
+            joint[which] = self.chosen
+        return shares_of(self.additive, joint, which)

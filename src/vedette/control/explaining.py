@@ -12,7 +12,7 @@ import numpy as np
 
 from vedette.control.evidence import Part
 from vedette.control.explanation import Bound, Explanation, Had, RunnerUp, TargetGains
-from vedette.control.shares import Shares, shares_of
+from vedette.control.shares import Shares
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import reject
@@ -81,9 +81,7 @@ class Questions:
     @cached_property
     def _contributions(self) -> tuple[Shares | None, ...]:
         """Of each part; None where its rewards are evaluated case by case."""
-        return tuple(
-            None if part.additive is None else shares_of(part.additive, np.array(part.chosen)) for part in self.parts
-        )
+        return tuple(part.shares() for part in self.parts)
 
     @cached_property
     def _samples(self) -> tuple[Floats, ...]:

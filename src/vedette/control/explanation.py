@@ -106,7 +106,8 @@ class Explanation:
     """Why a plan is what it is. Rewards are means over the samples; a field is None where `missing` says why.
 
     `baseline`, the sum of `of_targets.total` and `of_undetected` add up to `reward`; so do `baseline` and `of_sensors`.
-    An independent decision is explained as one: its reward is the sum of the sensors' own.
+    An independent decision is explained as one: its reward is the sum of those that the sensors decided on, with what
+    each of them presumes of the others.
 
     Attributes:
         planner: name of the planner.
@@ -114,7 +115,8 @@ class Explanation:
         reward: of the choice.
         standard_error: of that; None with a single sample.
         evaluations: how many joint actions were evaluated; of an independent decision, actions.
-        baseline: the reward without any scan.
+        baseline: the reward without any scan; where sensors presume that the others stay, the sum of rewards with
+            these alone.
         of_targets: what is gained by each target of the fused belief.
         of_undetected: what is gained by targets that were not found before.
         of_sensors: (num_sensors,) the sensors' shares in what is gained: half of what each adds to those before it and

@@ -21,6 +21,7 @@ from vedette.kernels.planning.ascent import Allowed
 from vedette.models import TargetModel
 from vedette.models.arguments import float_array, instance, reject, sequence, tell_degrees
 from vedette.platforms import Options, options_at
+from vedette.platforms.camera import HALF_WIDTH, POINTING
 from vedette.tracking import State
 
 
@@ -159,6 +160,32 @@ def beliefs_ahead(
 def single_mask(mask: Mask | None, sensor: int, num_courses: int) -> np.ndarray:
     """(num_courses,) what one sensor may do, whatever the others do."""
     return np.ones(num_courses, np.bool_) if mask is None else mask.single[sensor]
+
+
+# Changes of a pose that differ by less than this, relative to the largest or to 1, are equal.
+_SAME_CHANGE = 1e-9
+
+
+def staying(options: Sequence[Options], mask: Mask | None) -> tuple[int, ...]:
+    """For each sensor the course that changes its pose least, among those it may take: what it does until it decides.
+
+    The course with the least change of heading, of these that with the least change of where a camera points, then of
+    position, then of all else; means over the horizon.
+    """
+    found = []
+    for s, own in enumerate(options):
+        off = np.abs(own.courses - own.pose)
+        camera = len(own.pose) > HALF_WIDTH and own.pose[HALF_WIDTH] > 0.0
+        angles = [2, POINTING] if camera else [2]
+        off[:, :, angles] = np.abs(np.remainder(off[:, :, angles] + np.pi, 2.0 * np.pi) - np.pi)
+        rest = np.delete(off, [0, 1, *angles], axis=2).sum(axis=2)
+        left = np.flatnonzero(single_mask(mask, s, len(off)))
+        left = left if len(left) else np.arange(len(off))
+        for change in (*(off[:, :, angle] for angle in angles), np.hypot(off[:, :, 0], off[:, :, 1]), rest):
+            means = change.mean(axis=1)[left]
+            left = left[means <= means.min() + _SAME_CHANGE * max(1.0, means.max())]
+        found.append(int(left[0]))
+    return tuple(found)
 
 
 def allowed_of(mask: Mask | None, shape: Sequence[int]) -> Allowed | None:

@@ -8,16 +8,16 @@ from typing import ClassVar
 import numpy as np
 
 from vedette.control.constraints import Constraint
-from vedette.control.deciding import decide_alone, decide_jointly
+from vedette.control.deciding import Presumption, decide_alone, decide_jointly
 from vedette.control.inputs import check_steering, check_valuing
 from vedette.control.plan import Plan
-from vedette.control.preparation import AnyReward, Preparation, check_sums, stay_glmbs
+from vedette.control.preparation import AnyReward, Preparation
 from vedette.control.rewards import ExpectedLossReward
-from vedette.control.search import AutomaticSearch, JointSearch, SequentialGreedy
+from vedette.control.search import AutomaticSearch, JointSearch
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.fusion import Fusion
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import generator, instance, reject
+from vedette.models.arguments import generator, instance, one_of
 from vedette.tracking import State
 
 
@@ -35,7 +35,7 @@ class JointPlanner:
         notes: what every plan is to say beside what comes up, such as that the tracks are fused in another way.
 
     Raises:
-        InputError: parts of another kind, or a `SequentialGreedy` search of rewards that are no sums over labels.
+        InputError: parts of another kind.
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -51,13 +51,6 @@ class JointPlanner:
         check_steering(self)
         check_valuing(self.fusion, self.reward, self.notes)
         instance("search", self.search, JointSearch)
-        if not isinstance(self.search, SequentialGreedy):
-            return
-        purpose = "SequentialGreedy, which asks for rewards of some of the sensors alone"
-        check_sums(purpose, len(self.sensors), self.fusion, self.settings, self.reward)
-        if stay_glmbs(self.sensors, self.fusion, self.settings, self.reward):
-            expected = f"filters of LMBs, or of products of GLMBs, or settings.max_glmb_targets of 0, for {purpose}"
-            raise reject("sensors", expected, "filters of GLMBs")
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """The joint action of largest mean reward that the search finds; of equal ones the first in printed order.
@@ -81,18 +74,21 @@ class JointPlanner:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IndependentPlanner:
-    """Independent decision making: each sensor maximises the reward of its own update alone (paper, Algorithm 3).
+    """Independent decision making: each sensor maximises the reward by itself (paper, Algorithm 3).
 
     Attributes:
         sensors: the sensors, in the order of the beliefs.
-        fusion: how the beliefs became one; the decision itself does not use it.
+        fusion: how their pseudo-updated densities become one, where the others are presumed to stay.
         settings: horizon, samples, caps.
         reward: one of `vedette.control.rewards`, or of the user's own.
         constraints: what each sensor by itself must not do; those on pairs of sensors are not looked at.
         notes: what every plan is to say beside what comes up.
+        others: what each sensor presumes of the others. "stay": they go on as they are, on the course that changes
+            their pose least (`vedette.control.inputs.staying`), and the reward is that of all scans together.
+            "absent", as in the paper: there are none, and the reward is that of its own update alone.
 
     Raises:
-        InputError: parts of another kind.
+        InputError: parts of another kind, or another presumption.
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -101,14 +97,16 @@ class IndependentPlanner:
     reward: AnyReward = field(default_factory=ExpectedLossReward)
     constraints: tuple[Constraint, ...] = ()
     notes: tuple[str, ...] = ()
+    others: Presumption = "stay"
     name: ClassVar[str] = "idm"
 
     def __post_init__(self) -> None:
         check_steering(self)
         check_valuing(self.fusion, self.reward, self.notes)
+        one_of("others", self.others, ("stay", "absent"))
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """Each sensor's action of largest mean reward; arguments, ties and errors as `JointPlanner.plan`."""
         generator(rng)
         prepared = Preparation.of(self.sensors, self.fusion, self.settings, self.reward, state, poses, self.constraints)
-        return decide_alone(self.name, prepared, self.notes, rng=rng)
+        return decide_alone(self.name, prepared, self.others, self.notes, rng=rng)

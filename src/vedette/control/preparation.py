@@ -149,14 +149,6 @@ def check_sums(
     return rule
 
 
-def stay_glmbs(sensors: Sequence[MobileSensor], fusion: Fusion, settings: PlanningSettings, reward: AnyReward) -> bool:
-    """Whether beliefs of these filters may be planned on as GLMBs, hypothesis by hypothesis."""
-    initial = [sensor.filter.initial() for sensor in sensors]
-    return any(isinstance(own, Labelled) and not (own.is_lmb or own.is_product) for own in initial) and not _why_lmbs(
-        len(sensors), fusion, settings, reward, initial
-    )
-
-
 def planned_on(
     sensors: Sequence[MobileSensor],
     fusion: Fusion,

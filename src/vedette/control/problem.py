@@ -13,7 +13,7 @@ from vedette.control.constraints import Mask
 from vedette.control.evaluator import Evaluator
 from vedette.control.evidence import Evidence
 from vedette.control.explanation import Bound
-from vedette.control.inputs import allowed_of, check_choice, single_mask
+from vedette.control.inputs import allowed_of, check_choice, single_mask, staying
 from vedette.control.search import JointProblem, JointSearch, all_joint_actions, first_best
 from vedette.densities.checks import offsets_of
 from vedette.kernels.base.types import Floats, Ints
@@ -48,7 +48,13 @@ def searched(
 def joint_problem(evidence: Evidence, mask: Mask | None) -> JointProblem:
     """The search problem of a joint decision; what it evaluates is kept in the evidence."""
     evaluator = evidence.evaluator
-    plain = JointProblem(evidence.shape, evidence.evaluate, lambda: _independent(evidence, mask), mask)
+    stay = staying(evaluator.options, mask)
+
+    def partial(actions: Ints) -> Floats:
+        means = evidence.rewards(np.where(actions < 0, stay, actions)).mean(axis=1)
+        return np.where(np.isnan(means), -np.inf, means)
+
+    plain = JointProblem(evidence.shape, evidence.evaluate, lambda: _independent(evidence, mask), mask, partial=partial)
     additive, allowed = evaluator.additive, allowed_of(mask, evidence.shape)
     if additive is None:
         return plain
@@ -67,15 +73,12 @@ def joint_problem(evidence: Evidence, mask: Mask | None) -> JointProblem:
         evaluator.counts["rewards"] += int(trace.evaluations[-1]) * additive.num_samples
         return tuple(chosen.tolist())
 
-    def partial(actions: Ints) -> Floats:
-        return np.asarray(additive(np.ascontiguousarray(actions, np.int64)).mean(axis=1))
-
     def bound() -> float:
         most = most_by_target(evidence)
         return np.inf if most is None else most[0]
 
     compiled = additive.coefficients is not None and allowed is not None
-    return plain._replace(line=line, ascend=ascend if compiled else None, partial=partial, bound=bound)
+    return plain._replace(line=line, ascend=ascend if compiled else None, bound=bound)
 
 
 def note_lines(evidence: Evidence, choice: Sequence[int], mask: Mask | None) -> None:

@@ -17,7 +17,7 @@ class Shares(NamedTuple):
     Together with `baseline`, `sensors` add up to the reward, and so do `existence`, `localisation` and `found`.
     """
 
-    baseline: float  # the reward without any scan
+    baseline: float  # the reward without any scan of these sensors
     existence: Floats | None  # (num_labels,) what is gained by knowing better whether each target is there ...
     localisation: Floats | None  # (num_labels,) ... and where; None where the reward is not linear in its sums
     found: float  # what is gained by targets that were not found before
@@ -26,31 +26,33 @@ class Shares(NamedTuple):
     samples: Floats  # (num_samples,) rewards of the choice
 
 
-def shares_of(additive: AdditiveRewards, chosen: Ints) -> Shares:
-    """The shares in the reward of courses (num_sensors,), one a sensor.
+def shares_of(additive: AdditiveRewards, chosen: Ints, which: Ints) -> Shares:
+    """The shares of some sensors in the reward of courses (num_sensors,), one a sensor; the others always scan.
 
     A sensor's share is its Shapley value on two orders, the printed and the reverse one: rewards of the first sensors,
-    of the last ones, and of all but one, while the others do not scan.
+    of the last ones, and of all but one, while the rest of them do not scan. which: (num,) numbers of these sensors.
     """
-    num, sensors = len(chosen), np.arange(len(chosen))
-    begun = sensors < np.arange(num + 1)[:, np.newaxis]
+    num = len(which)
+    begun = np.arange(num) < np.arange(num + 1)[:, np.newaxis]
     scanning = np.concatenate([begun, ~begun, ~np.eye(num, dtype=bool)])
-    rewards = additive(np.where(scanning, chosen, -1))
+    actions = np.tile(chosen, (len(scanning), 1))
+    actions[:, which] = np.where(scanning, chosen[which], -1)
+    rewards = additive(actions)
     means = rewards.mean(axis=1)
     ahead, behind, without = np.split(means, [num + 1, 2 * num + 2])
-    existence, localisation = _of_labels(additive, chosen)
-    found = additive.found(chosen)
+    existence, localisation = _of_labels(additive, chosen, actions[0])
+    found = additive.found(chosen) - additive.found(actions[0])
     shares = 0.5 * (np.diff(ahead) - np.diff(behind))
     return Shares(float(means[0]), existence, localisation, found, shares, ahead[num] - without, rewards[num])
 
 
-def _of_labels(additive: AdditiveRewards, chosen: Ints) -> tuple[Floats, Floats] | tuple[None, None]:
+def _of_labels(additive: AdditiveRewards, chosen: Ints, rest: Ints) -> tuple[Floats, Floats] | tuple[None, None]:
     """(num_labels,) gains by existence, and by localisation; None where the reward is not linear in its sums.
 
-    That by existence is the gain of the existence after all scans with the density without any; the rest is
-    localisation.
+    That by existence is the gain of the existence after all scans with the density after the scans of `rest`, in which
+    -1 says that a sensor does not scan; what is left is localisation.
     """
-    valuation, coefficients, unseen = additive.valuation, additive.coefficients, additive.without_scans()
+    valuation, coefficients, unseen = additive.valuation, additive.coefficients, additive.with_scans(rest)
     if coefficients is None:
         return None, None
     seen, dim = additive.with_scans(chosen), valuation.references.shape[1]

@@ -285,6 +285,7 @@ def build_parts(
         replace(control.build(model.horizon, num_threads), end=float(model.time.build()[-1])),
         control.reward.build(folder),
         control.search.build(folder),
+        control.others,
         _first_actions(scenario, sensors),
         control.build_constraints(folder),
         _notes_of_decisions(scenario, fusion, strategy),
@@ -329,7 +330,7 @@ def _notes_of_decisions(scenario: Scenario, fusion: Fusion, strategy: Strategy) 
     """What the decisions of a strategy say of their fusion, where the tracks are fused in another way, and of radio."""
     model, section = scenario.model, scenario.model.fusion
     reward = getattr(strategy, "reward", None) or model.control.reward
-    alone = isinstance(strategy, NamedIndependent)
+    alone = isinstance(strategy, NamedIndependent) and (strategy.others or model.control.others) == "absent"
     found = []
     in_full = isinstance(fusion, ParallelUpdate) or reward.kind == "expected_loss"
     if in_full and not alone and section.kind not in (*IN_FULL, "none"):

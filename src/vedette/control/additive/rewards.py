@@ -85,16 +85,16 @@ class AdditiveRewards:
         found = np.array([self.found(joint) for joint in actions]) if len(self.cells.worth) else 0.0
         return np.asarray(self.of_sums(sums) + np.reshape(found, (-1, 1)))
 
-    def without_scans(self) -> Floats:
-        """(num_labels, bernoulli_size, num_samples) joint rows without any scan."""
-        return start_totals(self.table)
-
     def with_scans(self, chosen: Ints) -> Floats:
-        """The same with the scans of a joint action (num_sensors,)."""
-        table, rows = self.table, self.without_scans()
-        for power, course in zip(table.powers, (table.first_courses[:-1] + chosen).tolist(), strict=True):
+        """(num_labels, bernoulli_size, num_samples) joint rows with the scans of a joint action (num_sensors,).
+
+        -1: the sensor does not scan.
+        """
+        table, rows = self.table, start_totals(self.table)
+        for s in np.flatnonzero(chosen >= 0).tolist():
+            course = table.first_courses[s] + chosen[s]
             entries = slice(table.offsets[course], table.offsets[course + 1])
-            rows[table.labels[entries]] += power * table.changes[entries]
+            rows[table.labels[entries]] += table.powers[s] * table.changes[entries]
         return rows
 
     def line(self, chosen: Ints, sensor: int) -> Floats:

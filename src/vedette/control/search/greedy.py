@@ -18,20 +18,18 @@ from vedette.models.fields import Checked, part
 @part("sequential_greedy", "search")
 @dataclass(frozen=True, slots=True)
 class SequentialGreedy(Checked):
-    """Sensors are decided one after the other, each by the reward of those decided, while the others do not scan.
+    """Sensors are decided one after the other, each by the reward of all; the undecided are presumed to stay.
 
-    Of a reward that is monotone and submodular in the scans that are made, the joint action found has at least half of
-    the largest reward, in either order (Fisher, Nemhauser and Wolsey, An analysis of approximations for maximizing
-    submodular set functions II, 1978), where nothing is forbidden. Mutual information is such a reward where
-    measurements are conditionally independent given the targets. Cauchy-Schwarz is not known to be: nothing is
-    guaranteed for it. Nor is anything guaranteed of a reward that is estimated from samples, beyond their mean.
+    These go on as they are (`vedette.control.inputs.staying`), so that what they see is not looked at again. The joint
+    action found is never worse than that in which all sensors stay, where that is allowed.
 
     With a mask a sensor takes only what goes with those decided; sensors that are left without anything are decided in
     the end, by the fewest changes found (`vedette.control.constraints.repaired`, `opened`).
 
     Attributes:
         order: "printed": as the sensors stand. "best_first": always the sensor that adds most; what it adds is taken to
-            shrink as others are decided, which saves most of the evaluations (lazy greedy; Minoux 1978).
+            shrink as others are decided, which saves most of the evaluations (lazy greedy; Minoux 1978). It may grow,
+            where another sensor leaves a target; such a sensor is looked at again later than it should.
 
     Raises:
         InputError: another order.
@@ -42,13 +40,11 @@ class SequentialGreedy(Checked):
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
         """The joint action that is decided so; nothing is drawn.
 
-        Raises `InputError` where the rewards of some sensors alone are not to be had (`JointProblem.partial`).
+        Raises `InputError` for a problem without rewards of sensors that have not decided (`JointProblem.partial`).
         """
         if problem.partial is None:
-            raise InputError(
-                "search: expected rewards of some of the sensors alone, for SequentialGreedy; got none: reward and "
-                "beliefs of this decision have none; search by CoordinateAscent"
-            )
+            expected = "rewards of sensors that have not decided (JointProblem.partial), for SequentialGreedy"
+            raise InputError(f"search: expected {expected}; got none; search by CoordinateAscent")
         known = Known(problem)
         steps = _Steps(known, problem.partial)
         if self.order == "printed":

@@ -46,7 +46,8 @@ class JointProblem(NamedTuple):
         cheaper than to evaluate them. None: they are evaluated.
     ascend: the end of a coordinate ascent from a joint action, where it is compiled; it keeps to `mask` if what it
         starts from does. None: the search ascends itself.
-    partial: as `evaluate`, where -1 says that a sensor does not scan. None: not to be had.
+    partial: as `evaluate`, where -1 says that a sensor has not decided and is presumed to stay as it is. Any joint
+        action may be asked for, allowed or not; nothing is kept as evidence. None: not to be had.
     bound: what no joint action has a larger mean reward than; inf where that is not known. None: not to be had.
     late: whether the time for the decision is over: a search of rounds or restarts ends then, with the best that it has
         found, one ascent or round at the least. None: it never is.

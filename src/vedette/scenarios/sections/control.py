@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
@@ -96,6 +96,11 @@ class Control(Derived):
     search: AnySearch = Field(
         default=of_kind("automatic"), description="Which joint actions a joint decision evaluates [-]."
     )
+    others: Literal["stay", "absent"] = Field(
+        default="stay",
+        description="What each sensor presumes of the others under idm: they go on as they are, or, as in the paper, "
+        "there are none [-].",
+    )
     constraints: Annotated[tuple[AnyConstraint, ...], Field(strict=False)] = Field(
         default=(), description="What the sensors must not do [-]."
     )
@@ -161,35 +166,6 @@ def constraints_on_labels(model: ScenarioModel) -> Iterator[Finding]:
             yield ("control", "constraints", i, "kind"), wanted, describe(constraint.kind)
 
 
-def greedy_of_sums(model: ScenarioModel) -> Iterator[Finding]:
-    """Greedy searches ask for rewards of some of the sensors alone, which only sums over labels have."""
-    if model.filter.kind in UNLABELLED:
-        return
-    limits, other = model.control.limits, "coordinate_ascent or another"
-    few = len(model.sensors) <= limits.max_glmb_sensors and limits.max_glmb_targets > 0
-    of_lmbs = model.fusion.kind != "custom" and model.fusion.decides_in_full
-    for path, search, reward in _joint(model):
-        if search.kind != "sequential_greedy" or reward.kind == "expected_loss":
-            continue
-        if model.control.association == "full":
-            why = "as with control.association full decisions are no sums over labels"
-            yield (*path, "kind"), f"{other}, {why}", describe(search.kind)
-        elif few and not of_lmbs and model.filter.kind in ("delta_glmb", "m_delta_glmb"):
-            why = f"as decisions on {model.filter.kind} beliefs are no sums over labels"
-            hint = "or control.limits.max_glmb_targets of 0, with which they are"
-            yield (*path, "kind"), f"{other}, {why}, {hint}", describe(search.kind)
-
-
-def _joint(model: ScenarioModel) -> Iterator[tuple[Path, AnySearch, AnyReward]]:
-    """Of each strategy that decides jointly: where its search stands, the search, and the reward."""
-    control = model.control
-    yield ("control", "search"), control.search, control.reward
-    for name, own in model.planners.items():
-        if own.kind == "joint":
-            path: Path = ("control", "search") if own.search is None else ("planners", name, "search")
-            yield path, own.search or control.search, own.reward or control.reward
-
-
 def longer_plans(model: ScenarioModel) -> Iterator[Finding]:
     """Decisions over several periods are whole pseudo-updates apart, and sums over labels."""
     control = model.control
@@ -216,4 +192,4 @@ def targets_of_rules(model: ScenarioModel) -> Iterator[Finding]:
             yield ("planners", name, "targets"), wanted, describe(list(own.targets))
 
 
-DECISION_CHECKS = (constraints_on_labels, greedy_of_sums, longer_plans, targets_of_rules)
+DECISION_CHECKS = (constraints_on_labels, longer_plans, targets_of_rules)

@@ -21,6 +21,7 @@ from vedette.scenarios.sections.tracking import LABELLING, UNLABELLED
 
 if TYPE_CHECKING:  # with the planners comes the compiler, which a check does without
     from vedette.control import Constraint, JointSearch, MobileSensor, Plan, Planner, PlanningSettings
+    from vedette.control.deciding import Presumption
     from vedette.control.preparation import AnyReward as PlannedReward
     from vedette.densities import Estimator
     from vedette.fusion import Fusion
@@ -33,12 +34,12 @@ class Parts(NamedTuple):
     """What planners are made of.
 
     sensors: the sensors that are steered. fusion: how their densities become one; of one sensor, of it alone. settings:
-    horizon, samples, caps, threads. reward: the value of a density. search: which joint actions are evaluated.
-    first_actions: what each sensor does where nothing decides. constraints: what they must not do. notes: what plans
-    are to say of the fusion and of who hears whom. lookahead: arguments of `vedette.control.HorizonPlanner` by name,
-    about sequences of decisions. estimate: reads the targets off the fused belief. oracle: arguments of
-    `vedette.simulation.OraclePlanner` by name, about scans and scores. scene: what a program is told of the scenario,
-    as plain data.
+    horizon, samples, caps, threads. reward: the value of a density. search: which joint actions are evaluated. others:
+    what independent decisions presume of the other sensors. first_actions: what each sensor does where nothing decides.
+    constraints: what they must not do. notes: what plans are to say of the fusion and of who hears whom. lookahead:
+    arguments of `vedette.control.HorizonPlanner` by name, about sequences of decisions. estimate: reads the targets off
+    the fused belief. oracle: arguments of `vedette.simulation.OraclePlanner` by name, about scans and scores. scene:
+    what a program is told of the scenario, as plain data.
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -46,6 +47,7 @@ class Parts(NamedTuple):
     settings: PlanningSettings
     reward: PlannedReward
     search: JointSearch
+    others: Presumption
     first_actions: tuple[Actions, ...]
     constraints: tuple[Constraint, ...]
     notes: tuple[str, ...]
@@ -107,15 +109,19 @@ class NamedJoint(_Valued):
 
 
 class NamedIndependent(_Valued):
-    """Independent decisions, as of idm, by a reward of its own."""
+    """Independent decisions, as of idm, by a reward or a presumption of its own."""
 
     kind: Literal["independent"] = Field(default="independent", description="Kind of planner [-].")
+    others: Literal["stay", "absent"] | None = Field(
+        default=None, description="In place of control.others; none: that one [-]."
+    )
 
     def planner(self, parts: Parts, folder: Path) -> Planner:
         """Watched, as of pairs of sensors it knows nothing."""
         from vedette.control import IndependentPlanner
 
-        return _watched(IndependentPlanner(**self.shared(parts, folder)), parts)
+        own = IndependentPlanner(**self.shared(parts, folder), others=self.others or parts.others)
+        return _watched(own, parts)
 
 
 class _Ahead(_Valued):
@@ -199,8 +205,9 @@ class NamedOracle(Strategy, Derived):
 
 
 class CustomPlanner(Strategy, Custom):
-    """A user's own planner; called with `sensors`, `fusion`, `settings`, `reward`, `search`, `first_actions`,
-    `constraints`, `notes`, `lookahead`, `estimate`, `oracle`, `scene`, of which it names those that it wants."""
+    """A user's own planner; called with `sensors`, `fusion`, `settings`, `reward`, `search`, `others`,
+    `first_actions`, `constraints`, `notes`, `lookahead`, `estimate`, `oracle`, `scene`, of which it names those that it
+    wants."""
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of planner [-].")
     spared: ClassVar[tuple[str, ...]] = ("name",)  # which the scenario gives
