@@ -320,6 +320,12 @@ to_step: 20} -> to_step: 20}\nundetected: {cell: 9.0, expected: 1.0, speed: 1.0,
     24:60: undetected.enters: expected one of anywhere, border, got "sea"
 to_step: 20} -> to_step: 20}\nundetected: {cell: 0.1, expected: 1.0, speed: 1.0}
     24:20: undetected.cell: expected at least 0.285, as at most 250,000 cells may fill the region, got 0.1
+to_step: 20} -> to_step: 20}\nundetected: {cell: 9.0, expected: 1.0, speed: 1.0, birth_rate: learnt}
+    24:64: undetected.birth_rate: expected a number, as only one belief of all scans by filter.kind factored_glmb with births: poisson learns it, got "learnt"
+to_step: 20} -> to_step: 20}\nundetected: {cell: 9.0, expected: 1.0, speed: 1.0, birth_rate: known}
+    24:64: undetected.birth_rate: expected a number or learnt, got "known"
+to_step: 20} -> to_step: 20}\nundetected: {cell: 9.0, expected: 1.0, speed: 1.0, prior_rate: 0.1}
+    24:64: undetected.prior_rate: expected none, as birth_rate is not learnt, got 0.1
 to_step: 20}
 -> to_step: 20}\nundetected: {cell: 9.0, expected: 1.0, speed: 1.0, region: {x_min: 0.0, x_max: 0.0, y_min: 0.0, y_max: 1.0}}
     24:80: undetected.region.x_max: expected a number above x_min, 0, got 0.0

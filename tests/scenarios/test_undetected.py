@@ -11,6 +11,8 @@ from typer.testing import CliRunner
 
 from scenarios.minimal import MINIMAL, changed
 from vedette.cli import app
+from vedette.densities import existence_probabilities
+from vedette.errors import ScenarioError
 from vedette.evaluation import run_scenario
 from vedette.models import CellGrid, Region, UndetectedModel
 from vedette.scenarios import Scenario, parse_scenario
@@ -20,7 +22,7 @@ from vedette.scenarios.dumping import dump_scenario
 from vedette.scenarios.sections.undetected import MAX_CELLS, UndetectedSection
 from vedette.scenarios.summary import facts
 from vedette.simulation.loop import run_stream
-from vedette.tracking import Distributed, Searching
+from vedette.tracking import Central, Distributed, Searching
 
 SHORT = (
     ("num_steps: 20", "num_steps: 6"),
@@ -54,16 +56,13 @@ def test_a_region_of_their_own() -> None:
     assert tracker.model.grid == CellGrid(Region(0.0, 40.0, 0.0, 50.0), 4, 5)
     assert (tracker.model.birth_rate, tracker.model.enters, tracker.model.survival) == (0.0, "anywhere", None)
     told = dict(facts(scenario(own).model))["not yet found"]
-    assert told == (
-        "cell 10 m, expected 1, birth_rate 0 1/s, enters anywhere, speed 0 m/s, prior_rate 0.1 1/s, "
-        "in x 0 to 40 m, y 0 to 50 m"
-    )
+    assert told == ("cell 10 m, expected 1, enters anywhere, speed 0 m/s, in x 0 to 40 m, y 0 to 50 m")
     assert "not yet found" not in dict(facts(parse_scenario(MINIMAL)))
 
 
 def test_defaults_are_those_of_the_library() -> None:
     fields = UndetectedSection.model_fields
-    for name in ("birth_rate", "enters", "survival"):
+    for name in ("enters", "survival"):
         assert fields[name].default == UndetectedModel.__dataclass_fields__[name].default
 
 
@@ -123,3 +122,95 @@ def test_check_show_and_run_from_the_command_line(tmp_path: Path) -> None:
     refused = runner.invoke(app, ["check", str(file)])
     assert refused.exit_code == 1
     assert "undetected.cell: expected at least 0.285" in refused.output
+
+
+ONE = (
+    ("filter: {kind: m_delta_glmb}", "filter: {kind: factored_glmb}"),
+    ("cm_delta_glmb, weights: [0.5, 0.5]", "sequential"),
+)
+BORN = ("birth:", "birth:\n  from_measurements: {expected: 0.2, std: [6.0, 6.0, 3.0, 3.0]}")
+
+
+def test_a_belief_with_an_intensity_has_them_itself() -> None:
+    """The cells of the section, with the births from measurements where it gives no rate, and what came from sites."""
+    tracker: Any = build_experiment(scenario(WHOLE, *ONE, BORN)).tracker
+    assert isinstance(tracker, Central)
+    found = tracker.targets.birth.anywhere
+    assert found is not None
+    assert (found.expected, found.birth_rate, found.enters, found.speed, found.survival) == (
+        5.0,
+        0.02,
+        "border",
+        4.0,
+        0.99,
+    )
+    without: Any = build_experiment(scenario("{cell: 30.0, expected: 0.0, speed: 4.0}", *ONE, BORN)).tracker
+    assert without.targets.birth.anywhere.birth_rate == "learnt"
+    at_sites: Any = build_experiment(scenario("{cell: 30.0, expected: 0.0, speed: 4.0}", *ONE)).tracker
+    assert at_sites.targets.birth.anywhere.birth_rate == 0.0
+    state: Any = tracker.initial()
+    assert state.undetected.total == pytest.approx(5.0)
+    assert state.undetected.grid == found.grid
+    rngs = [run_stream(0, 1)] * 2
+    poses = np.zeros((2, 3)) + 1e6  # from where nothing is seen
+    state, _ = tracker.step(state, [None, None], poses, 2.0, rngs=rngs)
+    cells = state.fused.undetected.cells
+    assert cells.total == pytest.approx(5.0)  # at the first scan
+    at_site = state.undetected.expected - cells.expected
+    assert at_site.sum() == pytest.approx(0.1, rel=1e-6)
+    assert at_site.argmax() in found.grid.cells_at(np.array([[-1.0, -1.0], [1.0, 1.0], [-1.0, 1.0], [1.0, -1.0]]))
+    state, _ = tracker.step(state, [None, None], poses, 2.5, rngs=rngs)
+    expected = found.predict(cells.expected, 0.5, 0.99**0.5)
+    np.testing.assert_allclose(state.fused.undetected.cells.expected, expected, rtol=1e-12)
+
+
+def test_an_unexplained_measurement_starts_a_track_by_the_odds_of_the_intensity() -> None:
+    """Five targets are expected, and the clutter is that of the scenario: rho / (rho + kappa)."""
+    existence = []
+    for expected in (5.0, 0.5):
+        tracker: Any = build_experiment(
+            scenario(f"{{cell: 30.0, expected: {expected}, speed: 4.0}}", *ONE, BORN)
+        ).tracker
+        place = np.array([60.0, 20.0])
+        measured = tracker.sensors[0].measurement
+        pose = np.array([[0.0, 40.0, 0.0], [0.0, -40.0, 0.0]])
+        offset = place - pose[0, :2]
+        scan = [[np.arctan2(offset[1], offset[0]), np.hypot(*offset)]]
+        np.testing.assert_allclose(measured.positions(np.array(scan), pose[0]), [place], atol=1e-9)
+        state, _ = tracker.step(tracker.initial(), [scan, None], pose, 2.0, rngs=[run_stream(0, 1)] * 2)
+        labels, found = existence_probabilities(state.fused)
+        assert labels.tolist() == [[1, 1]]
+        existence.append(found[0] / (1.0 - found[0]))
+    assert existence[0] / existence[1] == pytest.approx(10.0, rel=1e-6)
+
+
+def test_where_no_track_starts_from_measurements_estimates_are_the_same() -> None:
+    mine, other = (
+        run_scenario(Scenario(parse_scenario(changed(*SHORT, *ONE) + more), Path("f.yaml")), "fixed", seed=3)
+        for more in (f"undetected: {WHOLE}\n", "")
+    )
+    for estimate, another in zip(mine.estimates, other.estimates, strict=True):
+        assert estimate.means.tobytes() == another.means.tobytes()
+
+
+def test_a_birth_rate_is_learnt() -> None:
+    rate = "{cell: 30.0, expected: 1.0, birth_rate: learnt, speed: 4.0}"
+    found: Any = build_experiment(scenario(rate, *ONE, BORN)).tracker.targets.birth.anywhere
+    assert (found.birth_rate, found.prior_rate) == ("learnt", pytest.approx(0.4))  # .2 a scan of .5 s
+    given = build_experiment(scenario(rate.replace("learnt", "learnt, prior_rate: 0.7"), *ONE, BORN))
+    assert given.tracker.targets.birth.anywhere.prior_rate == 0.7  # type: ignore[union-attr]
+    born = (BORN[0], BORN[1].replace("0.2", "learnt"))
+    alone: Any = build_experiment(Scenario(parse_scenario(changed(*ONE, born)), Path("f.yaml"))).tracker
+    found = alone.targets.birth.anywhere
+    assert (found.birth_rate, found.prior_rate, found.expected) == (
+        "learnt",
+        pytest.approx(0.2),
+        1.0,
+    )  # a tenth of a target a scan
+    told = dict(facts(parse_scenario(changed(*ONE, born))))
+    assert told["births"] == "1 site, steps 1, 5; at a learnt rate from measurements"
+    assert dict(facts(scenario(rate, *ONE, BORN).model))["not yet found"].startswith(
+        "cell 30 m, expected 1, birth_rate learnt"
+    )
+    with pytest.raises(ScenarioError, match=r"from_measurements\.expected: expected a number, as only one belief"):
+        parse_scenario(changed(ONE[1], born, ("m_delta_glmb", "lmb")))

@@ -36,6 +36,12 @@ TRACKERS: dict[str, dict[str, Any]] = {
     "parallel": {"fusion": {"kind": "parallel"}, "filter": {"kind": "factored_glmb"}},
     "gibbs": {"filter": {"kind": "delta_glmb", "assignment": {"kind": "gibbs"}}, "fusion": {"kind": "cm_delta_glmb"}},
     "measured": {**MEASURED, **LMBS},
+    "learnt": {
+        **MEASURED,
+        "filter": {"kind": "factored_glmb"},
+        "fusion": {"kind": "sequential"},
+        "undetected": {"cell": 100.0, "expected": 1.0, "birth_rate": "learnt", "speed": 5.0},
+    },
     "matched": {**MEASURED, "fusion": {"kind": "clmb", "matching": "assignment"}, "filter": {"kind": "lmb"}},
     "radio": {**RADIO, **MEASURED, **LMBS},
     "reach": {**MEASURED, **LMBS, "network": {"hops": 1, "loss": 0.3}},

@@ -157,6 +157,8 @@ def test_it_wants_a_tracker_and_a_model() -> None:
     wrong: Any = "tracker"
     with pytest.raises(InputError, match="tracker: expected a Tracker, with targets"):
         Searching(wrong, undetected())
+    with pytest.raises(InputError, match=r"UndetectedModel\.birth_rate: expected a number, as it is the beliefs of"):
+        Searching(TRACKERS["central"], undetected(birth_rate="learnt"))
     with pytest.raises(InputError, match="model: expected an UndetectedModel; got tracker"):
         Searching(TRACKERS["central"], wrong)
 

@@ -20,8 +20,8 @@ from vedette.densities import (
 from vedette.densities.checks import distinct_labels
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.steps.lmb import Reduction
-from vedette.kernels.steps.undetected import take_out_detected
-from vedette.models import BirthModel, SensorModel, SurvivalModel, TargetModel, UndetectedModel
+from vedette.kernels.steps.undetected import survival_probabilities, take_out_detected
+from vedette.models import BirthModel, SensorModel, SurvivalModel, TargetModel, UndetectedModel, kernel_motion
 from vedette.models.arguments import reject
 
 # Shape of the gamma prior of a learnt birth rate: half a target has been seen.
@@ -85,7 +85,8 @@ def survival_in_cells(model: UndetectedModel, targets: TargetModel, dt: float) -
     """Probability of living through `dt` seconds, in each cell (num_cells,) or everywhere."""
     if model.survival is not None:
         return float(model.survival**dt)
-    return targets.survival.prob(model.grid.states(targets.state_dim, 1)[:, 0], dt)
+    motion = kernel_motion(targets.motion, targets.survival)
+    return survival_probabilities(motion, dt, model.grid.states(targets.state_dim, 1)[:, 0].copy())
 
 
 def cells_after(

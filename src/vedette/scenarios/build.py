@@ -33,6 +33,7 @@ from vedette.scenarios.sections.scenario import ScenarioModel
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.tracking import CustomFilter
 from vedette.scenarios.sections.tracking import Filter as FilterSection
+from vedette.scenarios.sections.undetected import undetected_anywhere
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.oracle import Timetable
 from vedette.simulation.true_sensors import TrueSensor
@@ -91,10 +92,11 @@ def build_sensors(scenario: Scenario) -> tuple[MobileSensor, ...]:
     """
     model, folder = scenario.model, scenario.folder
     method, region = model.filter.gaussian_method, model.region.build()
+    birth = model.birth.build(model.motion, model.region)
     targets = TargetModel(
         model.motion.build(folder, method=method),
         model.survival.build(folder),
-        model.birth.build(model.motion, model.region),
+        replace(birth, anywhere=undetected_anywhere(model, birth)),
     )
     found = []
     for sensor in model.sensors:
@@ -159,12 +161,14 @@ def build_scan_times(scenario: Scenario) -> Bools:
 
 
 def _tracker(scenario: Scenario, filters: tuple[Filter, ...]) -> Tracker:
-    """What follows the targets that are found, and where the scenario has them those that are not."""
+    """What follows the targets that are found, and those that are not where the filter's belief does not have them."""
     section, found = scenario.model.undetected, _tracker_of_found(scenario, filters)
     lates = {s: sensor.scans.late.build() for s, sensor in enumerate(scenario.model.sensors) if sensor.scans.late}
     if lates:
         found = Delayed(found, lates)
-    return found if section is None else Searching(found, section.build(scenario.model.region))
+    if section is None or found.initial().undetected is not None:
+        return found
+    return Searching(found, section.build(scenario.model.region))
 
 
 def _tracker_of_found(scenario: Scenario, filters: tuple[Filter, ...]) -> Tracker:

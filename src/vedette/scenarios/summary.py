@@ -139,7 +139,10 @@ def _filter(section: AnyFilter) -> str:
 def _births(section: Birth) -> str:
     sites = f"{counted(len(section.sites), 'site')}, {_steps(section.steps)}" if section.sites else "no site"
     measured = section.from_measurements
-    return sites if measured is None else f"{sites}; {measured.expected:g} a scan from measurements"
+    if measured is None:
+        return sites
+    number = "at a learnt rate" if isinstance(measured.expected, str) else f"{measured.expected:g} a scan"
+    return f"{sites}; {number} from measurements"
 
 
 _IN_WORDS = {

@@ -36,7 +36,8 @@ class State(Speaking):
         step: number of the scan, from 1; 0 before the first.
         time: s, of that scan; None before the first.
         memory: what the tracker itself must know at the next step, such as who may then be born; None: nothing.
-        undetected: the targets that no sensor has found yet, where the tracker keeps account of them (`Searching`).
+        undetected: the targets that no sensor has found yet, where `BirthModel.anywhere` has cells for those of the
+            belief, or the tracker keeps account of them (`Searching`).
     """
 
     local: tuple[Any, ...]

@@ -21,6 +21,7 @@ from vedette.tracking.births import (
     births_waiting,
     check_measured_births,
 )
+from vedette.tracking.losing import undetected_of
 
 
 @runtime_checkable
@@ -130,4 +131,5 @@ class Central(OfAllScans):
         return self._state(belief, step, float(time), measured), TrackerInfo((info,), None, stages.seconds, sent)
 
     def _state(self, belief: Any, step: int, time: float | None, measured: LMB | None = None) -> State:
-        return State((belief,) * len(self.sensors), belief, step, time, measured)
+        undetected = undetected_of(belief, self.targets.birth)
+        return State((belief,) * len(self.sensors), belief, step, time, measured, undetected)

@@ -18,7 +18,7 @@ from vedette.models.arguments import flag, instance, probability
 from vedette.tracking.base import Stages, State, TrackerInfo, bytes_of_belief, check_step
 from vedette.tracking.births import births_due, births_from_scans, births_waiting
 from vedette.tracking.local import LocalFilters
-from vedette.tracking.losing import without_forgotten
+from vedette.tracking.losing import undetected_of, without_forgotten
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,7 +65,7 @@ class Distributed(LocalFilters):
     def initial(self) -> State:
         """No target anywhere; the fused belief is then the first sensor's."""
         local = tuple(local.initial() for local in self.filters)
-        return State(local, local[0])
+        return State(local, local[0], undetected=undetected_of(local[0], self.targets.birth))
 
     def step(
         self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
@@ -113,7 +113,8 @@ class Distributed(LocalFilters):
                 if dt == 0.0:
                     measured = tuple(births_waiting(birth, *own) for own in zip(state.memory, measured, strict=True))
         told = TrackerInfo(tuple(infos), report, stages.seconds, tuple(sent))
-        return State(tuple(local), fused, step, float(time), measured), told
+        undetected = undetected_of(fused, self.targets.birth)
+        return State(tuple(local), fused, step, float(time), measured, undetected), told
 
     def _without_forgotten(
         self, birth: MeasurementBirth, local: list[Any], infos: list[FilterInfo], views: Views

@@ -1,4 +1,4 @@
-"""Labels that a sensor has lost sight of, and where the targets are whose labels a tracker has just dropped."""
+"""Labels that a sensor has lost sight of, and where targets without a label are, on a grid."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from vedette.densities import LMB, Labelled, as_lmb, existence_probabilities, track_moments
+from vedette.densities import LMB, Labelled, UndetectedIntensity, as_lmb, existence_probabilities, track_moments
 from vedette.densities.containers import for_kernel
 from vedette.densities.label_sets import without_labels
 from vedette.filters.inputs import model_errors
@@ -15,7 +15,7 @@ from vedette.fusion import Views
 from vedette.kernels.base.types import Floats
 from vedette.kernels.gaussian.position_integrals import spread_nodes
 from vedette.kernels.planning.reach import predict_paths
-from vedette.models import CellGrid, MeasurementBirth, SensorModel, TargetModel, kernel_motion
+from vedette.models import BirthModel, CellGrid, MeasurementBirth, SensorModel, TargetModel, kernel_motion
 
 _Labelled = TypeVar("_Labelled", bound=Labelled)
 _NODES = spread_nodes()
@@ -49,10 +49,7 @@ def expected_of_lost(
     with model_errors():
         motion = kernel_motion(targets.motion, targets.survival)
         paths = predict_paths(motion, dt, 1, for_kernel(tracks.means), for_kernel(tracks.covs))
-    means, covs = paths.means[:, 0], paths.covs[:, 0]
-    states = np.repeat(means[:, None], len(_NODES), axis=1)  # (num_components, num_nodes, state_dim)
-    states[..., :2] += np.einsum("cij,nj->cni", np.linalg.cholesky(covs[:, :2, :2]), _NODES[:, 1:])
-    nodes = states.reshape(-1, states.shape[2])
+    nodes = _nodes_of(paths.means[:, 0], paths.covs[:, 0])
     living = lost.existence[of_component] * np.exp(tracks.log_weights) * targets.survival.prob(tracks.means, dt)
     shares = living[:, None] * _NODES[:, 0]
     for sensor, pose in looks:
@@ -60,6 +57,28 @@ def expected_of_lost(
     alive, missed = (np.bincount(of_component, each, tracks.num_tracks) for each in (living, shares.sum(axis=1)))
     shares /= np.maximum(1.0 - alive + missed, _LEAST)[of_component, None]
     return expected_in_cells(nodes, shares.ravel(), grid)
+
+
+def undetected_of(belief: Any, birth: BirthModel) -> UndetectedIntensity | None:
+    """The undetected targets of a belief on the cells of `birth.anywhere`, wherever they come from.
+
+    None where there are no such cells, or the belief has no undetected targets.
+    """
+    held = getattr(belief, "undetected", None)
+    if birth.anywhere is None or held is None:
+        return None
+    grid, intensity = birth.anywhere.grid, held.intensity
+    expected = birth.anywhere.initial() if held.cells is None else held.cells.expected
+    shares = np.exp(intensity.log_weights)[:, None] * _NODES[:, 0]
+    elsewhere = expected_in_cells(_nodes_of(intensity.means, intensity.covs), shares.ravel(), grid)
+    return UndetectedIntensity(grid, expected + elsewhere)
+
+
+def _nodes_of(means: Floats, covs: Floats) -> Floats:
+    """(num_components * num_nodes, state_dim) states that share each Gaussian's position evenly, one by one."""
+    states = np.repeat(means[:, None], len(_NODES), axis=1)
+    states[..., :2] += np.einsum("cij,nj->cni", np.linalg.cholesky(covs[:, :2, :2]), _NODES[:, 1:])
+    return states.reshape(-1, states.shape[2])
 
 
 def expected_in_cells(states: Floats, shares: Floats, grid: CellGrid) -> Floats:

@@ -1,4 +1,4 @@
-"""A tracker that also keeps account of the targets that no sensor has found yet, for planners that search."""
+"""Tracker that maintains the intensity of undetected targets where beliefs have none, for planners that search."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ import numpy as np
 
 from vedette.densities import UndetectedIntensity
 from vedette.errors import InputError
+from vedette.filters.appearing import survival_in_cells
 from vedette.kernels.base.types import Floats
-from vedette.kernels.steps.undetected import survival_probabilities, take_out_detected
-from vedette.models import SensorModel, UndetectedModel, kernel_motion
+from vedette.kernels.steps.undetected import take_out_detected
+from vedette.models import SensorModel, UndetectedModel
 from vedette.models.arguments import float_array, reject
 from vedette.tracking.base import AroundTracker, Stages, State, TrackerInfo
 from vedette.tracking.births import unexplained
@@ -46,6 +47,9 @@ class Searching(AroundTracker):
         AroundTracker.__post_init__(self)
         if not isinstance(self.model, UndetectedModel):
             raise reject("model", "an UndetectedModel", self.model)
+        if self.model.is_learnt:
+            wanted = "a number, as it is the beliefs of filters with an intensity of undetected targets that learn it"
+            raise reject("UndetectedModel.birth_rate", wanted, self.model.birth_rate)
         object.__setattr__(self, "_nodes", self.model.grid.states(self.targets.state_dim))
         object.__setattr__(self, "_node_weights", self.model.grid.node_weights())
 
@@ -86,7 +90,7 @@ class Searching(AroundTracker):
         dt = float(time) - state.time
         if dt == 0.0:
             return before.expected
-        return self.model.predict(before.expected, dt, self._survival(dt))
+        return self.model.predict(before.expected, dt, survival_in_cells(self.model, self.targets, dt))
 
     def _lost(
         self, before: State, after: State, looks: Sequence[tuple[SensorModel, Floats]], time: float
@@ -104,10 +108,3 @@ class Searching(AroundTracker):
             return 0.0
         found = unexplained(birth, after.fused, self.sensors, scans, poses)
         return expected_in_cells(found.positions, birth.max_existence * found.probabilities, self.model.grid)
-
-    def _survival(self, dt: float) -> Floats | float:
-        """Probability of living through `dt` seconds, in each cell or everywhere."""
-        if self.model.survival is not None:
-            return float(self.model.survival**dt)
-        motion = kernel_motion(self.targets.motion, self.targets.survival)
-        return survival_probabilities(motion, dt, self.model.grid.states(self.targets.state_dim, 1)[:, 0].copy())

@@ -61,7 +61,11 @@ class BirthSite(Section):
 class MeasuredBirth(Section):
     """Births anywhere in the region, of which tracks start where something is measured that no track explains."""
 
-    expected: Positive = Field(default=0.5, description="Mean number of such births a scan [-].")
+    expected: Positive | Literal["learnt"] = Field(
+        default=0.5,
+        description="Mean number of such births a scan; learnt: estimated from the scans, where undetected targets are "
+        "an intensity [-].",
+    )
     max_existence: Chance = Field(
         default=0.03,
         description="Most that any of them may have as existence in filters with labelled births; in others it follows "

@@ -20,7 +20,7 @@ from vedette.scenarios.sections.fusion import OF_LMBS, OF_SCANS
 from vedette.scenarios.sections.network import NETWORK_CHECKS
 from vedette.scenarios.sections.targets import RECORDED_DIM
 from vedette.scenarios.sections.tracking import LABELLING, UNLABELLED
-from vedette.scenarios.sections.undetected import cells_of_undetected
+from vedette.scenarios.sections.undetected import cells_of_undetected, learnt_births
 
 if TYPE_CHECKING:
     from vedette.scenarios.sections.scenario import ScenarioModel
@@ -256,6 +256,7 @@ CHECKS = (
     _planners_fit,
     _score,
     cells_of_undetected,
+    learnt_births,
     *NETWORK_CHECKS,
     *DECISION_CHECKS,
 )

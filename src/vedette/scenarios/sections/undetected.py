@@ -1,24 +1,28 @@
-"""The targets that no sensor has found yet, of which planners are told that search for them."""
+"""The targets that no sensor has found yet: the cells of the filter, and of planners that search for them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field
 
 from vedette.scenarios.faults import Finding, describe
-from vedette.scenarios.sections.base import Positive
+from vedette.scenarios.sections.base import NonNegative, Positive, check
 from vedette.scenarios.sections.derived import Derived, derived
+from vedette.scenarios.sections.fusion import ONE_BELIEF
+from vedette.scenarios.sections.tracking import Filter
 from vedette.scenarios.sections.world import RegionSection
 
 if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
-    from vedette.models import UndetectedModel
+    from vedette.models import BirthModel, UndetectedModel
     from vedette.scenarios.sections.scenario import ScenarioModel
 
 # Of every sensor, P_D is asked at nine places in each at every scan: some 40 ms for so many.
 MAX_CELLS = 250_000
+_PRIOR_A_SCAN = 0.1  # births, where their rate is learnt and no prior is given
 
 
 @derived("vedette.models.undetected:UndetectedModel", first=("cell",))
@@ -31,16 +35,65 @@ class UndetectedSection(Derived):
         ge=0.0,
         description="Standard deviation of both components of their velocity, drawn anew at every scan [m/s].",
     )
+    birth_rate: NonNegative | Literal["learnt"] | None = Field(
+        default=None,
+        description="Mean number of targets that appear in the region in a second; learnt: estimated from the first "
+        "detections, where undetected targets are an intensity; none: learnt where they are and tracks start from "
+        "measurements, else 0 [1/s].",
+    )
+    prior_rate: Positive | None = Field(
+        default=None,
+        description="Where the birth rate is learnt, the mean of its prior density, a gamma of shape 1/2; none: what "
+        "birth.from_measurements expects, or one target in ten scans [1/s].",
+    )
     region: RegionSection | None = Field(
         default=None, description="Where they are; none: in the region of the scenario [-]."
     )
+
+    @check
+    def _prior_of_learnt(self) -> Iterator[Finding]:
+        if self.prior_rate is not None and self.birth_rate != "learnt":
+            yield ("prior_rate",), "none, as birth_rate is not learnt", describe(self.prior_rate)
 
     def build(self, region: RegionSection) -> UndetectedModel:
         """The model; region: of the scenario, for want of one of its own."""
         from vedette.models import CellGrid, UndetectedModel
 
         grid = CellGrid.covering((self.region or region).build(), self.cell)
-        return UndetectedModel(grid, **self.given())
+        return UndetectedModel(grid, **{name: value for name, value in self.given().items() if value is not None})
+
+
+def undetected_anywhere(model: ScenarioModel, birth: BirthModel) -> UndetectedModel | None:
+    """The targets that appear anywhere, for filters whose undetected targets are an intensity.
+
+    None where `birth.from_measurements` says all there is to say. birth: of the filters, without them.
+    """
+    section, measured, scan = model.undetected, birth.from_measurements, model.time.step_period
+    if section is None:
+        found = measured.uniform() if measured is not None and measured.is_learnt else None
+        return None if found is None else replace(found, prior_rate=_PRIOR_A_SCAN / scan)
+    found = section.build(model.region)
+    if section.birth_rate is None and measured is not None:
+        found = replace(found, birth_rate="learnt")
+    if section.prior_rate is not None:
+        return found
+    if measured is None or isinstance(measured.expected, str):
+        return replace(found, prior_rate=_PRIOR_A_SCAN / scan)
+    return replace(found, prior_rate=measured.expected / (birth.period or scan))
+
+
+def learnt_births(model: ScenarioModel) -> Iterator[Finding]:
+    """A birth rate is learnt by beliefs that have an intensity of undetected targets."""
+    filters, fusion, measured, section = model.filter, model.fusion, model.birth.from_measurements, model.undetected
+    one_belief = fusion.kind in ONE_BELIEF and model.network is None and getattr(fusion, "filter", None) is None
+    has_intensity = isinstance(filters, Filter) and filters.kind == "factored_glmb" and filters.births == "poisson"
+    if one_belief and has_intensity:
+        return
+    wanted = "a number, as only one belief of all scans by filter.kind factored_glmb with births: poisson learns it"
+    if measured is not None and measured.expected == "learnt":
+        yield ("birth", "from_measurements", "expected"), wanted, describe(measured.expected)
+    if section is not None and section.birth_rate == "learnt":
+        yield ("undetected", "birth_rate"), wanted, describe(section.birth_rate)
 
 
 def cells_of_undetected(model: ScenarioModel) -> Iterator[Finding]:
