@@ -172,25 +172,34 @@ def test_sensors_keep_apart_and_inside() -> None:
 
 
 def test_targets_not_found_yet_are_looked_for() -> None:
-    """With nobody known, sensors go where somebody may be; the reward is the number that they find."""
+    """With nobody known, sensors go where somebody may be; the reward is the cutoff times the number that they find."""
     sensor = mobile_sensor("lmb", Courses(100.0, [0.0, 90.0, 180.0]), detection=models.limited_range(0.9, 100.0))
     grid = models.CellGrid.covering(models.Region(-500.0, 500.0, -500.0, 500.0), 50.0)
     expected = np.where((grid.centres[:, 0] > 100.0) & (np.abs(grid.centres[:, 1]) < 100.0), 0.05, 0.0)
     empty = LMB.empty(4)
     state = State((empty,) * 2, empty, 1, 1.0, undetected=UndetectedIntensity(grid, expected))
     poses = np.array([[0.0, 0.0, 0.0], [200.0, -250.0, 0.0]])
-    settings = replace(KNOWN, horizon_steps=1, horizon_period=2.0, undetected_worth=1.0)
+    settings = replace(KNOWN, horizon_steps=1, horizon_period=2.0)
     planner = JointPlanner((sensor,) * 2, ParallelUpdate(), settings, ExpectedLossReward(100.0))
     plan = planner.plan(state, poses, rng=np.random.default_rng(1))
     assert [action[0] for action in plan.chosen_actions] == [0.0, 90.0]
-    assert 0.0 < plan.expected_rewards[0][0] < expected.sum()
+    assert 0.0 < plan.expected_rewards[0][0] < 100.0 * expected.sum()
+    twice, none = (
+        replace(planner, settings=replace(settings, undetected_worth=worth)).plan(
+            state, poses, rng=np.random.default_rng(1)
+        )
+        for worth in (2.0, 0.0)
+    )
+    np.testing.assert_allclose(twice.tables[0].mean, 2.0 * plan.tables[0].mean, rtol=1e-12)
+    assert not none.tables[0].mean.any()
     assert plan.bound is not None
     assert plan.bound.reward <= plan.bound.upper + 1e-12
     ascent = replace(planner, search=CoordinateAscent(1)).plan(state, poses, rng=np.random.default_rng(1))
     assert ascent.chosen == plan.chosen
     assert ascent.bound is not None
     assert plan.bound.reward <= ascent.bound.upper + 1e-12
-    nowhere = planner.plan(replace(state, undetected=None), poses, rng=np.random.default_rng(1))
+    wanted = replace(planner, settings=replace(settings, undetected_worth=1.0))
+    nowhere = wanted.plan(replace(state, undetected=None), poses, rng=np.random.default_rng(1))
     assert any("not looked for" in note for note in nowhere.notes)
 
 

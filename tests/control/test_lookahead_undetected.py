@@ -24,10 +24,10 @@ from vedette.platforms import Courses
 from vedette.tracking import State
 
 HEADINGS = (0.0, 90.0, 180.0)
-SPEED, PERIOD, RANGE, WORTH = 100.0, 2.0, 100.0, 3.0
+SPEED, PERIOD, RANGE, WORTH, CUTOFF = 100.0, 2.0, 100.0, 300.0, 100.0
 GRID = models.CellGrid.covering(models.Region(-700.0, 700.0, -700.0, 700.0), 50.0)
 STARTS = np.array([[0.0, 0.0, 0.0], [200.0, -250.0, 0.0]])
-ONE = replace(KNOWN, horizon_steps=1, horizon_period=PERIOD, undetected_worth=WORTH)
+ONE = replace(KNOWN, horizon_steps=1, horizon_period=PERIOD, undetected_worth=WORTH / CUTOFF)
 
 
 def sensors() -> Any:
@@ -43,7 +43,7 @@ def state(expected: Any) -> State:
 
 def planner(**arguments: Any) -> HorizonPlanner:
     given = {"discount": None, **arguments}
-    return HorizonPlanner(sensors(), ParallelUpdate(), ONE, ExpectedLossReward(100.0), **given)
+    return HorizonPlanner(sensors(), ParallelUpdate(), ONE, ExpectedLossReward(CUTOFF), **given)
 
 
 def detections(headings: Any, start: Any) -> Any:

@@ -164,6 +164,33 @@ def test_a_belief_with_an_intensity_has_them_itself() -> None:
     np.testing.assert_allclose(state.fused.undetected.cells.expected, expected, rtol=1e-12)
 
 
+def test_planners_search_without_a_section() -> None:
+    """By the belief's own intensity, at a learnt rate; not where nothing decides, starts or is worth searching for."""
+
+    def anywhere(*changes: tuple[str, str]) -> Any:
+        given = Scenario(parse_scenario(changed(*changes)), Path("f.yaml"))
+        return build_experiment(given).tracker.targets.birth.anywhere, "not yet found" in dict(facts(given.model))
+
+    found, told = anywhere(*ONE, BORN)
+    assert (found.birth_rate, found.prior_rate, found.expected, found.grid.num_cells) == (
+        "learnt",
+        pytest.approx(0.4),
+        1.0,
+        16 * 16,
+    )
+    assert told
+    sight = "  detection: {kind: limited_range, probability: 0.9, max_range: 20.0}"
+    near = ("sensor_defaults:", f"sensor_defaults:\n{sight}")
+    assert anywhere(*ONE, BORN, near)[0].grid.num_cells > 16 * 16
+    for more in ((ONE[1], BORN), ONE, (*ONE, BORN, ("control: {", "control: {undetected_worth: 0.0, "))):
+        assert anywhere(*more) == (None, False)
+    given = Scenario(parse_scenario(changed(*SHORT, *ONE, BORN)), Path("f.yaml"))
+    record = run_scenario(given, "jdm", seed=1)
+    assert any(decision.plan.explain().of_undetected for decision in record.decisions)
+    wild = changed(*ONE, BORN, ("control: {", "control: {undetected_worth: 10000.0, "))
+    assert "a factor of that cost" in "".join(cautions(Scenario(parse_scenario(wild), Path("f.yaml"))))
+
+
 def test_an_unexplained_measurement_starts_a_track_by_the_odds_of_the_intensity() -> None:
     """Five targets are expected, and the clutter is that of the scenario: rho / (rho + kappa)."""
     existence = []

@@ -123,7 +123,7 @@ def notes_of_state(
     Of these, within the horizon, it is all one what they do. sums: whether rewards are sums over labels.
     """
     notes = []
-    if settings.undetected_worth != 0.0 and not (sums and state.undetected is not None):
+    if settings.undetected_worth and not (sums and state.undetected is not None):
         why = "the state has no intensity of them" if state.undetected is None else "rewards are no sums over labels"
         notes.append(f"targets not found yet are not looked for: {why}")
     for s, sensor in enumerate(sensors):

@@ -60,9 +60,10 @@ class PlanningSettings:
             targets and sensors; "full": the filter's own update, which also asks which of several targets was measured.
         max_glmb_sensors: with more sensors GLMB beliefs are planned on as LMBs, which plans then say.
         max_glmb_targets: the same with more targets expected.
-        undetected_worth: what finding a target of `undetected` is worth, in units of the reward; of the expected loss m
-            to the power of its order, such as its cutoff to that power; 0: nobody is looked for. Targets not found are
-            taken to stay where they are.
+        undetected_worth: what finding a target of `undetected` is worth: a factor of what the reward says that a missed
+            target costs (`missed_cost`: of the expected loss, its cutoff to the power of its order); of rewards that do
+            not say it a number in their units; none: 1 of the former, 0 of the latter; 0: nobody is looked for. Targets
+            not found are taken to stay where they are.
         end: s, time of the last scan, on the clock of `State.time`: no decision after it is planned for; None: none is.
         max_prior_hypotheses: most hypotheses, the heaviest, of each local posterior at the start of the horizon. An LMB
             enters whole.
@@ -97,7 +98,7 @@ class PlanningSettings:
     max_prior_hypotheses: Count = 10
     max_version_divergence: NonNegative = 1e-3
     max_bound_work: Natural = 256
-    undetected_worth: NonNegative = 0.0
+    undetected_worth: NonNegative | None = None
     end: Real | None = None
     confidence: Chance | None = None
     indifference: Share = 0.0

@@ -67,7 +67,7 @@ class MeasurementBirth:
         """Whether the expected number of births is learnt."""
         return isinstance(self.expected, str) and self.expected == LEARNT
 
-    def uniform(self) -> UndetectedModel | None:
+    def uniform(self, cells_a_side: int = _CELLS) -> UndetectedModel | None:
         """The targets that appear anywhere in the region alike, on cells; None without a region.
 
         Births of a known rate are not among them, as they may be so many a scan. Where the rate is learnt, one target
@@ -75,7 +75,10 @@ class MeasurementBirth:
         """
         if self.region is None:
             return None
-        grid, speed = CellGrid(self.region, _CELLS, _CELLS), float(self.std[2]) if len(self.std) > 2 else 0.0
+        grid, speed = (
+            CellGrid(self.region, cells_a_side, cells_a_side),
+            float(self.std[2]) if len(self.std) > 2 else 0.0,
+        )
         if self.is_learnt:
             return UndetectedModel(grid, 1.0, birth_rate=LEARNT, speed=speed)
         return UndetectedModel(grid, 0.0, speed=speed)

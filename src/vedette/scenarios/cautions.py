@@ -41,6 +41,7 @@ HANDFUL = 4
 # layouts drawn at random GCI lost 5 m and more to cardinality in 7 of the 17 below, and in one of the 23 above.
 NEAR_SITES = 4.0
 _POINTS_A_SIDE = 21
+_MOST_WORTH = 20.0  # of an undetected target, as a share of what a missed one costs
 
 
 def cautions(scenario: Scenario, further: Iterable[tuple[Path, str]] = ()) -> tuple[str, ...]:
@@ -49,7 +50,7 @@ def cautions(scenario: Scenario, further: Iterable[tuple[Path, str]] = ()) -> tu
     further: places and texts of other warnings, which come last.
     """
     found = [*_records(scenario), *_views(scenario), *_births(scenario), *_late_beliefs(scenario)]
-    found += [*_many_sensors(scenario), *_cells(scenario.model), *_labels(scenario.model)]
+    found += [*_many_sensors(scenario), *_cells(scenario.model), *_labels(scenario.model), *_worth(scenario.model)]
     found += coverage_cautions(scenario.model)
     found += [*_undetected_births(scenario.model), *start_cautions(scenario)]
     found += [*implausible(scenario.model), *coastline_cautions(scenario.model, scenario.folder), *further]
@@ -166,6 +167,17 @@ def _cells(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
                 "cell is taken at nine places in it, and too rough; take cells of at most twice as far as it sees",
             )
             return
+
+
+def _worth(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
+    """A worth of undetected targets that is taken for a number of metres."""
+    worth = model.control.undetected_worth
+    if worth is not None and worth > _MOST_WORTH and model.control.reward.kind in ("expected_loss", "expected_gospa"):
+        yield (
+            ("control", "undetected_worth"),
+            f"finding a target is worth {worth:g} times what a missed one costs: sensors do little but search; it is a "
+            "factor of that cost, mostly 1",
+        )
 
 
 def _labels(model: ScenarioModel) -> Iterator[tuple[Path, str]]:

@@ -15,7 +15,7 @@ from vedette.scenarios.sections.fusion import OF_SCANS, AnyFusion, CustomFusion
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.tracking import AnyFilter, Filter
 from vedette.scenarios.sections.true_sensors import BiasSection
-from vedette.scenarios.sections.undetected import UndetectedSection
+from vedette.scenarios.sections.undetected import UndetectedSection, searches
 from vedette.scenarios.sections.world import RegionSection
 from vedette.text import counted
 
@@ -84,6 +84,11 @@ def facts(model: ScenarioModel) -> list[tuple[str, str]]:
         ("fusion", _fusion(model.fusion)),
         *(() if model.network is None else (("network", settings(model.network)),)),
         *(() if model.undetected is None else (("not yet found", _undetected(model.undetected)),)),
+        *(
+            (("not yet found", "searched for where targets may be born, at a learnt birth rate"),)
+            if searches(model)
+            else ()
+        ),
         ("estimate", settings(model.estimator)),
         ("decisions", f"after {_steps(model.decision_steps)}" if model.decision_steps else "none"),
         ("horizon", f"{counted(model.horizon[0], 'step')} of {model.horizon[1]:g} s"),

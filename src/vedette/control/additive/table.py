@@ -61,10 +61,9 @@ def lay_out(
         )
         table = lay_out_changes(start, rule, num_threads, sampled=sampled)
     valuation = valuation_of(reward, prediction, start.prior)
-    if state.undetected is None or settings.undetected_worth == 0.0:
-        cells = no_cells(len(table.offsets) - 1)
-    else:
-        cells = cells_of(start, state.undetected, settings.undetected_worth, table.first_courses, prediction.state_dim)
+    cells = no_cells(len(table.offsets) - 1)
+    if state.undetected is not None and (worth := worth_of_finding(reward, settings)) > 0.0:
+        cells = cells_of(start, state.undetected, worth, table.first_courses, prediction.state_dim)
     own = reward if sampled else None
     return AdditiveRewards(table, valuation, start.bases, own, cells, num_threads)
 
@@ -152,6 +151,14 @@ def _filling(
     return lambda first, last: fill_changes(
         group.belief, group.decision, entries, references, group.rows, first, last, changes
     )
+
+
+def worth_of_finding(reward: Any, settings: PlanningSettings) -> float:
+    """What finding an undetected target is worth, in units of the reward."""
+    cost: float | None = getattr(reward, "missed_cost", None)
+    if cost is None:
+        return settings.undetected_worth or 0.0
+    return cost if settings.undetected_worth is None else settings.undetected_worth * cost
 
 
 def no_cells(num_courses: int) -> Cells:

@@ -93,6 +93,11 @@ class ExpectedGospaReward(_OneSum, Checked):
     words: ClassVar[str] = "minus squared GOSPA, m²"
 
     @property
+    def missed_cost(self) -> float:
+        """Of a target that is not reported, c^2 / 2 [m^2]."""
+        return 0.5 * self.cutoff**2
+
+    @property
     def function(self) -> ModelFunction:
         """See `vedette.control.rewards.labels`."""
         return gospa_of_label

@@ -128,3 +128,8 @@ class ExpectedLossReward(Checked):
     cutoff: Positive = 100.0
     order: Positive = 1.0
     words: ClassVar[str] = "minus expected loss"
+
+    @property
+    def missed_cost(self) -> float:
+        """Of a target that is lost, c^p [m^p]."""
+        return float(self.cutoff**self.order)

@@ -12,6 +12,7 @@ from pydantic import Field
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import NonNegative, Positive, check
 from vedette.scenarios.sections.derived import Derived, derived
+from vedette.scenarios.sections.field_of_view import reach_of
 from vedette.scenarios.sections.fusion import ONE_BELIEF
 from vedette.scenarios.sections.tracking import Filter
 from vedette.scenarios.sections.world import RegionSection
@@ -22,6 +23,8 @@ if TYPE_CHECKING:  # with the models comes the compiler, which a check does with
 
 # Of every sensor, P_D is asked at nine places in each at every scan: some 40 ms for so many.
 MAX_CELLS = 250_000
+# Without a section: cells along each side of the region, and from a sensor to where it sees no more.
+_LEAST_CELLS, _MOST_CELLS, _CELLS_A_REACH = 16, 64, 2.0
 _PRIOR_A_SCAN = 0.1  # births, where their rate is learnt and no prior is given
 
 
@@ -66,28 +69,45 @@ class UndetectedSection(Derived):
 def undetected_anywhere(model: ScenarioModel, birth: BirthModel) -> UndetectedModel | None:
     """The targets that appear anywhere, for filters whose undetected targets are an intensity.
 
-    None where `birth.from_measurements` says all there is to say. birth: of the filters, without them.
+    Their birth rate is learnt where the section does not give it and tracks start from measurements, and where planners
+    search: one that is promised for nothing makes them search for ever. None where `birth.from_measurements` says all
+    there is to say. birth: of the filters, without them.
     """
     section, measured, scan = model.undetected, birth.from_measurements, model.time.step_period
-    if section is None:
-        found = measured.uniform() if measured is not None and measured.is_learnt else None
-        return None if found is None else replace(found, prior_rate=_PRIOR_A_SCAN / scan)
-    found = section.build(model.region)
-    if section.birth_rate is None and measured is not None:
-        found = replace(found, birth_rate="learnt")
-    if section.prior_rate is not None:
+    if section is not None:
+        found = section.build(model.region)
+        if section.birth_rate is None and measured is not None:
+            found = replace(found, birth_rate="learnt")
+    elif measured is None or not (measured.is_learnt or searches(model)):
+        return None
+    elif (uniform := replace(measured, expected="learnt").uniform(_cells_a_side(model))) is not None:
+        found = uniform
+    else:
+        return None
+    if section is not None and section.prior_rate is not None:
         return found
-    if measured is None or isinstance(measured.expected, str):
-        return replace(found, prior_rate=_PRIOR_A_SCAN / scan)
-    return replace(found, prior_rate=measured.expected / (birth.period or scan))
+    expected = _PRIOR_A_SCAN if measured is None or isinstance(measured.expected, str) else measured.expected
+    return replace(found, prior_rate=expected / (birth.period or scan))
+
+
+def searches(model: ScenarioModel) -> bool:
+    """Whether planners look for undetected targets without a section that says how many there are."""
+    if model.undetected is not None or model.birth.from_measurements is None or not _has_intensity(model):
+        return False
+    return bool(model.decision_steps) and model.control.undetected_worth != 0.0
+
+
+def _cells_a_side(model: ScenarioModel) -> int:
+    """Cells along each side of the region: a few within the view of the sensor that sees least far."""
+    region, reach = model.region, min(map(reach_of, model.sensors))
+    side: float = max(region.x_max - region.x_min, region.y_max - region.y_min)
+    return min(max(math.ceil(_CELLS_A_REACH * side / reach), _LEAST_CELLS), _MOST_CELLS)
 
 
 def learnt_births(model: ScenarioModel) -> Iterator[Finding]:
     """A birth rate is learnt by beliefs that have an intensity of undetected targets."""
-    filters, fusion, measured, section = model.filter, model.fusion, model.birth.from_measurements, model.undetected
-    one_belief = fusion.kind in ONE_BELIEF and model.network is None and getattr(fusion, "filter", None) is None
-    has_intensity = isinstance(filters, Filter) and filters.kind == "factored_glmb" and filters.births == "poisson"
-    if one_belief and has_intensity:
+    measured, section = model.birth.from_measurements, model.undetected
+    if _has_intensity(model):
         return
     wanted = "a number, as only one belief of all scans by filter.kind factored_glmb with births: poisson learns it"
     if measured is not None and measured.expected == "learnt":
@@ -96,12 +116,20 @@ def learnt_births(model: ScenarioModel) -> Iterator[Finding]:
         yield ("undetected", "birth_rate"), wanted, describe(section.birth_rate)
 
 
+def _has_intensity(model: ScenarioModel) -> bool:
+    """Whether undetected targets are an intensity of the one belief of all scans."""
+    filters, fusion = model.filter, model.fusion
+    if fusion.kind not in ONE_BELIEF or model.network is not None or getattr(fusion, "filter", None) is not None:
+        return False
+    return isinstance(filters, Filter) and filters.kind == "factored_glmb" and filters.births == "poisson"
+
+
 def cells_of_undetected(model: ScenarioModel) -> Iterator[Finding]:
     """The region is cut into a number of cells that can be held and worked on; what is worth finding may be there."""
     section = model.undetected
     if section is None:
         worth = model.control.undetected_worth
-        if worth > 0.0:
+        if worth and not (_has_intensity(model) and model.birth.from_measurements is not None):
             wanted = "0, or a section `undetected`, which says where such targets may be"
             yield ("control", "undetected_worth"), wanted, describe(worth)
         return
