@@ -13,7 +13,7 @@ from fuzz.objects import Made, everything, sensor
 from vedette import models
 from vedette.control import planning_limits
 from vedette.errors import InputError
-from vedette.evaluation import TrackedShare
+from vedette.evaluation import TimeToTrack, TrackedShare
 from vedette.filters import Limits
 from vedette.recorded import Cleaning
 from vedette.scenarios import GeneratedCrowd
@@ -28,6 +28,7 @@ GOOD = everything() | {  # and what is made of files and settings
         ScriptedTargets, {"motion": models.constant_velocity(5.0), "initial_states": np.ones((3, 4))}
     ),
     "TrackedShare": Made(TrackedShare, {"sensors": (sensor(),) * 2, "cutoff": 2.0, "order": 1.0}),
+    "TimeToTrack": Made(TimeToTrack, {"cutoff": 2.0, "order": 1.0}),
 }
 NAN, INF = math.nan, math.inf
 MEANS = np.array([[1.0, 2.0, 0.0, 0.0], [3.0, 4.0, 0.0, 0.0]])
@@ -129,6 +130,8 @@ REFUSED: list[Case] = [
     *each("TrackedShare", "cutoff", 0.0, INF),
     *each("TrackedShare", "order", 0.5),
     *each("TrackedShare", "min_detection", 1.5),
+    *each("TimeToTrack", "cutoff", 0.0, INF),
+    *each("TimeToTrack", "from_step", 0),
     *each("HorizonPlanner", "depth", 0),
     *each("HorizonPlanner", "budget", 0),
     *each("HorizonPlanner", "discount", 1.5),

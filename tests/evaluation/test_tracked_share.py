@@ -1,4 +1,4 @@
-"""The share of the seen targets that are tracked, by hand and against plain loops."""
+"""The share of the seen targets that are tracked, and the time until one is, by hand and against plain loops."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from scenarios.minimal import changed
 from vedette import models
 from vedette.densities.estimates import Estimate
 from vedette.errors import InputError, ScenarioError
-from vedette.evaluation import TrackedShare, measure_run, own_metrics, run_scenario, seen_targets
+from vedette.evaluation import TimeToTrack, TrackedShare, measure_run, own_metrics, run_scenario, seen_targets
 from vedette.models import SensorModel
 from vedette.scenarios import load_scenario
 from vedette.simulation.records import RunRecord
@@ -88,6 +88,20 @@ def test_equals_plain_loops() -> None:
     assert 0.0 < np.nanmean(share) < 1.0
 
 
+def test_time_to_track_by_hand() -> None:
+    """0 and 1 from the start on, 2 and 3 later; 1 is tracked late, 3 never."""
+    truth = Truth(
+        np.array([1.0, 2.0, 4.0, 7.0]),
+        np.array([0, 2, 6, 10, 13]),
+        np.array([0, 1, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2]),
+        np.array([[0.0, 0.0], [9, 0], *[[0, 0], [9, 0], [20, 0], [50, 0]] * 2, [0, 0], [9, 0], [20, 0]]),
+    )
+    run = record_of(truth, [[[0.0, 0.0]], [[35.0, 0.0]], [[9.0, 0.5]], [[20.0, 1.0]]])
+    late = TimeToTrack(2.0, 1.0)(run)
+    np.testing.assert_array_equal(late, [math.nan, (5.0 + 2.0) / 2.0, math.nan, math.nan])
+    np.testing.assert_array_equal(TimeToTrack(2.0, 1.0, from_step=1)(run)[:2], [(0.0 + 3.0) / 2.0, 3.5])
+
+
 def test_a_run_of_other_sensors_is_refused() -> None:
     run = record_of(TRUTH, [[]] * 4)
     with pytest.raises(InputError, match="sensors: expected one for each of 2 sensors; got 1"):
@@ -96,12 +110,19 @@ def test_a_run_of_other_sensors_is_refused() -> None:
 
 
 def test_a_scenario_names_it(tmp_path: Path) -> None:
-    text = changed(("ospa: {cutoff: 50.0", "metrics: {share: {kind: tracked_share}}\nospa: {cutoff: 50.0"))
+    text = changed(
+        (
+            "ospa: {cutoff: 50.0",
+            "metrics: {share: {kind: tracked_share}, wait_s: {kind: time_to_track}}\nospa: {cutoff: 50.0",
+        )
+    )
     file = tmp_path / "f.yaml"
     file.write_text(text)
     scenario = load_scenario(file)
     record = run_scenario(scenario, "still", seed=1)
-    share = measure_run(record, scenario, own_metrics(scenario)).columns()["share"]
+    columns = measure_run(record, scenario, own_metrics(scenario)).columns()
+    share = columns["share"]
+    assert np.isnan(columns["wait_s"]).sum() == record.num_scans - 1  # one target, from the second scan on
     # Both sensors see everywhere, so the share is that of the targets which are not missed.
     missed = measure_run(record, scenario).num_missed
     alive = np.diff(record.truth.offsets)

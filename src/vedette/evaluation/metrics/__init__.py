@@ -6,6 +6,7 @@ from vedette.evaluation.metrics.matching import Matching, match_run
 from vedette.evaluation.metrics.point_gospa import GospaResult, GospaSeries, gospa, gospa_distance, gospa_of_run
 from vedette.evaluation.metrics.point_ospa import OspaResult, ospa, ospa_of_run
 from vedette.evaluation.metrics.run import Metric, RunMetrics, measure
+from vedette.evaluation.metrics.time_to_track import TimeToTrack
 from vedette.evaluation.metrics.track_ospa import TrackSet, ospa2, ospa2_of_run
 from vedette.evaluation.metrics.tracked_share import TrackedShare, seen_targets
 from vedette.evaluation.metrics.trajectories import Continuity, continuity, continuity_of_run
@@ -19,6 +20,7 @@ __all__ = [
     "Metric",
     "OspaResult",
     "RunMetrics",
+    "TimeToTrack",
     "TrackSet",
     "TrackedShare",
     "average_nees",

@@ -55,6 +55,13 @@ class TrackedShare(Part):
     kind: Literal["tracked_share"] = Field(default="tracked_share", description="Kind of measure [-].")
 
 
+@derived("vedette.evaluation.metrics.time_to_track:TimeToTrack", without=("cutoff", "order"))
+class TimeToTrack(Part):
+    """At each scan, the mean time until the targets that appear at it are tracked, within the cutoff of `ospa` [s]."""
+
+    kind: Literal["time_to_track"] = Field(default="time_to_track", description="Kind of measure [-].")
+
+
 if TYPE_CHECKING:
     AnyEstimator = Part
     AnyMetric = Part
@@ -62,7 +69,7 @@ else:
     _ESTIMATOR = "vedette.densities:Estimator, a function of the density and the number of the scan"
     _METRIC = "vedette.simulation.records:Measure, a function of a run's record that gives one number a scan"
     AnyEstimator = one_of("estimator", "densities", _ESTIMATOR, own=(MapEstimator, MarginalEstimator))
-    AnyMetric = one_of("metric", "evaluation/metrics", _METRIC, own=(TrackedShare,))
+    AnyMetric = one_of("metric", "evaluation/metrics", _METRIC, own=(TrackedShare, TimeToTrack))
 
 
 class Ospa(Section):
