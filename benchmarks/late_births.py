@@ -87,7 +87,8 @@ def measured(given: Scenario, run: int) -> tuple[float, float, float]:
     start = time.process_time()
     record = run_scenario(given, "jdm", seed=0, run=run, num_threads=1)
     seconds, waits = time.process_time() - start, TimeToTrack(CUTOFF, 1.0)(record)
-    return float(record.ospa[:, 0].mean()), float(np.mean(waits[~np.isnan(waits)])), seconds
+    waits = waits[~np.isnan(waits)]
+    return float(record.ospa[:, 0].mean()), float(waits.mean()) if len(waits) else np.nan, seconds
 
 
 def row(number: int, runs: int) -> tuple[str, float]:

@@ -34,6 +34,7 @@ from vedette.control.rewards import (
     PowerReward,
     RenyiReward,
     Reward,
+    WithMissedCost,
     WithUnitVolume,
 )
 from vedette.control.rules_of_thumb import RulePlanner
@@ -101,6 +102,7 @@ __all__ = [
     "TreeSearch",
     "VoidProbability",
     "WatchedPlanner",
+    "WithMissedCost",
     "WithReach",
     "WithUnitVolume",
     "WithViolations",

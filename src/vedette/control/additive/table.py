@@ -9,6 +9,7 @@ import numpy as np
 
 from vedette.control.additive.rewards import AdditiveRewards, valuation_of
 from vedette.control.additive.situation import SensorGroup, Start, starts_of
+from vedette.control.rewards.base import WithMissedCost
 from vedette.control.rewards.power import ExpectedLossReward
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import UndetectedIntensity
@@ -155,10 +156,9 @@ def _filling(
 
 def worth_of_finding(reward: Any, settings: PlanningSettings) -> float:
     """What finding an undetected target is worth, in units of the reward."""
-    cost: float | None = getattr(reward, "missed_cost", None)
-    if cost is None:
+    if not isinstance(reward, WithMissedCost):
         return settings.undetected_worth or 0.0
-    return cost if settings.undetected_worth is None else settings.undetected_worth * cost
+    return reward.missed_cost * (1.0 if settings.undetected_worth is None else settings.undetected_worth)
 
 
 def no_cells(num_courses: int) -> Cells:

@@ -1,6 +1,6 @@
 """How much a planned update is worth."""
 
-from vedette.control.rewards.base import LabelReward, LinearReward, PowerReward, Reward, WithUnitVolume
+from vedette.control.rewards.base import LabelReward, LinearReward, PowerReward, Reward, WithMissedCost, WithUnitVolume
 from vedette.control.rewards.labels import (
     CardinalityVarianceReward,
     ExpectedGospaReward,
@@ -21,5 +21,6 @@ __all__ = [
     "PowerReward",
     "RenyiReward",
     "Reward",
+    "WithMissedCost",
     "WithUnitVolume",
 ]

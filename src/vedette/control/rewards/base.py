@@ -90,6 +90,16 @@ class WithUnitVolume(Protocol):
 
 
 @runtime_checkable
+class WithMissedCost(Protocol):
+    """A reward that says what a missed target costs; finding one that was never detected is worth so much."""
+
+    @property
+    def missed_cost(self) -> float:
+        """In units of the reward, at least 0."""
+        ...
+
+
+@runtime_checkable
 class LinearReward(Protocol):
     """A reward whose `combine` is linear: searches then have bounds and compiled ascents, explanations targets."""
 
