@@ -64,7 +64,7 @@ class MeasuredBirth(Section):
     expected: Positive | Literal["learnt"] = Field(
         default=0.5,
         description="Mean number of such births a scan; learnt: estimated from the scans, where undetected targets are "
-        "an intensity [-].",
+        "an intensity. Where planners then search for them, a number is where that estimate starts [-].",
     )
     max_existence: Chance = Field(
         default=0.03,
