@@ -130,7 +130,7 @@ def _targets(scenario: Scenario) -> Table:
 
     truth = truth_of(scenario)
     table = _numbers_table("targets", "id", "from\n(s)", "to\n(s)", "x\n(m)", "y\n(m)", "vx\n(m/s)", "vy\n(m/s)")
-    scans = np.repeat(np.arange(truth.num_scans), np.diff(truth.offsets))
+    scans = truth.scans
     for target in np.unique(truth.ids):
         rows = np.flatnonzero(truth.ids == target)
         first, last = truth.times[scans[rows[0]]], truth.times[scans[rows[-1]]]

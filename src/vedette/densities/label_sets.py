@@ -123,8 +123,8 @@ def without_labels(belief: _Labelled, labels: Ints) -> tuple[_Labelled, float]:
     if len(labels) == 0:
         return belief, 0.0
     known, existence = belief.label_existence()
-    dropped = float(existence[_are_among(known, labels)].sum())
-    kept = ~_are_among(belief.tracks.labels, labels)
+    dropped = float(existence[are_among(known, labels)].sum())
+    kept = ~are_among(belief.tracks.labels, labels)
     given: Any = belief
     if belief.is_lmb:
         return given.take(np.flatnonzero(kept)), dropped
@@ -132,7 +132,7 @@ def without_labels(belief: _Labelled, labels: Ints) -> tuple[_Labelled, float]:
     return found, dropped
 
 
-def _are_among(labels: Ints, table: Ints) -> Bools:
+def are_among(labels: Ints, table: Ints) -> Bools:
     """(num_labels,) whether each label is in a table."""
     distinct, place = distinct_labels(np.concatenate([table, labels]))
     known = np.zeros(len(distinct), np.bool_)

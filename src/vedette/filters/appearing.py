@@ -18,6 +18,7 @@ from vedette.densities import (
     track_moments,
 )
 from vedette.densities.checks import distinct_labels
+from vedette.densities.label_sets import are_among
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.steps.lmb import Reduction
 from vedette.kernels.steps.undetected import survival_probabilities, take_out_detected
@@ -171,8 +172,7 @@ def with_learnt_rate(
     if learnt is None or cells is None or places is None:
         return undetected
     labels, existence = existence_probabilities(before)
-    held = set(map(tuple, kept.tracks.labels.tolist()))
-    is_held = np.array([tuple(label) in held for label in labels.tolist()], np.bool_)
+    is_held = are_among(labels, kept.tracks.labels)
     shares = _shares_of(learnt, labels)
     past = learnt.past + float((shares * existence)[~is_held].sum())
     number = past + float((shares * existence)[is_held].sum())

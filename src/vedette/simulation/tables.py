@@ -171,7 +171,7 @@ def _poses_of(tables: Mapping[str, Mapping[str, Any]]) -> Floats:
 
 def _truth(record: RunRecord) -> Columns:
     truth = record.truth
-    scans = np.repeat(np.arange(record.num_scans), np.diff(truth.offsets))
+    scans = truth.scans
     return {"step": scans + 1, "time_s": record.times[scans], "target": truth.ids, **_columns("state_", truth.states)}
 
 

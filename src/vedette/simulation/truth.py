@@ -42,6 +42,11 @@ class Truth(Speaking):
         """Number of scans."""
         return len(self.times)
 
+    @property
+    def scans(self) -> Ints:
+        """(total,) the scan of each row, counted from 0."""
+        return np.repeat(np.arange(self.num_scans), np.diff(self.offsets))
+
     def at(self, scan: int) -> tuple[Ints, Floats]:
         """(n,) ids and (n, state_dim) states of the targets alive at scan `scan`, counted from 0."""
         if not 0 <= scan < self.num_scans:
@@ -68,7 +73,7 @@ class Truth(Speaking):
         float_array("Truth.states", self.states, (int(offsets[-1]), None))
         if self.ids.shape != (offsets[-1],) or (self.ids < 0).any():
             raise reject("Truth.ids", f"{offsets[-1]} ids of at least 0", self.ids)
-        scans = np.repeat(np.arange(self.num_scans), np.diff(offsets))
+        scans = self.scans
         order = np.lexsort((self.ids, scans))
         twice = (np.diff(self.ids[order]) == 0) & (np.diff(scans[order]) == 0)
         if twice.any():

@@ -40,14 +40,12 @@ class TimeToTrack:
     def __call__(self, record: RunRecord) -> Floats:
         """(num_scans,) s. Raises `InputError` as `match_run` does."""
         truth = record.truth
-        scans = np.repeat(np.arange(truth.num_scans), np.diff(truth.offsets))
-        tracked = np.zeros(len(scans), np.bool_)
-        tracked[match_run(truth, record.estimates, cutoff=self.cutoff, order=self.order).truth_rows] = True
-        waits: list[list[float]] = [[] for _ in range(truth.num_scans)]
-        for target in np.unique(truth.ids):
-            own = np.flatnonzero(truth.ids == target)
-            first, found = scans[own[0]], own[tracked[own]]
-            until = scans[found[0] if len(found) else own[-1]]
-            if first + 1 >= self.from_step:
-                waits[first].append(float(truth.times[until] - truth.times[first]))
-        return np.array([np.mean(own) if own else np.nan for own in waits])
+        _, first, of_row = np.unique(truth.ids, return_index=True, return_inverse=True)
+        until = len(truth.ids) - 1 - np.unique(truth.ids[::-1], return_index=True)[1]
+        tracked = np.sort(match_run(truth, record.estimates, cutoff=self.cutoff, order=self.order).truth_rows)[::-1]
+        until[of_row[tracked]] = tracked  # of a target's rows the first one stays, as it comes last
+        appears, waits = truth.scans[first], truth.times[truth.scans[until]] - truth.times[truth.scans[first]]
+        counts = appears + 1 >= self.from_step
+        number = np.bincount(appears[counts], minlength=truth.num_scans)
+        total = np.bincount(appears[counts], waits[counts], truth.num_scans)
+        return np.where(number > 0, total / np.maximum(number, 1), np.nan)

@@ -71,7 +71,7 @@ class TrackedShare:
         matching = match_run(truth, record.estimates, cutoff=self.cutoff, order=self.order)
         tracked = np.zeros(len(seen), np.bool_)
         tracked[matching.truth_rows] = True
-        scans = np.repeat(np.arange(truth.num_scans), np.diff(truth.offsets))
+        scans = truth.scans
         number = np.bincount(scans[seen], minlength=truth.num_scans)
         kept = np.bincount(scans[seen & tracked], minlength=truth.num_scans)
         return np.where(number > 0, kept / np.maximum(number, 1), np.nan)
