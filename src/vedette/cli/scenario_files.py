@@ -218,7 +218,7 @@ def code_faults(scenario: Scenario) -> list[str]:
 
 
 def warn(scenario: Scenario, further: Iterable[tuple[Place, str]] = ()) -> list[str]:
-    """Print the warnings of a scenario to standard error, as of `cautions`; returns them."""
+    """Print the warnings of a scenario (`cautions`) to standard error, and return them."""
     from vedette.scenarios.cautions import cautions
 
     lines = list(cautions(scenario, further))

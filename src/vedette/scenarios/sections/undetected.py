@@ -70,7 +70,7 @@ def undetected_anywhere(model: ScenarioModel, birth: BirthModel) -> UndetectedMo
     """The targets that appear anywhere, for filters whose undetected targets are an intensity.
 
     Their birth rate is learnt where the section does not give it and tracks start from measurements, and where planners
-    search: one that is promised for nothing makes them search for ever. None where `birth.from_measurements` says all
+    search: with a fixed rate that is too high they never stop searching. None where `birth.from_measurements` says all
     there is to say. birth: of the filters, without them.
     """
     section, measured, scan = model.undetected, birth.from_measurements, model.time.step_period
