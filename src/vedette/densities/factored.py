@@ -135,9 +135,9 @@ class FactoredGLMB(Hypotheses):
         return self.to_kernel()
 
     @classmethod
-    def from_kernel(cls, density: kt.FactoredGlmb) -> FactoredGLMB:
+    def from_kernel(cls, density: kt.FactoredGlmb, undetected: UndetectedTargets | None = None) -> FactoredGLMB:
         """The arrays of a bundle as they are; a kernel's own need no check."""
-        return unchecked(cls, TrackTable.from_kernel(density.tracks), *density[1:], None)
+        return unchecked(cls, TrackTable.from_kernel(density.tracks), *density[1:], undetected)
 
     @classmethod
     def empty(cls, state_dim: int) -> FactoredGLMB:

@@ -15,11 +15,14 @@ from vedette.densities.label_sets import take_factors
 from vedette.errors import InputError, NumericalError
 from vedette.filters.appearing import appearing, with_deaths, with_faint_candidates, with_learnt_rate
 from vedette.filters.base import LabelledFilter, OfKind, SensorStep, blind_sensor
+from vedette.filters.inputs import born_at, check_new, nobody
 from vedette.filters.limits import Limits
 from vedette.filters.multi_sensor import InTurn, MultiSensorFilter
 from vedette.filters.protocols import FilterInfo
 from vedette.filters.undetected import (
+    SplitBirths,
     named_at,
+    no_births,
     no_undetected,
     predicted_undetected,
     seen_by,
@@ -31,7 +34,7 @@ from vedette.kernels.base.types import Bools, FactoredGlmb, Ints, Lmb
 from vedette.kernels.steps.factor_updates import Factoring
 from vedette.kernels.steps.factored import FactoredReport, step_factored
 from vedette.kernels.steps.in_view import in_view
-from vedette.models.arguments import dimension, non_negative, one_of
+from vedette.models.arguments import dimension, non_negative, one_of, step_number
 from vedette.models.fields import Count, L1Error
 
 # At a measurement, claims are cut while the sum over pairs of their products is at most this times the error of a
@@ -74,8 +77,18 @@ class _OfFactors(OfKind[FactoredGLMB]):
         return UndetectedTargets.none(self.targets.state_dim)
 
     def _births(self, dt: float, step: Any, prior: Labelled | None, births: LMB | None) -> Lmb:
-        born = OfKind._births(self, dt, step, prior, births)
-        return born if self.births == "labelled" or births is not None else split_births(born)[0]
+        if self.births == "labelled" or births is not None:
+            return OfKind._births(self, dt, step, prior, births)
+        number, birth = step_number(step), self.targets.birth
+        if prior is not None and birth.is_active(number):
+            check_new(prior, number, step)
+        born = self._born(dt, number).labels
+        return born_at(born, number).to_kernel() if born.tracks.num_tracks else nobody(birth.state_dim)
+
+    def _born(self, dt: float, step: int) -> SplitBirths:
+        """At the sites within the `dt` seconds before a step."""
+        birth = self.targets.birth
+        return split_births(birth, dt) if birth.is_active(step) else no_births(birth.state_dim)
 
     def _before_scan(self, prior: FactoredGLMB, dt: float, step: Any, births: LMB | None) -> _Before:
         if self.births == "labelled":
@@ -83,9 +96,11 @@ class _OfFactors(OfKind[FactoredGLMB]):
         undetected, error = self._none() if prior.undetected is None else prior.undetected, 0.0
         if dt > 0.0:
             # Births that a caller gives are instead of the model's, anywhere as at sites.
-            born = split_births(OfKind._births(self, dt, step, None, None))[1] if births is None else None
-            undetected = with_deaths(undetected, prior, self.targets.survival, dt)
-            undetected, error = predicted_undetected(undetected, self.targets, born, dt, self.limits)
+            born = self._born(dt, step) if births is None else no_births(self.targets.state_dim)
+            undetected, error = with_deaths(undetected, prior, self.targets.survival, dt), born.error
+            undetected = predicted_undetected(
+                undetected, self.targets, born.undetected, dt, self.limits, appear=births is None
+            )
         if step is not None:
             undetected = named_at(undetected, step, self.targets.birth.num_sites)
         return _Before(prior.to_kernel(), undetected, error)
@@ -114,7 +129,8 @@ class _OfFactors(OfKind[FactoredGLMB]):
     def _concluded(
         self, posterior: _Before, reports: Sequence[FactoredReport], *, log_likelihood: float, repeats: Sequence[Ints]
     ) -> tuple[FactoredGLMB, FilterInfo]:
-        whole, undetected = FactoredGLMB.from_kernel(posterior.density), posterior.undetected
+        undetected = posterior.undetected
+        whole = FactoredGLMB.from_kernel(posterior.density, undetected)
         found, dropped, is_full = self.limits.without_excess(whole)
         # Where undetected targets are an intensity, dropped labels return to it: the caps' are counted as dropped all
         # the same, those below `min_existence` are not.
@@ -123,7 +139,8 @@ class _OfFactors(OfKind[FactoredGLMB]):
         lost = "dropped_existence" if undetected is None else "left_out"
         dropped += sum(float(getattr(report, lost)) for report in reports)
         factoring = posterior.error + sum(float(report.split_error + 4.0 * report.taken_twice) for report in reports)
-        return found.with_fields(undetected=undetected), FilterInfo(
+        belief = found if found.undetected is undetected else found.with_fields(undetected=undetected)
+        return belief, FilterInfo(
             log_likelihood=log_likelihood,
             num_hypotheses=found.num_hyps,
             num_tracks=found.tracks.num_tracks,

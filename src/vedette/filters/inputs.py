@@ -53,15 +53,14 @@ def check_scan(scan: Any, sensor: SensorModel) -> tuple[Floats, Ints]:
     if given.ndim != 2 or given.shape[1] != meas_dim:
         raise InputError(f"scan: expected {expected}; got shape {given.shape}")
     array = np.array(given, dtype=np.float64, order="C")
-    bad, is_below, largest = examined_scan(array, measurement.least, measurement.angular)
+    bad, is_below, largest, may_repeat = examined_scan(array, measurement.least, measurement.angular)
     if bad >= 0:
         raise InputError(f"scan: expected finite numbers; got {array[bad].tolist()} in row {bad}")
     if is_below:
         _tell_negative(array, measurement, sensor.noise.least_stds)
     if largest > 3.14:  # few scans
-        array = _in_one_turn(array, measurement.angular)
-    column = np.sort(array[:, 0])
-    if (column[1:] != column[:-1]).all():  # most scans
+        array, may_repeat = _in_one_turn(array, measurement.angular), True
+    if not may_repeat:  # most scans
         return array, _NO_ROWS
     _, first = np.unique(array, axis=0, return_index=True)
     repeats = np.setdiff1d(np.arange(len(array)), first)
@@ -113,10 +112,16 @@ def births_for(
     else:
         return nobody(birth.state_dim)
     if belief is not None and len(born.tracks.labels):
-        newest = belief.tracks.labels[:, 0].max(initial=np.iinfo(np.int64).min)
-        if newest >= born.tracks.labels[:, 0].min():
-            raise reject("step", f"a step after those of the labels in the belief, of which the last is {newest}", step)
+        check_new(belief, born.tracks.labels[:, 0].min(), step)
     return born.to_kernel()
+
+
+def check_new(belief: Labelled, first: int, step: Any) -> None:
+    """`InputError` where labels born at steps from `first` on could repeat those of a belief. step: that was given."""
+    steps = belief.tracks.labels[:, 0]
+    newest = steps.max() if len(steps) else first - 1
+    if newest >= first:
+        raise reject("step", f"a step after those of the labels in the belief, of which the last is {newest}", step)
 
 
 def no_time(dt: Any) -> bool:
@@ -134,10 +139,13 @@ def births_at(birth: BirthModel, step: int) -> LMB:
     """The LMB of the targets that may be born at `step`, or within the model's period, labelled (step, site)."""
     if not birth.is_active(step):
         return LMB.empty(birth.state_dim)
-    born = _births_of(birth)
-    labels = born.tracks.labels.copy()
+    return born_at(births_of(birth), step)
+
+
+def born_at(born: LMB, step: int) -> LMB:
+    """The same targets with the labels of a step."""
+    tracks, labels = born.tracks, born.tracks.labels.copy()
     labels[:, 0] = step
-    tracks = born.tracks
     same = (tracks.offsets, tracks.log_weights, tracks.means, tracks.covs)
     return unchecked(LMB, unchecked(TrackTable, labels, *same, None), born.existence_logit)
 
@@ -155,8 +163,8 @@ def births_within(born: LMB, period: float | None, dt: float) -> LMB:
 
 
 @lru_cache(maxsize=1000)
-def _births_of(birth: BirthModel) -> LMB:
-    """Those of no step, laid out once a model."""
+def births_of(birth: BirthModel) -> LMB:
+    """The births at the sites, of step 0; laid out once a model."""
     labels = np.column_stack([np.zeros(birth.num_sites, np.int64), np.arange(birth.num_sites)])
     tracks = gaussian_tracks(labels, birth.means, birth.covs)
     return unchecked(LMB, tracks, np.log(birth.existence) - np.log1p(-birth.existence))

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
-from typing import Any
+from functools import cache, lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from vedette.densities import LMB, FactoredGLMB, Poisson, UndetectedTargets, as_lmb
 from vedette.densities.label_sets import without_labels
 from vedette.filters.appearing import cells_after, density_at, predicted_cells
+from vedette.filters.inputs import births_of, births_within
 from vedette.filters.limits import Limits
 from vedette.kernels.association.first_detections import Undetected
 from vedette.kernels.base.types import Floats, Lmb, Mixture
-from vedette.kernels.gaussian.intensities import condensed, predict_intensity_by, stacked_mixtures
+from vedette.kernels.gaussian.intensities import predicted_intensity, stacked_mixtures
 from vedette.models import BirthModel, SensorModel, TargetModel, kernel_motion
 from vedette.models.arguments import reject, step_number
 from vedette.probabilities import expit
@@ -30,44 +31,52 @@ _WIDE = 3.0
 @cache
 def no_undetected(state_dim: int) -> Undetected:
     """No undetected targets, as kernels take them."""
-    none = Poisson.empty(state_dim).to_kernel()
+    none = no_births(state_dim).undetected
     return Undetected(none, none, 0, 0, 0.0)
 
 
-def split_births(born: Lmb) -> tuple[Lmb, Lmb]:
-    """The births that are labels from the start, and those that are undetected targets."""
+class SplitBirths(NamedTuple):
+    """Births at sites, as the default filter takes them."""
+
+    labels: LMB  # that are there from the start, of step 0
+    undetected: Mixture  # intensity of the others
+    error: float  # L1, of taking these as Poisson
+
+
+@lru_cache(maxsize=100)
+def split_births(birth: BirthModel, dt: float) -> SplitBirths:
+    """The births at all sites within `dt` seconds."""
+    born = births_within(births_of(birth), birth.period, dt)
     existence = expit(born.existence_logit)
-    if (existence < FROM_THE_START).all():
-        return LMB.empty(born.tracks.means.shape[1]).to_kernel(), born
-    whole = LMB.from_kernel(born)
     strong, weak = (np.flatnonzero(chosen) for chosen in (existence >= FROM_THE_START, existence < FROM_THE_START))
-    return whole.take(strong).to_kernel(), whole.take(weak).to_kernel()
+    undetected = _intensity_of(born.take(weak).to_kernel())
+    return SplitBirths(born.take(strong), undetected, float((2.0 * existence * -np.expm1(-existence))[weak].sum()))
+
+
+@cache
+def no_births(state_dim: int) -> SplitBirths:
+    """Nobody is born."""
+    return SplitBirths(LMB.empty(state_dim), Poisson.empty(state_dim).to_kernel(), 0.0)
 
 
 def predicted_undetected(
-    before: UndetectedTargets, targets: TargetModel, births: Lmb | None, dt: float, limits: Limits
-) -> tuple[UndetectedTargets, float]:
-    """The undetected targets `dt` seconds later, and the L1 error of taking births at sites as Poisson.
+    before: UndetectedTargets, targets: TargetModel, born: Mixture, dt: float, limits: Limits, *, appear: bool
+) -> UndetectedTargets:
+    """The undetected targets `dt` seconds later.
 
     Args:
         before: at the time of the last scan.
         targets: how they move, live on, and appear anywhere.
-        births: at sites, which have appeared since; None: nobody has, anywhere.
+        born: intensity of those that have appeared at sites since.
         dt: s, above 0.
         limits: of which `max_intensity_components` counts.
+        appear: whether targets have appeared anywhere since.
     """
-    error = 0.0
     motion = kernel_motion(targets.motion, targets.survival)
-    intensity = predict_intensity_by(before.intensity.to_kernel(), motion, dt)
-    if births is not None and len(births.existence_logit):
-        existence = expit(births.existence_logit)
-        intensity = stacked_mixtures(intensity, _intensity_of(births))
-        error = float((2.0 * existence * -np.expm1(-existence)).sum())
-    intensity, _ = condensed(
-        intensity, max(limits.max_intensity_components, _COMPONENTS_A_SITE * targets.birth.num_sites)
-    )
-    cells = predicted_cells(before, targets, dt, appear=births is not None)
-    return UndetectedTargets(Poisson.from_kernel(intensity), before.next_label, *cells), error
+    most = max(limits.max_intensity_components, _COMPONENTS_A_SITE * targets.birth.num_sites)
+    intensity = predicted_intensity(before.intensity.to_kernel(), motion, dt, born, most)
+    cells = predicted_cells(before, targets, dt, appear=appear)
+    return UndetectedTargets(Poisson.from_kernel(intensity), before.next_label, *cells)
 
 
 def with_dropped(undetected: UndetectedTargets, before: FactoredGLMB, kept: FactoredGLMB) -> UndetectedTargets:
@@ -101,9 +110,9 @@ def named_at(undetected: UndetectedTargets, step: Any, num_sites: int) -> Undete
 def seen_by(
     undetected: UndetectedTargets, error: float, birth: BirthModel, sensor: SensorModel, scan: Floats, pose: Floats
 ) -> Undetected:
-    """Return the undetected targets in the form that `step_factored` needs. error: see `predicted_undetected`."""
+    """Return the undetected targets in the form that `step_factored` needs. error: see `SplitBirths`."""
     intensity = undetected.intensity.to_kernel()
-    local, measured = Poisson.empty(intensity.means.shape[1]).to_kernel(), birth.from_measurements
+    local, measured = no_births(birth.state_dim).undetected, birth.from_measurements
     if undetected.cells is not None and measured is not None and len(scan):
         places, std = sensor.measurement.positions(scan, pose), measured.std.copy()
         std[:2] *= _WIDE

@@ -35,7 +35,13 @@ def stacked_mixtures(first: Mixture, second: Mixture) -> Mixture:
 
 
 @kernel
-def predict_intensity_by(intensity: Mixture, motion: Motion, dt: float) -> Mixture:
+def predicted_intensity(intensity: Mixture, motion: Motion, dt: float, born: Mixture, max_components: int) -> Mixture:
+    """The intensity `dt` seconds later with those born since, condensed."""
+    return condensed(stacked_mixtures(_moved(intensity, motion, dt), born), max_components)
+
+
+@kernel
+def _moved(intensity: Mixture, motion: Motion, dt: float) -> Mixture:
     """Survival and motion over `dt` seconds, component by component."""
     num, dim = intensity.means.shape
     out, scratch = make_components(num, dim), make_scratch(dim, 1)
@@ -116,23 +122,22 @@ def _merged(mixture: Mixture, reach: float) -> Mixture:
 
 
 @kernel
-def condensed(intensity: Mixture, max_components: int) -> tuple[Mixture, float]:
-    """The intensity in at most `max_components` components, and the expected number of targets that were dropped.
+def condensed(intensity: Mixture, max_components: int) -> Mixture:
+    """The intensity in at most `max_components` components.
 
     Components that say nearly the same are merged; where there are still too many, those that differ more and more.
     Components lighter than a billionth of a target are dropped.
     """
-    found, reach, dropped = _merged(intensity, _REACH), _REACH, 0.0
+    found, reach = _merged(intensity, _REACH), _REACH
     while len(found.log_weights) > max_components:
         reach *= _GROWTH
         found = _merged(found, reach)
     lightest, kept = math.log(_LIGHTEST), 0
     for c in range(len(found.log_weights)):
         if found.log_weights[c] < lightest:
-            dropped += math.exp(found.log_weights[c])
             continue
         if kept < c:
             found.log_weights[kept] = found.log_weights[c]
             copy_component(found.means, found.covs, c, found.means, found.covs, kept)
         kept += 1
-    return Mixture(found.log_weights[:kept].copy(), found.means[:kept].copy(), found.covs[:kept].copy()), dropped
+    return Mixture(found.log_weights[:kept].copy(), found.means[:kept].copy(), found.covs[:kept].copy())

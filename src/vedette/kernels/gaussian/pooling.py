@@ -7,10 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.kernels.base.compile import inlined, kernel
-from vedette.kernels.base.types import Floats, Ints, Tracks
-from vedette.kernels.gaussian.mixtures import copy_component, match_components, moment_match, require_gaussians
-from vedette.kernels.gaussian.reduction import MixtureCaps, reduce_mixture
+from vedette.kernels.base.compile import borrowing, inlined, kernel
+from vedette.kernels.base.types import Floats, Ints, Mixture, Tracks
+from vedette.kernels.gaussian.mixtures import (
+    copy_component,
+    make_components,
+    match_components,
+    moment_match,
+    require_gaussians,
+)
+from vedette.kernels.gaussian.reduction import MixtureCaps, make_reduction_work, reduce_into
 
 
 class Moments(NamedTuple):
@@ -66,20 +72,16 @@ def _gather(
     return count
 
 
-@kernel
-def _reduced_components(
-    tracks: Tracks, components: Ints, weights: Floats, caps: MixtureCaps
-) -> tuple[Floats, Floats, Floats]:
-    """The normalised, reduced mixture of `components` under linear weights."""
-    num, n = len(components), tracks.means.shape[1]
-    log_weights, means, covs, total = np.empty(num), np.empty((num, n)), np.empty((num, n, n)), 0.0
-    for weight in weights:
-        total += weight
+@borrowing
+def _write_normalised(tracks: Tracks, components: Ints, weights: Floats, num: int, wide: Mixture) -> None:
+    """Write (-> wide) the mixture of the first `num` of `components` under linear weights, normalised."""
+    total = 0.0
+    for c in range(num):
+        total += weights[c]
     for c in range(num):
         share = weights[c] / total if total > 0.0 else 1.0 / num
-        log_weights[c] = math.log(share) if share > 0.0 else -math.inf
-        copy_component(tracks.means, tracks.covs, components[c], means, covs, c)
-    return reduce_mixture(log_weights, means, covs, caps)
+        wide.log_weights[c] = math.log(share) if share > 0.0 else -math.inf
+        copy_component(tracks.means, tracks.covs, components[c], wide.means, wide.covs, c)
 
 
 @kernel
@@ -95,25 +97,22 @@ def pooled_tracks(
         largest = max(largest, size)
         room += min(size, caps.max_components)
     components, component_weights = np.empty(largest, np.int64), np.empty(largest)
+    wide, work = make_components(largest, n), make_reduction_work(largest, n)
     offsets, log_weights, means, covs = (
         np.zeros(num + 1, np.int64),
         np.zeros(room),
         np.empty((room, n)),
         np.empty((room, n, n)),
     )
+    out = Mixture(log_weights, means, covs)
     for i in range(num):
         count = _gather(tracks, pool, weights, pool_offsets[i], pool_offsets[i + 1], components, component_weights)
         if caps.max_components == 1 or count == 1:
             match_components(components, component_weights, count, tracks.means, tracks.covs, means[used], covs[used])
             used += 1
         else:
-            reduced_log_weights, reduced_means, reduced_covs = _reduced_components(
-                tracks, components[:count], component_weights[:count], caps
-            )
-            for c in range(len(reduced_log_weights)):
-                log_weights[used] = reduced_log_weights[c]
-                copy_component(reduced_means, reduced_covs, c, means, covs, used)
-                used += 1
+            _write_normalised(tracks, components, component_weights, count, wide)
+            used = reduce_into(wide, count, caps, work, out, used)
         offsets[i + 1] = used
     if used < room:
         log_weights, means, covs = log_weights[:used].copy(), means[:used].copy(), covs[:used].copy()

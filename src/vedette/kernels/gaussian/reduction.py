@@ -9,7 +9,7 @@ import numpy as np
 
 from vedette.kernels.base.compile import borrowing, kernel
 from vedette.kernels.base.types import Floats, Ints, Mixture
-from vedette.kernels.gaussian.linalg import cholesky, log_sum, solve_lower
+from vedette.kernels.gaussian.linalg import cholesky, log_sum
 from vedette.kernels.gaussian.mixtures import (
     copy_component,
     make_components,
@@ -61,20 +61,23 @@ def _near(heaviest: int, wide: Mixture, width: int, merge_distance: float, work:
     means, covs, near = wide.means, wide.covs, work.near
     factor, difference, n = work.factor, work.difference, wide.means.shape[1]
     near[0] = heaviest
-    count = 1
+    count, most = 1, merge_distance * merge_distance
     # Distances are measured under the heaviest component's covariance, as its neighbours are to fit into it.
     if not merge_distance > 0.0 or not cholesky(covs[heaviest], factor):
         return count
     for c in range(width):
         if c == heaviest or work.left[c] == -math.inf:
             continue
-        for i in range(n):
-            difference[i] = means[c, i] - means[heaviest, i]
-        solve_lower(factor, difference, difference)
         squared = 0.0
-        for i in range(n):
+        for i in range(n):  # as `solve_lower`, until the distance is known to be too great
+            total = means[c, i] - means[heaviest, i]
+            for k in range(i):
+                total -= factor[i, k] * difference[k]
+            difference[i] = total / factor[i, i]
             squared += difference[i] * difference[i]
-        if squared < merge_distance * merge_distance:
+            if squared >= most:
+                break
+        if squared < most:
             near[count] = c
             count += 1
     return count

@@ -72,14 +72,19 @@ def mixed_scan(measured: Floats, ids: Ints, seen: Bools, clutter: Floats, order:
 
 
 @kernel
-def examined_scan(scan: Floats, least: Floats, angular: Bools) -> tuple[int, bool, float]:
-    """The first row that is not finite, or -1; whether any component is below its least value; the largest angle."""
+def examined_scan(scan: Floats, least: Floats, angular: Bools) -> tuple[int, bool, float, bool]:
+    """The first row that is not finite, or -1; whether any component is below its least value; the largest angle;
+    whether two rows begin with the same number.
+    """
     is_below, largest = False, 0.0
     for i in range(scan.shape[0]):
         for j in range(scan.shape[1]):
             if not math.isfinite(scan[i, j]):
-                return i, is_below, largest
+                return i, is_below, largest, False
             is_below = is_below or scan[i, j] < least[j]
             if angular[j]:
                 largest = max(largest, abs(scan[i, j]))
-    return -1, is_below, largest
+    column, is_repeated = np.sort(scan[:, 0]), False
+    for i in range(1, len(column)):
+        is_repeated = is_repeated or column[i] == column[i - 1]
+    return -1, is_below, largest, is_repeated

@@ -12,7 +12,7 @@ from vedette.kernels.association.children import Children, make_children
 from vedette.kernels.association.predicted import Rows
 from vedette.kernels.association.ranked import Ranking, ranked
 from vedette.kernels.association.search import make_search
-from vedette.kernels.association.totals import ROUNDING, log_heaviest_left, log_weight_bound
+from vedette.kernels.association.totals import ROUNDING, log_heaviest_left, log_row_totals, log_weight_bound
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.arrays import filled_ints
 from vedette.kernels.base.compile import borrowing, kernel
@@ -182,7 +182,8 @@ def update_group(group: Group, truncation: Truncation, ranking: Ranking, work: W
     ranking, cut = ranked(group.options, group.parents, truncation.search, ranking)
     children = ranking.children
     log_next = log_heaviest_left(children, truncation.search, cut)
-    log_bound = log_weight_bound(group.options, group.parents, children, log_next, group.log_bound)
+    log_totals = log_row_totals(group.options)
+    log_bound = log_weight_bound(group.options, group.parents, children, log_totals, log_next, group.log_bound)
     # A search that ran dry has left nothing out.
     is_covered = children.filled[0] < truncation.search.max_hypotheses and not cut
     children, kept = kept_children(found, children, truncation, is_covered)

@@ -140,8 +140,9 @@ def _conclude(
 
     num_prior: tracks of the prior. log_next: as of `log_weight_bound`. is_covered: as of `kept_children`.
     """
-    log_bound = log_total_bound(log_row_totals(found.options), found.parents)
-    log_bound = log_weight_bound(found.options, found.parents, children, log_next, log_bound)
+    log_totals = log_row_totals(found.options)
+    log_bound = log_total_bound(log_totals, found.parents)
+    log_bound = log_weight_bound(found.options, found.parents, children, log_totals, log_next, log_bound)
     children, kept = kept_children(found, children, truncation, is_covered)
     posterior, log_total, naming = assemble(children, kept, found.parents, found.rows, found.options)
     require_gaussians(posterior.tracks.means, posterior.tracks.covs)
