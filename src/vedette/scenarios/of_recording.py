@@ -13,6 +13,7 @@ from vedette.errors import InputError, ScenarioError
 from vedette.kernels.base.types import Floats
 from vedette.reading import read_text
 from vedette.recorded import Conventions, RecordedScans
+from vedette.scenarios.assumed_clutter import assumed_clutter, place_stds
 from vedette.scenarios.extents import measured_region, reached_region, region_in_words
 from vedette.scenarios.faults import Fault
 from vedette.scenarios.loading import Scenario, diagnose
@@ -217,7 +218,7 @@ def _assumed(
             for s in range(len(model.sensors))
         ]
         told |= _assumed_birth(model, measured, folder, speed, words)
-    told |= _assumed_clutter(said, model, recording, words)
+    told |= assumed_clutter(said, model, recording, folder, speed, words)
     if _are_recorded(said["targets"]) and "time_origin" not in said["targets"]:
         told["targets"] = {**said["targets"], "time_origin": recording.start}
     return told, tuple(words)
@@ -267,37 +268,15 @@ def _time(recording: RecordedScans) -> dict[str, Any]:
     return {"num_steps": len(recording.times), "step_period": period, "start": float(recording.times[0])}
 
 
-def _assumed_clutter(
-    said: Mapping[str, Any], model: ScenarioModel, recording: RecordedScans, words: list[str]
-) -> dict[str, Any]:
-    """The sensors with a rate of clutter, where none is said: half of what they measure."""
-    defaults = said.get("sensor_defaults")
-    shared = isinstance(defaults, Mapping) and "clutter" in defaults
-    sensors = []
-    for s, sensor in enumerate(said["sensors"]):
-        if shared or "clutter" in sensor:
-            sensors.append(sensor)
-            continue
-        counts = [len(scan) for scans in recording.scans if (scan := scans[s]) is not None]
-        rate = max(0.1, round(0.5 * float(np.mean(counts)), 2)) if counts else 1.0
-        sensors.append({**sensor, "clutter": {"kind": "region", "rate": rate}})
-        why = "half of what it measures" if counts else "as it has no scan in the recording"
-        words.append(f"clutter of {model.sensor_names[s]}: {rate:g} a scan, {why}")
-    return {"sensors": sensors}
-
-
 def _spread(model: ScenarioModel, measured: Sequence[Sequence[Floats]], folder: FilePath) -> float:
     """Standard deviation of where was measured, m: the upper quartile over all measurements that say a place."""
     region, method = model.region.build(), model.filter.gaussian_method
-    found = []
+    found = list[Floats]()
     for section, scans in zip(model.sensors, measured, strict=True):
         stds = section.build(region, method, folder, model.filter.detection_at).noise.least_stds
         if stds is None or not scans:
             continue
-        if section.measurement.kind == "bearing_range":
-            found.append(np.maximum(stds[1], stds[0] * np.concatenate(scans)[:, 1]))
-        elif section.measurement.kind == "position":
-            found.append(np.full(sum(map(len, scans)), stds.max()))
-    if not found:
+        found.append(place_stds(section.measurement.kind, stds, np.concatenate(scans)))
+    if not sum(map(len, found)):
         raise InputError("birth: expected it in the file about sensors, as what they measure says no places; got none")
     return float(np.quantile(np.concatenate(found), 0.75))

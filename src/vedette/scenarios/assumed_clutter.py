@@ -1,0 +1,139 @@
+"""The clutter of sensors whose file gives none, estimated from the recording."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path as FilePath
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vedette.kernels.base.types import Floats
+from vedette.recorded import RecordedScans
+from vedette.recorded.extents import PLACED, places_of
+from vedette.scenarios.sections import ScenarioModel
+
+_FASTER = 1.5  # times the speed that targets hardly exceed, which still count as neighbours
+_NEAR = 2.5 * math.sqrt(2.0)  # noise stds between two measurements of a target that stands still
+_WIDER = 3.0  # times the radius of a neighbourhood, up to which chance neighbours are counted
+_WORST = 0.25  # standard error of the share of measurements that are of targets, at most
+_LEAST = 0.1  # a scan; the least rate that is assumed
+
+
+class Look(NamedTuple):
+    """A scan as places.
+
+    time: s. places: (num, 2) m. stds: (num,) m, the noise of each. detection: (num,) probability of detection there.
+    """
+
+    time: float
+    places: Floats
+    stds: Floats
+    detection: Floats
+
+
+def target_share(looks: Sequence[Look], speed: float) -> float:
+    """Return the share of a sensor's measurements that are of targets; NaN where the recording shows too little.
+
+    A target that is detected at one scan has a neighbour at the next with the probability of detection, a false
+    measurement by chance only. With q_i the probability that measurement i has no chance neighbour, the share is
+
+        sum over i of (has neighbour_i - 1 + q_i) / sum over i of q_i P_D(x_i),
+
+    over the scans before and after. Each q_i is estimated from the ring around the neighbourhood, (1 - 1/8)^n with n
+    measurements in it, which is unbiased for a Poisson number of uniform density there. Measurements whose ring is
+    wider than where measurements lie are left out.
+
+    Args:
+        looks: the sensor's scans, in order of time.
+        speed: m/s that targets hardly exceed.
+    """
+    from scipy.spatial import KDTree
+
+    trees = [KDTree(look.places.reshape(-1, 2)) for look in looks]
+    widest = _widest(looks)
+    excess = expected = 0.0
+    num = 0
+    for k, own in enumerate(looks):
+        for j in (k - 1, k + 1):
+            if not 0 <= j < len(looks) or not len(own.places):
+                continue
+            radii = _NEAR * own.stds + _FASTER * speed * abs(looks[j].time - own.time)
+            near, wide = (
+                trees[j].query_ball_point(own.places, scale * radii, return_length=True) for scale in (1.0, _WIDER)
+            )
+            counts = _WIDER * radii <= widest
+            alone = (1.0 - 1.0 / (_WIDER**2 - 1.0)) ** (wide - near)
+            excess += float(((near > 0) - 1.0 + alone)[counts].sum())
+            expected += float((alone * own.detection)[counts].sum())
+            num += int(np.count_nonzero(counts))
+    if expected <= 0.0 or 0.5 * math.sqrt(num) > _WORST * expected:
+        return math.nan
+    return min(max(excess / expected, 0.0), 1.0)
+
+
+def _widest(looks: Sequence[Look]) -> float:
+    """m, half the side of the square as large as the box around all places."""
+    places = np.concatenate([np.empty((0, 2)), *(look.places for look in looks)])
+    return 0.5 * math.sqrt(np.prod(np.ptp(places, axis=0))) if len(places) else 0.0
+
+
+def place_stds(kind: str, stds: Floats, scan: Floats) -> Floats:
+    """(num,) larger standard deviation of the places of a scan, m; none of a kind that measures no places."""
+    if kind not in PLACED:
+        return np.empty(0)
+    return np.full(len(scan), stds.max()) if kind == "position" else np.maximum(stds[1], stds[0] * scan[:, 1])
+
+
+def assumed_clutter(
+    said: Mapping[str, Any],
+    model: ScenarioModel,
+    recording: RecordedScans,
+    folder: FilePath,
+    speed: float,
+    words: list[str],
+) -> dict[str, Any]:
+    """Return the section `sensors`, with a rate of clutter where none is given; adds to `words` what was assumed."""
+    defaults = said.get("sensor_defaults")
+    shared = isinstance(defaults, Mapping) and "clutter" in defaults
+    sensors = []
+    for s, sensor in enumerate(said["sensors"]):
+        if shared or "clutter" in sensor:
+            sensors.append(sensor)
+            continue
+        rate, why = _rate(model, recording, s, folder, speed)
+        sensors.append({**sensor, "clutter": {"kind": "region", "rate": rate}})
+        words.append(f"clutter of {model.sensor_names[s]}: {rate:g} a scan, {why}")
+    return {"sensors": sensors}
+
+
+def _rate(model: ScenarioModel, recording: RecordedScans, s: int, folder: FilePath, speed: float) -> tuple[float, str]:
+    """The rate of clutter of a sensor, a scan, and how it was found."""
+    counts = [len(scan) for scans in recording.scans if (scan := scans[s]) is not None]
+    if not counts:
+        return 1.0, "as it has no scan in the recording"
+    mean = float(np.mean(counts))
+    share = target_share(_looks(model, recording, s, folder), speed)
+    why = f"the part of its {mean:.3g} measurements a scan that scans before and after do not repeat"
+    if math.isnan(share):
+        share, why = 0.5, f"half of its {mean:.3g} measurements a scan, as its scans do not show which are false"
+    return max(_LEAST, round((1.0 - share) * mean, 2)), why
+
+
+def _looks(model: ScenarioModel, recording: RecordedScans, s: int, folder: FilePath) -> list[Look]:
+    """The scans of a sensor as places; none where it measures no places or its noise is not known."""
+    section = model.sensors[s]
+    sensor = section.build(model.region.build(), model.filter.gaussian_method, folder, model.filter.detection_at)
+    kind, stds, found = section.measurement.kind, sensor.noise.least_stds, list[Look]()
+    if kind not in PLACED or stds is None:
+        return found
+    for time, scans, poses in zip(recording.times.tolist(), recording.scans, recording.poses, strict=True):
+        if (scan := scans[s]) is None:
+            continue
+        places = places_of(scan, poses[s], kind)
+        states = np.zeros((len(places), model.motion.state_dim))
+        states[:, :2] = places
+        detection = sensor.detection.prob(states, poses[s]) if len(places) else np.empty(0)
+        found.append(Look(time, places, place_stds(kind, stds, scan), detection))
+    return found
