@@ -41,6 +41,10 @@ from vedette.models.fields import Count, L1Error
 # split, or this. Finer cuts make groups that no list is long enough for.
 _CUT_PER_ERROR, _MOST_CUT = 5.0, 0.05
 
+# Where undetected targets are an intensity, hypotheses beyond a group's list hold more targets than those in it: they
+# are condensed up to this L1 error. Labels that other sensors have, too, would lose which of them is which.
+_MAX_MERGING = 0.3
+
 # Of the largest factors, how many may take a scan together.
 _FACTORS_TOGETHER = 4
 
@@ -107,7 +111,8 @@ class _OfFactors(OfKind[FactoredGLMB]):
 
     def _stepped(self, prior: _Before, step: SensorStep) -> tuple[_Before, FactoredReport]:
         scan, reduction = step.inputs[0], step.limits.reduction()
-        factoring = _factoring(self.max_split_error, self.max_factor_labels, step.num_scans)
+        max_merging = 0.0 if self.births == "labelled" else _MAX_MERGING
+        factoring = _factoring(self.max_split_error, self.max_factor_labels, step.num_scans, max_merging)
         birth, at = self.targets.birth, (scan.measurements, scan.pose)
         seen = no_undetected(self.targets.state_dim)
         if prior.undetected is not None:
@@ -253,11 +258,11 @@ def _check_factoring(max_split_error: Any, max_factor_labels: Any, births: Any) 
     one_of("births", births, ("poisson", "labelled"))
 
 
-def _factoring(max_split_error: float, max_factor_labels: int, num_scans: int) -> Factoring:
+def _factoring(max_split_error: float, max_factor_labels: int, num_scans: int, max_merging: float) -> Factoring:
     """The fields of a filter as kernels take them."""
     error, most = float(max_split_error), int(max_factor_labels)
     max_cut = min(_CUT_PER_ERROR * error, _MOST_CUT) / num_scans**2
-    return Factoring(error, max_cut, most, _FACTORS_TOGETHER * most)
+    return Factoring(error, max_cut, most, _FACTORS_TOGETHER * most, max_merging)
 
 
 def with_labelled_births(local: Any) -> Any:

@@ -43,9 +43,8 @@ _LOG_RETURNED = math.log(10.0)
 
 # A posterior is condensed where the hypotheses behind this share of the most that a group may have weigh more than
 # that: the next scan has many times as many, and of those cut off most hold more targets than those kept. The L1 error
-# up to which versions of labels are made one then grows by a factor, until it is above the most.
-_KEPT_APART, _MOST_BEHIND = 0.25, 0.05
-_GROWTH, _MOST_MERGED = 3.0, 0.3
+# up to which versions of labels are made one then grows by a factor, until it is above `Factoring.max_merging`.
+_KEPT_APART, _MOST_BEHIND, _GROWTH = 0.25, 0.05, 3.0
 
 
 class Factoring(NamedTuple):
@@ -55,6 +54,7 @@ class Factoring(NamedTuple):
     max_cut: float  # sum over pairs of factors, at each measurement, of the products of claims that are cut
     max_labels: int  # of a factor, after a scan
     max_together: int  # labels of the factors that take a scan together
+    max_merging: float  # L1 error up to which a posterior with too many hypotheses is condensed; 0: it is cut
 
 
 class Work(NamedTuple):
@@ -227,18 +227,18 @@ def _append_label(
 
 
 @kernel
-def _merged(glmb: Glmb, reduction: Reduction, max_error: float, most: int) -> tuple[Glmb, Choices, float]:
+def _merged(glmb: Glmb, reduction: Reduction, factoring: Factoring, most: int) -> tuple[Glmb, Choices, float]:
     """The posterior with names and versions of targets made one, its choices, and a bound on its L1 change.
 
     most: hypotheses that a group may have.
     """
-    caps, choices, renaming_error = reduction.mixture, choices_of(glmb), 0.0
+    caps, choices, renaming_error, max_error = reduction.mixture, choices_of(glmb), 0.0, factoring.max_error
     if reduction.min_existence_logit > -math.inf:  # a prediction keeps all labels
         glmb, choices, renaming_error = with_known_names(glmb, choices, max_error)
     glmb, choices, total = merge_versions(glmb, choices, caps, max_error)
     total += renaming_error
     apart = int(_KEPT_APART * most)
-    while 0.0 < max_error < _MOST_MERGED and choices.weights[apart:].sum() > _MOST_BEHIND:
+    while 0.0 < max_error < factoring.max_merging and choices.weights[apart:].sum() > _MOST_BEHIND:
         max_error *= _GROWTH
         glmb, choices, error = merge_versions(glmb, choices, caps, max_error)
         total += error
@@ -250,7 +250,7 @@ def append_parts(
     store: FactorStore, glmb: Glmb, factoring: Factoring, reduction: Reduction, most: int, work: Work
 ) -> FactorStore:
     """Split the posterior of a group and enter its parts. most: hypotheses that the group may have."""
-    glmb, choices, merging_error = _merged(glmb, reduction, factoring.max_error, most)
+    glmb, choices, merging_error = _merged(glmb, reduction, factoring, most)
     min_existence = 1.0 / (1.0 + math.exp(-reduction.min_existence_logit))
     part_of, error = independent_parts(choices, factoring.max_error, factoring.max_labels, min_existence)
     work.sums[SPLIT] += error
