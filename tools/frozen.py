@@ -83,7 +83,7 @@ def cases(num_random: int) -> Iterator[Case]:
         yield Case(f"reward/{reward}/{search}", "paper-a", short | lmbs | changes)
     for kind, scene in product(("phd", "cphd", "cb_member", *filters), ("linear-10", "polar-10")):
         yield Case(f"{scene}/{kind}", scene, {"filter": {"kind": kind}, "estimator": {"kind": "map"}}, "still")
-    for strategy in ("lookahead", "nearest", "assigned", "centroid", "oracle", "random", "fixed"):
+    for strategy in ("lookahead", "nearest", "assigned", "centroid", "oracle", "told", "random", "fixed"):
         yield Case(f"strategy/{strategy}", "paper-a", short, strategy)
     for number in range(num_random):
         yield Case(f"{RANDOM}/{number:04}", RANDOM, {}, run=number)

@@ -17,7 +17,10 @@ REGION = {"x_min": -400.0, "x_max": 400.0, "y_min": -300.0, "y_max": 300.0}
 MEASURED = {"bearing_range": 2, "bearing_only": 1, "range_only": 1, "position": 2, "custom": 1}
 OWN = Path(__file__).parents[1] / "scenarios"
 SHIPS = "time,id,x,y\n" + "".join(f"{2.0 * k},{ship},{9.0 * k},{50.0 * ship}\n" for k in range(12) for ship in (1, 2))
-STRATEGIES = "jdm", "idm", "lookahead", "nearest", "assigned", "centroid", "oracle", "random", "fixed", "still"
+STRATEGIES = (
+    *("jdm", "idm", "lookahead", "nearest", "assigned", "centroid"),
+    *("oracle", "told", "random", "fixed", "still"),
+)
 
 
 def lay_beside(folder: Path) -> None:

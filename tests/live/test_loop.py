@@ -279,5 +279,17 @@ def test_a_file_that_cannot_serve_is_told(tmp_path: Path, text: str, words: str)
 
 
 def test_who_knows_the_targets_does_not_decide(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="expected one that does not know the targets; got oracle"):
-        small(tmp_path, decide_every=5.0, planner="oracle")
+    for name in ("oracle", "told"):
+        with pytest.raises(InputError, match=f"expected one that does not know the targets; got {name}"):
+            small(tmp_path, decide_every=5.0, planner=name)
+
+
+def test_a_planner_of_the_scenarios_own_decides(tmp_path: Path) -> None:
+    """It passes the truth on to a planner that knows it, and does not know it itself."""
+    text = (
+        SYNCHRONOUS
+        + "planners: {mine: {kind: independent}}\ncontrol: {constraints: [{kind: separation, distance: 1.0}]}\n"
+    )
+    live = small(tmp_path, text, decide_every=5.0, planner="mine")
+    assert live.planner is not None
+    assert live.planner.name == "mine"

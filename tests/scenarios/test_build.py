@@ -433,7 +433,7 @@ def test_decisions_that_name_no_reward_go_by_the_error_that_is_scored(score: str
 
 def test_an_unknown_planner() -> None:
     loaded = scenario()
-    known = "jdm, idm, lookahead, nearest, assigned, centroid, oracle, random, fixed, still"
+    known = "jdm, idm, lookahead, nearest, assigned, centroid, oracle, told, random, fixed, still"
     with pytest.raises(InputError, match=f"planner: expected one of {known}; got 'greedy'"):
         build.build_planner(loaded, "greedy")
 

@@ -219,7 +219,7 @@ def test_late_scans_and_planners_of_labels_do_not_go_with_filters_without(kind: 
 
 
 UNLABELLED = (
-    "jdm, idm or lookahead is refused: expected nearest, assigned, centroid, oracle or custom, as {} filters have"
+    "jdm, idm, lookahead or told is refused: expected nearest, assigned, centroid, oracle or custom, as {} filters have"
 )
 
 

@@ -106,7 +106,7 @@ def test_what_breaks_in_the_middle_of_a_run_is_named(scenario: Scenario) -> None
 def test_a_planner_that_nobody_has_named(scenario: Scenario) -> None:
     with pytest.raises(
         InputError,
-        match="planner: expected one of jdm, idm, lookahead, nearest, assigned, centroid, oracle, random, fixed, still, last, third, breaks; got 'x'",
+        match="planner: expected one of jdm, idm, lookahead, nearest, assigned, centroid, oracle, told, random, fixed, still, last, third, breaks; got 'x'",
     ):
         run_scenario(scenario, "x", seed=1)
 

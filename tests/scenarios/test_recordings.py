@@ -322,6 +322,7 @@ def test_a_recording_goes_with_no_decisions_and_no_invented_targets(folder: Path
     for old, new, message in (
         ("{kind: unknown}", "{kind: scripted, tracks: []}", "targets.kind: expected recorded or unknown"),
         ("decision_steps:\n", "decision_steps: [3]\n", "control: expected no decisions"),
+        ("planners: {}", "planners: {floor: {kind: told}}", r"planners\.floor\.kind: expected one that does not know"),
     ):
         assert old in text
         (folder / "kept.yaml").write_text(text.replace(old, new), "utf-8")

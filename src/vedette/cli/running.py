@@ -93,7 +93,8 @@ def run(
         typer.Option(
             "--planner",
             help="jdm (joint), idm (independent), lookahead (joint, several decisions), nearest, assigned, centroid "
-            "(rules of thumb), oracle (knows the targets), random, fixed (first course), still, or the scenario's own.",
+            "(rules of thumb), oracle and told (know the targets), random, fixed (first course), still, or the "
+            "scenario's own.",
             autocompletion=strategies,
         ),
     ] = "jdm",

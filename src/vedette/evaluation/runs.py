@@ -34,8 +34,8 @@ def run_scenario(
     Args:
         scenario: as `vedette.scenarios.load_scenario` reads it, or the name or file that it is read by.
         planner: "jdm" (joint), "idm" (independent), "lookahead" (joint, over several decisions), "nearest", "assigned"
-            or "centroid" (rules of thumb), "oracle" (who knows the targets), "random", "fixed", "still", or one of the
-            scenario's own.
+            or "centroid" (rules of thumb), "oracle" and "told" (which know the targets), "random", "fixed", "still",
+            or one of the scenario's own.
         seed, run: fix every random number; runs with equal seed and number are paired across strategies.
         num_threads: share a decision (0: one a processor) and change no result.
         watch: told the number of every scan that is done.

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
-from vedette.control import KnowsTruth
+from vedette.control import KnowsTruth, WatchedPlanner
 from vedette.errors import InputError
 from vedette.live.loop import Live
 from vedette.models.arguments import reject
@@ -13,6 +14,7 @@ from vedette.recorded.extents import box_of
 from vedette.recorded.instants import COMPONENTS
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.scenarios.of_recording import OfSensors
+from vedette.scenarios.sections.planners import Named
 from vedette.scenarios.sections.recording import sites_of
 from vedette.tracking import LateScans
 
@@ -52,7 +54,10 @@ def live_of(
     decides = None
     if decide_every is not None or experiment.decision_steps:
         decides = build_planner(known.scenario, planner, num_threads)
-        if isinstance(decides, KnowsTruth):
+        inside: Any = decides
+        while isinstance(inside, Named | WatchedPlanner):  # which pass the truth on, and need none themselves
+            inside = inside.planner
+        if isinstance(inside, KnowsTruth):
             raise InputError(f"planner: expected one that does not know the targets; got {planner}")
     return Live(
         LateScans(experiment.tracker, experiment.poses, window, seed),

@@ -247,8 +247,9 @@ def build_targets(scenario: Scenario) -> TargetSource:
 
 def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planner | None:
     """The planner of a strategy: `jdm` (joint), `idm` (independent), `lookahead` (joint, over several decisions),
-    `nearest`, `assigned`, `centroid` (rules of thumb), `oracle` (who knows the targets), `random`, `fixed` (sensors
-    keep their first course), or one of the scenario's own; None for `still`, where the sensors are never under way.
+    `nearest`, `assigned`, `centroid` (rules of thumb), `oracle` and `told` (which know the targets), `random`,
+    `fixed` (sensors keep their first course), or one of the scenario's own; None for `still`, where the sensors are
+    never under way.
 
     Args:
         scenario: with the sensors that it steers.
@@ -256,8 +257,9 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
         num_threads: share a decision; 0: one a processor.
 
     Raises:
-        InputError: another name, joint or independent decisions with filters that have no labels, an oracle of recorded
-            targets that lack components of the motion's states, or a custom part that cannot be had.
+        InputError: another name, joint or independent decisions with filters that have no labels, planners that
+            know the targets where these are unknown or lack components of the motion's states, or a custom part that
+            cannot be had.
     """
     model, folder = scenario.model, scenario.folder
     if name not in (*STRATEGIES, *model.planners):

@@ -19,7 +19,7 @@ def strategy_cautions(scenario: Scenario) -> Iterator[tuple[Path, str]]:
     """
     refused: dict[str, list[str]] = {}
     makes = bool(code_of(scenario.model)) and not not_own(scenario)
-    for name, strategy in STRATEGIES.items():
+    for name, strategy in STRATEGIES.items() if scenario.model.decision_steps else ():
         if wanted := strategy.misfit(scenario.model) or (makes and _fault_of_planner(scenario, name)):
             refused.setdefault(wanted, []).append(name)
     for wanted, names in refused.items():

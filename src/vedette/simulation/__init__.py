@@ -11,6 +11,7 @@ from vedette.simulation.records import Decision, RunRecord
 from vedette.simulation.scans import Scan, simulate_scan, simulate_scans
 from vedette.simulation.storage import load_run, save_run
 from vedette.simulation.true_sensors import TrueSensor
+from vedette.simulation.true_targets import ToldPlanner
 from vedette.simulation.truth import ScriptedTargets, TargetSource, Truth
 
 __all__ = [
@@ -27,6 +28,7 @@ __all__ = [
     "ScriptedTargets",
     "TargetSource",
     "Timetable",
+    "ToldPlanner",
     "TrueSensor",
     "Truth",
     "World",

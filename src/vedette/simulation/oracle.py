@@ -18,21 +18,19 @@ from vedette.control import (
 )
 from vedette.control.constraints import Mask, repaired
 from vedette.control.inputs import check_poses, check_steering, mask_of_decision, options_of
-from vedette.densities import Estimator, Labelled, best_estimate
+from vedette.densities import Estimator, best_estimate
 from vedette.errors import InputError
 from vedette.filters import shared_targets
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models import MotionModel
-from vedette.models.arguments import dimension, generator, instance, positive, reject
+from vedette.models.arguments import dimension, generator, instance, positive
 from vedette.models.fields import Count
 from vedette.platforms import Options
 from vedette.platforms.base import courses_of
 from vedette.simulation.cramer_rao import Stretch, scan_information, transition_jacobians
+from vedette.simulation.true_targets import held_covs, with_components
 from vedette.simulation.truth import Truth
 from vedette.tracking import State
-
-# Of a target that a belief has lost, the standard deviation of components beyond the position, relative to the cutoff.
-_LOST = 0.1
 
 
 class Timetable(NamedTuple):
@@ -104,7 +102,7 @@ class OraclePlanner:
         dimension("beam_width", self.beam_width)
         instance("search", self.search, JointSearch)
         if self.truth is not None:
-            object.__setattr__(self, "truth", _with_components(self.truth, self._motion.state_dim))
+            object.__setattr__(self, "truth", with_components(self.truth, self._motion.state_dim))
 
     @property
     def _motion(self) -> MotionModel:
@@ -133,41 +131,13 @@ class OraclePlanner:
 
     def _tracked(self, state: State, ids: Ints, states: Floats) -> tuple[Ints, tuple[Floats, ...]]:
         """The targets that can be helped, and their covariances in each belief."""
-        table, (covs, found) = self.timetable, self._covs(state.fused, state.step, states)
-        kept = found | table.rebirths
-        if table.one_belief:
-            return ids[kept], (covs[kept],)
-        return ids[kept], tuple(self._covs(own, state.step, states)[0][kept] for own in state.local)
-
-    def _covs(self, belief: object, step: int, states: Floats) -> tuple[Floats, Bools]:
-        """(num, dim, dim) of the tracks nearest to targets, and whether there is one within the cutoff.
-
-        Estimates come first; targets without one go by the labels that the belief holds beside these, however
-        improbable: the next scans may confirm them.
-        """
-        estimate = self.estimate(belief, step)
-        stds = np.full(states.shape[1], _LOST * self.cutoff)
-        stds[:2] = self.cutoff
-        covs, found = np.tile(np.diag(stds**2), (len(states), 1, 1)), np.zeros(len(states), bool)
-        self._match(estimate.means, estimate.covs, states, covs, found)
-        if isinstance(belief, Labelled) and not found.all():
-            estimated = {(step, index) for step, index in estimate.labels.tolist()}
-            held = [own for own in belief.targets() if own.label not in estimated]
-            if held:
-                means, others = (np.array([getattr(own, name) for own in held]) for name in ("mean", "cov"))
-                self._match(means, others, states, covs, found)
-        return covs, found
-
-    def _match(self, means: Floats, covs: Floats, states: Floats, out: Floats, found: Bools) -> None:
-        """Give each target that has none yet the covariance of the track assigned to it, within the cutoff."""
-        from scipy.optimize import linear_sum_assignment  # a third of a second that nobody else has to wait for
-
-        open_ = np.flatnonzero(~found)
-        offsets = states[open_, np.newaxis, :2] - means[:, :2]
-        gaps = np.minimum(np.hypot(offsets[..., 0], offsets[..., 1]), self.cutoff)
-        for target, track in zip(*linear_sum_assignment(gaps), strict=True):
-            if gaps[target, track] < self.cutoff:
-                out[open_[target]], found[open_[target]] = covs[track], True
+        table = self.timetable
+        held = [
+            held_covs(self.estimate, belief, state.step, states, self.cutoff)
+            for belief in (state.fused, *(() if table.one_belief else state.local))
+        ]
+        kept = held[0].found | table.rebirths
+        return ids[kept], tuple(own.covs[kept] for own in (held if table.one_belief else held[1:]))
 
     def _decide(
         self, moment: _Moment, truth: Truth, ids: Ints, depth: int, mask: Mask | None, rng: np.random.Generator
@@ -237,11 +207,3 @@ class OraclePlanner:
             table.one_belief,
             self.cutoff,
         )
-
-
-def _with_components(truth: Truth, dim: int) -> Truth:
-    """The same targets with states of `dim` components, of which those that are missing are 0."""
-    missing = dim - truth.states.shape[1]
-    if missing < 0:
-        raise reject("truth", f"states of at most {dim} components, as the motion's", truth.states.shape[1])
-    return replace(truth, states=np.pad(truth.states, ((0, 0), (0, missing)))) if missing else truth

@@ -107,6 +107,7 @@ _LABELS = {
     "assigned": "Assigned target",
     "centroid": "Centroid",
     "oracle": "Oracle",
+    "told": "JDM, true targets",
     "random": "Random",
     "fixed": "Fixed",
     "still": "Not moving",

@@ -108,6 +108,24 @@ class NamedJoint(_Valued):
         return JointPlanner(**self.shared(parts, folder), search=search)
 
 
+class NamedTold(NamedJoint):
+    """Joint decisions on the true targets, as of told: the floor that strategies are compared with."""
+
+    kind: Literal["told"] = Field(default="told", description="Kind of planner [-].")  # type: ignore[assignment]
+
+    def misfit(self, model: ScenarioModel, *, labels: bool | None = None) -> str:
+        """Unfit also where the true targets are not known, or lack components of a custom motion."""
+        return super().misfit(model, labels=labels) or _untrue(model)
+
+    def planner(self, parts: Parts, folder: Path) -> Planner:
+        """The joint planner on beliefs about the true targets, none of which is undetected."""
+        from vedette.simulation import ToldPlanner
+
+        settings = replace(parts.settings, undetected_worth=0.0)
+        joint = super().planner(parts._replace(settings=settings), folder)
+        return ToldPlanner(joint, parts.sensors, parts.oracle["cutoff"], parts.estimate)
+
+
 class NamedIndependent(_Valued):
     """Independent decisions, as of idm, by a reward or a presumption of its own."""
 
@@ -187,14 +205,8 @@ class NamedOracle(Strategy, Derived):
     kind: Literal["oracle"] = Field(default="oracle", description="Kind of planner [-].")
 
     def misfit(self, model: ScenarioModel, *, labels: bool | None = None) -> str:
-        """Unfit where recorded targets lack the components of a custom motion."""
-        motion = model.motion
-        if model.targets.kind != "recorded" or motion.kind != "custom" or motion.state_dim == RECORDED_DIM:
-            return ""
-        return (
-            f"another kind, as states have {motion.state_dim} components under motion and the recorded targets "
-            f"{RECORDED_DIM} (a motion of {RECORDED_DIM} components, or targets that are simulated, would do)"
-        )
+        """Unfit where the true targets are not known, or lack components of a custom motion."""
+        return _untrue(model)
 
     def planner(self, parts: Parts, folder: Path) -> Planner:
         """Who waits to be told of the targets."""
@@ -243,6 +255,19 @@ class _Fixed(Strategy):
         return _watched(FixedPlanner(parts.first_actions), parts)
 
 
+def _untrue(model: ScenarioModel) -> str:
+    """What is expected instead where a planner needs to know the true targets and does not; "" where it does."""
+    motion = model.motion
+    if model.targets.kind == "unknown":
+        return "one that does not know the targets, as these are unknown"
+    if model.targets.kind != "recorded" or motion.kind != "custom" or motion.state_dim == RECORDED_DIM:
+        return ""
+    return (
+        f"another kind, as states have {motion.state_dim} components under motion and the recorded targets "
+        f"{RECORDED_DIM} (a motion of {RECORDED_DIM} components, or targets that are simulated, would do)"
+    )
+
+
 def _watched(decides: Planner, parts: Parts) -> Planner:
     """A planner that does not keep to all constraints: its plans say which they violate."""
     from vedette.control import WatchedPlanner
@@ -261,6 +286,7 @@ STRATEGIES: dict[str, Strategy] = {
     "assigned": NamedRule(kind="assigned"),
     "centroid": NamedRule(kind="centroid"),
     "oracle": NamedOracle(),
+    "told": NamedTold.model_construct(),
     "random": _Random(),
     "fixed": _Fixed(),
     "still": Strategy(),
@@ -286,6 +312,13 @@ class Named:
 
 
 AnyPlanner = Annotated[
-    NamedJoint | NamedIndependent | NamedLookahead | NamedRule | NamedOracle | CustomPlanner | ProgramStrategy,
+    NamedJoint
+    | NamedIndependent
+    | NamedLookahead
+    | NamedRule
+    | NamedOracle
+    | NamedTold
+    | CustomPlanner
+    | ProgramStrategy,
     Field(discriminator="kind"),
 ]

@@ -106,7 +106,7 @@ class ScenarioModel(Section):
     planners: dict[Name, AnyPlanner] = Field(
         default={},
         description="Further strategies by name, beside jdm, idm, lookahead, nearest, assigned, centroid, oracle, "
-        "random, fixed and still [-].",
+        "told, random, fixed and still [-].",
     )
     ospa: Ospa = Field(default=Ospa(), description="How the estimates are scored [-].")
     metrics: dict[Name, AnyMetric] = Field(
