@@ -97,7 +97,7 @@ def test_ctrl_c_says_how_to_go_on(short: Yardstick, monkeypatch: pytest.MonkeyPa
         (
             (NAME, "--planners", "clever"),
             1,
-            "lookahead, nearest, assigned, centroid, oracle, random, fixed, still, greedy; got 'clever'",
+            "lookahead, nearest, assigned, centroid, oracle, told, random, fixed, still, greedy; got 'clever'",
         ),
         (
             ("deciding-six-camera",),

@@ -140,7 +140,7 @@ def test_reproduce(scenario_file, tmp_path):
         (
             ("run", "paper-a", "--planner", "clever"),
             2,
-            "jdm, idm, lookahead, nearest, assigned, centroid, oracle, random, fixed, still",
+            "jdm, idm, lookahead, nearest, assigned, centroid, oracle, told, random, fixed, still",
         ),
         (("reproduce", "--planners", "jdm,jdm"), 2, "each strategy once"),
         (("reproduce", "--runs", "0"), 2, "--runs"),
