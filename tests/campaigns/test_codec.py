@@ -104,7 +104,7 @@ def test_the_layout_of_this_version_is_as_written_here():
     } == {
         "own_rewards": "decision step time_s reward_table sensor action reward reward_se chosen",
         "explanations": "decision step time_s reward reward_se baseline undetected_gain evaluations bound bound_kind "
-        "bound_unbounded runner_up margin margin_se missing action_*",
+        "bound_unbounded runner_up margin margin_se missing price* action_*",
         "target_gains": "decision step time_s birth_step birth_site existence_gain localisation_gain",
         "sensor_gains": "decision step time_s sensor gain without",
     }

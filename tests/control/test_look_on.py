@@ -94,7 +94,7 @@ def test_between_poses_sensors_go_straight_and_after_them_by_as_much_again() -> 
     rng = np.random.default_rng(2)
     courses, pose, horizon = rng.normal(size=(3, 4, 3)), rng.normal(size=3), np.array([1.0, 2.5, 3.0, 7.0])
     own = options_at("platform", Still(), pose, horizon)
-    found = continued(Options(own.actions, courses, own.which, pose), horizon, TIMES).courses
+    found = continued(Options(own.actions, courses, own.which, pose, own.prices), horizon, TIMES).courses
     for course, poses in zip(courses, found, strict=True):
         for time, at in zip(TIMES, poses, strict=True):
             again = math.ceil(time / 7.0) - 1

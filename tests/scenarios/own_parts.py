@@ -31,6 +31,20 @@ class Hopper:
         return poses
 
 
+class Ferry:
+    """Goes 5 m to the east for a fare, or stays."""
+
+    columns = ("dx", "fare")
+
+    def actions(self, pose: Any) -> Any:
+        return [[0.0, 0.0], [5.0, 1e6]]
+
+    def course(self, pose: Any, action: Any, times: Any) -> Any:
+        poses = np.tile(pose[:3], (len(times), 1))
+        poses[:, 0] += action[0]
+        return poses
+
+
 class Filter:
     """An LMB filter under another name."""
 

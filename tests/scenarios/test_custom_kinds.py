@@ -6,6 +6,7 @@ from __future__ import annotations
 import shutil
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -186,3 +187,31 @@ def test_files_import_those_beside_them_each_its_own(tmp_path: Path) -> None:
     assert [found.number for found in made] == [1, 2]
     assert "helper_beside" not in sys.modules
     assert not {str(tmp_path / "1"), str(tmp_path / "2")} & set(sys.path)
+
+
+def test_actions_of_ones_own_have_the_prices_of_a_column(tmp_path: Path) -> None:
+    shutil.copy(OWN, tmp_path)
+    noise = "  noise: {kind: constant, std: [0.02, 3.0]}"
+    path = tmp_path / "scene.yaml"
+
+    def planned(price: str) -> Any:
+        path.write_text(changed((noise, f"{noise}\n  platform: {own('Ferry')}\n  price: {price}")))
+        return run_scenario(load_scenario(path), "jdm", seed=1).decisions[0].plan
+
+    # No step is worth a million.
+    dear = planned("fare")
+    assert [row[0] for row in dear.chosen_actions] == [0.0, 0.0]
+    assert dear.explanation.price == 0.0
+    assert planned("3.0").explanation.price == 6.0
+    path.write_text(changed((noise, f"{noise}\n  platform: {own('Ferry')}\n  price: fee")))
+    shown = CliRunner().invoke(app, ["check", str(path)])
+    assert shown.exit_code == 1
+    assert "own_parts.py:Ferry to have a column fee, as its price, got dx, fare" in " ".join(shown.output.split())
+
+
+def test_a_column_of_prices_is_a_custom_platforms(tmp_path: Path) -> None:
+    path, noise = tmp_path / "scene.yaml", "  noise: {kind: constant, std: [0.02, 3.0]}"
+    path.write_text(changed((noise, f"{noise}\n  price: speed")))
+    shown = CliRunner().invoke(app, ["check", str(path)])
+    assert shown.exit_code == 1
+    assert "a number, as only a custom platform has a column of prices" in " ".join(shown.output.split())

@@ -43,6 +43,7 @@ def explanation_of(plan: Plan, **fields: Any) -> Explanation:
         runner_up=RunnerUp(other, "sensor 1 with heading_deg 30", 0.125, 0.0625),
         bound=Bound(math.inf, 4.0, "by target", 3),
         missing={},
+        price=0.25,
     )
     return replace(whole, **fields)
 

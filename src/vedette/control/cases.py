@@ -108,7 +108,8 @@ class CaseRewards:
         compute = self._compute([self.posteriors[s] for s in which], fusion)
 
         def evaluate(actions: Ints) -> Floats:
-            rewards = compute(actions)
+            prices = [self.options[s].prices[own] for s, own in zip(which, actions.T, strict=True)]
+            rewards = np.asarray(compute(actions) - np.sum(prices, axis=0)[:, np.newaxis])
             self.counts["divergences"] += rewards.size
             self.counts["fusions"] += rewards.size if fusion is not None else 0
             self._check_finite(which, actions, rewards)

@@ -249,6 +249,5 @@ def _only(own: Options, courses: Ints) -> Options:
     """The options that take some courses, which are numbered anew."""
     kept = np.isin(own.which, courses)
     actions = Actions(own.actions.columns, own.actions.values[kept])
-    return Options(
-        actions, np.ascontiguousarray(own.courses[courses]), np.searchsorted(courses, own.which[kept]), own.pose
-    )
+    which, chosen = np.searchsorted(courses, own.which[kept]), np.ascontiguousarray(own.courses[courses])
+    return own._replace(actions=actions, courses=chosen, which=which, prices=own.prices[courses])

@@ -62,6 +62,7 @@ class Questions:
             runner_up=runner_up,
             bound=self.bound,
             missing=missing,
+            price=float(sum(own.prices[course] for own, course in zip(self._options, self._courses, strict=True))),
             answer=self.had,
         )
 
@@ -74,9 +75,12 @@ class Questions:
         return tuple(own.actions for own in self._options)
 
     @property
+    def _courses(self) -> list[int]:
+        return [course for part in self.parts for course in part.chosen]
+
+    @property
     def _chosen_actions(self) -> tuple[int, ...]:
-        courses = [course for part in self.parts for course in part.chosen]
-        return tuple(own.first_action(course) for own, course in zip(self._options, courses, strict=True))
+        return tuple(own.first_action(course) for own, course in zip(self._options, self._courses, strict=True))
 
     @cached_property
     def _contributions(self) -> tuple[Shares | None, ...]:

@@ -105,7 +105,8 @@ class Had(NamedTuple):
 class Explanation:
     """Why a plan is what it is. Rewards are means over the samples; a field is None where `missing` says why.
 
-    `baseline`, the sum of `of_targets.total` and `of_undetected` add up to `reward`; so do `baseline` and `of_sensors`.
+    `baseline`, the sum of `of_targets.total` and `of_undetected` less `price` add up to `reward`; so do `baseline` and
+    `of_sensors`.
     An independent decision is explained as one: its reward is the sum of those that the sensors decided on, with what
     each of them presumes of the others.
 
@@ -119,12 +120,13 @@ class Explanation:
             these alone.
         of_targets: what is gained by each target of the fused belief.
         of_undetected: what is gained by targets that were not found before.
-        of_sensors: (num_sensors,) the sensors' shares in what is gained: half of what each adds to those before it and
-            half of what it adds to those after it (a Shapley value on two orders).
-        without: (num_sensors,) the reward had the sensor not scanned, the others as chosen.
+        of_sensors: (num_sensors,) the sensors' shares in what is gained, less their prices: half of what each adds to
+            those before it and half of what it adds to those after it (a Shapley value on two orders).
+        without: (num_sensors,) the reward had the sensor not scanned, at no price, the others as chosen.
         runner_up: the best other joint action that was evaluated.
         bound: how far from the best the choice can be; None where nothing is known of that.
         missing: why fields are None, by name.
+        price: of all chosen actions, which is subtracted from what is gained.
         answer: behind `had`; None once the evidence is gone.
     """
 
@@ -141,6 +143,7 @@ class Explanation:
     runner_up: RunnerUp | None
     bound: Bound | None
     missing: dict[str, str]
+    price: float = 0.0
     answer: Callable[[int, int | None, dict[str, float]], Had] | None = field(default=None, repr=False, compare=False)
 
     @classmethod
@@ -250,6 +253,8 @@ def _of_targets(found: Explanation) -> list[str]:
         lines.append(f"{name:18s}{total:>12s}{existence:>14s}{localisation:>15s}")
     if found.of_undetected:
         lines.append(f"{'not found before':18s}{found.of_undetected:12.4g}")
+    if found.price:
+        lines.append(f"{'price':18s}{-found.price:12.4g}")
     return lines
 
 

@@ -122,9 +122,10 @@ def bound_of(evidence: Evidence, choice: Sequence[int]) -> Bound | None:
 
     After every joint action was evaluated, the best of them. Otherwise, for rewards that are sums over targets, each
     target is given the joint action that is best for it, and what is left of targets that were not found is found by
-    whoever sees it best: no joint action can be better than that for all of them. Where more ways to see a target are
-    possible than `PlanningSettings.max_bound_work` allows to try, the expected loss has a bound of its own (see
-    `vedette.kernels.planning.bounds`), and of another reward nothing is known for that target.
+    whoever sees it best: no joint action can be better than that for all of them. Every sensor pays its least price.
+    Where more ways to see a target are possible than `PlanningSettings.max_bound_work` allows to try, the expected loss
+    has a bound of its own (see `vedette.kernels.planning.bounds`), and of another reward nothing is known for that
+    target.
     """
     reward = evidence.mean_of(choice)
     if evidence.is_complete():
@@ -143,7 +144,8 @@ def most_by_target(evidence: Evidence) -> tuple[float, int] | None:
     if not known and additive is not None and additive.coefficients is not None:
         best = best_values(additive, evaluator.settings.max_bound_work)
         unknown = np.isinf(best).reshape(additive.num_horizons, -1).any(axis=0)
-        known.append((float(best.sum()) + _most_found(additive), int(unknown.sum())))
+        cheapest = np.minimum.reduceat(additive.prices, additive.table.first_courses[:-1]).sum()
+        known.append((float(best.sum()) + _most_found(additive) - float(cheapest), int(unknown.sum())))
     return known[0] if known else None
 
 

@@ -14,7 +14,8 @@ from vedette.kernels.planning.joint_values import existence_logits, label_values
 class Shares(NamedTuple):
     """How a reward comes about, in its own unit; means over the samples.
 
-    Together with `baseline`, `sensors` add up to the reward, and so do `existence`, `localisation` and `found`.
+    Together with `baseline`, `sensors` add up to the reward, and so do `existence`, `localisation` and `found` less
+    the price of the sensors' courses.
     """
 
     baseline: float  # the reward without any scan of these sensors

@@ -6,6 +6,7 @@ from vedette.platforms.camera import Carried, Pointing
 from vedette.platforms.compass import Compass, PlaneCompass
 from vedette.platforms.courses import PAPER_HEADINGS_DEG, Courses
 from vedette.platforms.fleet import Fleet
+from vedette.platforms.operated import Operated
 from vedette.platforms.sequences import Sequences
 from vedette.platforms.steps import Steps, Still, Waypoints
 
@@ -17,6 +18,7 @@ __all__ = [
     "Compass",
     "Courses",
     "Fleet",
+    "Operated",
     "Options",
     "PlaneCompass",
     "Platform",

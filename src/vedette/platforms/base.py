@@ -26,13 +26,14 @@ class Options(NamedTuple):
 
     actions: all of them, in the order of tables. courses: (num_courses, num_times, pose_dim) the different courses that
     they lead to, each in the place of its first action. which: (num_actions,) which course each action takes. pose:
-    (pose_dim,) where it is now.
+    (pose_dim,) where it is now. prices: (num_courses,) in units of the reward; actions of one course have one price.
     """
 
     actions: Actions
     courses: Floats
     which: Ints
     pose: Floats
+    prices: Floats
 
     def first_action(self, course: int) -> int:
         """The first action that takes a course."""
@@ -40,15 +41,16 @@ class Options(NamedTuple):
 
 
 def options_at(field: str, platform: Platform, pose: Floats, times: Floats) -> Options:
-    """The options of a platform at a pose, told apart by where it is at `times`, in seconds from now.
+    """The options of a platform at a pose, distinguished by price and by where it is at `times`, in seconds from now.
 
-    Raises `InputError`, with the name of the platform, for actions or courses that are none.
+    Raises `InputError`, with the name of the platform, for actions, courses or prices that are none.
     """
     actions = actions_at(field, platform, pose)
     courses = courses_of(field, platform, pose, actions.values, times)
-    firsts = _same(courses).argmax(axis=1)  # itself, if none before it
-    own, which = np.unique(firsts, return_inverse=True)
-    return Options(actions, courses[own], which, pose)
+    prices = prices_of(field, platform, actions.values)
+    same = _same(courses) & (prices[:, np.newaxis] == prices)
+    own, which = np.unique(same.argmax(axis=1), return_inverse=True)  # itself, if none before it
+    return Options(actions, courses[own], which, pose, prices[own])
 
 
 def _same(courses: Floats) -> Bools:
@@ -138,6 +140,15 @@ class TakesManyActions(Protocol):
         ...
 
 
+@runtime_checkable
+class WithPrices(Protocol):
+    """A platform whose actions have prices, which planners subtract from rewards; those of others cost nothing."""
+
+    def prices(self, actions: Floats) -> Floats:
+        """(num_actions,) in units of the reward, of actions (num_actions, num_columns)."""
+        ...
+
+
 def check_platform(field: str, platform: Any) -> None:
     """`InputError` for what lacks a member of `Platform`."""
     if isinstance(platform, type) or not isinstance(platform, Platform):
@@ -165,6 +176,13 @@ def courses_of(field: str, platform: Platform, pose: Floats, actions: Floats, ti
         courses = platform.courses(pose.copy(), actions.copy(), times.copy())
         return _checked(f"{field}.courses", courses, (len(actions), len(times)), pose)
     return np.stack([course_of(field, platform, pose, action, times) for action in actions])
+
+
+def prices_of(field: str, platform: Platform, actions: Floats) -> Floats:
+    """(num_actions,) what actions cost, in units of the reward; `InputError` for what are no prices."""
+    if not isinstance(platform, WithPrices):
+        return np.zeros(len(actions))
+    return float_array(f"{field}.prices", platform.prices(actions.copy()), (len(actions),))
 
 
 def _checked(field: str, given: Any, shape: tuple[int, ...], pose: Floats) -> Floats:

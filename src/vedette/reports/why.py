@@ -22,7 +22,8 @@ def why_data(plan: Plan, names: Sequence[str] = ()) -> dict[str, Any] | None:
     """What is shown, with the sensors' names; None for a decision that was kept without explanation.
 
     Facts as pairs of texts; of the ten targets that matter most label and gains, of the others their number and sums;
-    what is gained by targets not found before; of each sensor number, action, share and the reward without it.
+    what is gained by targets not found before; what the actions cost; of each sensor number, action, share and the
+    reward without it.
     """
     why = plan.explanation
     if why is None or why.reward is None:
@@ -31,6 +32,7 @@ def why_data(plan: Plan, names: Sequence[str] = ()) -> dict[str, Any] | None:
         "facts": _facts(plan, why, why.reward, names or [f"sensor {s + 1}" for s in range(plan.num_sensors)]),
         **({"targets": [], "more": None} if why.of_targets is None else _targets(why.of_targets)),
         "undetected": _number(why.of_undetected or 0.0),
+        "price": _number(why.price),
         "sensors": _sensors(plan, why),
     }
 

@@ -21,7 +21,7 @@ from vedette.filters import Filter, TwoStepFilter, labels_targets, shared_target
 from vedette.fusion import Clmb, CmDeltaGlmb, Fusion, Matched, ParallelUpdate
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models import SensorModel, TargetModel
-from vedette.platforms import Actions, ByCompass, Platform
+from vedette.platforms import Actions, ByCompass, Operated, Platform
 from vedette.platforms.base import actions_at
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections.courses import in_courses
@@ -29,6 +29,7 @@ from vedette.scenarios.sections.custom import Custom, NotGiven
 from vedette.scenarios.sections.deciding import Lookahead
 from vedette.scenarios.sections.fusion import IN_FULL, OF_SCANS, ONE_BELIEF, CustomFusion
 from vedette.scenarios.sections.planners import STRATEGIES, Named, NamedIndependent, Parts, Strategy
+from vedette.scenarios.sections.platforms import CustomPlatform
 from vedette.scenarios.sections.scenario import ScenarioModel
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.tracking import CustomFilter
@@ -108,9 +109,15 @@ def build_sensors(scenario: Scenario) -> tuple[MobileSensor, ...]:
 
 
 def _platform(model: ScenarioModel, sensor: Sensor, folder: Path) -> Platform:
-    """What carries a sensor; with an origin or a compass its actions are courses."""
-    platform = sensor.platform.build(folder)
-    return ByCompass(platform, model.north()) if model.by_compass and platform.columns else platform
+    """What carries a sensor, with its prices; with an origin or a compass its actions are courses."""
+    section, price = sensor.platform, sensor.price
+    platform = section.build(folder)
+    if model.by_compass and platform.columns:
+        platform = ByCompass(platform, model.north())
+    if isinstance(section, CustomPlatform) and isinstance(price, str) and price not in platform.columns:
+        wanted = f"{section.function} to have a column {price}, as its price"
+        raise NotGiven(section, "function", wanted, ", ".join(platform.columns) or "no columns")
+    return platform if price is None else Operated(platform, price)
 
 
 def _scan_times(model: ScenarioModel, sensor: Sensor) -> Floats | None:
@@ -233,8 +240,9 @@ def _first_actions(scenario: Scenario, sensors: tuple[MobileSensor, ...]) -> tup
         row = section.platform.first_action(section.heading_deg)
         own = actions_at(f"sensors[{s}].platform", sensor.platform, pose)
         rows = own.values[:1] if row is None else np.array([row])
-        if row is not None and isinstance(sensor.platform, ByCompass):
-            rows = sensor.platform.of_plane(rows, pose)
+        platform = sensor.platform.platform if isinstance(sensor.platform, Operated) else sensor.platform
+        if row is not None and isinstance(platform, ByCompass):
+            rows = platform.of_plane(rows, pose)
         found.append(Actions(own.columns, rows))
     return tuple(found)
 

@@ -35,7 +35,7 @@ EXPLAINED: dict[str, Layout] = {
             "margin_se": Kind.VALUE,
             "missing": Kind.TEXT,
         },
-        {"action_": Kind.COUNT},
+        {"price": Kind.VALUE, "action_": Kind.COUNT},
     ),
     "target_gains": Layout(
         {
@@ -62,11 +62,12 @@ def explained_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[st
             values = getattr(why, name)
             if values is not None and np.shape(values) != (num_sensors,):
                 raise InputError(f"plan.explanation.{name}: expected {num_sensors} numbers; got {np.shape(values)}")
-    names = [*EXPLAINED["explanations"].fixed, *(f"action_{sensor}" for sensor in range(num_sensors))]
+    priced = ("price",) if any(why.price for _, _, why in kept) else ()  # a column of runs whose actions have prices
+    names = [*EXPLAINED["explanations"].fixed, *priced, *(f"action_{sensor}" for sensor in range(num_sensors))]
     parts: dict[str, list[dict[str, Any]]] = {name: [] for name in EXPLAINED}
     for number, each, why in kept:
         of, gains = moment(number, each), why.of_targets
-        parts["explanations"].append({**of, **_told(why)})
+        parts["explanations"].append({**of, **_told(why), **dict.fromkeys(priced, why.price)})
         if gains is not None:
             labels = {"birth_step": gains.labels[:, 0], "birth_site": gains.labels[:, 1]}
             gained = {"existence_gain": gains.existence, "localisation_gain": gains.localisation}
@@ -149,6 +150,7 @@ def _explanation(
         runner_up=None if "runner_up" in missing else _runner_up(plan, table, row),
         bound=bound,
         missing=missing,
+        price=float(table["price"][row]) if "price" in table else 0.0,
     )
 
 

@@ -35,6 +35,7 @@ class AdditiveRewards:
         bases: for each sensor, the rows of its own belief without scans.
         reward: whose `combine` makes rewards of the sums; None: the sum itself.
         cells: where targets may be that were not found yet.
+        prices: (num_courses,) what each course costs, in units of the reward.
         num_threads: threads that may share the work; the result does not depend on it.
         num_horizons: at whose ends labels are valued, each as of labels of its own, one horizon after the other.
     """
@@ -44,6 +45,7 @@ class AdditiveRewards:
     bases: tuple[Floats, ...]
     reward: Any
     cells: Cells
+    prices: Floats
     num_threads: int
     num_horizons: int = 1
 
@@ -72,7 +74,7 @@ class AdditiveRewards:
             np.array([0, last - first]), offsets, self.table.labels, self.table.changes, self.bases[sensor], np.ones(1)
         )
         cells = self.cells._replace(offsets=self.cells.offsets[first : last + 1])
-        return replace(self, table=own, bases=(self.bases[sensor],), cells=cells)
+        return replace(self, table=own, bases=(self.bases[sensor],), cells=cells, prices=self.prices[first:last])
 
     def __call__(self, actions: Ints) -> Floats:
         """(num_joint, num_samples) rewards of joint actions (num_joint, num_sensors); -1: the sensor does not scan."""
@@ -82,8 +84,7 @@ class AdditiveRewards:
             joint_values(self.table, self.valuation, actions, first, last, sums)
 
         run_chunks(work, len(actions), self.num_threads, first_piece=8)
-        found = np.array([self.found(joint) for joint in actions]) if len(self.cells.worth) else 0.0
-        return np.asarray(self.of_sums(sums) + np.reshape(found, (-1, 1)))
+        return np.asarray(self.of_sums(sums) + self._beside(actions))
 
     def with_scans(self, chosen: Ints) -> Floats:
         """(num_labels, bernoulli_size, num_samples) joint rows with the scans of a joint action (num_sensors,).
@@ -114,12 +115,12 @@ class AdditiveRewards:
         run_chunks(work, last - first, self.num_threads, first_piece=8)
         start, stop = self.table.first_courses[[first, last]].tolist()
         rewards = self.of_sums(sums[start:stop])
-        if len(self.cells.worth):
+        if len(self.cells.worth) or self.prices.any():
             for s in range(first, last):
                 begin, end = (self.table.first_courses[s : s + 2] - start).tolist()
                 joint = np.tile(chosen, (end - begin, 1))
                 joint[:, s] = np.arange(end - begin)
-                rewards[begin:end] += np.array([[self.found(each)] for each in joint])
+                rewards[begin:end] += self._beside(joint)
         return rewards
 
     def each_alone(self) -> Floats:
@@ -136,18 +137,28 @@ class AdditiveRewards:
         rewards = self.of_sums(sums)
         if len(self.cells.worth):
             rewards += self._found_alone()[:, np.newaxis]
-        return rewards
+        return rewards - self.prices[:, np.newaxis]
 
     def ascend(self, start: Ints, allowed: Allowed) -> tuple[Ints, float, Trace]:
         """One compiled ascent; for rewards that are linear in their sums."""
         coefficients = self.coefficients
         assert coefficients is not None
-        return ascend(self.table, self.valuation, coefficients, self.cells, allowed, start, _MOST_LINES)
+        return ascend(self.table, self.valuation, coefficients, self.cells, self.prices, allowed, start, _MOST_LINES)
 
     def of_sums(self, sums: Floats) -> Floats:
-        """(..., num_samples) rewards of sums over labels (..., num, num_samples), cells left out."""
+        """(..., num_samples) rewards of sums over labels (..., num, num_samples), without cells and prices."""
         sums = np.moveaxis(sums, -2, -1)
         return sums[..., 0] if self.reward is None else combined(self.reward, sums)
+
+    def price(self, actions: Ints) -> Floats:
+        """(num_joint,) what joint actions (num_joint, num_sensors) cost; -1: the sensor does not scan, for free."""
+        prices = self.prices[np.maximum(actions, 0) + self.table.first_courses[:-1]]
+        return np.asarray(np.where(actions >= 0, prices, 0.0).sum(axis=1))
+
+    def _beside(self, actions: Ints) -> Floats:
+        """(num_joint, 1) what rewards of joint actions have beside sums over labels: cells, less prices."""
+        found = np.array([self.found(joint) for joint in actions]) if len(self.cells.worth) else 0.0
+        return np.asarray(found - self.price(actions))[:, np.newaxis]
 
     def _found_alone(self) -> Floats:
         """(num_courses,) what each course finds by itself."""

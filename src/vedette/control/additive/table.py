@@ -66,7 +66,8 @@ def lay_out(
     if state.undetected is not None and (worth := worth_of_finding(reward, settings)) > 0.0:
         cells = cells_of(start, state.undetected, worth, table.first_courses, prediction.state_dim)
     own = reward if sampled else None
-    return AdditiveRewards(table, valuation, start.bases, own, cells, num_threads)
+    prices = np.concatenate([each.prices for each in options])
+    return AdditiveRewards(table, valuation, start.bases, own, cells, prices, num_threads)
 
 
 def lay_out_changes(start: Start, rule: LinearRule, num_threads: int, *, sampled: bool) -> Table:

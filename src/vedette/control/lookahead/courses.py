@@ -101,6 +101,10 @@ class CourseTree:
         last = self.options(sequence[:-1]).courses[sequence[-1], : self.stages.steps]
         return np.concatenate([*parts, last])
 
+    def price(self, sequence: Sequence, first: int) -> float:
+        """What the actions of a sequence cost, from decision `first` (from 0) on."""
+        return sum(float(self.options(sequence[:k]).prices[sequence[k]]) for k in range(first, len(sequence)))
+
     def rows(self, sequence: Sequence) -> Floats:
         """(num_decisions, num_columns) the actions of a sequence."""
         found = [self.options(sequence[:k]) for k in range(len(sequence))]

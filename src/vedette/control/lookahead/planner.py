@@ -179,7 +179,8 @@ class HorizonPlanner:
                 horizons = first.horizons if stage == 1 else ()
                 return self._lay_out(given, stage, horizons, options, copy.deepcopy(samples))
 
-            return LaidCourses(given.trees, stage, lay_out, weight, first.counts)
+            begin = 0 if self.discount is None else stage - 1
+            return LaidCourses(given.trees, stage, lay_out, weight, begin, first.counts)
 
         if self.discount is None:
             parts = [part(1.0, depth)]

@@ -61,6 +61,7 @@ class LaidCourses:
         stage: number of courses that each sensor has taken by then.
         lay_out: makes the changes of some courses of each sensor; with the same samples each time.
         weight: of these rewards in the value of a sequence.
+        first: the first decision, from 0, whose prices are subtracted here.
         counts: filter steps and rewards so far.
     """
 
@@ -68,10 +69,12 @@ class LaidCourses:
     stage: int
     lay_out: Callable[[tuple[Options, ...]], Evaluator]
     weight: float
+    first: int
     counts: dict[str, int]
     _places: dict[tuple[int, Sequence], int] = field(default_factory=dict)
     _additive: AdditiveRewards | None = None
     _lists: tuple[_Lists, ...] = ()
+    _prices: list[float] = field(default_factory=list)
 
     def __call__(self, joints: list[Taken]) -> Floats:
         """(num, num_samples) rewards of joint actions."""
@@ -90,6 +93,7 @@ class LaidCourses:
         for s, taken in new:
             self._places[s, taken] = len(self._places)
             courses[s].append(self.trees[s].course(taken))
+            self._prices.append(self.trees[s].price(taken, self.first))
         laid = self.lay_out(tuple(self._options(*own) for own in zip(self.trees, courses, strict=True)))
         self.counts["filter_steps"] += laid.counts["filter_steps"]
         assert laid.additive is not None
@@ -104,7 +108,8 @@ class LaidCourses:
 
     def _options(self, tree: CourseTree, courses: list[Floats]) -> Options:
         shape = len(courses), tree.stages.num_steps(self.stage), len(tree.pose)
-        return Options(tree.options(()).actions, np.array(courses).reshape(shape), np.arange(len(courses)), tree.pose)
+        actions, free = tree.options(()).actions, np.zeros(len(courses))
+        return Options(actions, np.array(courses).reshape(shape), np.arange(len(courses)), tree.pose, free)
 
     def _rewards(self) -> AdditiveRewards:
         """Of all courses so far: a sensor might take any of them, and is given its own."""
@@ -113,7 +118,8 @@ class LaidCourses:
         (offsets, labels, changes), (cell_offsets, cells, log_miss) = (own.values for own in self._lists)
         firsts = np.zeros(len(self.trees) + 1, np.int64)
         table = old.table._replace(first_courses=firsts, offsets=offsets, labels=labels, changes=changes)
-        return replace(old, table=table, cells=Cells(cell_offsets, cells, log_miss, old.cells.worth))
+        cells_of = Cells(cell_offsets, cells, log_miss, old.cells.worth)
+        return replace(old, table=table, cells=cells_of, prices=np.array(self._prices))
 
 
 class Best(NamedTuple):

@@ -93,6 +93,7 @@ def _line(
     valuation: Valuation,
     coefficients: Floats,
     cells: Cells,
+    prices: Floats,
     sensor: int,
     at: Ascent,
     before: Floats,
@@ -105,7 +106,7 @@ def _line(
     for entry in range(table.offsets[first], table.offsets[last]):
         before[table.labels[entry]] = math.inf
     for course in range(first, last):
-        gain = _found(cells, course, at.cell_totals)
+        gain = _found(cells, course, at.cell_totals) - prices[course]
         for entry in range(table.offsets[course], table.offsets[course + 1]):
             label = table.labels[entry]
             if before[label] == math.inf:
@@ -137,16 +138,17 @@ def _best(table: Table, allowed: Allowed, chosen: Ints, sensor: int, gains: Floa
 
 @kernel
 def _start(
-    table: Table, valuation: Valuation, coefficients: Floats, cells: Cells, chosen: Ints
+    table: Table, valuation: Valuation, coefficients: Floats, cells: Cells, prices: Floats, chosen: Ints
 ) -> tuple[Ascent, float]:
     """Where the ascent begins, and the mean reward there."""
     num_labels, num_samples = len(table.start), table.changes.shape[2]
-    at = Ascent(chosen.copy(), start_totals(table), np.zeros(len(cells.worth)))
+    at, price = Ascent(chosen.copy(), start_totals(table), np.zeros(len(cells.worth))), 0.0
     for s in range(len(chosen)):
         add_course(table, s, table.first_courses[s] + chosen[s], 1.0, at.totals)
         _add_cells(cells, table.first_courses[s] + chosen[s], 1.0, at.cell_totals)
+        price += prices[table.first_courses[s] + chosen[s]]
     work, values = make_value_work(valuation, num_samples), np.empty((valuation.num, num_samples))
-    reward = np.sum(cells.worth * -np.expm1(at.cell_totals))
+    reward = np.sum(cells.worth * -np.expm1(at.cell_totals)) - price
     for label in range(num_labels):
         value_rows(valuation, label, at.totals[label], work, values)
         reward += label_mean(values, coefficients)
@@ -159,16 +161,17 @@ def ascend(
     valuation: Valuation,
     coefficients: Floats,
     cells: Cells,
+    prices: Floats,
     allowed: Allowed,
     start: Ints,
     max_lines: int,
 ) -> tuple[Ints, float, Trace]:
     """One ascent from a joint action: one sensor after the other, until none alone can do better.
 
-    coefficients: (num,) of a label's numbers in the reward. max_lines: an end, for which no ascent is known to have
-    had need. Returns the joint action, its mean reward, and the trace.
+    coefficients: (num,) of a label's numbers in the reward. prices: (num_courses,) of each course. max_lines: an end,
+    for which no ascent is known to have had need. Returns the joint action, its mean reward, and the trace.
     """
-    at, reward = _start(table, valuation, coefficients, cells, start)
+    at, reward = _start(table, valuation, coefficients, cells, prices, start)
     num_samples = table.changes.shape[2]
     work, values = make_value_work(valuation, num_samples), np.empty((valuation.num, num_samples))
     before, gains = np.empty(len(table.start)), np.empty(np.max(np.diff(table.first_courses)))
@@ -178,7 +181,7 @@ def ascend(
         first, present = table.first_courses[sensor], at.chosen[sensor]
         add_course(table, sensor, first + present, -1.0, at.totals)
         _add_cells(cells, first + present, -1.0, at.cell_totals)
-        _line(table, valuation, coefficients, cells, sensor, at, before, values, work, gains)
+        _line(table, valuation, coefficients, cells, prices, sensor, at, before, values, work, gains)
         chosen = _best(table, allowed, at.chosen, sensor, gains, reward)
         reward += gains[chosen] - gains[present]
         at.chosen[sensor] = chosen

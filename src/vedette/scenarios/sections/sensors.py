@@ -133,6 +133,12 @@ class Sensor(Section):
         "stand instead, clockwise from true north [deg].",
     )
     platform: AnyPlatform = Field(default=of_kind("still"), description="What carries it: what it may do [-].")
+    price: float | str | None = Field(
+        default=None,
+        description="What each of its actions costs, in units of the reward, which planners subtract; or, of a custom "
+        "platform, the column of its actions that has the price of each; none: nothing, or as a custom platform says "
+        "[-].",
+    )
     moves_from: Literal["first_decision", "start"] = Field(
         default="first_decision",
         description="Whether it lies still until its first decision, as in the paper, or is under way on its course, "
@@ -165,6 +171,11 @@ class Sensor(Section):
         kinds = [section.kind for section in (self.detection, *true) if section is not None]
         if "camera" in kinds and len(self.pose) < 5:
             yield ("platform",), "a camera, as its detection is a camera's", self.platform.kind
+
+    @check
+    def _prices_stand_in_custom_columns(self) -> Iterator[Finding]:
+        if isinstance(self.price, str) and self.platform.kind != "custom":
+            yield ("price",), "a number, as only a custom platform has a column of prices", describe(self.price)
 
     @check
     def _a_compass_tells_bearings(self) -> Iterator[Finding]:

@@ -61,6 +61,14 @@ function targetRows(why) {
       title: `targets that were not found before: ${short(why.undetected)}`,
     });
   }
+  if (why.price) {
+    rows.push({
+      name: "price",
+      segments: [{ value: -why.price, shade: "orange" }],
+      numbers: [short(-why.price)],
+      title: `price of the actions: ${short(why.price)}`,
+    });
+  }
   return rows;
 }
 
