@@ -145,7 +145,7 @@ def test_a_tracking_loop_with_a_plan_needs_no_extra(tmp_path: Path) -> None:
 
 
 def test_light_commands_need_no_extra(tmp_path: Path) -> None:
-    write_recording(tmp_path, seconds=20.0)
+    write_recording(tmp_path, seconds=40.0)
     for command, (status, _, error, exception) in zip(LIGHT, outcomes(LIGHT, tmp_path), strict=True):
         assert (status, exception) == (0, "None"), f"{command}: {error}"
 
