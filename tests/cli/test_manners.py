@@ -35,7 +35,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "short.yaml").write_text(text, "utf-8")
     (tmp_path / "faulty.yaml").write_text(text.replace("num_steps: 3", "num_steps: few"), "utf-8")
     (tmp_path / "spec.toml").write_text(SPEC, "utf-8")
-    write_recording(tmp_path, seconds=20.0)
+    write_recording(tmp_path, seconds=40.0)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

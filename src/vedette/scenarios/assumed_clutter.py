@@ -36,14 +36,14 @@ class Look(NamedTuple):
 def target_share(looks: Sequence[Look], speed: float) -> float:
     """Return the share of a sensor's measurements that are of targets; NaN where the recording shows too little.
 
-    A target that is detected at one scan has a neighbour at the next with the probability of detection, a false
-    measurement by chance only. With q_i the probability that measurement i has no chance neighbour, the share is
-
-        sum over i of (has neighbour_i - 1 + q_i) / sum over i of q_i P_D(x_i),
-
-    over the scans before and after. Each q_i is estimated from the ring around the neighbourhood, (1 - 1/8)^n with n
-    measurements in it, which is unbiased for a Poisson number of uniform density there. Measurements whose ring is
-    wider than where measurements lie are left out.
+    A target that is detected at one scan has a neighbour at the next with the probability of detection; a false
+    measurement has one by chance only. Let h_i say whether measurement i has a neighbour in an adjacent scan, and q_i
+    be the probability that it has no chance neighbour. Over measurements and adjacent scans, the mean of
+    a_i = h_i - 1 + q_i over that of q_i is the share times P_D. The product of a_i for the scan before and that for
+    the scan after gives the share times P_D^2 in the same way, and so P_D itself, which counts where it exceeds what
+    the file gives. Each q_i is estimated from the ring around the neighbourhood, (1 - 1/8)^n with n measurements in
+    it, which is unbiased for a Poisson number of uniform density there. Measurements whose ring is wider than where
+    measurements lie are left out.
 
     Args:
         looks: the sensor's scans, in order of time.
@@ -51,36 +51,45 @@ def target_share(looks: Sequence[Look], speed: float) -> float:
     """
     from scipy.spatial import KDTree
 
-    trees = [KDTree(look.places.reshape(-1, 2)) for look in looks]
-    widest = _widest(looks)
-    excess = expected = 0.0
-    num = 0
+    trees, widest = [KDTree(look.places.reshape(-1, 2)) for look in looks], _widest(looks)
+    single, double = np.zeros(2), np.zeros(2)  # sums of a_i and q_i; of their products over both sides
+    num, expected = 0, 0.0
     for k, own in enumerate(looks):
-        for j in (k - 1, k + 1):
-            if not 0 <= j < len(looks) or not len(own.places):
-                continue
-            radii = _NEAR * own.stds + _FASTER * speed * abs(looks[j].time - own.time)
-            near, wide = (
-                trees[j].query_ball_point(own.places, scale * radii, return_length=True) for scale in (1.0, _WIDER)
-            )
-            counts = _WIDER * radii <= widest
-            alone = (1.0 - 1.0 / (_WIDER**2 - 1.0)) ** (wide - near)
-            excess += float(((near > 0) - 1.0 + alone)[counts].sum())
-            expected += float((alone * own.detection)[counts].sum())
-            num += int(np.count_nonzero(counts))
+        sides = [j for j in (k - 1, k + 1) if 0 <= j < len(looks)] if len(own.places) else []
+        terms = [_terms(own, trees[j], speed * abs(looks[j].time - own.time), widest) for j in sides]
+        single += sum(each.sum(axis=1) for each in terms)
+        if len(terms) == 2:
+            double += (terms[0] * terms[1]).sum(axis=1)
+        expected += sum(float((each[1] * own.detection).sum()) for each in terms)
+        num += sum(int(np.count_nonzero(each[1])) for each in terms)
     if expected <= 0.0 or 0.5 * math.sqrt(num) > _WORST * expected:
         return math.nan
-    return min(max(excess / expected, 0.0), 1.0)
+    repeated = max(single[0] / single[1], 0.0)
+    detection = expected / single[1]
+    if repeated > 0.0 and double[1] > 0.0:
+        detection = max(detection, min(double[0] / double[1] / repeated, 1.0))
+    return float(min(repeated / detection, 1.0))
 
 
 def _widest(looks: Sequence[Look]) -> float:
     """m, half the side of the square as large as the box around all places."""
-    places = np.concatenate([np.empty((0, 2)), *(look.places for look in looks)])
+    places = np.concatenate([np.empty((0, 2)), *(look.places.reshape(-1, 2) for look in looks)])
     return 0.5 * math.sqrt(np.prod(np.ptp(places, axis=0))) if len(places) else 0.0
 
 
+def _terms(own: Look, other: Any, moved: float, widest: float) -> Floats:
+    """(2, num) of each measurement a_i and q_i with the places of an adjacent scan, between which targets moved, m.
+
+    Zeros where the ring is wider than `widest`, m.
+    """
+    radii = _NEAR * own.stds + _FASTER * moved
+    near, wide = (other.query_ball_point(own.places, scale * radii, return_length=True) for scale in (1.0, _WIDER))
+    alone = (1.0 - 1.0 / (_WIDER**2 - 1.0)) ** (wide - near)
+    return np.array([(near > 0) - 1.0 + alone, alone]) * (_WIDER * radii <= widest)
+
+
 def place_stds(kind: str, stds: Floats, scan: Floats) -> Floats:
-    """(num,) larger standard deviation of the places of a scan, m; none of a kind that measures no places."""
+    """(num,) larger standard deviation of each place that a scan measured, m; none where it measures no places."""
     if kind not in PLACED:
         return np.empty(0)
     return np.full(len(scan), stds.max()) if kind == "position" else np.maximum(stds[1], stds[0] * scan[:, 1])
@@ -115,9 +124,12 @@ def _rate(model: ScenarioModel, recording: RecordedScans, s: int, folder: FilePa
         return 1.0, "as it has no scan in the recording"
     mean = float(np.mean(counts))
     share = target_share(_looks(model, recording, s, folder), speed)
-    why = f"the part of its {mean:.3g} measurements a scan that scans before and after do not repeat"
+    why = f"of {mean:.3g} measurements, estimated from how many have a neighbour in the scans before and after"
     if math.isnan(share):
-        share, why = 0.5, f"half of its {mean:.3g} measurements a scan, as its scans do not show which are false"
+        share, why = (
+            0.5,
+            f"half of its {mean:.3g} measurements, as the recording is too short, or not of places, to estimate it",
+        )
     return max(_LEAST, round((1.0 - share) * mean, 2)), why
 
 
