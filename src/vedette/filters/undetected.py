@@ -55,7 +55,7 @@ def split_births(birth: BirthModel, dt: float) -> SplitBirths:
 
 @cache
 def no_births(state_dim: int) -> SplitBirths:
-    """Nobody is born."""
+    """Return no births, of either kind."""
     return SplitBirths(LMB.empty(state_dim), Poisson.empty(state_dim).to_kernel(), 0.0)
 
 

@@ -111,7 +111,7 @@ def _assign(rows: Ints, columns: Ints, costs: Floats, pairs: dict[int, int]) -> 
     if alone.any():
         _assign(rows[~alone], columns[~alone], costs[~alone], pairs)
         return
-    from scipy.optimize import linear_sum_assignment  # a third of a second that nobody else has to wait for
+    from scipy.optimize import linear_sum_assignment  # here, as it takes a third of a second to load
 
     # More than any change of the allowed pairs can save.
     forbidden = costs.max() + (np.ptp(costs) + 1.0) * min(len(row_names), len(column_names))

@@ -127,7 +127,7 @@ def with_components(truth: Truth, dim: int) -> Truth:
 
 def _assign(means: Floats, covs: Floats, states: Floats, cutoff: float, out: Floats, found: Bools) -> list[int]:
     """Give targets that have none yet the covariance of a track within the cutoff; the tracks that were assigned."""
-    from scipy.optimize import linear_sum_assignment  # a third of a second that nobody else has to wait for
+    from scipy.optimize import linear_sum_assignment  # here, as it takes a third of a second to load
 
     open_, assigned = np.flatnonzero(~found), []
     offsets = states[open_, np.newaxis, :2] - means[:, :2]

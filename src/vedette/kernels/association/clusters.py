@@ -75,7 +75,16 @@ def find_clusters(options: Options, work: MarginalWork) -> bool:
 
     Leaders, followers and owners are written (union-find, the lesser root leads).
     """
-    leaders, owners, shared = work.leaders, work.owners, False
+    shared = lead_rows(options, work.leaders, work.owners)
+    if shared:
+        _link_followers(work.leaders, work.followers, len(options.offsets) - 1)
+    return shared
+
+
+@borrowing
+def lead_rows(options: Options, leaders: Ints, owners: Ints) -> bool:
+    """Write leaders (num_rows,) and owners (num_measurements,) as of `MarginalWork`; false where no rows share."""
+    shared = False
     for column in range(options.num_measurements):
         owners[column] = -1
     for row in range(len(options.offsets) - 1):
@@ -91,8 +100,6 @@ def find_clusters(options: Options, work: MarginalWork) -> bool:
                 shared = True
                 a, b = root_of(leaders, owners[column]), root_of(leaders, row)
                 leaders[max(a, b)] = min(a, b)
-    if shared:
-        _link_followers(leaders, work.followers, len(options.offsets) - 1)
     return shared
 
 

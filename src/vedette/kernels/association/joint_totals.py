@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.kernels.association.assignment import Options
-from vedette.kernels.association.clusters import root_of
+from vedette.kernels.association.clusters import lead_rows, root_of
 from vedette.kernels.base.arrays import filled_ints, hashed
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints
@@ -29,13 +29,11 @@ class TotalWork(NamedTuple):
     owners: Ints  # (num_measurements,) the first place that gates each, -1: none
     shared: Ints  # (num_measurements,) 1 where two places gate it
     bits: Ints  # (num_measurements,) number among the contested ones of a cluster, -1: none
-    leaders: Ints  # (widest,) union-find over the places of the rows at hand
-    relative: Floats  # (most options of a row,) of the row at hand, the weights relative to the heaviest
+    leaders: Ints  # (widest,) union-find over the places of the rows that are summed
+    relative: Floats  # (most options of a row,) weights of one row, relative to its heaviest
     table: Floats  # (2^MAX_CONTESTED,) weight of each set of taken measurements
     components: Ints  # (num_rows,) component of each row of the scan
     firsts: Ints  # (num_rows,) first place of a hypothesis that is of the component, -1: none
-    lasts: Ints  # (num_rows,) last place of it, -1: there is no second
-    met: Ints  # (widest,) components of which a hypothesis has two rows or more
     others: Ints  # (widest,) next place of the same component, -1: none
     members: Ints  # (widest,) rows of one component
     slots: Ints  # hash table: number of a known share, -1: none
@@ -62,8 +60,6 @@ def make_total_work(options: Options, widest: int, num_rows: int) -> TotalWork:
         np.empty(1 << MAX_CONTESTED),
         _components(options),
         filled_ints(len(options.offsets) - 1, -1),
-        filled_ints(len(options.offsets) - 1, -1),
-        np.empty(widest, np.int64),
         np.empty(widest, np.int64),
         np.empty(widest, np.int64),
         filled_ints(size, -1),
@@ -77,17 +73,9 @@ def make_total_work(options: Options, widest: int, num_rows: int) -> TotalWork:
 @kernel
 def _components(options: Options) -> Ints:
     """(num_rows,) the first of the rows that share a measurement with each, directly or not."""
-    num, owners = len(options.offsets) - 1, filled_ints(options.num_measurements, -1)
-    leaders = np.arange(num)
-    for row in range(num):
-        for option in range(options.offsets[row], options.offsets[row + 1]):
-            column = options.columns[option]
-            if column >= 0 and owners[column] < 0:
-                owners[column] = row
-            elif column >= 0:
-                a, b = root_of(leaders, owners[column]), root_of(leaders, row)
-                leaders[max(a, b)] = min(a, b)
-    for row in range(num):
+    leaders = np.empty(len(options.offsets) - 1, np.int64)
+    lead_rows(options, leaders, np.empty(options.num_measurements, np.int64))
+    for row in range(len(leaders)):
         leaders[row] = root_of(leaders, row)
     return leaders
 
@@ -145,7 +133,7 @@ def _take_row(options: Options, row: int, work: TotalWork, size: int) -> None:
         work.relative[option - start] = weight
         if column < 0 or work.bits[column] < 0:
             free += weight
-    # From the largest set on: what is read has not been overwritten.
+    # From the largest set down, as each set is made of smaller ones that must still hold the sums without this row.
     for mask in range(size - 1, -1, -1):
         weight = free * table[mask]
         for option in range(start, stop):
@@ -192,7 +180,7 @@ def _log_component_share(options: Options, rows: Ints, log_totals: Floats, work:
 
 @inlined
 def _is_share_of(work: TotalWork, known: int, num: int) -> bool:
-    """Whether a known share is of the `num` members at hand."""
+    """Whether a known share belongs to the first `num` rows of `work.members`."""
     start = work.ends[known - 1] if known > 0 else 0
     same = work.ends[known] - start == num
     for i in range(num):
@@ -202,7 +190,7 @@ def _is_share_of(work: TotalWork, known: int, num: int) -> bool:
 
 @borrowing
 def _log_known_share(options: Options, num: int, log_totals: Floats, work: TotalWork) -> float:
-    """As `_log_component_share` of the `num` members at hand, which is worked out where it is not known."""
+    """Return `_log_component_share` of the first `num` rows of `work.members`; computed once for the same rows."""
     key, last = 0, len(work.slots) - 1
     for i in range(num):
         key = hashed(key, work.members[i])
@@ -225,27 +213,19 @@ def log_contested_share(options: Options, rows: Ints, log_totals: Floats, work: 
 
     At least that share where a cluster has more than `MAX_CONTESTED` contested measurements. log_totals: of each row.
     """
-    log_share, num_met = 0.0, 0
-    for i in range(len(rows)):
+    log_share = 0.0
+    # From behind, so that the places of a component come to stand in order.
+    for i in range(len(rows) - 1, -1, -1):
         component = work.components[rows[i]]
-        work.others[i] = -1
-        if work.firsts[component] < 0:
-            work.firsts[component] = i
-        else:
-            if work.lasts[component] < 0:
-                work.met[num_met] = component
-                num_met += 1
-                work.others[work.firsts[component]] = i
-            else:
-                work.others[work.lasts[component]] = i
-            work.lasts[component] = i
-    for k in range(num_met):
-        num, place = 0, work.firsts[work.met[k]]
+        work.others[i], work.firsts[component] = work.firsts[component], i
+    for i in range(len(rows)):
+        if work.firsts[work.components[rows[i]]] != i or work.others[i] < 0:
+            continue
+        num, place = 0, i
         while place >= 0:
             work.members[num] = rows[place]
             num, place = num + 1, work.others[place]
         log_share += _log_known_share(options, num, log_totals, work)
-        work.lasts[work.met[k]] = -1
     for row in rows:
         work.firsts[work.components[row]] = -1
     return log_share

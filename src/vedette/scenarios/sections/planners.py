@@ -109,7 +109,7 @@ class NamedJoint(_Valued):
 
 
 class NamedTold(NamedJoint):
-    """Joint decisions on the true targets, as of told: the floor that strategies are compared with."""
+    """Joint decisions on the true targets (`told`): the floor that strategies are compared with."""
 
     kind: Literal["told"] = Field(default="told", description="Kind of planner [-].")  # type: ignore[assignment]
 
