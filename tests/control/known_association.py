@@ -43,12 +43,14 @@ def followed(
     return logit, mean, cov, missed
 
 
-def updated(mean: Any, cov: Any, measured: Any, pose: Any, sensor: MobileSensor) -> tuple[Any, Any, float]:
+def updated(
+    mean: Any, cov: Any, measured: Any, pose: Any, sensor: MobileSensor, start: Any = None
+) -> tuple[Any, Any, float]:
     """Mean, covariance and log likelihood of a measurement, by "ekf", or "auto" of a bearing and range.
 
     "auto" is the extended filter unless the second-order error of the bearing or range is above 0.3 standard deviations
-    of its noise. Then: Gauss-Newton steps from the unscented update to the peak, away from the sensor along its ray,
-    and a regression over the posterior there.
+    of its noise. Then: Gauss-Newton steps from the unscented update, or from a start, to the peak, away from the sensor
+    along its ray, and a regression over the posterior there.
     """
     own = sensor.filter.sensor
     assert own.method in ("ekf", "auto")
@@ -60,7 +62,7 @@ def updated(mean: Any, cov: Any, measured: Any, pose: Any, sensor: MobileSensor)
         return linear_update(mean, cov, mean, unwrapped(measured - expected, sensor), slope, noise)
     expected, slope, left = regression(mean, cov, pose, sensor)
     state, _, _ = linear_update(mean, cov, mean, unwrapped(measured - expected, sensor), slope, noise + left)
-    state, spread = climbed(state, mean, cov, measured, pose, sensor)
+    state, spread = climbed(state if start is None else start.copy(), mean, cov, measured, pose, sensor)
     ray = state[:2] - pose[:2]
     ratio = ray @ spread[:2, :2] @ ray / (ray @ ray) ** 2
     state[:2] = pose[:2] + (0.5 + 0.5 * np.sqrt(1.0 + 4.0 * ratio)) * ray

@@ -226,7 +226,7 @@ def plain_loss(example: Situation, evaluator: Evaluator, joint: Any, order: floa
             own, pose = example.sensors[s].filter.sensor, evaluator.options[s].courses[course, -1]
             detection = float(own.mean_detection(mean[None], cov[None], pose)[0])
             centre = own.measurement.measure(mean[None], pose)[0]
-            _, measured, _ = updated(mean, cov, centre, pose, example.sensors[s])
+            _, measured, _ = updated(mean, cov, centre, pose, example.sensors[s], start=mean)
             missed *= 1.0 - detection
             information += detection * (np.linalg.inv(measured) - np.linalg.inv(cov))
         seen = np.linalg.inv(np.linalg.inv(cov) + information / (1.0 - missed))

@@ -147,7 +147,7 @@ def _filling(
 ) -> Callable[[int, int], None]:
     if not sampled:
         return lambda first, last: fill_expected_changes(
-            group.belief, group.decision, entries, group.rows, LEAST_DETECTION, first, last, changes
+            group.belief, group.decision, entries, group.rows, LEAST_DETECTION, group.reach, first, last, changes
         )
     references = np.ascontiguousarray(start.references[group.labels])
     return lambda first, last: fill_changes(

@@ -167,7 +167,7 @@ def condition(
 
 
 @inlined
-def _bends(pose: Floats, mean: Floats, cov: Floats, jacobian: Floats, noise: Floats, n: int, m: int) -> bool:
+def bends_over(pose: Floats, mean: Floats, cov: Floats, jacobian: Floats, noise: Floats, n: int, m: int) -> bool:
     """Whether the second-order error of some component exceeds `LARGEST_BEND` standard deviations of its noise.
 
     A measurement of a position at distance d has second derivatives of about |H| / d. Over a position of variance V,
@@ -211,7 +211,7 @@ def expect_measurement(
     if linearised:
         sensor.measurement(mean, pose, sensor.measurement_params, out.predicted[at])
         sensor.measurement_jacobian(mean, pose, sensor.measurement_params, jacobian)
-    out.bends[at] = sensor.method == SWITCHED and _bends(pose, mean, cov, jacobian, noise, n, m)
+    out.bends[at] = sensor.method == SWITCHED and bends_over(pose, mean, cov, jacobian, noise, n, m)
     if out.bends[at] or not linearised:
         linearised = False
         weights = _expect_sigma_points(sensor, pose, mean, cov, out.predicted[at], cross, scratch)

@@ -16,6 +16,7 @@ from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Sensor
 from vedette.kernels.gaussian.innovation import (
     Innovation,
+    bends_over,
     condition,
     expect_measurement,
     log_norm_of_factor,
@@ -27,7 +28,13 @@ from vedette.kernels.gaussian.innovation import (
 from vedette.kernels.gaussian.joseph import posterior_of_squares
 from vedette.kernels.gaussian.linalg import cholesky, solve_lower, solve_upper
 from vedette.kernels.gaussian.scratch import Scratch, make_scratch, wrap_angle
-from vedette.kernels.gaussian.sigma_points import UNSCENTED, PointWeights, fill_sigma_points, moments_of_images
+from vedette.kernels.gaussian.sigma_points import (
+    SWITCHED,
+    UNSCENTED,
+    PointWeights,
+    fill_sigma_points,
+    moments_of_images,
+)
 
 # Two or three steps suffice unless the prior is as wide as the target is far; then the search follows a curved ridge.
 _MOST_STEPS = 20
@@ -209,6 +216,32 @@ def relinearise(sensor: Sensor, pair: Pair, work: PairWork) -> float:
     distance = _update(sensor, pair, scratch.points[0], work)
     innovation.log_norm[0] = log_norm_of_factor(innovation.factor[0])
     return distance
+
+
+@borrowing
+def learn_at_mean(sensor: Sensor, pair: Pair, share: float, work: PairWork) -> None:
+    """Write the posterior covariance (-> that of the innovation) of a part of a measurement of a target at the mean.
+
+    For linearised measurements. The peak of prior times likelihood is then the mean, and a `share` of the information
+    of a linear measurement is a measurement with so much more noise. pair: with the measurement at its mean.
+    """
+    innovation, scratch, n, m = work.innovation, work.scratch, pair.mean.shape[0], pair.measurement.shape[0]
+    state, jacobian, noise = scratch.points[0], scratch.measurement_jacobian, scratch.measurement_noise
+    for j in range(n):
+        state[j] = pair.mean[j]
+    sensor.measurement_noise_cov(pair.mean, pair.pose, sensor.noise_params, noise)
+    for a in range(m):
+        innovation.predicted[0, a] = pair.measurement[a]
+    sensor.measurement_jacobian(state, pair.pose, sensor.measurement_params, jacobian)
+    if sensor.method == SWITCHED and bends_over(pair.pose, pair.mean, pair.cov, jacobian, noise, n, m):
+        _update(sensor, pair, state, work)
+        _leave_sensor(pair, state, innovation.covs[0])
+        _linearise(sensor, pair, state, work)
+        _regress(sensor, pair, work)
+    for a in range(m):
+        for b in range(m):
+            noise[a, b] /= share
+    _update(sensor, pair, state, work)
 
 
 @inlined

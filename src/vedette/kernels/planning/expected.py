@@ -18,12 +18,13 @@ from vedette.kernels.gaussian.detection import detection_probability
 from vedette.kernels.gaussian.innovation import Innovation, expect_measurement, make_innovation
 from vedette.kernels.gaussian.linalg import cholesky, inverse_from_factor
 from vedette.kernels.gaussian.prediction import predict
-from vedette.kernels.gaussian.relinearisation import Pair, PairWork, relinearise
+from vedette.kernels.gaussian.relinearisation import Pair, PairWork, learn_at_mean
 from vedette.kernels.gaussian.scratch import Scratch, make_scratch
+from vedette.kernels.gaussian.sigma_points import LINEARISED, SWITCHED
 from vedette.kernels.planning.bernoulli_rows import log_miss
 from vedette.kernels.planning.ideal import Decision
 from vedette.kernels.planning.known import Entries
-from vedette.kernels.planning.reach import Belief
+from vedette.kernels.planning.reach import Belief, is_beyond
 
 
 class _Work(NamedTuple):
@@ -61,23 +62,44 @@ def _invert(matrix: Floats, factor: Floats, out: Floats) -> None:
 
 
 @inlined
-def _expect_at_centre(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, work: _Work) -> None:
-    """Posterior covariance of a measurement; where it bends, of that of a target at the mean."""
-    expect_measurement(sensor, pose, mean, cov, 0, work.seen, work.scratch)
-    if work.seen.bends[0]:
+def _learn(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, detection: float, work: _Work, out: Floats) -> None:
+    """Write the covariance after `detection` times the information of a measurement.
+
+    Where the measurement bends, it is that of a target at the mean.
+    """
+    n, prior, updated = len(mean), work.inverse, work.predicted_cov
+    if sensor.method == LINEARISED or sensor.method == SWITCHED:
         sensor.measurement(mean, pose, sensor.measurement_params, work.measurement)
-        relinearise(sensor, Pair(pose, mean, cov, work.measurement), PairWork(work.seen, work.scratch))
+        learn_at_mean(sensor, Pair(pose, mean, cov, work.measurement), detection, PairWork(work.seen, work.scratch))
+        for i in range(n):
+            for j in range(n):
+                out[i, j] = work.seen.covs[0, i, j]
+        return
+    expect_measurement(sensor, pose, mean, cov, 0, work.seen, work.scratch)
+    _invert(cov, work.factor, prior)
+    _invert(work.seen.covs[0], work.factor, updated)
+    for i in range(n):
+        for j in range(n):
+            updated[i, j] = prior[i, j] + detection * (updated[i, j] - prior[i, j])
+    _invert(updated, work.factor, out)
 
 
 @borrowing
 def _is_seen(
-    belief: Belief, decision: Decision, course: int, label: int, least: float, work: _Work, detections: Floats
+    belief: Belief,
+    decision: Decision,
+    course: int,
+    label: int,
+    least: float,
+    reach: float,
+    work: _Work,
+    detections: Floats,
 ) -> bool:
     """Whether a label is detected with probability `least` or more at some step; the probabilities are written."""
     paths, seen = belief.paths, False
     for h in range(len(detections)):
         pose, state, detections[h] = decision.horizon.poses[course, h], work.scratch.points[0], 0.0
-        if decision.horizon.scans[h]:
+        if not is_beyond(belief, decision, course, label, h, reach):
             mean, cov = paths.means[label, h], paths.covs[label, h]
             detections[h] = detection_probability(decision.sensor, pose, mean, cov, state)
             seen |= detections[h] >= least
@@ -86,32 +108,37 @@ def _is_seen(
 
 @borrowing
 def _expected_cov(
-    belief: Belief, decision: Decision, course: int, label: int, detections: Floats, work: _Work, out: Floats
+    belief: Belief,
+    decision: Decision,
+    course: int,
+    label: int,
+    detections: Floats,
+    least: float,
+    work: _Work,
+    out: Floats,
 ) -> float:
-    """Write the expected covariance at the end of the horizon; returns the log probability of never being detected."""
+    """Write the expected covariance at the end of the horizon; returns the log probability of never being detected.
+
+    A scan that detects with a probability below `least` teaches nothing of the state.
+    """
     paths, horizon, n = belief.paths, decision.horizon, out.shape[0]
-    missed, prior, updated, factor = 0.0, work.inverse, work.predicted_cov, work.factor
+    missed, was_seen = 0.0, False
     for h in range(horizon.poses.shape[1]):
-        mean, cov = paths.means[label, h], paths.covs[label, h]
-        if h > 0:
+        mean, cov, detection = paths.means[label, h], paths.covs[label, h], detections[h]
+        if was_seen:
             predict(
                 decision.motion, horizon.dt, paths.means[label, h - 1], out, work.predicted_mean, work.cov, work.scratch
             )
             cov = work.cov
-        if not horizon.scans[h]:
-            for i in range(n):
-                for j in range(n):
-                    out[i, j] = cov[i, j]
-            continue
-        _expect_at_centre(decision.sensor, horizon.poses[course, h], mean, cov, work)
-        detection = detections[h]
         missed += log_miss(detection)
-        _invert(cov, factor, prior)
-        _invert(work.seen.covs[0], factor, updated)
-        for i in range(n):
-            for j in range(n):
-                updated[i, j] = prior[i, j] + detection * (updated[i, j] - prior[i, j])
-        _invert(updated, factor, out)
+        if detection < least:
+            if was_seen:
+                for i in range(n):
+                    for j in range(n):
+                        out[i, j] = cov[i, j]
+            continue
+        was_seen = True
+        _learn(decision.sensor, horizon.poses[course, h], mean, cov, detection, work, out)
     return missed
 
 
@@ -122,14 +149,15 @@ def fill_expected_changes(
     entries: Entries,
     bases: Floats,
     least: float,
+    reach: float,
     first: int,
     last: int,
     changes: Floats,
 ) -> None:
     """Changes (num_entries, bernoulli_size, 1) for courses `first:last` of a sensor; see `known.fill_changes`.
 
-    Zeros for a label that is detected with a probability below `least` at every step. P_D is that of the prediction,
-    also where earlier scans of the horizon are expected to have narrowed it.
+    Zeros for a label that is detected with a probability below `least` at every step, as where all of it lies beyond
+    `reach`, m. P_D is that of the prediction, also where earlier scans of the horizon are expected to have narrowed it.
     """
     dim, size = belief.paths.means.shape[2], bases.shape[1]
     work = _make_work(dim, len(decision.sensor.angular))
@@ -139,9 +167,9 @@ def fill_expected_changes(
             label, row, at = entries.own[entry], changes[entry, :, 0], 0
             for k in range(size):
                 row[k] = 0.0
-            if not _is_seen(belief, decision, course, label, least, work, detections):
+            if not _is_seen(belief, decision, course, label, least, reach, work, detections):
                 continue
-            row[size - 1] = _expected_cov(belief, decision, course, label, detections, work, cov)
+            row[size - 1] = _expected_cov(belief, decision, course, label, detections, least, work, cov)
             _invert(cov, work.factor, information)
             for i in range(dim):
                 for j in range(i + 1):

@@ -70,7 +70,7 @@ def label_radii(paths: Paths, targets: Ints, states: Floats) -> Floats:
 
 
 @inlined
-def _beyond(belief: Belief, decision: Decision, course: int, label: int, step: int, reach: float) -> bool:
+def is_beyond(belief: Belief, decision: Decision, course: int, label: int, step: int, reach: float) -> bool:
     """Whether a label is, at a step of a course, where a sensor of this reach detects nothing, or does not scan."""
     if not decision.horizon.scans[step]:
         return True
@@ -110,7 +110,7 @@ def fill_reach(
         for label in range(out.shape[1]):
             out[course, label] = 0
             for h in range(decision.horizon.poses.shape[1]):
-                if not _beyond(belief, decision, course, label, h, reach) and (
+                if not is_beyond(belief, decision, course, label, h, reach) and (
                     least == 0.0 or _detects(belief, decision, course, label, h, least, state)
                 ):
                     out[course, label] = 1
