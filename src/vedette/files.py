@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import sqlite3
 import uuid
@@ -16,8 +17,10 @@ from vedette.errors import InputError
 def write_whole(target: Path, write: Callable[[BinaryIO], object]) -> None:
     """Let `write` fill a new file beside `target`, make it durable, and put it in the place of `target`.
 
-    Raises `OSError` where that cannot be done; `target` is then as it was.
+    Raises `OSError` where that cannot be done, or `target` is a device or a pipe; `target` is then as it was.
     """
+    if target.exists() and not target.is_file() and not target.is_dir():
+        raise OSError(errno.EINVAL, "it is no regular file", str(target))
     temporary = target.with_name(f".{target.name}.{uuid.uuid4().hex}")
     try:
         with temporary.open("xb") as file:
@@ -39,7 +42,15 @@ def write_file(target: Path, write: Callable[[BinaryIO], object], *, make_folder
             target.parent.mkdir(parents=True, exist_ok=True)
         write_whole(target, write)
     except OSError as error:
-        raise InputError(f"{target}: expected a file that can be written; {error}") from error
+        raise InputError(f"{target}: expected a file that can be written; {error.strerror or error}") from error
+
+
+def unwritable(target: Path) -> str:
+    """The reason why nothing can be written at `target`; empty where the folder around it may be written to."""
+    around = next(folder for folder in target.absolute().parents if folder.exists())
+    if not around.is_dir():
+        return f"{around} is no folder"
+    return "" if os.access(around, os.W_OK | os.X_OK) else f"{around} may not be written to"
 
 
 def sync_folder(folder: Path) -> None:

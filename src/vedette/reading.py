@@ -32,7 +32,7 @@ def read_file(path: Path, most: int = MOST_BYTES) -> bytes:
     """The bytes of a regular file. Raises `OSError` where it cannot be read."""
     if not stat.S_ISREG(path.stat().st_mode):  # a pipe would wait for ever, and a device may have no end
         if path.is_dir():
-            raise IsADirectoryError(21, "it is a folder")
+            raise IsADirectoryError(21, "a folder")
         raise ValueError("it is no regular file")
     with path.open("rb") as file:
         content = file.read(min(os.fstat(file.fileno()).st_size, most) + 1)  # what is asked for is allocated

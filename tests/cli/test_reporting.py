@@ -69,14 +69,15 @@ def test_a_folder_without_results_is_an_error(tmp_path: Path) -> None:
 
 def test_places_that_cannot_be_written_are_named_by_their_option_alone(folder: Path, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    below = tmp_path / "file" / "below"
+    below, in_the_way = tmp_path / "file" / "below.html", tmp_path / "folder.html"
+    in_the_way.mkdir()
     result = report(folder, "--out", below)
     assert (result.exit_code, result.output.splitlines()) == (
         1,
         [f"--out: expected a place to write a report; got {below}: {reason(below)}"],
     )
-    result = report(folder, "--out", tmp_path)
-    assert result.output.strip() == f"--out: expected a place to write a report; got {tmp_path}: a folder"
+    result = report(folder, "--out", in_the_way)
+    assert result.output.strip() == f"--out: expected a place to write a report; got {in_the_way}: a folder"
     result = report(folder, "--out", tmp_path / "page.html", "--figures", below)
     assert result.exit_code == 1
     assert f"--figures: expected a folder to write figures into; got {below}: " in result.output

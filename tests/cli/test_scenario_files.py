@@ -222,4 +222,4 @@ def test_a_place_that_cannot_be_written(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("", encoding="utf-8")
     result = vedette("schema", "--out", str(tmp_path / "file" / "s.json"))
     assert result.exit_code == 1
-    assert result.stderr.startswith(f"{tmp_path / 'file' / 's.json'}: expected a place to write; got ")
+    assert result.stderr.startswith(f"{tmp_path / 'file' / 's.json'}: expected a file that can be written; ")

@@ -145,11 +145,13 @@ def checked_keys(path: Path, rows: Sequence[tuple[Any, Any]]) -> list[tuple[str,
 def lock_of(folder: Path) -> sqlite3.Connection:
     """An open transaction on a file beside: SQLite's own locks, which the system ends with the process."""
     path = folder / LOCK
-    lock = sqlite3.connect(path, timeout=0.0, isolation_level=None, check_same_thread=False)
+    lock = None
     try:
+        lock = sqlite3.connect(path, timeout=0.0, isolation_level=None, check_same_thread=False)
         lock.execute("BEGIN EXCLUSIVE")
     except (sqlite3.Error, UnicodeDecodeError) as error:
-        lock.close()
+        if lock is not None:
+            lock.close()
         if _code(error) == sqlite3.SQLITE_BUSY:
             raise InputError(f"{folder}: expected to write alone; another process is writing this campaign") from None
         why = f"{path.name}: {printable(said(error))}"

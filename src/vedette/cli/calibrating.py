@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from vedette.cli.compiling import compiling
+from vedette.cli.errors import check_ending
 from vedette.cli.options import BadRows, Overwrite, SensorsFile, Speed, Trust
 from vedette.cli.output import console, note, publish, say
 from vedette.cli.running import compile_if_cold, interruptible
@@ -44,11 +45,14 @@ def calibrate(
 ) -> None:
     """Find from recorded scans alone what each sensor is like: biases, noise, detection, clutter, with intervals."""
     from vedette.calibration.drifting import calibrate_windows
-    from vedette.files import write_whole
+    from vedette.files import unwritable, write_file
     from vedette.scenarios.calibrated import calibrated_text, problem_of
 
+    check_ending(out, "--out", "yaml", "yml")
     if out is not None and out.exists() and not overwrite:
         raise InputError(f"{out}: already there; --overwrite replaces it")
+    if out is not None and (reason := unwritable(out)):
+        raise InputError(f"{out}: expected a file that can be written; {reason}")
     read, cautions = read_recording(sensors, scans, None, speed=speed, bad_rows=bad_rows, trust=trust)
     scenario, recording, assumed = read
     with interruptible("nothing was written"):
@@ -58,11 +62,7 @@ def calibrate(
             windows = list(calibrate_windows(problem, window or math.inf, watch))
         if out is not None:
             text = calibrated_text(scenario, sensors, windows[-1].calibration, out.parent)
-            try:
-                out.parent.mkdir(parents=True, exist_ok=True)
-                write_whole(out, lambda file: file.write(text.encode("utf-8")))
-            except OSError as error:
-                raise InputError(f"{out}: expected a place to write; got {error.strerror}") from None
+            write_file(out, lambda file: file.write(text.encode("utf-8")), make_folder=True)
     names = scenario.model.sensor_names
     _print(windows, names, position)
     if out is not None:

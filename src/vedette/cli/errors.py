@@ -8,6 +8,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import typer
@@ -63,6 +64,12 @@ def _with_value(error: typer.BadParameter) -> str:
 def usage_error(message: str, option: str) -> typer.BadParameter:
     """Wrong use of an option: exit status 2."""
     return typer.BadParameter(message, param_hint=option)
+
+
+def check_ending(path: Path | None, option: str, *endings: str) -> None:
+    """Raise a usage error unless the file to write, if any, has one of the endings; it then replaces no other kind."""
+    if path is not None and path.suffix[1:].lower() not in endings:
+        raise usage_error(f"expected a file ending in {', '.join(endings)}; got {path}", option)
 
 
 @contextmanager

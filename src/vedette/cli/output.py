@@ -145,7 +145,7 @@ def accept_any_letter() -> None:
 def trouble_of_system(error: OSError) -> str:
     """What to say of an error of the system that no command has explained; empty for a reader that went away.
 
-    Raises the error where it is neither about the output nor about a limit of the system.
+    Raises the error where it is neither about the output, nor about a limit of the system, nor about a file.
     """
     if error.errno == errno.EPIPE:
         return ""
@@ -153,6 +153,8 @@ def trouble_of_system(error: OSError) -> str:
         return f"the output cannot be written: {error.strerror}"
     if error.errno in (errno.EMFILE, errno.ENFILE):
         return f"{error.strerror}: this process may have too few files open at once (ulimit -n)"
+    if error.filename is not None:
+        return f"{error.filename}: expected a file or folder that can be used; {error.strerror}"
     raise error
 
 

@@ -11,7 +11,7 @@ import typer
 from vedette.cli.comparisons import print_comparison
 from vedette.cli.completing import one_of
 from vedette.cli.documents import results_document, run_document
-from vedette.cli.errors import named_options, usage_error
+from vedette.cli.errors import check_ending, named_options, usage_error
 from vedette.cli.options import ResultsFolder
 from vedette.cli.output import note, publish, say
 from vedette.cli.running import interruptible, print_run
@@ -46,6 +46,7 @@ def report(
     ] = False,
 ) -> None:
     """Report on a campaign or a run: one page that opens anywhere, with tables, figures and a replay of runs."""
+    check_ending(out, "--out", "html")
     need("vedette report", "jinja2", "matplotlib", "pyarrow")
     from vedette.simulation.storage import holds_run
 
@@ -171,6 +172,7 @@ def results(
             raise usage_error(f"expected one of {', '.join(_FORMATS)}; got {name}", "--format")
     if formats and export is None:
         raise usage_error("expected with --export, which names the folder", "--format")
+    check_ending(tex, "--tex", "tex")
     need("vedette results", "pyarrow")
     if "netcdf" in (formats or ()):
         need("vedette results --format netcdf", "xarray")

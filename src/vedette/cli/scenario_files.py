@@ -12,7 +12,7 @@ import typer
 
 from vedette.cli import completing
 from vedette.cli.completing import built_in_scenarios, one_of
-from vedette.cli.errors import usage_error
+from vedette.cli.errors import check_ending, usage_error
 from vedette.cli.options import Overwrite, SceneFile
 from vedette.cli.output import note, print_names, publish, say
 from vedette.errors import InputError, ScenarioError
@@ -234,6 +234,7 @@ def schema(
 
     It describes every field, and editors that know it complete and check as one writes.
     """
+    check_ending(out, "--out", "json")
     text = _schema_text()
     if out is None:
         say(text, nl=False)
@@ -251,9 +252,7 @@ def _schema_text() -> str:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a file, making its folder. Raises `InputError` where that cannot be."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{path}: expected a place to write; got {error.strerror}") from None
+    """Write a file whole or not at all, making its folder. Raises `InputError` where that cannot be."""
+    from vedette.files import write_file
+
+    write_file(path, lambda file: file.write(text.encode("utf-8")), make_folder=True)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from vedette.cli.errors import usage_error
+from vedette.cli.errors import check_ending, named_options
 from vedette.cli.options import ScenarioName, Trust
 from vedette.cli.output import console as new_console
 from vedette.cli.output import note, publish, say
@@ -40,8 +40,7 @@ def show(
     """
     from vedette.scenarios import load_scenario
 
-    if out is not None and out.suffix[1:].lower() not in PICTURE_FORMATS:
-        raise usage_error(f"expected a file ending in {', '.join(PICTURE_FORMATS)}; got {out}", "--out")
+    check_ending(out, "--out", *PICTURE_FORMATS)
     if out is not None:
         need("vedette show --out", "matplotlib")
     loaded = load_scenario(scenario)
@@ -154,6 +153,7 @@ def _draw(scenario: Scenario, out: Path) -> None:
     from vedette.evaluation.figures import save_figure
 
     name = out.suffix[1:].lower()
-    written = save_figure(scenario_figure(scenario, truth_of(scenario)), out.with_suffix(""), formats=(name,))[0]
+    with named_options({"path": "--out"}):
+        written = save_figure(scenario_figure(scenario, truth_of(scenario)), out.with_suffix(""), formats=(name,))[0]
     if written != out:
         written.replace(out)

@@ -134,7 +134,9 @@ def load_scenario(name_or_path: str | FilePath) -> Scenario:
     """
     builtin = list_builtin()
     path = builtin.get(str(name_or_path), FilePath(name_or_path))
-    if not os.path.isfile(path):  # a name can be too long, or hold what no name can: for pathlib, an error
+    if os.path.isdir(path) or not os.path.exists(
+        path
+    ):  # a name can be too long, or hold what no name can: for pathlib, an error
         raise missing_scenario(str(name_or_path), "", list(builtin))
     if path.suffix.lower() == ".toml":
         raise InputError(

@@ -15,7 +15,7 @@ from vedette.reading import read_text
 from vedette.recorded import Conventions, RecordedScans
 from vedette.scenarios.assumed_clutter import assumed_clutter, place_stds
 from vedette.scenarios.extents import measured_region, reached_region, region_in_words
-from vedette.scenarios.faults import Fault
+from vedette.scenarios.faults import Fault, describe
 from vedette.scenarios.loading import Scenario, diagnose
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.yaml_reader import MOST_BYTES, Document, read_yaml
@@ -62,8 +62,8 @@ def scenario_of_recording(
         ScenarioError: with every fault of the file about sensors.
     """
     for file, what in ((scans, "scans"), (truth, "the targets' reports")):
-        if file is not None and not file.is_file():
-            raise InputError(f"{file}: no such file; expected a file of {what}")
+        if file is not None and (file.is_dir() or not file.exists()):
+            raise InputError(f"{file}: {'a folder' if file.is_dir() else 'no such file'}; expected a file of {what}")
     document = _document(sensors)
     said = {key: value for key, value in document.data.items() if key not in ("control", "planners", "time")}
     control, own = document.data.get("control"), said.get("recording")
@@ -175,7 +175,7 @@ def _endless(said: Mapping[str, Any], decide_every: float) -> dict[str, Any]:
 def _document(sensors: FilePath) -> Document:
     document = read_yaml(read_text(sensors, "file about sensors", MOST_BYTES), str(sensors))
     if not isinstance(document.data, Mapping):
-        raise InputError(f"{sensors}: expected a mapping with `sensors`; got {type(document.data).__name__}")
+        raise InputError(f"{sensors}: expected a mapping with `sensors`; got {describe(document.data)}")
     return document
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import platform
 import shlex
 import shutil
@@ -21,6 +20,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from vedette.errors import InputError
+from vedette.files import unwritable
 from vedette.reading import parse_json, read_file, unreadable
 from vedette.simulation.kept import FORMAT_VERSION, LACKING, decode_run, encode_run, encode_timings
 from vedette.simulation.records import RunRecord
@@ -200,16 +200,16 @@ def check_free(target: Path, overwrite: bool) -> None:
     """`InputError` unless a run may be saved there: nothing is there, or a run that may be overwritten; and the folder
     around it may be written to.
     """
-    around = next(folder for folder in (target, *target.absolute().parents) if folder.exists())
-    if not around.is_dir() or not os.access(around, os.W_OK):
-        raise InputError(f"directory: expected a folder that may be written to; got {target}, as {around} is none")
+    reason = f"{target} is no folder" if target.exists() and not target.is_dir() else unwritable(target)
+    if reason:
+        raise InputError(f"directory: expected a folder that may be written to; got {target}: {reason}")
     if not target.exists() or (target.is_dir() and not any(target.iterdir())):
         return
     if not overwrite:
         raise InputError(
             f"directory: expected a new folder; {target} exists (--overwrite or overwrite=True replaces it)"
         )
-    if not (target / MANIFEST).is_file():
+    if not holds_run(target):
         raise InputError(f"directory: expected a folder that holds a run; {target} holds something else and is kept")
 
 

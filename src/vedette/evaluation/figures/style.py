@@ -201,7 +201,9 @@ def save_figure(figure: Figure, path: Path | str, *, formats: Sequence[str] = _F
         with _as_it_is(figure):
             return tuple(_save(figure, stem.with_name(f"{stem.name}.{name}"), name) for name in formats)
     except OSError as error:
-        raise InputError(f"path: expected a place to write figures; got {stem}: {error.strerror}") from error
+        raise InputError(
+            f"path: expected a place to write figures; got {error.filename or stem}: {error.strerror}"
+        ) from error
 
 
 @styled
