@@ -12,6 +12,7 @@ from vedette.models import Region
 from vedette.models.arguments import reject
 from vedette.models.fields import NonNegative, Positive, check_fields
 from vedette.recorded.reports import Reports
+from vedette.text import counted
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,6 +42,17 @@ class CleaningCounts:
     short_tracks: int
     slow_tracks: int
     tracks: int
+
+    def in_words(self) -> str:
+        """The reports, and what was removed, for messages."""
+        removed = {
+            "jumps": self.jumps,
+            "outside the region": self.outside,
+            "tracks of a single report": self.short_tracks,
+            "slow tracks": self.slow_tracks,
+        }
+        found = ", ".join(f"{number} {what}" for what, number in removed.items() if number)
+        return f"{counted(self.reports, 'report')} ({found or 'none removed'})"
 
 
 @dataclass(frozen=True, slots=True)

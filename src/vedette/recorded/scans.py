@@ -119,7 +119,12 @@ class _Rows(ScanColumns):
         except (TypeError, ValueError, OverflowError):
             time = math.nan
         if not abs(time) <= LATEST or is_number(cell) == self.is_utc:
-            wanted = "an ISO 8601 time" if self.is_utc else "a finite number of seconds"
+            number = (
+                f"a number of seconds from {-LATEST:g} to {LATEST:g}"
+                if abs(time) > LATEST
+                else "a finite number of seconds"
+            )
+            wanted = "an ISO 8601 time" if self.is_utc else number
             raise self.table.fault(i, self._time, wanted)
         return time
 

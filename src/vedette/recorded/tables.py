@@ -6,7 +6,7 @@ import csv
 import hashlib
 import numbers
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from decimal import Decimal
@@ -26,6 +26,7 @@ from vedette.text import elided, printable, shown
 # Beyond these, differences and speeds of reports mean nothing.
 FARTHEST = 1e9  # m, m/s
 LATEST = 1e12  # s
+_SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars"}
 # Larger files would fill the memory before anything could be said of them.
 _MOST_BYTES = 500_000_000
 _MOST_REPORTS = 5_000_000
@@ -226,7 +227,7 @@ def _read_csv(file: Path) -> Table:
     try:
         with file.open(encoding="utf-8-sig", newline="") as lines:
             reader = csv.reader(lines, strict=True)
-            header = [name.strip() for name in next(reader, [])]
+            header = header_of(reader, file)
             rows = [(reader.line_num, cells) for cells in reader if cells]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{file}: cannot be read as CSV in UTF-8: {_reason(error)}") from error
@@ -237,6 +238,16 @@ def _read_csv(file: Path) -> Table:
             raise InputError(f"{file}, row {line}: expected {len(header)} cells, as in the header; got {len(cells)}")
     columns = {name: [cells[i] for _, cells in rows] for i, name in enumerate(header)}
     return Table(columns, [line for line, _ in rows], str(file))
+
+
+def header_of(reader: Iterator[list[str]], file: Path) -> list[str]:
+    """The names of the columns of a CSV file; `InputError` where other letters than commas separate them."""
+    header = [name.strip() for name in next(reader, [])]
+    other = next((letter for letter in _SEPARATORS if letter in header[0]), None) if len(header) == 1 else None
+    if other is not None:
+        separators = f"{_SEPARATORS[other]}; write it anew with commas, and with a point in numbers"
+        raise InputError(f"{file}, row 1: expected columns separated by commas; got them separated by {separators}")
+    return header
 
 
 def _read_parquet(file: Path) -> Table:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,8 @@ from vedette.recorded.cleaning import Cleaning, CleaningCounts, RecordedTrack
 from vedette.recorded.reports import Reports, parse_reports
 from vedette.recorded.tables import read_table, seconds, table_of
 from vedette.simulation.truth import TIME_TOLERANCE, Truth, scan_times
+
+_FIRST_DATE, _LAST_DATE = 1e8, 1e10  # s of the Unix epoch, 1973 and 2286
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,7 +48,9 @@ class RecordedTargets:
     def __post_init__(self) -> None:
         tracks, counts = self.cleaning.apply(self.reports)
         if not tracks:
-            raise InputError(f"recorded targets: expected at least one track after cleaning; got none of {counts}")
+            raise InputError(
+                f"recorded targets: expected at least one track after cleaning; got none of {counts.in_words()}"
+            )
         try:
             origin = float(self.reports.times.min()) if self.time_origin is None else seconds(self.time_origin)
         except (TypeError, ValueError):
@@ -115,6 +120,13 @@ class RecordedTargets:
             states[i, alive[i], 2:] = path(recorded[alive[i]], 1)
         if not alive.any():
             first, last = min(track.times[0] for track in self.tracks), max(track.times[-1] for track in self.tracks)
-            expected = f"scans between the first and last report, {first:g} to {last:g} s"
-            raise reject("times", expected, f"{recorded[0]:g} to {recorded[-1]:g} s of recorded time")
+            expected = f"scans between the first and last report, {_span(first, last)}"
+            raise reject("times", expected, f"{_span(recorded[0], recorded[-1])} of recorded time")
         return Truth.from_arrays(scans, alive, states)
+
+
+def _span(first: float, last: float) -> str:
+    """Two recorded times in a message: as dates where they are seconds of the Unix epoch."""
+    if not _FIRST_DATE <= first <= last <= _LAST_DATE:
+        return f"{first:.6g} to {last:.6g} s"
+    return " to ".join(datetime.fromtimestamp(time, UTC).isoformat(timespec="seconds") for time in (first, last))

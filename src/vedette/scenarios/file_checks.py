@@ -66,15 +66,19 @@ def _columns(recorded: RecordedTargets, file: FilePath) -> Iterator[Finding]:
     """Names of columns that a CSV file does not have."""
     if file.suffix.lower() != ".csv":
         return
+    from vedette.recorded.tables import column_names, header_of
+
     try:
         with file.open(encoding="utf-8-sig", errors="replace", newline="") as lines:
-            header = [name.strip() for name in next(csv.reader(lines), [])]
+            header = header_of(csv.reader(lines), file)
+    except InputError as error:
+        yield ("targets", "path"), "a readable CSV file", str(error)
+        return
     except (OSError, csv.Error) as error:
         yield ("targets", "path"), "a readable CSV file", f"{describe(recorded.path)}: {error}"
         return
     from vedette.recorded.opensky import is_opensky
     from vedette.recorded.reports import usual_names
-    from vedette.recorded.tables import column_names
 
     if not recorded.columns.given() and is_opensky(header):
         return

@@ -183,15 +183,22 @@ def _model(document: Document, data: Mapping[str, Any], sensors: FilePath) -> Sc
     """The scenario of a document with other data; raises for its faults."""
     model, faults = diagnose(replace(document, data=data), sensors.parent)
     if model is None:
-        raise ScenarioError([_in_words_of_user(fault, document, sensors) for fault in faults])
+        raise ScenarioError([_in_words_of_user(fault, document, data, sensors) for fault in faults])
     return model
 
 
-def _in_words_of_user(fault: Fault, document: Document, sensors: FilePath) -> str:
+def _in_words_of_user(fault: Fault, document: Document, data: Mapping[str, Any], sensors: FilePath) -> str:
     """The message of a fault, without fields and places that the file about sensors does not have."""
     path = fault.told.path
     if path == ("recording",):
-        return fault.told.got  # names the file of scans
+        got = fault.told.got
+        return got if data["recording"]["path"] in got else f"{sensors}: recording.{got}"
+    if path[:1] == ("targets",) and "targets" not in document.data:
+        file, got = data["targets"]["path"], fault.told.got
+        if path == ("targets", "path"):
+            return got if file in got else f"{file}: {got}"
+        where = ".".join(map(str, path))
+        return f"{file}: {where}: expected {fault.told.expected}, got {got} (it belongs in {sensors})"
     if path[:1] == ("sensors",) and path[-2:] == ("measurement", "kind") and "birth" not in document.data:
         wanted = "a measurement that says where a target is, or births at sites: give one wide site in birth.sites"
         fault = Fault(fault.place, fault.told._replace(expected=wanted))
