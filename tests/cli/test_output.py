@@ -10,7 +10,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from cli.test_small_scenes import SCENE
 from vedette.cli import app
+from vedette.cli.output import folded
 from vedette.scenarios import Scenario, load_scenario
 from vedette.scenarios.dumping import dump_scenario
 from vedette.scenarios.overrides import with_fields
@@ -84,6 +86,30 @@ def test_a_reader_that_goes_away_hears_nothing_more(command: tuple[str, ...]) ->
     finally:
         os.close(writer)
     assert (done.returncode, done.stderr) == (1, b"")
+
+
+def test_a_long_line_is_broken_between_words_on_a_terminal() -> None:
+    text = "\ninterrupted: trial-results keeps every run that is finished; the same command goes on"
+    broken = "\ninterrupted: trial-results keeps every\nrun that is finished; the same command\ngoes on"
+    assert folded(text, 40) == broken
+    assert folded(text, 100) == text
+    for kept in ("  vedette campaign SPEC --runs=2 --out trial-shards --shard 2/2", "a: 1\n" + 50 * "b", 50 * "x"):
+        assert folded(kept, 40) == kept
+
+
+@posix
+def test_a_terminal_of_60_columns_breaks_no_word(tmp_path: Path) -> None:
+    import pty
+
+    (tmp_path / "s.yaml").write_text(SCENE)
+    leader, follower = pty.openpty()
+    done = program("check", tmp_path / "s.yaml", stdout=follower, env={**os.environ, "COLUMNS": "60"})
+    os.close(follower)
+    lines = os.read(leader, 10_000).decode().split("\r\n")
+    os.close(leader)
+    assert done.returncode == 0
+    assert max(map(len, lines[1:])) <= 60  # the first is the path, which has no place to break
+    assert " ".join(lines).split()[-3:] == ["filter,", "1", "decision"]
 
 
 @posix

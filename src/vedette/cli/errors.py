@@ -14,7 +14,7 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-from vedette.cli.output import accept_any_letter, drop_output, trouble_of_system
+from vedette.cli.output import accept_any_letter, complain, drop_output, trouble_of_system
 from vedette.errors import InputError, VedetteError
 from vedette.text import shown
 
@@ -39,13 +39,13 @@ class Commands(TyperGroup):
             error.message = _with_value(error)
             raise
         except VedetteError as error:
-            typer.echo(str(error), err=True)
+            complain(str(error))
             raise typer.Exit(1) from None
         except OSError as error:
             text = trouble_of_system(error)
             drop_output()
             if text:
-                typer.echo(text, err=True)
+                complain(text)
             raise typer.Exit(1) from None
         except KeyboardInterrupt:  # where a command has nothing to say of what it leaves
             typer.echo("\ninterrupted", err=True)

@@ -12,12 +12,14 @@ import inspect
 import json
 import math
 import os
+import shutil
 import sys
+import textwrap
 import warnings
 from collections.abc import Callable, Mapping
 from contextvars import ContextVar
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TextIO, get_type_hints
 
 import typer
 
@@ -70,18 +72,33 @@ def say(text: str = "", *, nl: bool = True, even_if_quiet: bool = False) -> None
     """A line of the result."""
     manner = _manner.get()
     if not manner.as_json and (even_if_quiet or not manner.quiet):
-        typer.echo(text, nl=nl)
+        typer.echo(_for_terminal(text, sys.stdout), nl=nl)
 
 
 def note(text: str) -> None:
     """A line beside the result: how far it is, what was left out, what may not be meant."""
     if not _manner.get().quiet:
-        typer.echo(text, err=True)
+        complain(text)
 
 
 def complain(text: str) -> None:
     """A line of what went wrong."""
-    typer.echo(text, err=True)
+    typer.echo(_for_terminal(text, sys.stderr), err=True)
+
+
+def _for_terminal(text: str, stream: TextIO) -> str:
+    return folded(text, shutil.get_terminal_size().columns) if stream.isatty() else text
+
+
+def folded(text: str, width: int) -> str:
+    """A line, broken between words where it is longer than a terminal is wide.
+
+    Several lines, and what is indented, such as a command to copy, stay as they are.
+    """
+    line = text.strip("\n")
+    if "\n" in line or line.startswith(" ") or len(line) <= width:
+        return text
+    return text.replace(line, textwrap.fill(line, width, break_long_words=False, break_on_hyphens=False))
 
 
 def publish(document: Any) -> None:
