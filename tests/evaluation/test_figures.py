@@ -4,6 +4,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import matplotlib
@@ -11,6 +12,7 @@ import matplotlib.style
 import numpy as np
 import pytest
 import scipy.stats
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
@@ -271,6 +273,20 @@ def test_few_values_have_no_tails() -> None:
 
     assert reach(19) == 0.0
     assert reach(20) > 0.0
+
+
+@pytest.mark.parametrize("times", [(3e-4, 6e-4), (3e-4,), (1e-6, 2e-3), (1e-4, 3e-3)])
+def test_labels_of_times_do_not_meet(times: tuple[float, ...]) -> None:
+    figure = cost_figure({"jdm": {f"stage {i}": np.array([time]) for i, time in enumerate(times)}})
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    (axes,) = figure.axes
+    low, high = axes.get_xlim()
+    ticks = [*axes.get_xticklabels(), *axes.get_xticklabels(minor=True)]
+    shown = [tick for tick in ticks if tick.get_text() and low <= tick.get_position()[0] <= high]
+    boxes = sorted((tick.get_window_extent(canvas.get_renderer()) for tick in shown), key=lambda box: box.x0)
+    assert len(boxes) >= 3
+    assert all(left.x1 < right.x0 for left, right in pairwise(boxes))
 
 
 def test_no_display_and_no_pyplot_is_needed() -> None:

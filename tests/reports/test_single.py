@@ -20,6 +20,7 @@ from vedette.reports.groups import group_of_run
 from vedette.reports.replay import replay_data
 from vedette.scenarios import Scenario
 from vedette.scenarios.of_recording import OfRecording, scenario_of_recording
+from vedette.scenarios.overrides import with_fields
 from vedette.simulation.records import RunRecord
 
 
@@ -86,6 +87,26 @@ def test_a_recording_that_is_another_now_is_not_shown(tmp_path: Path) -> None:
     lines = (tmp_path / "scans.csv").read_text("utf-8").splitlines()
     (tmp_path / "scans.csv").write_text("\n".join(lines[:1] + lines[9:]), "utf-8")
     assert data_of(record, scenario)["scans"] == []
+
+
+def test_a_heading_that_nobody_gave_is_not_drawn(tmp_path: Path) -> None:
+    """Sensors that see all round, and of which the recording has no headings."""
+    (scenario, *_), record = tracked(tmp_path, truth=False)
+    data = data_of(record, scenario)
+    for s, sensor in enumerate(data["sensors"]):
+        assert {poses[s][2] for poses in data["poses"]} == {sensor["unturned"]}
+    turned = with_fields(
+        scenario,
+        {
+            "sensors.0.detection": {
+                "kind": "limited_sector",
+                "probability": 0.9,
+                "max_range": 5000.0,
+                "half_width_deg": 60.0,
+            }
+        },
+    )
+    assert ["unturned" in sensor for sensor in data_of(record, turned)["sensors"]] == [False, True]
 
 
 def report(*words: object) -> Result:

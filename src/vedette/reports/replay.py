@@ -99,8 +99,13 @@ def _extent(record: RunRecord, scenario: Scenario) -> tuple[float, float, float,
 
 
 def drawn_sensor(name: str, section: SensorSection) -> dict[str, Any]:
-    """What a sensor sees, for drawing: how a measurement lies in the plane, and its field where that has an edge."""
+    """What a sensor sees, for drawing: how a measurement lies in the plane, and its field where that has an edge.
+
+    `unturned` is the heading (rad) that has no meaning: of a sensor that stands and sees alike all round.
+    """
     found: dict[str, Any] = {"name": name, "kind": LIE.get(section.measurement.kind, "none")}
+    if section.platform.kind == "still" and section.detection.kind in ("constant", "gaussian", "limited_range"):
+        found["unturned"] = round(math.radians(section.heading_deg), 4)
     if section.detection.kind in ("limited_range", "limited_sector", "soft_sector"):
         found["range"] = section.detection.max_range
     if section.detection.kind in ("limited_sector", "soft_sector"):

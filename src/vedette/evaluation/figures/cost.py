@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from vedette.errors import InputError
@@ -44,7 +45,7 @@ def cost_figure(seconds: Mapping[str, Mapping[str, NDArray[np.floating]]]) -> Fi
         axes.hlines(places, low, high, color=shade, linewidth=1.2)
         axes.plot(middle, places, linestyle="", marker=marker, markersize=4, color=shade, label=label)
     axes.set_xscale("log")
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    _label_times(axes)
     counts = [max(len(spent.get(stage, ())) for spent in seconds.values()) for stage in stages]
     axes.set_yticks(range(len(stages)), [f"{stage}\nn = {count}" for stage, count in zip(stages, counts, strict=True)])
     axes.set_ylim(len(stages) - 0.5, -0.5)
@@ -53,6 +54,19 @@ def cost_figure(seconds: Mapping[str, Mapping[str, NDArray[np.floating]]]) -> Fi
     axes.set_xlabel("Time (ms): median, 5 % to 95 %")
     figure.legend(loc="outside upper center", ncols=columns, handlelength=1.2)
     return figure
+
+
+def _label_times(axes: Axes) -> None:
+    """Labels that do not meet: decades, or within two decades 1, 2 and 5; a decade at least is shown."""
+    low, high = axes.get_xlim()
+    if high < 10.0 * low:
+        middle = float(np.sqrt(low * high))
+        low, high = middle / np.sqrt(10.0), middle * np.sqrt(10.0)
+        axes.set_xlim(low, high)
+    if high < 100.0 * low:
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
 
 
 def _quantiles(values: NDArray[np.floating]) -> tuple[float, float, float]:

@@ -165,10 +165,12 @@ function drawSensor(context, run, view, step, s) {
   context.strokeStyle = colours.ink;
   context.fillStyle = colours.grey;
   context.lineWidth = 1.5;
-  const [tipX, tipY] = [px + 20 * Math.cos(heading), py - 20 * Math.sin(heading)];
-  line(context, px, py, tipX, tipY);
-  for (const side of [2.6, -2.6]) {
-    line(context, tipX, tipY, tipX + 6 * Math.cos(heading + side), tipY - 6 * Math.sin(heading + side));
+  if (heading !== seen.unturned) {
+    const [tipX, tipY] = [px + 20 * Math.cos(heading), py - 20 * Math.sin(heading)];
+    line(context, px, py, tipX, tipY);
+    for (const side of [2.6, -2.6]) {
+      line(context, tipX, tipY, tipX + 6 * Math.cos(heading + side), tipY - 6 * Math.sin(heading + side));
+    }
   }
   context.fillRect(px - 5.5, py - 5.5, 11, 11);
   context.strokeRect(px - 5.5, py - 5.5, 11, 11);
