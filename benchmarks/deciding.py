@@ -10,11 +10,12 @@ again, so that it goes on after a Ctrl-C; `--runs 0` prints the tables of the fi
 
 A table a scene. "more" is the paired mean difference to the first strategy, joint decisions by the expected loss, with
 its standard error; it is marked * where Holm's correction over the scene's strategies leaves it told from zero at 95 %.
-"won" is the share of runs in which the first strategy is better. "lost" is the part of OSPA that is of lost and false
-targets. "score" is (rule - plan) / (rule - floor), with its standard error: 0 for the best rule of thumb, 1 for the
-floor, joint decisions on the true targets; none where these are less than two standard errors apart. "short" is how far
-the choices may be from the best joint ones, by the plans' own bounds. "ms" is CPU time of a decision on one thread, the
-mean over decisions and runs.
+"won" is the share of runs in which the first strategy is better. Then come the mean OSPA of the median and of the worst
+run, and the share of runs that end with a lost target. "lost" is the part of OSPA that is of lost and false targets.
+"score" is (rule - plan) / (rule - floor), with its standard error: 0 for the best rule of thumb, 1 for the floor, joint
+decisions on the true targets; none where these are less than two standard errors apart. "short" is how far the choices
+may be from the best joint ones, by the plans' own bounds. "ms" is CPU time of a decision on one thread, the mean over
+decisions and runs.
 """
 
 from __future__ import annotations
@@ -33,8 +34,9 @@ from deciding_scenes import RULES, Scene, scenes, strategies
 from pages import write_between
 from timed_planner import Timed
 
-from vedette.evaluation.metrics import ospa_of_run
+from vedette.evaluation.metrics import match_run, ospa_of_run
 from vedette.evaluation.statistics import paired_difference, summarise
+from vedette.evaluation.tails import tail, tail_header
 from vedette.kernels.base.types import Floats
 from vedette.processes import end_with_parent
 from vedette.scenarios import Scenario, with_fields
@@ -45,6 +47,7 @@ SEED, FIRST, FLOOR, LEVEL = 0, "jdm loss", "true targets", 0.05
 BEFORE = ("random", "fixed")
 LEAST_GAP = 0.02  # m, between a rule of thumb and the floor: below it there is nothing to score
 COLUMNS = (FLOOR, "oracle 1", "idm stay", "best rule")
+REST = ("lost (m)", "score", "short", "ms", "runs")
 USUAL = (FIRST, FLOOR, "oracle 1", "idm stay", "rule")
 
 
@@ -55,6 +58,7 @@ class Score(NamedTuple):
     lost: float  # its part of lost and false targets
     milliseconds: float  # of a decision
     short: float  # how far the choices may be from the best, relative; NaN where plans do not say
+    ends_lost: float  # 1 where a target has no estimate at the last scored scan, else 0
 
 
 Runs = dict[str, dict[int, Score]]  # by strategy and run
@@ -76,9 +80,11 @@ def score(scene_name: str, strategy: str, run: int) -> Score:
     ospa_of = partial(ospa_of_run, cutoff=ospa.cutoff, order=ospa.order, components=ospa.components)
     record = simulate(build_experiment(scenario), timed, seed=SEED, run=run, score=ospa_of)
     first = ospa.from_step or (scenario.model.decision_steps[0] + 1 if scenario.model.decision_steps else 1)
-    total, _, lost = record.ospa[first - 1 : ospa.to_step].mean(axis=0).tolist()
+    scored = slice(first - 1, ospa.to_step)
+    total, _, lost = record.ospa[scored].mean(axis=0).tolist()
     short = float(np.mean(timed.short)) if timed.short else np.nan
-    return Score(total, lost, 1e3 * float(np.mean(timed.seconds)), short)
+    missed = match_run(record.truth, record.estimates, cutoff=ospa.cutoff, order=ospa.order).num_missed[scored]
+    return Score(total, lost, 1e3 * float(np.mean(timed.seconds)), short, float(missed[-1] > 0))
 
 
 class Store:
@@ -167,8 +173,8 @@ def shortfall(runs: Runs, name: str) -> str:
 
 def table(runs: Runs) -> Iterator[str]:
     """The table of one scene."""
-    yield "| Strategy | OSPA (m) | more (m) | won | lost (m) | score | short | ms | runs |"
-    yield "| --- |" + " ---: |" * 8
+    yield "| " + " | ".join(["Strategy", "OSPA (m)", "more (m)", "won", *tail_header("m"), *REST]) + " |"
+    yield "| --- |" + " ---: |" * 11
     names = [name for name in runs if len(runs[name]) > 1]
     differences = {name: np.subtract(*paired(runs, name, FIRST)) for name in names}
     clear = dict(zip(names, holm([p_value(own) for own in differences.values()]), strict=True))
@@ -182,7 +188,12 @@ def table(runs: Runs) -> Iterator[str]:
         else:
             star = "*" if clear[name] else ""
             cells += [f"{more.mean:+.2f} ± {more.standard_error:.2f}{star}", f"{np.mean(differences[name] > 0):.0%}"]
-        cells += [f"{scores[:, 1].mean():.2f}", place(runs, name), shortfall(runs, name)]
+        cells += [
+            *tail(scores[:, 0], scores[:, 4]).cells(),
+            f"{scores[:, 1].mean():.2f}",
+            place(runs, name),
+            shortfall(runs, name),
+        ]
         cells += [f"{scores[:, 2].mean():.1f}", str(len(scores))]
         yield "| " + " | ".join(cells) + " |"
 

@@ -7,12 +7,12 @@ Compared are the filter that runs where nothing is said, the LMB filter, the del
 20,000 hypotheses, the M-delta-GLMB filter, and the factored filter with each of `--errors` as its split error. The runs
 of a scene are paired: truth and scans are the same for all. A scene is taken if any of the words is in its name.
 
-Prints a Markdown table a scene: runs; mean OSPA with its standard error, over the scans that the scenario scores;
-how much more that is than the first filter's, and its ratio to the best that has five runs, each in the runs that both
-have, with the standard error of the difference; OSPA(2) over 10 scans; share of the targets that have an estimate
-within 0.4 of the cutoff; label switches a run; CPU milliseconds a scan, the median over the runs. After the second run
-none begins when a filter has spent `--seconds` on a scene: slow ones have fewer runs. Then a table of the ratios in all
-scenes.
+Prints a Markdown table a scene: runs; mean OSPA with its standard error, over the scans that the scenario scores; that
+of the median and of the worst run, and the share of runs that end with a lost target; how much more the mean is than
+the first filter's, and its ratio to the best that has five runs, each in the runs that both have, with the standard
+error of the difference; OSPA(2) over 10 scans; share of the targets that have an estimate within 0.4 of the cutoff;
+label switches a run; CPU milliseconds a scan, the median over the runs. After the second run none begins when a filter
+has spent `--seconds` on a scene: slow ones have fewer runs. Then a table of the ratios in all scenes.
 
 `--out` appends a line of JSON for each filter and scene, with the figures of every run. What the file held before is in
 the tables, unless it was measured again; `--runs 0` prints the file alone.
@@ -36,6 +36,7 @@ from scenes import Scene, all_scenes
 
 from vedette.errors import VedetteError
 from vedette.evaluation import Summary, match_run, measure_run, ospa_of_run, summarise
+from vedette.evaluation.tails import tail, tail_header
 from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.simulation import Experiment, RunRecord, simulate
@@ -50,6 +51,7 @@ class Row:
     scene: str
     filter: str
     ospa: Sequence[float] = ()
+    ends_lost: Sequence[float] = ()  # 1 where a target has no estimate at the last scored scan, else 0
     ospa2: Sequence[float] = ()
     near: Sequence[float] = ()
     switches: Sequence[float] = ()
@@ -90,11 +92,12 @@ def _run(scenario: Scenario, planner: str, run: int, first_scans: int | None = N
 
 
 def _scores(record: RunRecord, scenario: Scenario) -> tuple[float, ...]:
-    """OSPA, OSPA(2), share of targets near an estimate, label switches."""
+    """OSPA, whether a target is lost at the end, OSPA(2), share of targets near an estimate, label switches."""
     scored, cutoff, of_run = _scored(scenario), scenario.model.ospa.cutoff, measure_run(record, scenario)
     near = match_run(record.truth, record.estimates, cutoff=NEAR * cutoff, order=1.0)
     return (
         float(record.ospa[scored, 0].mean()),
+        float(of_run.num_missed[scored][-1] > 0),
         float(of_run.ospa2_m[scored].mean()),
         float(near.num_matched[scored].sum() / max(1, near.num_targets[scored].sum())),
         float(of_run.label_switches.sum()),
@@ -126,8 +129,10 @@ class Ratio(NamedTuple):
 def table(scene: str, rows: Sequence[Row]) -> Iterator[str]:
     """A scene's rows, compared with the first and with the best."""
     yield f"\n### {scene}\n"
-    yield "| filter | runs | OSPA, m | more than the first | to the best | OSPA(2), m | near, % | switches | ms |"
-    yield "|---|---:|---:|---:|---:|---:|---:|---:|---:|"
+    names = ["runs", "OSPA, m", *tail_header("m"), "more than the first", "to the best"]
+    names += ["OSPA(2), m", "near, %", "switches", "ms"]
+    yield "| filter | " + " | ".join(names) + " |"
+    yield "|---|" + "---:|" * len(names)
     ratios, first = to_the_best(rows), next((row for row in rows if not row.refused), None)
     for row in rows:
         if first is None or row.refused:
@@ -136,8 +141,9 @@ def table(scene: str, rows: Sequence[Row]) -> Iterator[str]:
         ospa, more = summarise(row.ospa), _difference(row, first)
         rest = (np.mean(row.ospa2), 100.0 * np.mean(row.near), np.mean(row.switches), np.median(row.milliseconds))
         yield (
-            f"| {row.filter} | {len(row.ospa)} | {ospa.mean:.2f} ± {ospa.standard_error:.2f} "
-            f"| {more.mean:+.2f} ± {more.standard_error:.2f} | {ratios[row.filter]} | "
+            f"| {row.filter} | {len(row.ospa)} | {ospa.mean:.2f} ± {ospa.standard_error:.2f} | "
+            + " | ".join(tail(row.ospa, row.ends_lost).cells())
+            + f" | {more.mean:+.2f} ± {more.standard_error:.2f} | {ratios[row.filter]} | "
             + " | ".join(f"{value:.2f}" for value in rest)
             + " |"
         )

@@ -1,13 +1,14 @@
 """What late scans cost, and what it costs to drop them.
 
     python benchmarks/late_scans.py [--scenario NAME] [--runs N] [--delay S] [--window S]
-    python benchmarks/late_scans.py --write docs/tracking.md
+    python benchmarks/late_scans.py --scenario paper-a --write docs/recordings.md
 
 The sensors of a scenario stand still and scan as it says; a share of their scans arrives late, uniformly by up to
 `--delay` seconds, each scan by itself. After every scan time the estimate is read off what has arrived by then,
 predicted to now. Prints for each share late the OSPA distance, with its standard error over the runs, where what is
 late is put in its place (`LateScans`) and where it is dropped; how many steps were worked for each scan; the CPU time
-of a scan; and the memory that a second of window holds (instants as pickled). Runs are paired: the truth and the scans
+of a scan; and the memory that a second of window holds (instants as pickled). A second table has the mean OSPA of the
+median and of the worst run, and the share of runs that end with a lost target. Runs are paired: the truth and the scans
 are the same in every line. Equal arguments print equal tables, but for the times.
 """
 
@@ -23,7 +24,8 @@ from typing import NamedTuple
 import numpy as np
 from pages import write_between
 
-from vedette.evaluation import ospa_of_run
+from vedette.evaluation import match_run, ospa_of_run
+from vedette.evaluation.tails import tail, tail_header
 from vedette.scenarios import load_scenario
 from vedette.scenarios.build import build_experiment
 from vedette.simulation.experiment import Experiment
@@ -33,6 +35,7 @@ from vedette.simulation.truth import Truth
 from vedette.tracking import LateScans, SensorScan, Timeline
 
 SHARES = (0.0, 0.1, 0.2, 0.3, 0.5)
+WAYS = ("put in place", "dropped")
 SEED = 11
 _DROPS = 1e-9  # s; a window in which nothing is late
 
@@ -41,6 +44,7 @@ class Outcome(NamedTuple):
     """Of one run: mean OSPA, m; steps a scan; CPU ms a scan; bytes held a second of window."""
 
     ospa: float
+    ends_lost: float  # 1 where a target has no estimate at the last scan, else 0
     steps: float
     milliseconds: float
     held: float
@@ -61,7 +65,8 @@ def run(experiment: Experiment, number: int, share: float, delay: float, window:
         estimates.append(experiment.estimate(late.at(timeline, now).fused, step))
     cutoff = load_scenario(experiment.name).model.ospa.cutoff
     ospa = float(ospa_of_run(truth, estimates, cutoff=cutoff, order=1.0)[:, 0].mean())
-    return Outcome(ospa, steps / place, 1e3 * spent / place, held(timeline))
+    lost = match_run(truth, estimates, cutoff=cutoff, order=1.0).num_missed[-1] > 0
+    return Outcome(ospa, float(lost), steps / place, 1e3 * spent / place, held(timeline))
 
 
 def arriving(
@@ -91,14 +96,27 @@ def table(name: str, runs: int, delay: float, window: float) -> Iterator[str]:
     run(experiment, 0, 0.5, delay, window)  # compiles
     yield "| late | put in place, OSPA, m | dropped, m | steps a scan | ms a scan | kB a second of window |"
     yield "| ---: | ---: | ---: | ---: | ---: | ---: |"
+    tails = []
     for share in SHARES:
         whole = [run(experiment, number, share, delay, window) for number in range(runs)]
         dropped = [run(experiment, number, share, delay, _DROPS) for number in range(runs)]
-        means = np.mean([each[1:] for each in whole], axis=0)
+        tails += [
+            [f"{share:.0%}", way, *tail_cells(runs_of)] for way, runs_of in zip(WAYS, (whole, dropped), strict=True)
+        ]
+        means = np.mean([each[2:] for each in whole], axis=0)
         cells = [f"{share:.0%}", with_error(whole), with_error(dropped), f"{means[0]:.2f}", f"{means[1]:.2f}"]
         yield "| " + " | ".join([*cells, f"{means[2] / 1e3:.1f}"]) + " |"
     yield ""
     yield f"`{name}`, {runs} paired runs, late by up to {delay:g} s, window {window:g} s."
+    yield ""
+    yield "| " + " | ".join(["late", "late scans are", *tail_header("m")]) + " |"
+    yield "| ---: | --- | ---: | ---: | ---: |"
+    yield from ("| " + " | ".join(row) + " |" for row in tails)
+
+
+def tail_cells(outcomes: list[Outcome]) -> tuple[str, str, str]:
+    """Median, worst run, and share of runs that end with a lost target."""
+    return tail([outcome.ospa for outcome in outcomes], [outcome.ends_lost for outcome in outcomes]).cells()
 
 
 def with_error(outcomes: list[Outcome]) -> str:

@@ -8,7 +8,8 @@
 Runs are paired: at the same number every strategy meets the same truth, and random numbers of the same seed. OSPA and
 GOSPA (alpha = 2, under the scene's cutoff and order) are means over scans and runs, with one standard error over the
 runs; "gained" is what the single decision ("depth 1", or another strategy: `--against`) has more than the strategy,
-paired, with its standard error, and "(none)" where it is less than two of these above zero. Times are process
+paired, with its standard error, and "(none)" where it is less than two of these above zero. Beside the mean OSPA stand
+that of the median and of the worst run, and the share of runs that end with a lost target. Times are process
 CPU time of planning, the median of a run's decisions and then of the runs, in a process of one thread. With `--out`
 each run is written as it ends, and what is there is not run again.
 
@@ -38,6 +39,7 @@ from timed_planner import Timed
 
 from vedette.evaluation.metrics import ospa_of_run
 from vedette.evaluation.runs import measure_run
+from vedette.evaluation.tails import tail, tail_header
 from vedette.kernels.base.types import Floats
 from vedette.processes import end_with_parent
 from vedette.scenarios import Scenario, load_scenario, with_fields
@@ -76,6 +78,7 @@ class Score(NamedTuple):
     ospa: float
     gospa: float
     seconds: float
+    ends_lost: float  # 1 where a target has no estimate at the last scored scan, else 0
 
 
 @cache
@@ -153,8 +156,13 @@ def score(scene: str, strategy: Strategy, run: int, seed: int) -> Score:
     ospa_of = partial(ospa_of_run, cutoff=ospa.cutoff, order=ospa.order, components=ospa.components)
     record = simulate(build_experiment(scenario), timed, seed=seed, run=run, score=ospa_of)
     window = slice(ospa.from_step - 1, ospa.to_step)
-    gospa = float(measure_run(record, scenario).gospa_m.mean())
-    return Score(float(record.ospa[window, 0].mean()), gospa, float(np.median(timed.seconds)))
+    measures = measure_run(record, scenario)
+    return Score(
+        ospa=float(record.ospa[window, 0].mean()),
+        gospa=float(measures.gospa_m.mean()),
+        seconds=float(np.median(timed.seconds)),
+        ends_lost=float(measures.num_missed[window][-1] > 0),
+    )
 
 
 def with_error(values: Floats) -> str:
@@ -170,12 +178,15 @@ def gain(gains: Floats) -> str:
 
 
 def table(scene: str, rows: dict[str, Floats], against: str) -> Iterator[str]:
-    """The lines of a scene's table, of scores (num_runs, 3) by strategy."""
-    yield f"| Strategy | OSPA (m) | GOSPA (m) | CPU ms a decision | OSPA gained on {against} (m) | GOSPA gained (m) |"
-    yield "| --- | ---: | ---: | ---: | ---: | ---: |"
+    """The lines of a scene's table, of scores (num_runs, 4) by strategy."""
+    names = ["OSPA (m)", *tail_header("m"), "GOSPA (m)", "CPU ms a decision"]
+    names += [f"OSPA gained on {against} (m)", "GOSPA gained (m)"]
+    yield "| Strategy | " + " | ".join(names) + " |"
+    yield "| --- |" + " ---: |" * len(names)
     single = rows[against]
     for name, scores in rows.items():
-        own = [with_error(scores[:, 0]), with_error(scores[:, 1]), f"{1e3 * np.median(scores[:, 2]):.0f}"]
+        own = [with_error(scores[:, 0]), *tail(scores[:, 0], scores[:, 3]).cells()]
+        own += [with_error(scores[:, 1]), f"{1e3 * np.median(scores[:, 2]):.0f}"]
         gained = ["", ""] if scores is single else [gain(single[:, i] - scores[:, i]) for i in (0, 1)]
         yield "| " + " | ".join([name, *own, *gained]) + " |"
     yield ""

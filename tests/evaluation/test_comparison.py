@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from evaluation.synthetic import make_record
+from scripts import load
 from vedette.errors import InputError
 from vedette.evaluation import Comparison, compare, decision_rows, holm, strategy_csv, strategy_markdown, strategy_rows
 from vedette.evaluation.tables import header, strategy_latex, told_apart
-from vedette.evaluation.tails import tails
+from vedette.evaluation.tails import Tail, tail, tails
 from vedette.simulation.records import RunRecord
 
 NUM_RUNS = 6
@@ -166,6 +167,30 @@ def test_tails_stand_beside_means(comparison: Comparison) -> None:
     numbers = next(csv.DictReader(io.StringIO(strategy_csv(replace(comparison, ensembles=ensembles)))))
     assert (float(numbers["median_m"]), float(numbers["worst_m"])) == (np.median(means), means.max())
     assert float(numbers["share_lost"]) == 2 / 6
+
+
+def test_tail_is_of_the_runs_that_are_known() -> None:
+    assert tail([3.0, np.nan, 1.0, 8.0], [1.0, 0.0, 0.0, 1.0]) == Tail(3.0, 8.0, 0.5)
+    assert tail([3.0, 1.0]).cells() == ("2.00", "3.00", "")
+    assert tail([np.nan]).cells() == ("", "", "")
+
+
+def test_benchmarks_have_tails_beside_means() -> None:
+    deciding, defaults, lookahead = (load(f"benchmarks/{name}.py") for name in ("deciding", "defaults", "lookahead"))
+    ospa, ends_lost = [2.0, 3.0, 9.0, 4.0], [0.0, 0.0, 1.0, 0.0]
+    scores = {run: deciding.Score(own, 0.0, 1.0, np.nan, ends_lost[run]) for run, own in enumerate(ospa)}
+    ahead = np.column_stack([ospa, ospa, np.ones(4), ends_lost])
+    tables = [
+        defaults.table("scene", [defaults.Row("scene", "default", *[ospa, ends_lost, *[ospa] * 4])]),
+        deciding.table({deciding.FIRST: scores}),
+        lookahead.table("scene", {"depth 1": ahead}, "depth 1"),
+    ]
+    for lines in map(list, tables):
+        [header] = [
+            line for line in lines if "Median run (m) | Worst run (m) | Runs that end with a lost target" in line
+        ]
+        [row] = [line for line in lines if "| 3.50 | 9.00 | 25 % |" in line]
+        assert header.count("|") == row.count("|")
 
 
 def test_csv_holds_the_unrounded_numbers(comparison: Comparison) -> None:

@@ -16,7 +16,7 @@ from vedette.campaigns.results import CampaignResults, open_results
 from vedette.evaluation import Summary, paired_difference, summarise
 from vedette.evaluation.comparison import scored
 from vedette.evaluation.ensembles import Ensemble
-from vedette.evaluation.tails import Tail, lost_at_end, tail_header
+from vedette.evaluation.tails import Tail, lost_at_end, tail, tail_header
 from vedette.kernels.base.types import Floats
 from vedette.scenarios.dumping import dump_scenario
 from vedette.simulation.storage import versions
@@ -122,7 +122,7 @@ def _tried(scene: Scene, results: CampaignResults) -> Iterator[tuple[Standing, d
             len(ospa),
             len(lost),
             summarise([ospa[run] for run in sorted(ospa)]),
-            Tail(float(np.median(list(ospa.values()))), max(ospa.values()), _mean(lost_targets)),
+            tail(list(ospa.values()), lost_targets),
             None,
             _mean(cardinality),
             summarise(nees) if len(nees) and nees.mean() > _SAYS_NOTHING else None,

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from vedette.evaluation.comparison import Comparison
 from vedette.kernels.base.types import Floats
@@ -33,15 +34,20 @@ def tail_header(unit: str) -> tuple[str, str, str]:
     return named_in("Median run", unit), named_in("Worst run", unit), "Runs that end with a lost target"
 
 
+def tail(means: ArrayLike, lost: ArrayLike = ()) -> Tail:
+    """Tail of runs by the mean OSPA of each, and by whether it ends with a lost target (1 or 0).
+
+    NaN stands for a mean that is not known; lost is empty where that is not known.
+    """
+    known, ended = np.asarray(means, np.float64), np.asarray(lost, np.float64)
+    known = known[~np.isnan(known)]
+    found = (float(np.median(known)), float(known.max())) if len(known) else (np.nan, np.nan)
+    return Tail(*found, float(ended.mean()) if len(ended) else np.nan)
+
+
 def tail_of(comparison: Comparison, strategy: str) -> Tail:
-    """Of the runs of a strategy."""
-    means, lost = comparison.run_means(strategy), lost_at_end(comparison, strategy)
-    known = not np.isnan(means).all()
-    return Tail(
-        float(np.nanmedian(means)) if known else np.nan,
-        float(np.nanmax(means)) if known else np.nan,
-        float(lost.mean()) if len(lost) else np.nan,
-    )
+    """Tail of the runs of a strategy."""
+    return tail(comparison.run_means(strategy), lost_at_end(comparison, strategy))
 
 
 def lost_at_end(comparison: Comparison, strategy: str) -> Floats:
