@@ -54,6 +54,8 @@ class SensorModel:
             linearisation of its own for each measurement; the UKF where the measurement has no Jacobian.
         detection_at: of a predicted Gaussian, the filters take the probability of detection at its "centre", as the
             paper does, or its "mean" over the Gaussian: by the model's `mean_function`, or by nodes over the position.
+            With the mean, where P_D differs over the Gaussian, a miss moves the density to where it is low, and a
+            detection has the mean P_D of the density after it.
         meas_dim: number of components of a measurement.
 
     Raises:
@@ -156,5 +158,5 @@ def _bundle_of(model: SensorModel, over_gaussian: bool) -> Sensor:
         model.measurement.angular,
         resolve_method("SensorModel.method", model.method, jacobian is not None, bends=not model.measurement.is_linear),
         rule,
-        _NODES if rule == BY_NODES else _NO_NODES,
+        _NODES if over_gaussian else _NO_NODES,
     )

@@ -19,7 +19,7 @@ import numpy as np
 from vedette.kernels.association.assignment import ABSENT, Options
 from vedette.kernels.association.joined_rows import copy_entry
 from vedette.kernels.association.near import near_measurements
-from vedette.kernels.association.options import Sight, make_room, room_for_bent, sort_row, weigh_detection
+from vedette.kernels.association.options import Sight, make_room, room_for_bent, sort_row, weigh_detection, write_missed
 from vedette.kernels.association.predicted import Rows, expect_rows, log_or_minus_inf, make_rows
 from vedette.kernels.base.arrays import group_members
 from vedette.kernels.base.compile import borrowing, kernel
@@ -27,7 +27,7 @@ from vedette.kernels.base.types import Floats, Ints, Mixture, ScanInput, Sensor
 from vedette.kernels.gaussian.innovation import copy_innovation
 from vedette.kernels.gaussian.linalg import log_add
 from vedette.kernels.gaussian.mixtures import copy_component, make_components
-from vedette.kernels.gaussian.relinearisation import make_pair_work
+from vedette.kernels.gaussian.relinearisation import copy_updated, make_pair_work
 from vedette.kernels.gaussian.scratch import make_scratch
 
 _LEAST_SHARE = math.log(1e-5)  # of a candidate's density, below which a component of the intensity is not in it
@@ -82,19 +82,24 @@ def seen_intensity(intensity: Mixture, scan: ScanInput, sensor: Sensor) -> Rows:
 
 
 @kernel
-def missed_intensity(seen: Rows, num: int) -> tuple[Mixture, float]:
+def missed_intensity(seen: Rows, scan: ScanInput, sensor: Sensor, num: int) -> tuple[Mixture, float]:
     """The intensity of the targets that the scan did not detect, and the log probability that it detected none.
 
     num: components that are of the intensity. The log probability is minus the integral of P_D D, as the number of
     detections is Poisson.
     """
     state_dim = seen.means.shape[1]
-    out, expected = make_components(num, state_dim), 0.0
+    out, expected, updated = make_components(num, state_dim), 0.0, np.empty((state_dim + 1, state_dim))
+    sight = Sight(sensor, scan.pose, make_pair_work(state_dim, len(sensor.angular)))
     for c in range(num):
         detected = seen.innovation.prob_detection[c]
         expected += math.exp(seen.log_weights[c]) * detected
         out.log_weights[c] = seen.log_weights[c] + log_or_minus_inf(1.0 - detected)
-        copy_component(seen.means, seen.covs, c, out.means, out.covs, c)
+        if seen.innovation.at_edge[c]:
+            write_missed(sight, seen, c, updated)
+            copy_updated(updated, out.means[c], out.covs[c])
+        else:
+            copy_component(seen.means, seen.covs, c, out.means, out.covs, c)
     return out, -expected
 
 

@@ -17,7 +17,8 @@ from vedette.kernels.association.predicted import Rows, log_or_minus_inf
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, ScanInput, Sensor
-from vedette.kernels.gaussian.innovation import copy_innovation, whiten
+from vedette.kernels.gaussian.detection import detection_probability, moments_if_missed
+from vedette.kernels.gaussian.innovation import copy_innovation, update_mean, whiten
 from vedette.kernels.gaussian.relinearisation import Pair, PairWork, make_pair_work, update_pair
 
 
@@ -66,9 +67,9 @@ def _room_for(rows: Rows, near: Near, num_measurements: int, meas_dim: int) -> O
 
 @kernel
 def room_for_bent(rows: Rows, num_entries: int) -> Floats:
-    """(num_entries, state_dim + 1, state_dim), or (0, ...) where no component bends."""
-    dim = rows.means.shape[1]
-    return np.empty((num_entries if rows.innovation.bends.any() else 0, dim + 1, dim))
+    """(num_entries, state_dim + 1, state_dim), or (0, ...) where no component bends or is at the edge of the view."""
+    dim, kinds = rows.means.shape[1], rows.innovation
+    return np.empty((num_entries if kinds.bends.any() or kinds.at_edge.any() else 0, dim + 1, dim))
 
 
 @inlined
@@ -146,7 +147,30 @@ def weigh_detection(
         return -math.inf
     # The predicted component times p_D g(z | x) / kappa(z), integrated over x.
     weight = rows.log_weights[c] + log_norm - 0.5 * distance - log_clutter
-    return float(weight + log_or_minus_inf(innovation.prob_detection[c]))
+    detected = innovation.prob_detection[c]
+    if innovation.at_edge[c]:
+        detected = _detected_there(rows, c, sight, out.whitened[entry], out.updated[entry])
+    return float(weight + log_or_minus_inf(detected))
+
+
+@inlined
+def _detected_there(rows: Rows, c: int, sight: Sight, whitened: Floats, updated: Floats) -> float:
+    """P_D over what a component is after a measurement; written to `updated` unless it bends and is there already."""
+    innovation, scratch = rows.innovation, sight.work.scratch
+    if not innovation.bends[c]:
+        update_mean(innovation, c, whitened, rows.means[c], updated[0])
+        for i in range(updated.shape[1]):
+            for j in range(updated.shape[1]):
+                updated[1 + i, j] = innovation.covs[c, i, j]
+    return detection_probability(sight.sensor, sight.pose, updated[0], updated[1:], scratch.points[0])
+
+
+@inlined
+def write_missed(sight: Sight, rows: Rows, c: int, updated: Floats) -> None:
+    """Write mean and covariance of a component that was not detected, mean first."""
+    moments_if_missed(
+        sight.sensor, sight.pose, rows.means[c], rows.covs[c], sight.work.scratch.points[0], updated[0], updated[1:]
+    )
 
 
 @inlined
@@ -191,6 +215,8 @@ def _fill_options(
         for i in range(count):
             missed = log_or_minus_inf(1.0 - rows.innovation.prob_detection[first + i])
             out.component_log_weights[entry + i] = rows.log_weights[first + i] + missed
+            if rows.innovation.at_edge[first + i]:
+                write_missed(sight, rows, first + i, out.updated[entry + i])
             peak = max(peak, out.component_log_weights[entry + i])
         if peak > -math.inf:
             total = _total_from_peak(out.component_log_weights, entry, count, peak)

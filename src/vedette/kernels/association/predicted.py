@@ -69,6 +69,7 @@ def view_rows(rows: Rows, num: int) -> Rows:
             innovation.covs[:num],
             innovation.log_norm[:num],
             innovation.prob_detection[:num],
+            innovation.at_edge[:num],
             innovation.bends[:num],
         ),
     )
@@ -130,6 +131,7 @@ def predict_rows(tracks: Tracks, scan: ScanInput, motion: Motion, sensor: Sensor
 def leave_unseen(rows: Rows) -> None:
     """Make the scan of the rows one that sees nothing: with no measurements, to update is then to predict."""
     rows.innovation.prob_detection[:] = 0.0
+    rows.innovation.at_edge[:] = False
 
 
 @kernel

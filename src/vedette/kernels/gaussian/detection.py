@@ -23,18 +23,31 @@ def checked(detection: float) -> float:
 
 
 @inlined
-def _mean_of_nodes(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, state: Floats) -> float:
-    """Sum of weight * P_D at mean + L (standard deviates), L L' the covariance of the position."""
+def _at(
+    sensor: Sensor, pose: Floats, mean: Floats, root: tuple[float, float, float], u: float, v: float, state: Floats
+) -> float:
+    """P_D at standard deviates of the position; the rest of the state must stand in `state`."""
+    state[0] = mean[0] + root[0] * u
+    state[1] = mean[1] + root[1] * u + root[2] * v
+    return checked(sensor.prob_detection(state, pose, sensor.detection_params))
+
+
+@inlined
+def _root_of_position(cov: Floats) -> tuple[float, float, float]:
+    """Cholesky factor (a, 0; b, c) of the covariance of the position."""
     a = math.sqrt(max(cov[0, 0], 0.0))
     b = cov[1, 0] / a if a > 0.0 else 0.0
-    c = math.sqrt(max(cov[1, 1] - b * b, 0.0))
+    return a, b, math.sqrt(max(cov[1, 1] - b * b, 0.0))
+
+
+@inlined
+def _mean_of_nodes(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, state: Floats) -> float:
+    """Sum of weight * P_D at mean + L (standard deviates), L L' the covariance of the position."""
+    nodes, total, root = sensor.detection_nodes, 0.0, _root_of_position(cov)
     for j in range(mean.shape[0]):
         state[j] = mean[j]
-    nodes, total = sensor.detection_nodes, 0.0
     for i in range(nodes.shape[0]):
-        state[0] = mean[0] + a * nodes[i, 1]
-        state[1] = mean[1] + b * nodes[i, 1] + c * nodes[i, 2]
-        total += nodes[i, 0] * checked(sensor.prob_detection(state, pose, sensor.detection_params))
+        total += nodes[i, 0] * _at(sensor, pose, mean, root, nodes[i, 1], nodes[i, 2], state)
     return min(total, 1.0)  # weights sum to 1 but for rounding
 
 
@@ -49,6 +62,74 @@ def detection_probability(sensor: Sensor, pose: Floats, mean: Floats, cov: Float
     if sensor.detection_rule == CLOSED_FORM:
         return checked(sensor.mean_prob_detection(mean, cov, pose, sensor.detection_params))
     return _mean_of_nodes(sensor, pose, mean, cov, state)
+
+
+# Directions from the mean, in standard deviations, in which the probability of detection is looked at.
+_FAR, _DIAGONAL = 2.5, 2.5 * math.sqrt(0.5)
+# P_D is the same over a Gaussian if it differs by less than the first; the second is the least share of its variance
+# that a miss leaves.
+_LEAST_DIFFERENCE, _LEAST_VARIANCE = 1e-3, 0.02
+
+
+@inlined
+def detection_differs(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, state: Floats) -> bool:
+    """Whether P_D is another in different parts of a Gaussian; never where it is taken at its centre."""
+    if sensor.detection_rule == AT_CENTRE:
+        return False
+    root = _root_of_position(cov)
+    if root[0] == 0.0 or root[2] == 0.0:
+        return False
+    for j in range(mean.shape[0]):
+        state[j] = mean[j]
+    least = _at(sensor, pose, mean, root, 0.0, 0.0, state)
+    most = least
+    for k in range(4):
+        u, v = (1.0 - k, 0.0) if k % 2 == 0 else (0.0, 2.0 - k)
+        for far, x, y in ((_FAR, u, v), (_DIAGONAL, u - v, u + v)):
+            found = _at(sensor, pose, mean, root, far * x, far * y, state)
+            least, most = min(least, found), max(most, found)
+    return most - least > _LEAST_DIFFERENCE
+
+
+@inlined
+def moments_if_missed(
+    sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, state: Floats, out_mean: Floats, out_cov: Floats
+) -> None:
+    """Mean and covariance of (1 - P_D(x)) N(x; mean, cov), normalised: what a miss leaves lies rather out of view.
+
+    Moments of the position by nodes, those of the rest of the state by its regression on the position. They stay as
+    they were where no node can be missed. state: (state_dim,) to be written.
+    """
+    n, nodes, root = mean.shape[0], sensor.detection_nodes, _root_of_position(cov)
+    for j in range(n):
+        state[j] = mean[j]
+    total, u, v, uu, uv, vv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(nodes.shape[0]):
+        x, y = nodes[i, 1], nodes[i, 2]
+        missed = nodes[i, 0] * (1.0 - _at(sensor, pose, mean, root, x, y, state))
+        total, u, v = total + missed, u + missed * x, v + missed * y
+        uu, uv, vv = uu + missed * x * x, uv + missed * x * y, vv + missed * y * y
+    for i in range(n):
+        out_mean[i] = mean[i]
+        for j in range(n):
+            out_cov[i, j] = cov[i, j]
+    if total <= 0.0:
+        return
+    u, v = u / total, v / total
+    # The covariance of the standard deviates less I, what that of the nodes is where all are missed alike.
+    uu, uv, vv = uu / total - u * u - 1.0, uv / total - u * v, vv / total - v * v - 1.0
+    lack = _LEAST_VARIANCE - 1.0 - 0.5 * (uu + vv) + math.hypot(0.5 * (uu - vv), uv)
+    if lack > 0.0:
+        uu, vv = uu + lack, vv + lack
+    for i in range(n):
+        # Covariance of the state with the two standard deviates.
+        first = cov[i, 0] / root[0]
+        second = (cov[i, 1] - first * root[1]) / root[2]
+        out_mean[i] += first * u + second * v
+        for j in range(n):
+            other = cov[j, 0] / root[0]
+            another = (cov[j, 1] - other * root[1]) / root[2]
+            out_cov[i, j] += first * (uu * other + uv * another) + second * (uv * other + vv * another)
 
 
 @kernel

@@ -9,7 +9,7 @@ import numpy as np
 from vedette.errors import ModelError
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Bools, Floats, Sensor
-from vedette.kernels.gaussian.detection import detection_probability
+from vedette.kernels.gaussian.detection import detection_differs, detection_probability
 from vedette.kernels.gaussian.joseph import posterior_of_squares
 from vedette.kernels.gaussian.linalg import LOG_2PI, cholesky_of_size, log_det_from_factor
 from vedette.kernels.gaussian.scratch import Scratch, wrap_angle
@@ -42,6 +42,7 @@ class Innovation(NamedTuple):
     covs: Floats  # (num, state_dim, state_dim) posterior covariances, the same for all measurements
     log_norm: Floats  # (num,) log of the normalising constant of the predicted measurement's Gaussian
     prob_detection: Floats  # (num,)
+    at_edge: Bools  # (num,) whether the probability of detection differs over it, see `detection`
     bends: Bools  # (num,) whether updates linearise again at each measurement, see `relinearisation`
 
 
@@ -54,6 +55,7 @@ def make_innovation(num: int, state_dim: int, meas_dim: int) -> Innovation:
         np.empty((num, state_dim, state_dim)),
         np.empty(num),
         np.empty(num),
+        np.zeros(num, np.bool_),
         np.empty(num, np.bool_),
     )
 
@@ -73,6 +75,7 @@ def copy_innovation(innovation: Innovation, source: int, out: Innovation, target
             out.covs[target, i, j] = innovation.covs[source, i, j]
     out.log_norm[target] = innovation.log_norm[source]
     out.prob_detection[target] = innovation.prob_detection[source]
+    out.at_edge[target] = innovation.at_edge[source]
     out.bends[target] = innovation.bends[source]
 
 
@@ -196,6 +199,7 @@ def expect(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, at: int, out
     """Fill entry `at` of `out`; noise is taken at the predicted mean (paper-notes 3), detection as the sensor says."""
     expect_measurement(sensor, pose, mean, cov, at, out, scratch)
     out.prob_detection[at] = detection_probability(sensor, pose, mean, cov, scratch.points[0])
+    out.at_edge[at] = detection_differs(sensor, pose, mean, cov, scratch.points[0])
 
 
 @inlined

@@ -45,7 +45,7 @@ def write_updated(row: int, option: int, rows: Rows, options: Options, start: in
         if weight == -math.inf:
             continue
         out.log_weights[start] = weight
-        if detected and rows.innovation.bends[first + i]:
+        if rows.innovation.bends[first + i] if detected else rows.innovation.at_edge[first + i]:
             copy_updated(options.updated[entry + i], out.means[start], out.covs[start])
         elif detected:
             c, whitened = first + i, options.whitened[entry + i]

@@ -130,7 +130,7 @@ def step_factored(
             store = append_parts(store, posterior, factoring, reduction, most, work)
     sums, density = work.sums, stored(store)
     require_gaussians(density.tracks.means, density.tracks.covs)
-    missed, log_missed = missed_intensity(seen, len(undetected.intensity.log_weights))
+    missed, log_missed = missed_intensity(seen, scan, sensor, len(undetected.intensity.log_weights))
     return (
         density,
         stacked_mixtures(missed, found_faint(work)),

@@ -52,7 +52,7 @@ def _gather(row: int, rows: Rows, options: Options, marginals: Floats, out: Mixt
                 continue
             # The option's marginal, shared out over its components; a single Gaussian needs no exponential.
             out.weights[count] = scale if log_weight == 0.0 else scale * math.exp(log_weight)
-            if detected and rows.innovation.bends[c]:
+            if rows.innovation.bends[c] if detected else rows.innovation.at_edge[c]:
                 out.sources[count] = 3 * at + RELINEARISED
                 for i in range(out.means.shape[1]):
                     out.means[count, i] = options.updated[at, 0, i]

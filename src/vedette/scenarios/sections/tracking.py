@@ -56,7 +56,7 @@ class _Sensing(Section):
     detection_at: DetectionAt = Field(
         default="centre",
         description="Of a predicted Gaussian, the probability of detection at its centre, as in the paper, or its mean "
-        "over the Gaussian: for sensors whose view ends [-].",
+        "over the Gaussian, where a miss also moves the density out of view: for sensors whose view ends [-].",
     )
 
 
