@@ -54,6 +54,19 @@ def test_it_goes_on_from_what_it_left(tmp_path: Path, live: Live, end: int, kept
         assert Keeping(live, snapshot=tmp_path / "snapshot").state.num_lines == len(LINES)
 
 
+@pytest.mark.parametrize(
+    "content", [b"time,x,y\n1,2,3\n", b"sensors:\n- name: A\n", b'{"type": "Feature"}\n', b"notes"]
+)
+def test_a_file_that_is_no_record_is_refused(tmp_path: Path, live: Live, content: bytes) -> None:
+    path = tmp_path / "scans.csv"
+    path.write_bytes(content)
+    with pytest.raises(
+        InputError, match=r"scans\.csv: expected a new file, or a record of live scans; got a file without"
+    ):
+        Keeping(live, record=path)
+    assert path.read_bytes() == content
+
+
 def test_a_record_replays_to_the_same_bytes(tmp_path: Path, live: Live) -> None:
     keeping = Keeping(live, record=tmp_path / "record")
     splitter = LineSplitter(MOST_BYTES)
@@ -71,7 +84,7 @@ def test_files_of_others_are_refused(tmp_path: Path, live: Live) -> None:
     keeping.close()
     with pytest.raises(InputError, match="expected a snapshot of the same sensors and options; got one of others"):
         Keeping(live, of="that", snapshot=tmp_path / "a")
-    (tmp_path / "r").write_bytes(b"{}\n")
+    (tmp_path / "r").write_bytes(LINES[0] + b"\n")
     with pytest.raises(InputError, match="expected at least the 4 lines that the snapshot has taken; got 1"):
         resumed(short := Keeping(live, of="this", snapshot=tmp_path / "a", record=tmp_path / "r"))
     short.close()

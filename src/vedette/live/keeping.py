@@ -14,7 +14,7 @@ from vedette.errors import InputError
 from vedette.files import lock_beside
 from vedette.live.lines import CHUNK, LineSplitter
 from vedette.live.loop import Answer, Live, LiveState
-from vedette.live.messages import MOST_BYTES
+from vedette.live.messages import MOST_BYTES, is_message
 from vedette.tracking import load_snapshot, save_snapshot
 
 
@@ -123,9 +123,24 @@ def _opened(path: Path) -> BinaryIO:
     if path.exists() and not path.is_file():
         raise InputError(f"{path}: expected a file for the record; got something else")
     try:
-        return path.open("r+b" if path.exists() else "w+b")
+        file = path.open("r+b" if path.exists() else "w+b")
     except OSError as error:
         raise InputError(f"{path}: expected a file that can be written; {error.strerror}") from error
+    if not _may_be_record(file):
+        file.close()
+        raise InputError(f"{path}: expected a new file, or a record of live scans; got a file without any scan")
+    return file
+
+
+def _may_be_record(file: BinaryIO) -> bool:
+    """Whether some line of a file is a message, or it ends within its first line, which may become one."""
+    is_whole = False
+    for line in _lines(file):
+        if is_message(line):
+            return True
+        is_whole = True
+    file.seek(0)
+    return not is_whole and file.read(1) in (b"", b"{")
 
 
 def _lines(file: BinaryIO) -> Iterator[bytes]:

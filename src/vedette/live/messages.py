@@ -21,6 +21,15 @@ MOST_MEASUREMENTS = 2000  # of a scan
 _KEYS = ("sensor", "time", "measurements", "pose")
 
 
+def is_message(line: bytes) -> bool:
+    """Whether a line has the form of a message, whatever its values are."""
+    try:
+        _object(line, "line")
+    except InputError:
+        return False
+    return True
+
+
 class Message(NamedTuple):
     """A scan, at its time as it was told; and whether that is seconds since 1970 UTC."""
 
