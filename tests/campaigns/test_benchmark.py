@@ -198,6 +198,14 @@ def test_of_few_runs_no_interval_is_shown() -> None:
     assert standings._interval(Summary(*numbers, 5), "+.2f") == "+2.00 to +4.00"
 
 
+def test_an_entrant_without_a_scene_is_refused(tmp_path: Path) -> None:
+    given = ["benchmark", "--planner", "mine=random:choice", "--scenes", "polar-10", "--out", str(tmp_path / "out")]
+    result = CliRunner().invoke(app, given)
+    assert result.exit_code == 2
+    assert "expected a scene of planners for mine, see --list; got polar-10" in " ".join(result.stderr.split())
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_scene_that_is_none_is_named() -> None:
     result = CliRunner().invoke(app, ["benchmark", "--scenes", "paper-a,bay"])
     assert result.exit_code == 2

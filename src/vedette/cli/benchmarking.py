@@ -68,8 +68,11 @@ def benchmark(
     approve, num_runs = Approval(trust), runs or (_QUICK_RUNS if quick else _RUNS)
     chosen = _chosen(names, quick, entered)
     for each in entered:  # before anything is kept
-        if first := next((scene for scene in chosen if scene.role == each.role), None):
-            try_entrant(each, campaign_of(first, each, num_runs, seed, out, approve=approve))
+        first = next((scene for scene in chosen if scene.role == each.role), None)
+        if first is None:
+            got = ", ".join(scene.name for scene in chosen)
+            raise usage_error(f"expected a scene of {each.role}s for {each.name}, see --list; got {got}", "--scenes")
+        try_entrant(each, campaign_of(first, each, num_runs, seed, out, approve=approve))
     for scene in chosen:
         for own in (*(each for each in entered if each.role == scene.role), None):  # who may fail comes first
             folder = out / scene.name / (OWN if own is None else own.name)
