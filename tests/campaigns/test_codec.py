@@ -94,7 +94,7 @@ def test_the_layout_of_this_version_is_as_written_here():
         "tracks": "step time_s birth_step birth_site existence mean_* cov_*",
         "sensors": "step time_s sensor x_m y_m heading_rad log_likelihood num_hypotheses num_tracks "
         "discarded_weight_bound dropped_existence num_clutter_raised num_duplicates num_inexact_clusters search_cut "
-        "cap_met factoring_error num_missing_sets num_missing_labels bytes_sent pose_*",
+        "cap_met factoring_error num_missing_sets num_missing_labels bytes_sent pose_* off*",
         "decisions": "decision step time_s planner notes num_*",
         "actions": "decision step time_s sensor action chosen *",
         "rewards": "decision step time_s reward_table reward reward_se chosen action_*",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from copy import copy
 from dataclasses import replace
 from typing import Any
 
@@ -29,7 +30,7 @@ from vedette.control.search import all_joint_actions
 from vedette.densities import LMB, UndetectedIntensity
 from vedette.filters import LmbFilter
 from vedette.fusion import ParallelUpdate
-from vedette.platforms import Carried, Courses, Options, Pointing, Steps, Still
+from vedette.platforms import Carried, Courses, Pointing, Steps, Still
 from vedette.platforms.base import options_at
 
 HORIZON = KNOWN.horizon_times()
@@ -94,7 +95,7 @@ def test_between_poses_sensors_go_straight_and_after_them_by_as_much_again() -> 
     rng = np.random.default_rng(2)
     courses, pose, horizon = rng.normal(size=(3, 4, 3)), rng.normal(size=3), np.array([1.0, 2.5, 3.0, 7.0])
     own = options_at("platform", Still(), pose, horizon)
-    found = continued(Options(own.actions, courses, own.which, pose, own.prices), horizon, TIMES).courses
+    found = continued(own._replace(courses=courses, scans=np.ones((3, 4), bool)), horizon, TIMES).courses
     for course, poses in zip(courses, found, strict=True):
         for time, at in zip(TIMES, poses, strict=True):
             again = math.ceil(time / 7.0) - 1
@@ -234,9 +235,8 @@ def test_at_all_is_the_mean_of_evaluators_that_are_prepared_one_by_one(hidden: b
     of = placed(bernoullis(FAR), POSES, undetected_worth=50.0 if hidden else 0.0)
     if different:  # rows of its own for each sensor
         scans: tuple[Any, ...] = None, [3.0, 7.0, 13.0, 17.0, 18.0], [8.0, 12.5, 20.0, 25.0]
-        of = replace(
-            of, sensors=tuple(replace(own, scan_times=when) for own, when in zip(of.sensors, scans, strict=True))
-        )
+        sensors = tuple(replace(own, scan_times=when) for own, when in zip(of.sensors, scans, strict=True))
+        of = replace(of, sensors=sensors, beliefs=tuple(map(copy, of.beliefs)))
     searched = undetected() if hidden else None
     later = tuple(replace(own, undetected_worth=of.settings.undetected_worth) for own in OTHERS)
     found, single = prepared(of, None, later, searched), [prepared(of, own, (), searched) for own in (None, *later)]

@@ -100,9 +100,9 @@ def test_an_action_is_updated_alike_whatever_the_others_are(kind: str, mode: Any
     labels, (futures, *_) = draw_futures(example.fused, example.sensors, settings, rng=np.random.default_rng(2))
     belief, sensor = example.beliefs[0], example.sensors[0]
     courses = options_at("platform", sensor.platform, example.poses[0], settings.horizon_times()).courses
-    always = np.ones(settings.horizon_steps, bool)
+    always = np.ones((len(courses), settings.horizon_steps), bool)
     together = pseudo_posteriors(belief, sensor, courses, labels, futures, settings, always)
-    alone = pseudo_posteriors(belief, sensor, courses[1:2], labels, futures, settings, always)
+    alone = pseudo_posteriors(belief, sensor, courses[1:2], labels, futures, settings, always[1:2])
     cases = slice(SETTINGS.num_samples, 2 * SETTINGS.num_samples)
     for name in ("log_weights", "means", "covs"):
         np.testing.assert_array_equal(getattr(together, name)[cases], getattr(alone, name))
@@ -118,7 +118,7 @@ def test_a_target_is_seen_with_or_above_its_detection_probability(mode: Any) -> 
         certain = type(example.fused)(example.fused.tracks, np.full(example.fused.tracks.num_tracks, 40.0))
         labels, (futures,) = draw_futures(certain, (sensor,), settings, rng=np.random.default_rng(0))
         own = pseudo_posteriors(
-            example.beliefs[0], sensor, POSES[:1, np.newaxis], labels, futures, settings, np.ones(1, bool)
+            example.beliefs[0], sensor, POSES[:1, np.newaxis], labels, futures, settings, np.ones((1, 1), bool)
         )
         rose = own.existence_logits > example.beliefs[0].existence_logit
         assert abs(rose.mean() - share[mode]) < 0.15

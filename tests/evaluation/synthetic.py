@@ -73,6 +73,7 @@ def make_record(planner: str = "jdm", run: int = 0, seed: int = 7, num_scans: in
         times=truth.times,
         truth=truth,
         poses=poses,
+        off=np.zeros(poses.shape[:2], np.bool_),
         estimates=estimates,
         decisions=decisions,
         ospa=np.zeros((num_scans, 3)),

@@ -32,12 +32,16 @@ def some_courses(num_courses: int = 6, num_times: int = 4) -> Any:
     )
 
 
-def plainly(detection: Any, courses: Any, least: float) -> tuple[Any, Any, Any]:
-    """For each course the cells of which the mean of P_D over the nodes is `least` at some time, and their misses."""
+def always(num_courses: int = 6, num_times: int = 4) -> Any:
+    return np.ones((num_courses, num_times), np.bool_)
+
+
+def plainly(detection: Any, courses: Any, scans: Any, least: float) -> tuple[Any, Any, Any]:
+    """For each course the cells of which the mean of P_D over the nodes is `least` at some scan, and their misses."""
     offsets, cells, log_miss = [0], [], []
-    for course in courses:
+    for course, own in zip(courses, scans, strict=True):
         for cell, states in enumerate(STATES):
-            chances = np.array([WEIGHTS @ detection.prob(states, pose) for pose in course])
+            chances = own * np.array([WEIGHTS @ detection.prob(states, pose) for pose in course])
             if chances.max() >= least:
                 cells.append(cell)
                 log_miss.append(np.log1p(-chances).sum())
@@ -55,11 +59,12 @@ def plainly(detection: Any, courses: Any, least: float) -> tuple[Any, Any, Any]:
     ],
 )
 @pytest.mark.parametrize("least", [1e-6, 0.3])
-def test_cells_in_view_are_those_of_plain_numpy(detection: Any, reach: float, least: float) -> None:
+@pytest.mark.parametrize("scans", [always(), np.random.default_rng(3).random((6, 4)) < 0.5])
+def test_cells_in_view_are_those_of_plain_numpy(detection: Any, reach: float, least: float, scans: Any) -> None:
     courses, own = some_courses(), sensor(detection).to_kernel()
-    expected = plainly(detection, courses, least)
+    expected = plainly(detection, courses, scans, least)
     for known in (reach, math.inf):
-        offsets, cells, log_miss = cells_in_view(own, courses, STATES, WEIGHTS, least, known)
+        offsets, cells, log_miss = cells_in_view(own, courses, scans, STATES, WEIGHTS, least, known)
         np.testing.assert_array_equal(offsets, expected[0])
         np.testing.assert_array_equal(cells, expected[1])
         np.testing.assert_allclose(log_miss, expected[2], rtol=1e-12)
@@ -93,7 +98,7 @@ def test_survival_is_asked_state_by_state() -> None:
 def test_nothing_in_view() -> None:
     courses = some_courses() + np.array([1e4, 0.0, 0.0])
     own = sensor(models.limited_range(0.9, 55.0)).to_kernel()
-    offsets, cells, log_miss = cells_in_view(own, courses, STATES, WEIGHTS, 1e-6, 55.0)
+    offsets, cells, log_miss = cells_in_view(own, courses, always(), STATES, WEIGHTS, 1e-6, 55.0)
     np.testing.assert_array_equal(offsets, np.zeros(7))
     assert len(cells) == len(log_miss) == 0
 
@@ -106,7 +111,7 @@ def _certain(state, pose, params):
 def test_a_detection_that_is_certain_leaves_nothing() -> None:
     own = sensor(models.DetectionModel(_certain, np.array([1.0]))).to_kernel()
     nodes, weights = GRID.states(4, 1), GRID.node_weights(1)
-    offsets, cells, log_miss = cells_in_view(own, some_courses(1), nodes, weights, 0.5, math.inf)
+    offsets, cells, log_miss = cells_in_view(own, some_courses(1), always(1), nodes, weights, 0.5, math.inf)
     np.testing.assert_array_equal(offsets, [0, 35])
     np.testing.assert_array_equal(cells, np.arange(35))
     np.testing.assert_array_equal(log_miss, np.full(35, -math.inf))
@@ -115,4 +120,4 @@ def test_a_detection_that_is_certain_leaves_nothing() -> None:
 def test_what_is_no_probability_is_refused() -> None:
     own = sensor(models.DetectionModel(_certain, np.array([1.5]))).to_kernel()
     with pytest.raises(ModelError, match=r"probability is not in \[0, 1\]"):
-        cells_in_view(own, some_courses(), STATES, WEIGHTS, 0.5, math.inf)
+        cells_in_view(own, some_courses(), always(), STATES, WEIGHTS, 0.5, math.inf)

@@ -15,7 +15,7 @@ from vedette.control.baselines import WatchedPlanner
 from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.models import Region
-from vedette.platforms import Actions, Courses
+from vedette.platforms import Actions, Courses, Operated
 from vedette.scenarios import load_scenario, with_fields
 from vedette.scenarios.build import build_experiment, build_planner, build_sensors
 from vedette.simulation import KnowsTruth, OraclePlanner, Timetable, Truth, simulate
@@ -143,6 +143,28 @@ def test_who_does_not_scan_tells_nothing() -> None:
     assert chosen.chosen[1] == 0  # all its courses are worth the same
     first = [cost(timetable(powers=(1.0, 0.0)), 1, 4, (action, 0), POSES, covs)[0] for action in range(3)]
     assert chosen.chosen[0] == int(np.argmin(first))
+
+
+def test_who_is_off_tells_nothing() -> None:
+    """With one sensor that can only be off, and with one that is better on."""
+
+    class Off(Operated):
+        """Of a switched platform what is off."""
+
+        def actions(self, pose: Any) -> Any:
+            """Those with the sensor off."""
+            return self.switched_on_and_off(self.platform.actions(pose))[3:]
+
+    plans = []
+    table = timetable(scans_at=np.array([[True] * 6, [False] * 6]))
+    switched = [Operated(own.platform, switchable=True) for own in SENSORS]
+    off = Off(SENSORS[1].platform, switchable=True)
+    for table_of, platforms in ((table, (SENSORS[0].platform, SENSORS[1].platform)), (timetable(), (switched[0], off))):
+        sensors = tuple(replace(own, platform=platform) for own, platform in zip(SENSORS, platforms, strict=True))
+        planner = OraclePlanner(sensors, table_of, truth=truth())
+        plans.append(planner.plan(state(), POSES, rng=np.random.default_rng(0)))
+    assert plans[1].chosen == plans[0].chosen
+    assert plans[1].chosen_actions[1][-1] == 0.0
 
 
 def test_what_is_lost_is_given_up_where_nothing_is_born() -> None:

@@ -105,6 +105,7 @@ def first_scan(record: RunRecord) -> RunRecord:
         times=record.times[:1],
         truth=record.truth.first(1),
         poses=record.poses[:1],
+        off=record.off[:1],
         estimates=record.estimates[:1],
         decisions=(),
         ospa=record.ospa[:1],
@@ -122,6 +123,7 @@ def test_runs_of_one_scan_that_stopped_or_have_wider_poses_read_back(tmp_path: P
         "stopped": replace(first_scan(whole), stopped="synthetic: stopped at step 2: the filter: ²"),
         "no times": replace(whole, timings={}),
         "wide": replace(whole, poses=wide, decisions=decisions),
+        "off": replace(whole, off=np.random.default_rng(5).random((40, 2)) < 0.3),
     }
     for name, record in cases.items():
         assert_same(load_run(save_run(record, tmp_path / name)), record)

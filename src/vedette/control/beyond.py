@@ -189,7 +189,8 @@ def continued(own: Options, horizon: Floats, times: Floats) -> Options:
     """The options with courses (num_courses, num_times, pose_dim) at other times, s, from now on.
 
     horizon: (num_steps,) s of the poses that there are. Between them a sensor goes straight; after the last it goes on
-    by as much as it went over the whole horizon, again and again, and what else its pose has stays.
+    by as much as it went over the whole horizon, again and again, what else its pose has stays, and it scans, even
+    where its action keeps it from scanning up to then.
     """
     start = np.broadcast_to(own.pose, (len(own.courses), 1, len(own.pose)))
     known = np.concatenate([start, own.courses], axis=1)
@@ -202,7 +203,8 @@ def continued(own: Options, horizon: Floats, times: Floats) -> Options:
     moved = known[:, -1:, :2] - known[:, :1, :2]
     straight = known[:, after - 1, :2] * (1.0 - share) + known[:, after, :2] * share
     courses[:, :, :2] = straight + rounds[:, np.newaxis] * moved
-    return own._replace(courses=np.ascontiguousarray(courses))
+    scans = (rounds > 0.0) | own.scans[:, after - 1]
+    return own._replace(courses=np.ascontiguousarray(courses), scans=scans)
 
 
 def sight(sensor: MobileSensor, pose: Floats) -> float:

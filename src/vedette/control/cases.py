@@ -24,11 +24,11 @@ from vedette.control.rewards.base import (
     speaks_for,
     unit_volume_of,
 )
-from vedette.control.settings import Belief, MobileSensor, PlanningSettings
+from vedette.control.settings import Belief, MobileSensor, PlanningSettings, scans_within
 from vedette.densities.cases import LabelledCases
 from vedette.errors import NumericalError, SlowRewardWarning
 from vedette.fusion import Fusion, LaidOut, LaysOut, Views, lay_out_alone
-from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.platforms import Options
 from vedette.tracking import State
 
@@ -47,7 +47,7 @@ class CaseRewards:
         options: of each sensor.
         prediction: the fused density predicted to the horizon, one Gaussian a track.
         posteriors: the pseudo-posteriors of each sensor.
-        scanned: whether each sensor scans within the horizon.
+        scanned: (num_courses,) of each sensor whether it scans within the horizon.
         counts: how many filter steps, fusions and divergences have been evaluated so far.
         notes: what a reader of the decision must know, in the order in which it came up (keys; no values).
     """
@@ -59,7 +59,7 @@ class CaseRewards:
     options: tuple[Options, ...]
     prediction: Belief
     posteriors: tuple[LabelledCases, ...]
-    scanned: tuple[bool, ...]
+    scanned: tuple[Bools, ...]
     counts: dict[str, int]
     notes: dict[str, None]
 
@@ -78,14 +78,14 @@ class CaseRewards:
     ) -> CaseRewards:
         """Draw the samples and run the pseudo-updates of every sensor (paper section III-B, steps 1 to 4)."""
         labels, futures = draw_futures(state.fused, sensors, settings, rng=rng)
-        scans = tuple(sensor.scans(state.time, settings) for sensor in sensors)
+        scans = scans_within(sensors, options, state.time, settings)
         posteriors = tuple(
             pseudo_posteriors(belief, sensor, own.courses, labels, future, settings, when)
             for belief, sensor, own, future, when in zip(state.local, sensors, options, futures, scans, strict=True)
         )
         steps = sum(len(own.courses) for own in options) * settings.num_samples * settings.horizon_steps
         counts = {"filter_steps": steps, "fusions": 0, "divergences": 0}
-        scanned = tuple(bool(own.any()) for own in scans)
+        scanned = tuple(np.asarray(own.any(axis=1)) for own in scans)
         return cls(
             tuple(sensors), fusion, settings, reward, tuple(options), prediction, posteriors, scanned, counts, {}
         )
@@ -129,7 +129,8 @@ class CaseRewards:
         """What the sensors could see at the end of chosen courses, and what all their updates began with."""
         models = tuple(sensor.filter.sensor for sensor in self.sensors)
         poses = np.stack([own.courses[course, -1] for own, course in zip(self.options, chosen, strict=True)])
-        return Views(models, poses, self.scanned, self.prediction)
+        scanned = tuple(bool(own[course]) for own, course in zip(self.scanned, chosen, strict=True))
+        return Views(models, poses, scanned, self.prediction)
 
     def _check_finite(self, which: Sequence[int], actions: Ints, rewards: Floats) -> None:
         bad = np.argwhere(~np.isfinite(rewards))

@@ -250,4 +250,5 @@ def _only(own: Options, courses: Ints) -> Options:
     kept = np.isin(own.which, courses)
     actions = Actions(own.actions.columns, own.actions.values[kept])
     which, chosen = np.searchsorted(courses, own.which[kept]), np.ascontiguousarray(own.courses[courses])
-    return own._replace(actions=actions, courses=chosen, which=which, prices=own.prices[courses])
+    prices, scans = own.prices[courses], own.scans[courses]
+    return own._replace(actions=actions, courses=chosen, which=which, prices=prices, scans=scans)

@@ -93,7 +93,7 @@ def decision_of(
 ) -> Decision:
     """What the pseudo-updates of a sensor depend on besides its prior.
 
-    scans: (horizon_steps,) at which of them it scans. detection_at: as of `SensorModel.to_kernel`.
+    scans: (num_courses, horizon_steps) at which of them it scans. detection_at: as of `SensorModel.to_kernel`.
     """
     horizon = Horizon(
         np.ascontiguousarray(courses),

@@ -67,8 +67,8 @@ def pseudo_posteriors(
     """Run the sensor's filter over the horizon for every course and sample, without births or deaths.
 
     courses: (num_courses, horizon_steps, pose_dim) poses at the pseudo-updates. labels: of the targets of `futures`.
-    scans: (horizon_steps,) at which of them it scans. The belief is one of the filter's kind. Raises `ModelError` and
-    `NumericalError` as the filter.
+    scans: (num_courses, horizon_steps) at which of them it scans. The belief is one of the filter's kind. Raises
+    `ModelError` and `NumericalError` as the filter.
     """
     decision = decision_of(sensor, courses, futures, settings, scans)
     num_cases = len(courses) * settings.num_samples

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
@@ -25,7 +26,7 @@ from vedette.models.fields import (
     Share,
     check_fields,
 )
-from vedette.platforms import Platform
+from vedette.platforms import Options, Platform
 from vedette.platforms.base import check_platform
 from vedette.threads import processors
 
@@ -166,3 +167,11 @@ class MobileSensor:
         # A scan at the very time of a decision has been taken in; sums of periods differ from it in the last digit.
         ends = now + period * (np.arange(num + 1.0) + 1e-6)
         return np.asarray(np.diff(np.searchsorted(self.scan_times, ends, "right")) > 0)
+
+
+def scans_within(
+    sensors: Sequence[MobileSensor], options: Sequence[Options], now: float | None, settings: PlanningSettings
+) -> tuple[Bools, ...]:
+    """For each sensor (num_courses, horizon_steps) the pseudo-updates at which it scans on each of its courses."""
+    pairs = zip(sensors, options, strict=True)
+    return tuple(own.scans & sensor.scans(now, settings) for sensor, own in pairs)

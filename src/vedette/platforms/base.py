@@ -20,6 +20,13 @@ from vedette.text import counted
 # Poses nearer than this, relative to their size, are one: rounding of degrees to radians and back stays below.
 _SAME_POSE = 1e-9
 
+SWITCH = "on"  # the column of actions that says whether the sensor scans: 1, or 0 where it is off
+
+
+def switch_word(value: float) -> str:
+    """Of a number in the column `on`: `on` or `off`."""
+    return "on" if value else "off"
+
 
 class Options(NamedTuple):
     """What one sensor may do at a decision.
@@ -27,6 +34,7 @@ class Options(NamedTuple):
     actions: all of them, in the order of tables. courses: (num_courses, num_times, pose_dim) the different courses that
     they lead to, each in the place of its first action. which: (num_actions,) which course each action takes. pose:
     (pose_dim,) where it is now. prices: (num_courses,) in units of the reward; actions of one course have one price.
+    scans: (num_courses, num_times) whether the actions of each course let the sensor scan.
     """
 
     actions: Actions
@@ -34,6 +42,7 @@ class Options(NamedTuple):
     which: Ints
     pose: Floats
     prices: Floats
+    scans: Bools
 
     def first_action(self, course: int) -> int:
         """The first action that takes a course."""
@@ -41,16 +50,17 @@ class Options(NamedTuple):
 
 
 def options_at(field: str, platform: Platform, pose: Floats, times: Floats) -> Options:
-    """The options of a platform at a pose, distinguished by price and by where it is at `times`, in seconds from now.
+    """The options of a platform at a pose, distinguished by price, poses and scans at `times`, in seconds from now.
 
-    Raises `InputError`, with the name of the platform, for actions, courses or prices that are none.
+    Raises `InputError`, with the name of the platform, for actions, courses, prices or scans that are none.
     """
     actions = actions_at(field, platform, pose)
     courses = courses_of(field, platform, pose, actions.values, times)
     prices = prices_of(field, platform, actions.values)
-    same = _same(courses) & (prices[:, np.newaxis] == prices)
+    scans = scans_of(field, platform, pose, actions.values, times)
+    same = _same(courses) & (prices[:, np.newaxis] == prices) & (scans[:, np.newaxis] == scans).all(axis=2)
     own, which = np.unique(same.argmax(axis=1), return_inverse=True)  # itself, if none before it
-    return Options(actions, courses[own], which, pose, prices[own])
+    return Options(actions, courses[own], which, pose, prices[own], scans[own])
 
 
 def _same(courses: Floats) -> Bools:
@@ -101,9 +111,11 @@ class Actions(Speaking):
         return f"of {counted(len(self), 'choice')}: {', '.join(self.columns)}"
 
     def text(self, index: int) -> str:
-        """One action in words: `heading_deg 30, speed 5`."""
+        """One action in words: `heading_deg 30, speed 5`; a switch is `on` or `off`."""
         numbers = zip(self.columns, self.values[index].tolist(), strict=True)
-        return ", ".join(f"{name} {round(value, 6):g}" for name, value in numbers)
+        return ", ".join(
+            switch_word(value) if name == SWITCH else f"{name} {round(value, 6):g}" for name, value in numbers
+        )
 
 
 @runtime_checkable
@@ -149,6 +161,15 @@ class WithPrices(Protocol):
         ...
 
 
+@runtime_checkable
+class WithScans(Protocol):
+    """A platform some of whose actions keep its sensor from scanning; under those of others it always scans."""
+
+    def scans(self, pose: Floats, actions: Floats, times: Floats) -> Bools:
+        """(num_actions, num_times) whether the sensor scans `times` seconds after it began each action at `pose`."""
+        ...
+
+
 def check_platform(field: str, platform: Any) -> None:
     """`InputError` for what lacks a member of `Platform`."""
     if isinstance(platform, type) or not isinstance(platform, Platform):
@@ -183,6 +204,17 @@ def prices_of(field: str, platform: Platform, actions: Floats) -> Floats:
     if not isinstance(platform, WithPrices):
         return np.zeros(len(actions))
     return float_array(f"{field}.prices", platform.prices(actions.copy()), (len(actions),))
+
+
+def scans_of(field: str, platform: Platform, pose: Floats, actions: Floats, times: Floats) -> Bools:
+    """(num_actions, num_times) whether each action lets its sensor scan; `InputError` for what is no such table."""
+    shape = len(actions), len(times)
+    if not isinstance(platform, WithScans):
+        return np.ones(shape, np.bool_)
+    scans = as_array(f"{field}.scans", platform.scans(pose.copy(), actions.copy(), times.copy()), "b", "booleans")
+    if scans.shape != shape:
+        raise reject(f"{field}.scans", f"booleans of shape {shape}", f"shape {scans.shape}")
+    return scans
 
 
 def _checked(field: str, given: Any, shape: tuple[int, ...], pose: Floats) -> Floats:

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import Bools, Floats
 from vedette.models.arguments import instance
-from vedette.platforms.base import Platform, actions_at, check_platform, courses_of
+from vedette.platforms.base import Platform, actions_at, check_platform, courses_of, scans_of
 from vedette.platforms.camera import Carried, Pointing
 from vedette.platforms.compass import Compass, PlaneCompass, course_deg
 from vedette.platforms.courses import Courses
@@ -64,6 +64,10 @@ class ByCompass:
     def courses(self, pose: Floats, actions: Floats, times: Floats) -> Floats:
         """Those of many actions at once."""
         return courses_of("platform", self.platform, pose, self._own(actions, pose), times)
+
+    def scans(self, pose: Floats, actions: Floats, times: Floats) -> Bools:
+        """Those of the platform."""
+        return scans_of("platform", self.platform, pose, self._own(actions, pose), times)
 
     @property
     def _parts(self) -> tuple[Platform, ...]:

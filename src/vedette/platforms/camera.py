@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import Bools, Floats
 from vedette.models.arguments import float_array, positive, reject
 from vedette.models.fields import Positive
 from vedette.models.measurement import wrap_angles
-from vedette.platforms.base import Platform, check_platform
+from vedette.platforms.base import Platform, check_platform, prices_of, scans_of
 
 POSE_DIM = 5
 # Of its pose; sensors that are no cameras have no half width, or one of 0.
@@ -134,3 +134,15 @@ class Carried:
         poses = np.array(self.pointing.course(pose.copy(), action[num:], times), np.float64)
         poses[:, :3] = np.asarray(self.carrier.course(pose[:3].copy(), action[:num], times))[:, :3]
         return poses
+
+    def prices(self, actions: Floats) -> Floats:
+        """(num_actions,) of both together."""
+        num = len(self.carrier.columns)
+        carried = prices_of("carrier", self.carrier, actions[:, :num])
+        return carried + prices_of("pointing", self.pointing, actions[:, num:])
+
+    def scans(self, pose: Floats, actions: Floats, times: Floats) -> Bools:
+        """(num_actions, num_times) where both let the sensor scan."""
+        num = len(self.carrier.columns)
+        carried = scans_of("carrier", self.carrier, pose[:3], actions[:, :num], times)
+        return carried & scans_of("pointing", self.pointing, pose, actions[:, num:], times)

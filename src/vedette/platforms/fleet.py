@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import Bools, Floats
 from vedette.models.arguments import float_array
-from vedette.platforms.base import Platform, course_of
+from vedette.platforms.base import Platform, course_of, scans_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,6 +48,15 @@ class Fleet:
             if action is not None:
                 at[s] = course_of(f"sensors[{s}].platform", platform, self.starts[s], action, seconds)[0]
         return at
+
+    def off(self, time: float) -> Bools:
+        """(num_sensors,) whether the action of each keeps its sensor from scanning at `time`, s."""
+        seconds, off = np.array([time - self.since]), np.zeros(len(self.platforms), np.bool_)
+        for s, (platform, action) in enumerate(zip(self.platforms, self.actions, strict=True)):
+            if action is not None:
+                rows = action[np.newaxis]
+                off[s] = not scans_of(f"sensors[{s}].platform", platform, self.starts[s], rows, seconds)[0, 0]
+        return off
 
     def follow(self, actions: Sequence[Floats | None], time: float) -> Fleet:
         """All on their ways from where they are at `time`, each under its new action."""

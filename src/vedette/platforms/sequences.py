@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models.arguments import dimension, positive
-from vedette.platforms.base import Platform, actions_at, check_platform, course_of
+from vedette.platforms.base import Platform, actions_at, check_platform, course_of, prices_of, scans_of
 
 # More sequences are not listed: they are a power of the number of actions.
 MAX_SEQUENCES = 1_000_000
@@ -70,14 +70,29 @@ class Sequences:
 
     def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
         """The courses of the actions one after the other, each from where the one before ended."""
+        return self._followed(pose, action, times)[0]
+
+    def prices(self, actions: Floats) -> Floats:
+        """(num_sequences,) of all their actions together."""
+        num = len(self.platform.columns)
+        stages = [actions[:, stage * num : (stage + 1) * num] for stage in range(self.depth)]
+        return np.asarray(sum(prices_of("platform", self.platform, rows) for rows in stages))
+
+    def scans(self, pose: Floats, actions: Floats, times: Floats) -> Bools:
+        """(num_sequences, num_times) as their actions let the sensor scan, one after the other."""
+        return np.array([self._followed(pose, action, times)[1] for action in actions])
+
+    def _followed(self, pose: Floats, action: Floats, times: Floats) -> tuple[Floats, Bools]:
+        """Poses (num_times, pose_dim) of a sequence, and (num_times,) whether the sensor scans."""
         poses, stages, num = np.tile(pose, (len(times), 1)), self._stages(times), len(self.platform.columns)
-        at = pose
+        scans, at = np.ones(len(times), np.bool_), pose
         for stage in range(self.depth):
             own, row = stages == stage, action[stage * num : (stage + 1) * num]
             moments = np.append(times[own] - stage * self.period, self.period)
             course = course_of("platform", self.platform, at, row, moments)
+            scans[own] = scans_of("platform", self.platform, at, row[np.newaxis], moments[:-1])[0]
             poses[own], at = course[:-1], course[-1]
-        return poses
+        return poses, scans
 
     def _ends(self, poses: Floats, actions: list[Floats]) -> Floats:
         """Where the actions from each pose have taken it when the next one begins."""

@@ -22,7 +22,7 @@ from vedette.fusion import Clmb, CmDeltaGlmb, Fusion, Matched, ParallelUpdate
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models import SensorModel, TargetModel
 from vedette.platforms import Actions, ByCompass, Operated, Platform
-from vedette.platforms.base import actions_at
+from vedette.platforms.base import SWITCH, actions_at
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections.courses import in_courses
 from vedette.scenarios.sections.custom import Custom, NotGiven
@@ -109,7 +109,7 @@ def build_sensors(scenario: Scenario) -> tuple[MobileSensor, ...]:
 
 
 def _platform(model: ScenarioModel, sensor: Sensor, folder: Path) -> Platform:
-    """What carries a sensor, with its prices; with an origin or a compass its actions are courses."""
+    """What carries a sensor, with its prices and switch; with an origin or a compass its actions are courses."""
     section, price = sensor.platform, sensor.price
     platform = section.build(folder)
     if model.by_compass and platform.columns:
@@ -117,7 +117,10 @@ def _platform(model: ScenarioModel, sensor: Sensor, folder: Path) -> Platform:
     if isinstance(section, CustomPlatform) and isinstance(price, str) and price not in platform.columns:
         wanted = f"{section.function} to have a column {price}, as its price"
         raise NotGiven(section, "function", wanted, ", ".join(platform.columns) or "no columns")
-    return platform if price is None else Operated(platform, price)
+    if isinstance(section, CustomPlatform) and sensor.switchable and SWITCH in platform.columns:
+        wanted = f"{section.function} to have no column {SWITCH}, as the sensor is switchable"
+        raise NotGiven(section, "function", wanted, ", ".join(platform.columns))
+    return Operated(platform, price, sensor.switchable) if price is not None or sensor.switchable else platform
 
 
 def _scan_times(model: ScenarioModel, sensor: Sensor) -> Floats | None:
@@ -140,7 +143,7 @@ def _check_own(scenario: Scenario, section: Sensor, sensor: SensorModel, local: 
         wanted = f"{measured.function} to give a measurement with `places`, as targets are born of measurements"
         raise NotGiven(measured, "function", wanted, "one without")
     waits = section.scans.drop_out or section.scans.late or not section.scans.build(model.time).all()
-    waits = waits or (model.network is not None and model.network.delay)
+    waits = waits or section.switchable or (model.network is not None and model.network.delay)
     if isinstance(model.filter, CustomFilter) and (born or waits) and not isinstance(local, TwoStepFilter):
         why = "targets are born of measurements" if born else "it must predict without a scan"
         wanted = f"{model.filter.function} to give a TwoStepFilter, with predict() and update(), as {why}"
@@ -243,6 +246,8 @@ def _first_actions(scenario: Scenario, sensors: tuple[MobileSensor, ...]) -> tup
         platform = sensor.platform.platform if isinstance(sensor.platform, Operated) else sensor.platform
         if row is not None and isinstance(platform, ByCompass):
             rows = platform.of_plane(rows, pose)
+        if row is not None and isinstance(sensor.platform, Operated):
+            rows = sensor.platform.switched_on_and_off(rows)[:1]
         found.append(Actions(own.columns, rows))
     return tuple(found)
 

@@ -11,7 +11,7 @@ import numpy as np
 from vedette.control import Plan
 from vedette.densities import Estimate
 from vedette.errors import VedetteError
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import Bools, Floats
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.health import Health
 from vedette.simulation.records import Decision, RunRecord
@@ -32,6 +32,7 @@ class Journal:
         self.step = 1
         self.estimates: list[Estimate] = []
         self._poses: list[Floats] = []
+        self._off: list[Bools] = []
         self._decisions: list[Decision] = []
         self.health = Health.unreported(len(experiment.times), experiment.num_sensors)
         self._clocks: list[Stages] = [Stages()]
@@ -53,7 +54,7 @@ class Journal:
         """Take the time of a stage of the scan at hand."""
         return self._clocks[-1].timing(stage)
 
-    def note(self, poses: Floats, info: TrackerInfo, estimate: Estimate) -> None:
+    def note(self, poses: Floats, off: Bools, info: TrackerInfo, estimate: Estimate) -> None:
         """Write down the scan at hand."""
         with self.timing("report of the tracker"):
             self.health.note_filters(self.step - 1, info.filters)
@@ -61,6 +62,7 @@ class Journal:
             self.health.note_sent(self.step - 1, info.bytes_sent)
         self._fusion.append(float(info.seconds.get("fusion", 0.0)))
         self._poses.append(poses)
+        self._off.append(off)
         self.estimates.append(estimate)
 
     def decide(self, plan: Plan) -> None:
@@ -90,6 +92,7 @@ class Journal:
             times=self.experiment.times[:num],
             truth=self.truth.first(num),
             poses=np.array(self._poses[:num]),
+            off=np.array(self._off[:num]),
             estimates=tuple(self.estimates),
             decisions=tuple(self._decisions),
             ospa=ospa,

@@ -19,7 +19,7 @@ from vedette.plausible import told_elsewhere
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.journal import Journal, Score
 from vedette.simulation.records import RunRecord
-from vedette.simulation.scans import Scan, simulate_scans
+from vedette.simulation.scans import Scan, kept_scans, simulate_scans
 from vedette.simulation.truth import Truth
 from vedette.tracking import Central, Stages, State, TrackerInfo
 
@@ -105,6 +105,7 @@ class Moment(NamedTuple):
     poses: Floats  # (num_sensors, 3 or more) where the sensors scanned
     measurements: tuple[Floats | None, ...]  # of each sensor (num, meas_dim); None of one that did not scan
     scans: tuple[Scan | None, ...]  # the same with the targets behind them, for evaluation; () where they were recorded
+    off: Bools  # (num_sensors,) whether its action kept each sensor from scanning
     state: State  # what the tracker believes now
     info: TrackerInfo  # what it reports
     estimate: Estimate  # read off the fused belief
@@ -177,11 +178,12 @@ class World:
         time, recording = float(experiment.times[step - 1]), experiment.recording
         poses = self.fleet.poses(time) if recording is None else recording.poses[step - 1]
         scans: tuple[Scan | None, ...] = ()
+        off = self.fleet.off(time) if recording is None else np.zeros(experiment.num_sensors, np.bool_)
         with clock.timing("scans"):
             if recording is None:
                 ids, states = self.truth.at(step - 1)
                 sensors = experiment.sensors_at(step, self._scans_at)
-                scans = simulate_scans(states, poses, sensors, ids=ids, rngs=self._scan_rngs)
+                scans = kept_scans(simulate_scans(states, poses, sensors, ids=ids, rngs=self._scan_rngs), off)
                 measurements = tuple(None if scan is None else scan.measurements for scan in scans)
             else:
                 measurements = tuple(recording.scans[step - 1])
@@ -189,7 +191,8 @@ class World:
             state, info = self._tracker.step(self._state, measurements, poses, time, rngs=self._filter_rngs)
         with clock.timing("estimate"):
             estimate = experiment.estimate(state.fused, step)
-        self._state, self.moment = state, Moment(step, time, poses, measurements, scans, state, info, estimate)
+        self._state = state
+        self.moment = Moment(step, time, poses, measurements, scans, off, state, info, estimate)
         return self.moment
 
 
@@ -207,7 +210,7 @@ def advance(world: World, journal: Journal, watch: Callable[[int], None] | None 
     moments: list[Moment] = []
     for step in range(first, len(world.experiment.times) + 1):
         moments.append(world.step(stages=journal.begin(step)))
-        journal.note(moments[-1].poses, moments[-1].info, moments[-1].estimate)
+        journal.note(moments[-1].poses, moments[-1].off, moments[-1].info, moments[-1].estimate)
         if watch is not None:
             watch(step)
         if step in steps:

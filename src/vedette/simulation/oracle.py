@@ -26,7 +26,7 @@ from vedette.models import MotionModel
 from vedette.models.arguments import dimension, generator, instance, positive
 from vedette.models.fields import Count
 from vedette.platforms import Options
-from vedette.platforms.base import courses_of
+from vedette.platforms.base import courses_of, scans_of
 from vedette.simulation.cramer_rao import Stretch, scan_information, transition_jacobians
 from vedette.simulation.true_targets import held_covs, with_components
 from vedette.simulation.truth import Truth
@@ -145,8 +145,8 @@ class OraclePlanner:
         """The best joint action, and what it costs together with the decisions after it."""
         last = next((own for own in self.timetable.decision_steps if own > moment.step), len(self.timetable.times))
         options = options_of(self.sensors, moment.poses, self.settings)
-        courses = self._courses(moment, options, last)
-        stretch = self._stretch(moment.step, last, courses, truth, ids)
+        courses, scans = self._courses(moment, options, last)
+        stretch = self._stretch(moment.step, last, courses, scans, truth, ids)
         known: dict[tuple[int, ...], float] = {}
 
         def evaluate(actions: Ints) -> Floats:
@@ -169,16 +169,29 @@ class OraclePlanner:
         best = min(totals, key=lambda joint: (totals[joint], joint))
         return best, totals[best]
 
-    def _courses(self, moment: _Moment, options: tuple[Options, ...], last: int) -> tuple[Floats, ...]:
-        """Of each sensor (num_courses, num_scans, pose_dim) where it is at the scans up to the next decision."""
-        times = self.timetable.times
-        waits, found = times[moment.step : last] - times[moment.step - 1], []
+    def _courses(
+        self, moment: _Moment, options: tuple[Options, ...], last: int
+    ) -> tuple[tuple[Floats, ...], tuple[Bools, ...]]:
+        """Of each sensor (num_courses, num_scans, pose_dim) where it is at the times of scans up to the next decision,
+        and (num_courses, num_scans) whether it scans then."""
+        times, table = self.timetable.times, self.timetable.scans_at
+        waits, found, scans = times[moment.step : last] - times[moment.step - 1], [], []
         for s, (sensor, own) in enumerate(zip(self.sensors, options, strict=True)):
             actions = own.actions.values[[own.first_action(course) for course in range(len(own.courses))]]
-            found.append(courses_of(f"sensors[{s}].platform", sensor.platform, moment.poses[s], actions, waits))
-        return tuple(found)
+            of_platform = f"sensors[{s}].platform", sensor.platform, moment.poses[s], actions, waits
+            found.append(courses_of(*of_platform))
+            scans.append(scans_of(*of_platform) & (True if table is None else table[s, moment.step : last]))
+        return tuple(found), tuple(scans)
 
-    def _stretch(self, first: int, last: int, courses: tuple[Floats, ...], truth: Truth, ids: Ints) -> Stretch:
+    def _stretch(
+        self,
+        first: int,
+        last: int,
+        courses: tuple[Floats, ...],
+        scans: tuple[Bools, ...],
+        truth: Truth,
+        ids: Ints,
+    ) -> Stretch:
         """The scans after scan `first`, when all of `ids` are there, to scan `last`; who ends stays where it was."""
         table, times = self.timetable, self.timetable.times
         motion = self._motion
@@ -191,12 +204,10 @@ class OraclePlanner:
             states[k, places], alive[k, places] = own[rows], 1.0
         steps = list(zip(states[:-1], np.diff(times[first - 1 : last]).tolist(), strict=True))
         told = []
-        for s, (sensor, own) in enumerate(zip(self.sensors, courses, strict=True)):
+        for sensor, own, when in zip(self.sensors, courses, scans, strict=True):
             said = np.zeros((*own.shape[:2], num, dim, dim))
-            for k in range(last - first):
-                if table.scans_at is None or table.scans_at[s, first + k]:
-                    for course in range(len(own)):
-                        said[course, k] = scan_information(sensor.filter.sensor, states[k + 1], own[course, k])
+            for course, k in np.argwhere(when).tolist():
+                said[course, k] = scan_information(sensor.filter.sensor, states[k + 1], own[course, k])
             told.append(said)
         return Stretch(
             np.array([transition_jacobians(motion, own, dt) for own, dt in steps]).reshape(len(steps), num, dim, dim),

@@ -10,7 +10,7 @@ import numpy as np
 from vedette.control.plan import Plan
 from vedette.densities.estimates import Estimate
 from vedette.errors import InputError
-from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.simulation.arrow import Columns
 from vedette.simulation.health import FUSION_COLUMNS, Health
 from vedette.simulation.truth import Truth
@@ -89,6 +89,7 @@ class RunRecord(Tabled):
         times: (num_scans,) s.
         truth: the targets, scan by scan.
         poses: (num_scans, num_sensors, 3 or more) sensor poses [px, py, heading_rad, ...] at each scan.
+        off: (num_scans, num_sensors) whether its action kept each sensor from scanning.
         estimates: one a scan.
         decisions: in order of time.
         ospa: (num_scans, 3) total, localisation and cardinality parts, m; where whole states are compared, in no unit.
@@ -105,6 +106,7 @@ class RunRecord(Tabled):
     times: Floats
     truth: Truth
     poses: Floats
+    off: Bools
     estimates: tuple[Estimate, ...]
     decisions: tuple[Decision, ...]
     ospa: Floats

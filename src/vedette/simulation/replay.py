@@ -9,7 +9,7 @@ from vedette.errors import InputError
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.loop import SCANS, scans_of_run, sensor_streams
 from vedette.simulation.records import RunRecord
-from vedette.simulation.scans import Scan, simulate_scans
+from vedette.simulation.scans import Scan, kept_scans, simulate_scans
 from vedette.simulation.true_sensors import TrueSensor
 
 
@@ -43,6 +43,8 @@ def scans_of_sensors(
         raise InputError(f"record: expected {num_sensors} sensors; got {record.num_sensors}")
     streams = sensor_streams(record.seed, record.run, SCANS, num_sensors)
     return tuple(
-        simulate_scans(states, record.poses[step], sensors_at(step + 1), ids=ids, rngs=streams)
+        kept_scans(
+            simulate_scans(states, record.poses[step], sensors_at(step + 1), ids=ids, rngs=streams), record.off[step]
+        )
         for step, (ids, states) in enumerate(record.truth.at(scan) for scan in range(record.num_scans))
     )

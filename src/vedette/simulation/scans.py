@@ -119,6 +119,14 @@ def simulate_scans(
     return tuple(scans)
 
 
+def kept_scans(scans: Sequence[Scan | None], off: Bools) -> tuple[Scan | None, ...]:
+    """The scans of a time without those of sensors that are off (num_sensors,).
+
+    All are drawn first, so that a sensor meets the same luck whether or not it was off before.
+    """
+    return tuple(None if is_off else scan for scan, is_off in zip(scans, off.tolist(), strict=True))
+
+
 def _shown(sensor: TrueSensor, states: Floats, pose: Floats) -> tuple[Floats, Floats]:
     """The targets' states at the time by the world's clock, and where the sensor is in truth."""
     bias = sensor.bias

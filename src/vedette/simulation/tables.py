@@ -16,7 +16,7 @@ import numpy as np
 
 from vedette.densities.estimates import Estimate
 from vedette.errors import InputError
-from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.simulation.arrow import Columns, Kind, Layout
 from vedette.simulation.explained import EXPLAINED, explained_tables, with_explanations
 from vedette.simulation.health import FUSION_COLUMNS, SENSOR_COLUMNS, Health
@@ -27,6 +27,7 @@ from vedette.simulation.truth import Truth
 Tables: TypeAlias = dict[str, Columns]
 
 POSE_COLUMNS = ("x_m", "y_m", "heading_rad")
+OFF = "off"  # a column of runs in which an action kept a sensor from scanning: 1 where it did
 
 _TIME = {"step": Kind.INTEGER, "time_s": Kind.NUMBER}
 _LABEL = {"birth_step": Kind.INTEGER, "birth_site": Kind.INTEGER}
@@ -39,7 +40,7 @@ LAYOUTS: dict[str, Layout] = {
     "tracks": Layout({**_TIME, **_LABEL, "existence": Kind.NUMBER}, {"mean_": Kind.NUMBER, "cov_": Kind.NUMBER}),
     "sensors": Layout(
         {**_TIME, "sensor": Kind.INTEGER, **dict.fromkeys(POSE_COLUMNS, Kind.NUMBER), **SENSOR_COLUMNS},
-        {"pose_": Kind.NUMBER},
+        {"pose_": Kind.NUMBER, OFF: Kind.COUNT},
     ),
     **PLANNED,
 }
@@ -63,6 +64,8 @@ def check_record(record: RunRecord) -> None:
             raise InputError(f"record.{name}: expected one entry for each of {num_scans} scans; got {length}")
     if record.ospa.shape != (num_scans, 3):
         raise InputError(f"record.ospa: expected shape {(num_scans, 3)}; got {record.ospa.shape}")
+    if record.off.shape != record.poses.shape[:2] or record.off.dtype != np.bool_:
+        raise InputError(f"record.off: expected booleans of {record.poses.shape[:2]}; got {record.off.shape}")
     record.health.check(num_scans, record.num_sensors)
     for decision in record.decisions:
         decision.check(record.times, record.poses)
@@ -118,6 +121,7 @@ def record_of(
             times, _offsets(tables["truth"], len(times)), tables["truth"]["target"], _matrix(tables["truth"], "state_")
         ),
         poses=poses,
+        off=_off_of(tables, poses),
         estimates=_estimates_of(tables["tracks"], len(times)),
         decisions=with_explanations(decisions, tables) if any(name in tables for name in EXPLAINED) else decisions,
         ospa=outline.ospa,
@@ -165,8 +169,14 @@ def _poses_of(tables: Mapping[str, Mapping[str, Any]]) -> Floats:
         raise InputError(
             f"sensors: expected a row of every sensor for each of {num_scans} scans; got {len(sensors['step'])}"
         )
-    columns = [*POSE_COLUMNS, *LAYOUTS["sensors"].others(sensors)]
+    columns = [*POSE_COLUMNS, *(name for name in sensors if name.startswith("pose_"))]
     return np.stack([sensors[name] for name in columns], axis=1).reshape(num_scans, -1, len(columns))
+
+
+def _off_of(tables: Mapping[str, Mapping[str, Any]], poses: Floats) -> Bools:
+    """(num_scans, num_sensors)."""
+    off = tables["sensors"].get(OFF)
+    return np.zeros(poses.shape[:2], np.bool_) if off is None else (off == 1).reshape(poses.shape[:2])
 
 
 def _truth(record: RunRecord) -> Columns:
@@ -209,6 +219,7 @@ def _sensors(record: RunRecord) -> Columns:
         **dict(zip(POSE_COLUMNS, poses.T, strict=False)),
         **{f"pose_{index}": poses[:, index] for index in range(len(POSE_COLUMNS), pose_dim)},
         **{name: getattr(record.health, name).ravel() for name in SENSOR_COLUMNS},
+        **({OFF: record.off.ravel().astype(np.int64)} if record.off.any() else {}),
     }
 
 

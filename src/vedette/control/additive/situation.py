@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vedette.control.priors import decision_of, draw_paths, targets_of
-from vedette.control.settings import IDEAL_MODES, MobileSensor, PlanningSettings
+from vedette.control.settings import IDEAL_MODES, MobileSensor, PlanningSettings, scans_within
 from vedette.densities import LMB
 from vedette.densities.checks import offsets_of
 from vedette.densities.containers import unchecked
@@ -17,6 +17,7 @@ from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.planning.ideal import EXPECTED, IDEAL, Decision, Futures
 from vedette.kernels.planning.known import rows_without_scans
 from vedette.kernels.planning.reach import Belief, label_radii, predict_paths
+from vedette.platforms import Options
 from vedette.probabilities import logit
 from vedette.tracking import State
 
@@ -78,7 +79,7 @@ def starts_of(
     prediction: LMB,
     state: State,
     sensors: Sequence[MobileSensor],
-    courses: Sequence[Floats],
+    options: Sequence[Options],
     settings: PlanningSettings,
     *,
     missing_existence: float,
@@ -87,17 +88,17 @@ def starts_of(
 ) -> Start:
     """What the changes of the sensors' scans are added to.
 
-    prediction: the fused density at the end of the horizon, of one Gaussian a label. courses: of each sensor
-    (num_courses, horizon_steps, pose_dim). missing_existence: of a label that a sensor lacks. sampled: false for what
-    needs no samples, and takes the mean P_D over the predicted Gaussian.
+    prediction: the fused density at the end of the horizon, of one Gaussian a label. options: of each sensor, with
+    courses over the horizon. missing_existence: of a label that a sensor lacks. sampled: false for what needs no
+    samples, and takes the mean P_D over the predicted Gaussian.
     """
     samples = Samples.draw(state.fused, sensors, settings, rng=rng) if sampled else Samples.none(state.fused, settings)
     given = prediction.to_kernel()
     references = given.tracks.means
     prior = rows_without_scans(references, given.tracks.covs, given.existence_logit, references)
-    scans = [sensor.scans(state.time, settings) for sensor in sensors]
+    courses, scans = [own.courses for own in options], scans_within(sensors, options, state.time, settings)
     shared, groups = IDEAL_MODES[settings.ideal_measurements] == IDEAL or not sampled, []
-    for members in _alike(sensors, state.local, scans, shared=shared):
+    for members in _alike(sensors, state.local, shared=shared):
         group = _group(members, prediction, state.local, sensors, courses, scans, samples, settings, sampled, rng)
         groups.append(group)
     bases: list[Floats] = [prior] * len(sensors)
@@ -108,14 +109,12 @@ def starts_of(
     return Start(tuple(groups), references, prior, tuple(bases), samples.targets.shape[1])
 
 
-def _alike(
-    sensors: Sequence[MobileSensor], beliefs: Sequence[Any], scans: Sequence[Bools], *, shared: bool
-) -> list[tuple[int, ...]]:
-    """Sensors with the same belief, equal models and scans, together; each by itself unless `shared`."""
+def _alike(sensors: Sequence[MobileSensor], beliefs: Sequence[Any], *, shared: bool) -> list[tuple[int, ...]]:
+    """Sensors with the same belief and equal models together; each by itself unless `shared`."""
     found: dict[object, list[int]] = {}
-    for s, (sensor, belief, when) in enumerate(zip(sensors, beliefs, scans, strict=True)):
+    for s, (sensor, belief) in enumerate(zip(sensors, beliefs, strict=True)):
         key: list[object] = [id(belief)]
-        for part in (*sensor.filter.sensor.to_kernel(), when):
+        for part in sensor.filter.sensor.to_kernel():
             key.append(part.tobytes() if isinstance(part, np.ndarray) else part)
         found.setdefault(tuple(key) if shared else s, []).append(s)
     return list(map(tuple, found.values()))
@@ -138,8 +137,8 @@ def _group(
     own = np.flatnonzero((places >= 0) & (belief.existence_logit > -np.inf))
     prior = unchecked(LMB, single_gaussians(take_tracks(belief.tracks, own)), belief.existence_logit[own]).to_kernel()
     futures = samples.futures(sensor.filter.sensor.meas_dim, settings, rng=rng)
-    together = np.concatenate([courses[s] for s in members])
-    decision = decision_of(sensor, together, futures, settings, scans[members[0]], None if sampled else "mean")
+    together, when = (np.concatenate([own[s] for s in members]) for own in (courses, scans))
+    decision = decision_of(sensor, together, futures, settings, when, None if sampled else "mean")
     labels, tracks, horizon = places[own], prior.tracks, decision.horizon
     paths = predict_paths(decision.motion, horizon.dt, horizon.poses.shape[1], tracks.means, tracks.covs)
     ends = np.ascontiguousarray(paths.means[:, -1]), np.ascontiguousarray(paths.covs[:, -1])

@@ -54,11 +54,11 @@ def lay_out(
 ) -> AdditiveRewards:
     """The rewards at the end of the horizon: each label followed over every course that reaches it."""
     sampled = not isinstance(reward, ExpectedLossReward)
-    courses, missing = [own.courses for own in options], rule.missing_existence
+    missing = rule.missing_existence
     num_threads = settings.threads()
     with model_errors():
         start = starts_of(
-            prediction, state, sensors, courses, settings, missing_existence=missing, sampled=sampled, rng=rng
+            prediction, state, sensors, options, settings, missing_existence=missing, sampled=sampled, rng=rng
         )
         table = lay_out_changes(start, rule, num_threads, sampled=sampled)
     valuation = valuation_of(reward, prediction, start.prior)
@@ -193,8 +193,7 @@ def cells_of(start: Start, undetected: UndetectedIntensity, worth: float, first_
 
 def _view(group: SensorGroup, states: Floats, weights: Floats) -> tuple[Ints, Ints, Floats]:
     decision, horizon = group.decision, group.decision.horizon
-    poses = np.ascontiguousarray(horizon.poses[:, horizon.scans])
     found: tuple[Ints, Ints, Floats] = cells_in_view(
-        decision.sensor, poses, states, weights, LEAST_DETECTION, group.reach
+        decision.sensor, horizon.poses, horizon.scans, states, weights, LEAST_DETECTION, group.reach
     )
     return found

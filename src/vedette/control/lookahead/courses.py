@@ -93,13 +93,14 @@ class CourseTree:
             self._allowed[key] = found
         return self._allowed[key]
 
-    def course(self, sequence: Sequence) -> Floats:
-        """(num_steps, pose_dim) poses at the pseudo-updates, up to the end of the last decision's horizon."""
-        parts = [
-            self.options(sequence[:k]).courses[taken, : self.stages.stride] for k, taken in enumerate(sequence[:-1])
-        ]
-        last = self.options(sequence[:-1]).courses[sequence[-1], : self.stages.steps]
-        return np.concatenate([*parts, last])
+    def course(self, sequence: Sequence) -> tuple[Floats, Bools]:
+        """Poses (num_steps, pose_dim) at the pseudo-updates, up to the end of the last decision's horizon, and
+        (num_steps,) whether it scans there."""
+        stages, found = self.stages, [(self.options(sequence[:k]), taken) for k, taken in enumerate(sequence)]
+        nums = [stages.stride] * (len(found) - 1) + [stages.steps]
+        parts = list(zip(found, nums, strict=True))
+        poses = np.concatenate([own.courses[taken, :num] for (own, taken), num in parts])
+        return poses, np.concatenate([own.scans[taken, :num] for (own, taken), num in parts])
 
     def price(self, sequence: Sequence, first: int) -> float:
         """What the actions of a sequence cost, from decision `first` (from 0) on."""

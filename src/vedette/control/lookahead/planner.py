@@ -163,7 +163,10 @@ class HorizonPlanner:
     def _single(self, given: _Given, rng: np.random.Generator) -> tuple[Evidence, tuple[int, ...]]:
         """What a `JointPlanner` would decide, and on what."""
         options, steps = tuple(tree.options(()) for tree in given.trees), given.stages.steps
-        now = tuple(own._replace(courses=np.ascontiguousarray(own.courses[:, :steps])) for own in options)
+        now = tuple(
+            own._replace(courses=np.ascontiguousarray(own.courses[:, :steps]), scans=own.scans[:, :steps])
+            for own in options
+        )
         evaluator = self._lay_out(given, 1, None, now, rng)
         evidence = Evidence(evaluator, tuple(range(len(now))), evaluator.joint())
         mask = None if given.rules is None else given.rules.first()

@@ -17,7 +17,7 @@ from vedette.control.lookahead.courses import CourseTree, Sequence
 from vedette.control.lookahead.rules import Rules
 from vedette.control.plan import SearchCurve
 from vedette.control.search import first_best
-from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.planning.ascent import Cells
 from vedette.platforms import Options
 
@@ -89,7 +89,7 @@ class LaidCourses:
         return rewards
 
     def _add(self, new: list[tuple[int, Sequence]]) -> None:
-        courses: list[list[Floats]] = [[] for _ in self.trees]
+        courses: list[list[tuple[Floats, Bools]]] = [[] for _ in self.trees]
         for s, taken in new:
             self._places[s, taken] = len(self._places)
             courses[s].append(self.trees[s].course(taken))
@@ -106,10 +106,11 @@ class LaidCourses:
             for lists, more in zip(self._lists, (changes, found), strict=True):
                 lists.append(*more)
 
-    def _options(self, tree: CourseTree, courses: list[Floats]) -> Options:
-        shape = len(courses), tree.stages.num_steps(self.stage), len(tree.pose)
-        actions, free = tree.options(()).actions, np.zeros(len(courses))
-        return Options(actions, np.array(courses).reshape(shape), np.arange(len(courses)), tree.pose, free)
+    def _options(self, tree: CourseTree, courses: list[tuple[Floats, Bools]]) -> Options:
+        num, steps = len(courses), tree.stages.num_steps(self.stage)
+        poses = np.array([own for own, _ in courses]).reshape(num, steps, len(tree.pose))
+        scans = np.array([own for _, own in courses], np.bool_).reshape(num, steps)
+        return Options(tree.options(()).actions, poses, np.arange(num), tree.pose, np.zeros(num), scans)
 
     def _rewards(self) -> AdditiveRewards:
         """Of all courses so far: a sensor might take any of them, and is given its own."""

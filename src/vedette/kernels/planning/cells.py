@@ -9,7 +9,7 @@ import numpy as np
 
 from vedette.kernels.base.arrays import grown_floats, grown_ints
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import Floats, Ints, Sensor
+from vedette.kernels.base.types import Bools, Floats, Ints, Sensor
 from vedette.kernels.steps.undetected import mean_detection
 
 
@@ -42,14 +42,21 @@ def _out_of_reach(bounds: Floats, c: int, pose: Floats, reach: float) -> bool:
 
 @borrowing
 def _write_view(
-    sensor: Sensor, course: Floats, grid: _Cells, least: float, reach: float, cells: Ints, log_miss: Floats
+    sensor: Sensor,
+    course: Floats,
+    scans: Bools,
+    grid: _Cells,
+    least: float,
+    reach: float,
+    cells: Ints,
+    log_miss: Floats,
 ) -> int:
     """Write the cells in view on one course, and what `cells_in_view` says of them; returns their number."""
     count = 0
     for c in range(len(grid.states)):
         most, total = 0.0, 0.0
         for h in range(len(course)):
-            if _out_of_reach(grid.bounds, c, course[h], reach):
+            if not scans[h] or _out_of_reach(grid.bounds, c, course[h], reach):
                 continue
             detection = mean_detection(sensor, course[h], grid.states[c], grid.node_weights)
             most = max(most, detection)
@@ -62,7 +69,7 @@ def _write_view(
 
 @kernel
 def cells_in_view(
-    sensor: Sensor, courses: Floats, states: Floats, node_weights: Floats, least: float, reach: float
+    sensor: Sensor, courses: Floats, scans: Bools, states: Floats, node_weights: Floats, least: float, reach: float
 ) -> tuple[Ints, Ints, Floats]:
     """For each course the cells that are seen on it, and the log probability of missing a target in them all along.
 
@@ -70,7 +77,8 @@ def cells_in_view(
 
     Args:
         sensor: which.
-        courses: (num_courses, num_times, pose_dim) where it scans.
+        courses: (num_courses, num_times, pose_dim) where it is.
+        scans: (num_courses, num_times) whether it scans there.
         states: (num_cells, num_nodes, state_dim) targets at the nodes of each cell.
         node_weights: (num_nodes,) of the mean; sum 1.
         least: probability of detection from which a cell is seen; with 0 all are.
@@ -88,6 +96,7 @@ def cells_in_view(
     entry_offsets[0] = 0
     for course in range(len(courses)):
         cells, log_miss = grown_ints(cells, count + num_cells), grown_floats(log_miss, count + num_cells)
-        count += _write_view(sensor, courses[course], grid, least, reach, cells[count:], log_miss[count:])
+        poses, found, missed = courses[course], cells[count:], log_miss[count:]
+        count += _write_view(sensor, poses, scans[course], grid, least, reach, found, missed)
         entry_offsets[course + 1] = count
     return entry_offsets, cells[:count].copy(), log_miss[:count].copy()

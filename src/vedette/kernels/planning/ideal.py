@@ -46,7 +46,7 @@ class Horizon(NamedTuple):
     """Where and how a sensor will scan."""
 
     poses: Floats  # (num_actions, horizon_steps, pose_dim) where each action takes the sensor
-    scans: Bools  # (horizon_steps,) whether it scans then
+    scans: Bools  # (num_actions, horizon_steps) whether it scans then
     dt: float  # seconds a step
     mode: int  # IDEAL, EXPECTED or SAMPLED measurements
     threshold: float  # detection probability from which a target is measured, where IDEAL
@@ -100,7 +100,7 @@ def ideal_measurement(decision: Decision, action: int, target: int, step: int, s
     detection = sensor.prob_detection(state, pose, sensor.detection_params)
     # The uniforms are the same for all actions, so that actions are compared on common random numbers.
     seen = detection >= horizon.threshold if horizon.mode == IDEAL else futures.uniforms[step, target] < detection
-    seen = seen and horizon.scans[step]
+    seen = seen and horizon.scans[action, step]
     if seen:
         sensor.measurement(state, pose, sensor.measurement_params, out)
         if horizon.mode == SAMPLED:

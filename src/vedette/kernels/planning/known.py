@@ -258,7 +258,7 @@ def _follow(
             _take_path(belief, label, step, num, lanes)
         else:
             predict_lanes(decision.motion, forms, horizon.dt, out.means, out.covs, num, lanes, own)
-        if not horizon.scans[step]:
+        if not horizon.scans[course, step]:
             _keep_predicted(num, lanes, out)
             continue
         expect_lanes(sensor, forms, pose, num, lanes, own)

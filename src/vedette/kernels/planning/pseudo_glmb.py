@@ -81,7 +81,7 @@ def _update_cases(
             rows = work.first_rows if step == 0 else view_rows(work.rows, num_tracks)
             if step > 0 or action != prepared:
                 predict_rows(belief.tracks, scan, decision.motion, sensor, rows, work.pair.scratch)
-                if not horizon.scans[step]:
+                if not horizon.scans[action, step]:
                     leave_unseen(rows)
             prepared = action
             options = view_options(work.options, num_tracks, num)

@@ -116,7 +116,7 @@ def _update_cases(
             rows, current = (work.first_rows, prior) if step == 0 else (work.rows, belief)
             if step > 0 or action != prepared:
                 predict_rows(current.tracks, scan, decision.motion, sensor, rows, work.pair.scratch)
-                if not horizon.scans[step]:
+                if not horizon.scans[action, step]:
                     leave_unseen(rows)
                 weigh_by_existence(current.existence_logit, rows)
             prepared = action

@@ -72,7 +72,7 @@ def label_radii(paths: Paths, targets: Ints, states: Floats) -> Floats:
 @inlined
 def is_beyond(belief: Belief, decision: Decision, course: int, label: int, step: int, reach: float) -> bool:
     """Whether a label is, at a step of a course, where a sensor of this reach detects nothing, or does not scan."""
-    if not decision.horizon.scans[step]:
+    if not decision.horizon.scans[course, step]:
         return True
     pose, mean = decision.horizon.poses[course, step], belief.paths.means[label, step]
     return math.hypot(mean[0] - pose[0], mean[1] - pose[1]) > reach + belief.radii[label, step]

@@ -210,6 +210,8 @@ def _scans_of_unlabelled(model: ScenarioModel) -> Iterator[Finding]:
             yield ("sensors", i, "scans", "late"), wanted, "late scans"
         if sensor.scans.drop_out or not sensor.scans.build(model.time).all():
             yield ("sensors", i, "scans"), f"every step, as {kind} filters go on from each scan", "only some"
+        if sensor.switchable:
+            yield ("sensors", i, "switchable"), f"false, as {kind} filters go on from each scan", "true"
 
 
 def _planners_fit(model: ScenarioModel) -> Iterator[Finding]:

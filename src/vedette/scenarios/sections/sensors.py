@@ -139,6 +139,11 @@ class Sensor(Section):
         "platform, the column of its actions that has the price of each; none: nothing, or as a custom platform says "
         "[-].",
     )
+    switchable: bool = Field(
+        default=False,
+        description="Whether it can be switched off: each of its actions is listed a second time with `on` 0, by which "
+        "it makes no measurement and no clutter until its next decision, and pays no price [-].",
+    )
     moves_from: Literal["first_decision", "start"] = Field(
         default="first_decision",
         description="Whether it lies still until its first decision, as in the paper, or is under way on its course, "
