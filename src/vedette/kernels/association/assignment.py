@@ -28,9 +28,7 @@ class Options(NamedTuple):
     entries: Ints  # (num_options,) where the option's components start in the next two, -1 if absent
     component_log_weights: Floats  # (num_entries,) those of an option sum to its weight; -inf outside the gate
     whitened: Floats  # (num_entries, meas_dim) whitened residuals of the components of a detection
-    updated: (
-        Floats  # (num_entries, state_dim + 1, state_dim) mean, then covariance, where `Innovation` says so; or empty
-    )
+    updated: Floats  # (num_entries, state_dim + 1, state_dim) mean and covariance of those that bend or are at an edge
     num_measurements: int  # of the scan
 
 

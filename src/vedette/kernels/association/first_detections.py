@@ -19,15 +19,16 @@ import numpy as np
 from vedette.kernels.association.assignment import ABSENT, Options
 from vedette.kernels.association.joined_rows import copy_entry
 from vedette.kernels.association.near import near_measurements
-from vedette.kernels.association.options import Sight, make_room, room_for_bent, sort_row, weigh_detection, write_missed
+from vedette.kernels.association.options import Sight, make_room, room_for_updated, sort_row, weigh_detection
 from vedette.kernels.association.predicted import Rows, expect_rows, log_or_minus_inf, make_rows
 from vedette.kernels.base.arrays import group_members
 from vedette.kernels.base.compile import borrowing, kernel
 from vedette.kernels.base.types import Floats, Ints, Mixture, ScanInput, Sensor
+from vedette.kernels.gaussian.detection import moments_if_missed
 from vedette.kernels.gaussian.innovation import copy_innovation
 from vedette.kernels.gaussian.linalg import log_add
 from vedette.kernels.gaussian.mixtures import copy_component, make_components
-from vedette.kernels.gaussian.relinearisation import copy_updated, make_pair_work
+from vedette.kernels.gaussian.relinearisation import make_pair_work
 from vedette.kernels.gaussian.scratch import make_scratch
 
 _LEAST_SHARE = math.log(1e-5)  # of a candidate's density, below which a component of the intensity is not in it
@@ -89,15 +90,13 @@ def missed_intensity(seen: Rows, scan: ScanInput, sensor: Sensor, num: int) -> t
     detections is Poisson.
     """
     state_dim = seen.means.shape[1]
-    out, expected, updated = make_components(num, state_dim), 0.0, np.empty((state_dim + 1, state_dim))
-    sight = Sight(sensor, scan.pose, make_pair_work(state_dim, len(sensor.angular)))
+    out, expected, state = make_components(num, state_dim), 0.0, np.empty(state_dim)
     for c in range(num):
         detected = seen.innovation.prob_detection[c]
         expected += math.exp(seen.log_weights[c]) * detected
         out.log_weights[c] = seen.log_weights[c] + log_or_minus_inf(1.0 - detected)
         if seen.innovation.at_edge[c]:
-            write_missed(sight, seen, c, updated)
-            copy_updated(updated, out.means[c], out.covs[c])
+            moments_if_missed(sensor, scan.pose, seen.means[c], seen.covs[c], state, out.means[c], out.covs[c])
         else:
             copy_component(seen.means, seen.covs, c, out.means, out.covs, c)
     return out, -expected
@@ -107,7 +106,7 @@ def missed_intensity(seen: Rows, scan: ScanInput, sensor: Sensor, num: int) -> t
 def _gated_pairs(seen: Rows, num_local: int, scan: Floats, log_clutter: Floats, sight: Sight, gate: float) -> _Pairs:
     near = near_measurements(seen, scan, sight.sensor.angular, gate)
     num, num_rows = near.offsets[len(near.offsets) - 1], len(seen.log_absent)
-    options = make_room(0, num, num, len(scan), scan.shape[1], room_for_bent(seen, num))
+    options = make_room(0, num, num, len(scan), scan.shape[1], room_for_updated(seen, num))
     components, filled = np.empty(num, np.int64), 0
     for c in range(num_rows):
         own = c - (num_rows - num_local)
@@ -183,8 +182,8 @@ def candidates_of(
     chosen, log_left_out, left_out = _chosen(pairs, unclaimed, least_logit)
     num, meas_dim = len(chosen.measurements), len(sensor.angular)
     rows = make_rows(num, chosen.num_pairs, seen.means.shape[1], meas_dim)
-    bent = room_for_bent(seen, chosen.num_pairs)
-    options = make_room(num, 2 * num, chosen.num_pairs, len(scan.measurements), meas_dim, bent)
+    updated = room_for_updated(seen, chosen.num_pairs)
+    options = make_room(num, 2 * num, chosen.num_pairs, len(scan.measurements), meas_dim, updated)
     for row in range(num):
         j = chosen.measurements[row]
         rows.labels[row, 0], rows.labels[row, 1] = label.step, label.first_index + j

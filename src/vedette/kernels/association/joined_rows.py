@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vedette.kernels.association.assignment import Options
-from vedette.kernels.association.options import room_for_bent
+from vedette.kernels.association.options import room_for_updated
 from vedette.kernels.association.predicted import Rows, make_rows
 from vedette.kernels.base.arrays import grown_floats, grown_ints
 from vedette.kernels.base.compile import inlined, kernel
@@ -36,7 +36,7 @@ def joined_rows(rows: Rows, options: Options, new: Rows, new_options: Options) -
         entries,
         component_log_weights,
         whitened,
-        room_for_bent(out, len(component_log_weights)),
+        room_for_updated(out, len(component_log_weights)),
         options.num_measurements,
     )
     for entry in range(num_entries):

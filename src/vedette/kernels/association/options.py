@@ -18,7 +18,7 @@ from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, ScanInput, Sensor
 from vedette.kernels.gaussian.detection import detection_probability, moments_if_missed
-from vedette.kernels.gaussian.innovation import copy_innovation, update_mean, whiten
+from vedette.kernels.gaussian.innovation import copy_innovation, whiten, write_posterior
 from vedette.kernels.gaussian.relinearisation import Pair, PairWork, make_pair_work, update_pair
 
 
@@ -61,12 +61,12 @@ def _room_for(rows: Rows, near: Near, num_measurements: int, meas_dim: int) -> O
     num, most_entries = len(rows.log_absent), 0
     for row in range(num):
         most_entries += (rows.offsets[row + 1] - rows.offsets[row]) * (near.offsets[row + 1] - near.offsets[row] + 1)
-    updated = room_for_bent(rows, most_entries)
+    updated = room_for_updated(rows, most_entries)
     return make_room(num, near.offsets[num] + 2 * num, most_entries, num_measurements, meas_dim, updated)
 
 
 @kernel
-def room_for_bent(rows: Rows, num_entries: int) -> Floats:
+def room_for_updated(rows: Rows, num_entries: int) -> Floats:
     """(num_entries, state_dim + 1, state_dim), or (0, ...) where no component bends or is at the edge of the view."""
     dim, kinds = rows.means.shape[1], rows.innovation
     return np.empty((num_entries if kinds.bends.any() or kinds.at_edge.any() else 0, dim + 1, dim))
@@ -155,22 +155,10 @@ def weigh_detection(
 
 @inlined
 def _detected_there(rows: Rows, c: int, sight: Sight, whitened: Floats, updated: Floats) -> float:
-    """P_D over what a component is after a measurement; written to `updated` unless it bends and is there already."""
-    innovation, scratch = rows.innovation, sight.work.scratch
-    if not innovation.bends[c]:
-        update_mean(innovation, c, whitened, rows.means[c], updated[0])
-        for i in range(updated.shape[1]):
-            for j in range(updated.shape[1]):
-                updated[1 + i, j] = innovation.covs[c, i, j]
-    return detection_probability(sight.sensor, sight.pose, updated[0], updated[1:], scratch.points[0])
-
-
-@inlined
-def write_missed(sight: Sight, rows: Rows, c: int, updated: Floats) -> None:
-    """Write mean and covariance of a component that was not detected, mean first."""
-    moments_if_missed(
-        sight.sensor, sight.pose, rows.means[c], rows.covs[c], sight.work.scratch.points[0], updated[0], updated[1:]
-    )
+    """Mean P_D of a component after a measurement. Its Gaussian is in `updated` if it bends, else written there."""
+    if not rows.innovation.bends[c]:
+        write_posterior(rows.innovation, c, whitened, rows.means[c], updated)
+    return detection_probability(sight.sensor, sight.pose, updated[0], updated[1:], sight.work.scratch.points[0])
 
 
 @inlined
@@ -216,7 +204,9 @@ def _fill_options(
             missed = log_or_minus_inf(1.0 - rows.innovation.prob_detection[first + i])
             out.component_log_weights[entry + i] = rows.log_weights[first + i] + missed
             if rows.innovation.at_edge[first + i]:
-                write_missed(sight, rows, first + i, out.updated[entry + i])
+                mean, cov, updated = rows.means[first + i], rows.covs[first + i], out.updated[entry + i]
+                state = sight.work.scratch.points[0]
+                moments_if_missed(sight.sensor, sight.pose, mean, cov, state, updated[0], updated[1:])
             peak = max(peak, out.component_log_weights[entry + i])
         if peak > -math.inf:
             total = _total_from_peak(out.component_log_weights, entry, count, peak)

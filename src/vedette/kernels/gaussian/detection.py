@@ -14,6 +14,12 @@ AT_CENTRE = 0
 CLOSED_FORM = 1
 BY_NODES = 2
 
+# Directions from the mean, in standard deviations, in which the probability of detection is looked at.
+_FAR, _DIAGONAL = 2.5, 2.5 * math.sqrt(0.5)
+# P_D is the same over a Gaussian if it differs by less than the first; the second is the least share of its variance
+# that a miss leaves.
+_LEAST_DIFFERENCE, _LEAST_VARIANCE = 1e-3, 0.02
+
 
 @inlined
 def checked(detection: float) -> float:
@@ -64,13 +70,6 @@ def detection_probability(sensor: Sensor, pose: Floats, mean: Floats, cov: Float
     return _mean_of_nodes(sensor, pose, mean, cov, state)
 
 
-# Directions from the mean, in standard deviations, in which the probability of detection is looked at.
-_FAR, _DIAGONAL = 2.5, 2.5 * math.sqrt(0.5)
-# P_D is the same over a Gaussian if it differs by less than the first; the second is the least share of its variance
-# that a miss leaves.
-_LEAST_DIFFERENCE, _LEAST_VARIANCE = 1e-3, 0.02
-
-
 @inlined
 def detection_differs(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, state: Floats) -> bool:
     """Whether P_D is another in different parts of a Gaussian; never where it is taken at its centre."""
@@ -95,10 +94,10 @@ def detection_differs(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, s
 def moments_if_missed(
     sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, state: Floats, out_mean: Floats, out_cov: Floats
 ) -> None:
-    """Mean and covariance of (1 - P_D(x)) N(x; mean, cov), normalised: what a miss leaves lies rather out of view.
+    """Write mean and covariance of (1 - P_D(x)) N(x; mean, cov), normalised: of a target that was missed.
 
-    Moments of the position by nodes, those of the rest of the state by its regression on the position. They stay as
-    they were where no node can be missed. state: (state_dim,) to be written.
+    Moments of the position are sums over nodes, those of the rest of the state follow by its regression on the
+    position. They stay as they were where P_D is 1 at every node. state: (state_dim,) to be written.
     """
     n, nodes, root = mean.shape[0], sensor.detection_nodes, _root_of_position(cov)
     for j in range(n):

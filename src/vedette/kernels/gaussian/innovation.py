@@ -262,3 +262,12 @@ def update_mean(innovation: Innovation, at: int, whitened: Floats, mean: Floats,
         for a in range(whitened.shape[0]):
             total += innovation.whitened_cross[at, a, j] * whitened[a]
         out[j] = total
+
+
+@inlined
+def write_posterior(innovation: Innovation, at: int, whitened: Floats, mean: Floats, out: Floats) -> None:
+    """Write mean and covariance of component `at` after a measurement to the rows of `out`, mean first."""
+    update_mean(innovation, at, whitened, mean, out[0])
+    for i in range(mean.shape[0]):
+        for j in range(mean.shape[0]):
+            out[1 + i, j] = innovation.covs[at, i, j]

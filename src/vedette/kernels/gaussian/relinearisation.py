@@ -24,6 +24,7 @@ from vedette.kernels.gaussian.innovation import (
     project,
     update_mean,
     whiten,
+    write_posterior,
 )
 from vedette.kernels.gaussian.joseph import posterior_of_squares
 from vedette.kernels.gaussian.linalg import cholesky, solve_lower, solve_upper
@@ -248,10 +249,7 @@ def learn_at_mean(sensor: Sensor, pair: Pair, share: float, work: PairWork) -> N
 def update_pair(sensor: Sensor, pair: Pair, work: PairWork, out: Floats) -> float:
     """As `relinearise`; mean and covariance after the update are written to the rows of `out`, mean first."""
     distance = relinearise(sensor, pair, work)
-    update_mean(work.innovation, 0, work.scratch.residual, pair.mean, out[0])
-    for i in range(pair.mean.shape[0]):
-        for j in range(pair.mean.shape[0]):
-            out[1 + i, j] = work.innovation.covs[0, i, j]
+    write_posterior(work.innovation, 0, work.scratch.residual, pair.mean, out)
     return distance
 
 
