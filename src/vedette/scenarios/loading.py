@@ -134,9 +134,8 @@ def load_scenario(name_or_path: str | FilePath) -> Scenario:
     """
     builtin = list_builtin()
     path = builtin.get(str(name_or_path), FilePath(name_or_path))
-    if os.path.isdir(path) or not os.path.exists(
-        path
-    ):  # a name can be too long, or hold what no name can: for pathlib, an error
+    # By `os.path`: a name can be too long, or hold what no name can, which for pathlib is an error.
+    if os.path.isdir(path) or not os.path.exists(path):
         raise missing_scenario(str(name_or_path), "", list(builtin))
     if path.suffix.lower() == ".toml":
         raise InputError(
