@@ -16,9 +16,9 @@ from filters.test_exactness import enumerated
 from reference import glmb as oracle
 from reference.l1 import l1_distance
 from vedette import models
-from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable
+from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable, existence_probabilities
 from vedette.errors import NumericalError
-from vedette.filters import DeltaGlmbFilter, FactoredGlmbFilter, Limits
+from vedette.filters import DeltaGlmbFilter, FactoredGlmbFilter, Limits, factored
 from vedette.kernels.association.children import Parents
 from vedette.kernels.association.products import product_of
 
@@ -191,6 +191,28 @@ def one_scan(prior: FactoredGLMB, scan: Any, sensor: Any, targets: Any, **dials:
     error, spread = l1_distance(plain_product(got), plain_glmb(exact), 1000, rng)
     stated = info.factoring_error + info.reduction_error + 4.0 * info.discarded_weight_bound
     return error, spread, stated + 2.0 * info.dropped_existence
+
+
+def test_uncertain_labels_of_several_versions_that_meet_at_one_measurement_are_exact_apart(monkeypatch):
+    """Groups and measurements make no cycle, so that each label has its exact existence without being linked."""
+    monkeypatch.setattr(factored, "_FACTORS_TOGETHER", 1)
+    rng = np.random.default_rng(3)
+    targets, sensor, _ = contested_scene(rng)
+    factors = []
+    for label in range(3):
+        tracks = TrackTable.from_gaussians(
+            [[-1, label]] * 2,
+            rng.normal(scale=[5.0, 5.0, 1.0, 1.0], size=(2, 4)),
+            [np.diag([64.0, 64.0, 4.0, 4.0])] * 2,
+        )
+        factors.append(GLMB.from_hypotheses(tracks, [[], [0], [1]], rng.dirichlet([2.0, 1.0, 1.0])))
+    prior, scan = FactoredGLMB.from_factors(factors, 4), np.array([[2.0, -3.0]])
+    exact, _ = DeltaGlmbFilter(targets, sensor, Limits.none()).step(as_one(prior), scan, np.zeros(3), DT, 2, rng=rng)
+    tracker = FactoredGlmbFilter(targets, sensor, Limits.none(), max_factor_labels=1, births="labelled")
+    got, _ = tracker.step(prior, scan, np.zeros(3), DT, 2, rng=rng)
+    assert got.num_factors == 3
+    for found, wanted in zip(existence_probabilities(got), existence_probabilities(exact), strict=True):
+        np.testing.assert_allclose(found, wanted, atol=1e-6)
 
 
 @pytest.mark.parametrize("max_split_error", [None, 0.0, 0.3])

@@ -37,12 +37,11 @@ from vedette.kernels.steps.in_view import in_view
 from vedette.models.arguments import dimension, non_negative, one_of, step_number
 from vedette.models.fields import Count, L1Error
 
-# At a measurement, claims are cut while the sum over pairs of their products is at most this times the error of a
-# split, or this. Finer cuts make groups that no list is long enough for.
-_CUT_PER_ERROR, _MOST_CUT = 5.0, 0.05
+# At a measurement, claims are cut while the sum over pairs of their products is at most the error of a split, or this.
+_MOST_CUT = 0.01
 
 # Where undetected targets are an intensity, hypotheses beyond a group's list hold more targets than those in it: they
-# are condensed up to this L1 error. Labels that other sensors have, too, would lose which of them is which.
+# are condensed and split up to this L1 error. Labels that other sensors have, too, would lose which of them is which.
 _MAX_MERGING = 0.3
 
 # Of the largest factors, how many may take a scan together.
@@ -181,7 +180,7 @@ class FactoredGlmbFilter(_OfFactors, LabelledFilter[FactoredGLMB]):
         max_split_error: of a factored_glmb: L1 error, of densities that each integrate to 1, up to which labels that
             contended are taken as independent again, and versions of a label as one; 2: always, as an LMB; 0: where
             they are. At each measurement the weakest claims of factors are cut while the sum over pairs of their
-            products is at most five times this, and at most .05; see `scans_together`.
+            products is at most this, and at most .01; see `scans_together`.
         max_factor_labels: of a factored_glmb: most labels of a factor, and a quarter of those that take a scan
             together; where more contend, links are made from the strongest on and left out where they would join more.
             What all this leaves out is in `FilterInfo.factoring_error`.
@@ -261,7 +260,7 @@ def _check_factoring(max_split_error: Any, max_factor_labels: Any, births: Any) 
 def _factoring(max_split_error: float, max_factor_labels: int, num_scans: int, max_merging: float) -> Factoring:
     """The fields of a filter as kernels take them."""
     error, most = float(max_split_error), int(max_factor_labels)
-    max_cut = min(_CUT_PER_ERROR * error, _MOST_CUT) / num_scans**2
+    max_cut = min(error, _MOST_CUT) / num_scans**2
     return Factoring(error, max_cut, most, _FACTORS_TOGETHER * most, max_merging)
 
 

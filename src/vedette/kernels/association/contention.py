@@ -19,16 +19,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vedette.kernels.association.alternatives import LEAST_MISSED, Alternatives
 from vedette.kernels.association.assignment import Options
 from vedette.kernels.association.options import sort_row
 from vedette.kernels.base.arrays import filled_ints, group_members
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints
-from vedette.kernels.gaussian.linalg import log_sum
 
 _MOST_ROUNDS = 50
 _SETTLED = 1e-6  # change of a message after which it is taken as final
-_LEAST_MISSED = 1e-12  # probability that a group does not take a measurement, so that odds are finite
 
 
 class Meetings(NamedTuple):
@@ -68,25 +67,22 @@ def _meetings(options: Options, group_of: Ints) -> Meetings:
 
 
 @borrowing
-def _write_odds(options: Options, shares: Floats, presence: Floats, meetings: Meetings, odds: Floats) -> None:
-    """(num_meetings,) the odds that each group takes each measurement, if that were left to it alone.
-
-    shares: (num_options,) of each option in its row. presence: (num_rows,) probability of each row in its factor.
-    """
+def _write_odds(alone: Alternatives, meetings: Meetings, odds: Floats) -> None:
+    """(num_meetings,) the odds that each group takes each measurement, if that were left to it alone."""
     for meeting in range(len(odds)):
         odds[meeting] = 1.0
-    for row in range(len(presence)):
-        total = 0.0
-        for option in range(options.offsets[row], options.offsets[row + 1]):
-            meeting = meetings.of_option[option]
-            total += shares[option] * (meetings.messages[meeting] if meeting >= 0 else 1.0)
-        for option in range(options.offsets[row], options.offsets[row + 1]):
-            meeting = meetings.of_option[option]
+    for label in range(len(alone.undetected)):
+        first, last, total = alone.offsets[label], alone.offsets[label + 1], alone.undetected[label]
+        for i in range(first, last):
+            meeting = meetings.of_option[alone.options[i]]
+            total += alone.weights[i] * (meetings.messages[meeting] if meeting >= 0 else 1.0)
+        for i in range(first, last):
+            meeting, weight = meetings.of_option[alone.options[i]], alone.weights[i]
             if meeting >= 0:
-                others = max(0.0, total - meetings.messages[meeting] * shares[option])
-                odds[meeting] *= 1.0 - presence[row] * shares[option] / (others + shares[option])
+                others = max(0.0, total - meetings.messages[meeting] * weight)
+                odds[meeting] *= 1.0 - weight / (others + weight)
     for meeting in range(len(odds)):
-        missed = max(_LEAST_MISSED, odds[meeting])
+        missed = max(LEAST_MISSED, odds[meeting])
         odds[meeting] = (1.0 - missed) / missed
 
 
@@ -139,62 +135,26 @@ def _weigh(options: Options, components: Ints, meetings: Meetings) -> None:
 
 
 @kernel
-def leave_to_others(options: Options, group_of: Ints, presence: Floats, components: Ints) -> float:
+def leave_to_others(options: Options, group_of: Ints, alone: Alternatives, components: Ints) -> float:
     """Weigh the options of rows by what other groups leave of their measurements.
 
     Args:
         options: written; rows stay in order, heaviest option first.
         group_of: (num_rows,) group of each row.
-        presence: (num_rows,) probability that a row's track is that of its label, in the rows' factors.
+        alone: of the same options.
         components: (num_rows + 1,) offsets of the components of each row.
 
     Returns:
         The log of the factor by which the product of the groups' total weights is then smaller than that of all.
     """
     meetings = _meetings(options, group_of)
-    if len(meetings.messages) == 0:
+    num = len(meetings.messages)
+    if num == 0:
         return 0.0
-    shares, odds = np.empty(options.offsets[-1]), np.empty(len(meetings.messages))
-    totals = np.empty(options.num_measurements)
-    for row in range(len(group_of)):
-        start, stop = options.offsets[row], options.offsets[row + 1]
-        log_total = log_sum(options.log_weights[start:stop])
-        for option in range(start, stop):
-            shares[option] = math.exp(options.log_weights[option] - log_total)
+    odds, totals = np.empty(num), np.empty(options.num_measurements)
     for _ in range(_MOST_ROUNDS):
-        _write_odds(options, shares, presence, meetings, odds)
+        _write_odds(alone, meetings, odds)
         if _renew(meetings, odds, totals) < _SETTLED:
             break
     _weigh(options, components, meetings)
     return _log_counted_twice(meetings, totals)
-
-
-@kernel
-def log_unclaimed(options: Options, labels: Ints, presence: Floats) -> Floats:
-    """(num_measurements,) log probability that no track takes each measurement, with labels independent of each other.
-
-    labels: (num_rows, 2) of the rows; versions of a label are adjacent. presence: see `leave_to_others`.
-    """
-    claims, unclaimed = np.zeros(options.num_measurements), np.zeros(options.num_measurements)
-    first, num_rows = 0, len(labels)
-    while first < num_rows:
-        last, there, peak = first, 0.0, 0.0
-        while last < num_rows and labels[last, 0] == labels[first, 0] and labels[last, 1] == labels[first, 1]:
-            there += presence[last]
-            if options.offsets[last + 1] > options.offsets[last]:
-                peak = max(peak, options.log_weights[options.offsets[last]])
-            last += 1
-        total = max(0.0, 1.0 - there) * math.exp(-peak)
-        for row in range(first, last):
-            for option in range(options.offsets[row], options.offsets[row + 1]):
-                weight = presence[row] * math.exp(options.log_weights[option] - peak)
-                total += weight
-                if options.columns[option] >= 0:
-                    claims[options.columns[option]] += weight
-        for option in range(options.offsets[first], options.offsets[last]):
-            j = options.columns[option]
-            if j >= 0 and claims[j] > 0.0:
-                unclaimed[j] += math.log(max(_LEAST_MISSED, 1.0 - claims[j] / total))
-                claims[j] = 0.0
-        first = last
-    return unclaimed

@@ -12,26 +12,25 @@ others are linked. What the factors of different groups still claim of one measu
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
+from vedette.kernels.association.alternatives import Alternatives
 from vedette.kernels.association.assignment import Options
 from vedette.kernels.association.clusters import root_of
 from vedette.kernels.base.arrays import counted_ints, filled_ints, group_members
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints
-from vedette.kernels.gaussian.linalg import log_sum
 from vedette.kernels.gaussian.mixtures import descending_order
 
 
 class Claims(NamedTuple):
-    """How probable it is that a factor takes a measurement, of every measurement that one of its rows gates."""
+    """How probable it is that a factor takes a measurement, of every measurement that one of its labels may take."""
 
     offsets: Ints  # (num_factors + 1,) into the others
     measurements: Ints  # of each factor
-    strengths: Floats  # the most that one of its rows takes it with
+    strengths: Floats  # the most that one of its labels takes it with
 
 
 class Contest(NamedTuple):
@@ -69,56 +68,54 @@ def _others_claim(contest: Contest, factor: int, measurement: int) -> float:
 
 
 @kernel
-def _claims(options: Options, row_offsets: Ints) -> Claims:
-    """What rows claim by themselves. row_offsets: (num_factors + 1,) rows of each factor."""
-    num_factors, num = len(row_offsets) - 1, options.offsets[-1]
+def _claims(options: Options, alone: Alternatives, row_offsets: Ints) -> Claims:
+    """What labels claim by themselves. row_offsets: (num_factors + 1,) rows of each factor."""
+    num_factors, num, label = len(row_offsets) - 1, len(alone.weights), 0
     offsets, measurements, strengths = np.zeros(num_factors + 1, np.int64), np.empty(num, np.int64), np.empty(num)
     place, filled = filled_ints(options.num_measurements, -1), 0
     for factor in range(num_factors):
-        for row in range(row_offsets[factor], row_offsets[factor + 1]):
-            start, stop = options.offsets[row], options.offsets[row + 1]
-            log_total = log_sum(options.log_weights[start:stop])
-            for option in range(start, stop):
-                j = options.columns[option]
-                if j < 0:
-                    continue
+        while label < len(alone.undetected) and alone.rows[label] < row_offsets[factor + 1]:
+            first, last = alone.offsets[label], alone.offsets[label + 1]
+            total = alone.undetected[label] + alone.weights[first:last].sum()
+            for i in range(first, last):
+                j = options.columns[alone.options[i]]
                 if place[j] < offsets[factor]:
-                    place[j] = filled
-                    measurements[filled], strengths[filled] = j, 0.0
+                    place[j], measurements[filled], strengths[filled] = filled, j, 0.0
                     filled += 1
-                strength = math.exp(options.log_weights[option] - log_total)
-                strengths[place[j]] = max(strengths[place[j]], strength)
+                strengths[place[j]] = max(strengths[place[j]], alone.weights[i] / total)
+            label += 1
         offsets[factor + 1] = filled
     return Claims(offsets, measurements[:filled], strengths[:filled])
 
 
 @borrowing
 def _strengthen(
-    options: Options, row_offsets: Ints, contest: Contest, least: float, place: Ints, claims: Claims
+    options: Options,
+    alone: Alternatives,
+    row_offsets: Ints,
+    contest: Contest,
+    least: float,
+    place: Ints,
+    claims: Claims,
 ) -> None:
-    """Raise each claim to what it is if a row's other contested measurements go to others.
+    """Raise each claim to what it is if a label's other contested measurements go to others.
 
     least: a measurement is contested where another factor claims it with more. place: (num_measurements,) to work in.
     """
+    label = 0
     for factor in range(len(row_offsets) - 1):
         for i in range(claims.offsets[factor], claims.offsets[factor + 1]):
             place[claims.measurements[i]] = i
-        for row in range(row_offsets[factor], row_offsets[factor + 1]):
-            start, stop = options.offsets[row], options.offsets[row + 1]
-            if start == stop:
-                continue
-            peak, sure = options.log_weights[start], 0.0
-            for option in range(start, stop):
-                j = options.columns[option]
-                if j < 0 or _others_claim(contest, factor, j) <= least:
-                    sure += math.exp(options.log_weights[option] - peak)
-            for option in range(start, stop):
-                j = options.columns[option]
-                if j >= 0:
-                    own = math.exp(options.log_weights[option] - peak)
-                    total = sure if _others_claim(contest, factor, j) <= least else sure + own
-                    at = place[j]
-                    claims.strengths[at] = max(claims.strengths[at], own / total if total > 0.0 else 1.0)
+        while label < len(alone.undetected) and alone.rows[label] < row_offsets[factor + 1]:
+            first, last, sure = alone.offsets[label], alone.offsets[label + 1], alone.undetected[label]
+            for i in range(first, last):
+                if _others_claim(contest, factor, options.columns[alone.options[i]]) <= least:
+                    sure += alone.weights[i]
+            for i in range(first, last):
+                j, own = options.columns[alone.options[i]], alone.weights[i]
+                total = sure if _others_claim(contest, factor, j) <= least else sure + own
+                claims.strengths[place[j]] = max(claims.strengths[place[j]], own / total)
+            label += 1
 
 
 @kernel
@@ -167,18 +164,20 @@ def _join(links: Links, order: Ints, sizes: Ints, most: int, leaders: Ints) -> N
 
 
 @kernel
-def linked_factors(options: Options, row_offsets: Ints, sizes: Ints, max_cut: float, most: int) -> Ints:
+def linked_factors(
+    options: Options, alone: Alternatives, row_offsets: Ints, sizes: Ints, max_cut: float, most: int
+) -> Ints:
     """(num_factors,) the first factor of the group that each is taken with.
 
-    row_offsets: (num_factors + 1,) rows of each. sizes: (num_factors,) labels of each, overwritten. max_cut: at each
-    measurement, the sum over pairs of the product of their claims up to which claims are cut. most: labels of a group;
-    links are made from the strongest on, and left out where they would join more.
+    alone: of the same options. row_offsets: (num_factors + 1,) rows of each. sizes: (num_factors,) labels of each,
+    overwritten. max_cut: at each measurement, the sum over pairs of the product of their claims up to which claims are
+    cut. most: labels of a group; links are made from the strongest on, and left out where they would join more.
     """
     num_factors, num = len(row_offsets) - 1, options.num_measurements
-    leaders, claims = counted_ints(num_factors), _claims(options, row_offsets)
+    leaders, claims = counted_ints(num_factors), _claims(options, alone, row_offsets)
     contest = Contest(np.empty(num), np.empty(num), np.empty(num, np.int64))
     _rank_claims(claims, contest)
-    _strengthen(options, row_offsets, contest, max_cut, filled_ints(num, -1), claims)
+    _strengthen(options, alone, row_offsets, contest, max_cut, filled_ints(num, -1), claims)
     _rank_claims(claims, contest)
     links = _links(claims, contest, max_cut)
     _join(links, descending_order(links.strengths), sizes, most, leaders)

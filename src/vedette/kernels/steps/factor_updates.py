@@ -43,7 +43,8 @@ _LOG_RETURNED = math.log(10.0)
 
 # A posterior is condensed where the hypotheses behind this share of the most that a group may have weigh more than
 # that: the next scan has many times as many, and of those cut off most hold more targets than those kept. The L1 error
-# up to which versions of labels are made one then grows by a factor, until it is above `Factoring.max_merging`.
+# up to which versions of labels are made one then grows by a factor, until it is above `Factoring.max_merging`. Where
+# that is not enough, the posterior is split up to that error.
 _KEPT_APART, _MOST_BEHIND, _GROWTH = 0.25, 0.05, 3.0
 
 
@@ -54,7 +55,7 @@ class Factoring(NamedTuple):
     max_cut: float  # sum over pairs of factors, at each measurement, of the products of claims that are cut
     max_labels: int  # of a factor, after a scan
     max_together: int  # labels of the factors that take a scan together
-    max_merging: float  # L1 error up to which a posterior with too many hypotheses is condensed; 0: it is cut
+    max_merging: float  # L1 error up to which a posterior with too many hypotheses is condensed and split; 0: it is cut
 
 
 class Work(NamedTuple):
@@ -227,6 +228,12 @@ def _append_label(
 
 
 @kernel
+def _is_crowded(choices: Choices, most: int) -> bool:
+    """Whether a list of at most `most` hypotheses is too short for the next scan."""
+    return bool(choices.weights[int(_KEPT_APART * most) :].sum() > _MOST_BEHIND)
+
+
+@kernel
 def _merged(glmb: Glmb, reduction: Reduction, factoring: Factoring, most: int) -> tuple[Glmb, Choices, float]:
     """The posterior with names and versions of targets made one, its choices, and a bound on its L1 change.
 
@@ -237,8 +244,7 @@ def _merged(glmb: Glmb, reduction: Reduction, factoring: Factoring, most: int) -
         glmb, choices, renaming_error = with_known_names(glmb, choices, max_error)
     glmb, choices, total = merge_versions(glmb, choices, caps, max_error)
     total += renaming_error
-    apart = int(_KEPT_APART * most)
-    while 0.0 < max_error < factoring.max_merging and choices.weights[apart:].sum() > _MOST_BEHIND:
+    while 0.0 < max_error < factoring.max_merging and _is_crowded(choices, most):
         max_error *= _GROWTH
         glmb, choices, error = merge_versions(glmb, choices, caps, max_error)
         total += error
@@ -251,8 +257,11 @@ def append_parts(
 ) -> FactorStore:
     """Split the posterior of a group and enter its parts. most: hypotheses that the group may have."""
     glmb, choices, merging_error = _merged(glmb, reduction, factoring, most)
+    max_error = factoring.max_error
+    if 0.0 < max_error < factoring.max_merging and _is_crowded(choices, most):
+        max_error = factoring.max_merging
     min_existence = 1.0 / (1.0 + math.exp(-reduction.min_existence_logit))
-    part_of, error = independent_parts(choices, factoring.max_error, factoring.max_labels, min_existence)
+    part_of, error = independent_parts(choices, max_error, factoring.max_labels, min_existence)
     work.sums[SPLIT] += error
     work.sums[REDUCED] += merging_error
     num, num_labels, tracks = len(choices.weights), len(part_of), glmb.tracks

@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.kernels.association.contention import leave_to_others, log_unclaimed
+from vedette.kernels.association.alternatives import alternatives_of, log_unclaimed
+from vedette.kernels.association.contention import leave_to_others
 from vedette.kernels.association.first_detections import (
     Undetected,
     candidates_of,
@@ -96,19 +97,17 @@ def step_factored(
     options, log_clutter, num_raised = weighed_options_at(rows, scan, sensor, truncation, log_levels)
     seen = seen_intensity(stacked_mixtures(undetected.intensity, undetected.local), scan, sensor)
     presence = presence_of_rows(prior, len(rows.log_absent) + len(scan.measurements))
-    unclaimed = np.zeros(len(scan.measurements))
-    if len(seen.log_absent) > 0:
-        unclaimed = log_unclaimed(options, rows.labels, presence)
+    alone = alternatives_of(options, rows.labels, presence[: len(rows.log_absent)])
+    unclaimed = log_unclaimed(options, alone) if len(seen.log_absent) > 0 else np.zeros(len(scan.measurements))
     least = reduction.min_existence_logit
     new = candidates_of(seen, scan, sensor, log_levels, unclaimed, truncation.gate, least, undetected)
     if len(new.rows.log_absent) > 0:
         rows, options = joined_rows(rows, options, new.rows, new.options)
+        alone = alternatives_of(options, rows.labels, presence[: len(rows.log_absent)])
     factors = factors_of(prior, len(rows.log_absent) - len(prior.tracks.labels))
     sizes = factors.num_labels.copy()
-    leaders = linked_factors(options, factors.row_offsets, sizes, factoring.max_cut, factoring.max_together)
-    log_twice = leave_to_others(
-        options, groups_of_rows(factors, leaders), presence[: len(rows.log_absent)], rows.offsets
-    )
+    leaders = linked_factors(options, alone, factors.row_offsets, sizes, factoring.max_cut, factoring.max_together)
+    log_twice = leave_to_others(options, groups_of_rows(factors, leaders), alone, rows.offsets)
     offsets, members = group_members(leaders, len(leaders))
     work, ranking, most_labels = make_work(rows, options), make_ranking(), 0
     widest = len(work.wide.log_weights)
