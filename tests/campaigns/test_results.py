@@ -203,7 +203,7 @@ def test_what_is_no_results_folder_is_named(folder, tmp_path):
         open_results(folder)
     assert not (folder / "campaign.sqlite").exists()
     (folder / "manifest.json").unlink()
-    with pytest.raises(InputError, match=r"manifest\.json: no such file; expected the manifest of a campaign"):
+    with pytest.raises(InputError, match=r"manifest\.json: no such file; expected the manifest of a results folder"):
         open_results(folder)
     with pytest.raises(InputError, match="no such folder; expected the results folder of a campaign"):
         open_results(folder / "nowhere")

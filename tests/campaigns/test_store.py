@@ -133,7 +133,7 @@ def test_a_folder_of_something_else_is_not_touched(tmp_path, campaign):
     with pytest.raises(InputError, match="holds something else"):
         Store.open(tmp_path, campaign)
     (tmp_path / "thesis.txt").rename(tmp_path / "manifest.json")
-    with pytest.raises(InputError, match=r"manifest\.json: expected the manifest of a campaign"):
+    with pytest.raises(InputError, match=r"manifest\.json: expected the manifest of a results folder"):
         Store.open(tmp_path, campaign)
     assert contents(tmp_path) == {"manifest.json": b"years of work"}
     with pytest.raises(InputError, match="expected a folder for results; got a file"):

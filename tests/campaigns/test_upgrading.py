@@ -202,7 +202,7 @@ def test_what_is_no_results_folder_is_named(campaign: Path, tmp_path: Path) -> N
     with pytest.raises(InputError, match="expected a results folder; got a file"):
         upgrade_results(campaign / "manifest.json")
     (tmp_path / "photos").mkdir()
-    with pytest.raises(InputError, match=r"manifest\.json: no such file; expected the manifest of a campaign"):
+    with pytest.raises(InputError, match=r"manifest\.json: no such file; expected the manifest of a results folder"):
         upgrade_results(tmp_path / "photos")
 
 

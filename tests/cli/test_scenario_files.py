@@ -154,6 +154,15 @@ def test_init_starts_in_a_folder_from_a_scene_whose_fusion_loses_nothing(tmp_pat
     assert (len(model.sensors), model.fusion.kind) == (3, "sequential")
 
 
+def test_init_refuses_a_file_of_another_kind(tmp_path: Path) -> None:
+    result = vedette("init", str(tmp_path / "bay.txt"))
+    assert result.exit_code == 2
+    assert "expected a file that ends in .yaml or .yml, or a folder" in " ".join(result.output.split())
+    assert not list(tmp_path.iterdir())
+    (tmp_path / "bay.2026").mkdir()
+    assert vedette("init", str(tmp_path / "bay.2026")).exit_code == 0
+
+
 def test_init_brings_recorded_data_and_its_licence_along(tmp_path: Path) -> None:
     assert vedette("init", str(tmp_path), "--from", "solent").exit_code == 0
     scenario = load_scenario(tmp_path / "scenario.yaml")

@@ -293,3 +293,18 @@ def test_a_planner_of_the_scenarios_own_decides(tmp_path: Path) -> None:
     live = small(tmp_path, text, decide_every=5.0, planner="mine")
     assert live.planner is not None
     assert live.planner.name == "mine"
+
+
+def test_a_measurement_beyond_the_reach_of_its_sensor_is_counted_and_left_out(tmp_path: Path) -> None:
+    near = SYNCHRONOUS.replace(
+        "detection: {kind: constant, probability: 0.9}",
+        "detection: {kind: limited_range, probability: 0.9, max_range: 300.0, outside: 0.0}",
+    )
+    lines = [
+        line(1, 0.0, [[100.0, 0.0], [314.0, 0.0], [316.0, 0.0], [0.0, -900.0]]),
+        line(2, 1.0, [[414.0, 0.0], [-216.0, 0.0]]),
+        line(1, 2.0, [[50.0, 0.0]]),
+    ]
+    answers = [json.loads(answer) for answer in answered(small(tmp_path, near), lines)]
+    assert [answer.get("beyond", 0) for answer in answers] == [2, 1, 0]
+    assert all("error" not in answer for answer in answers)

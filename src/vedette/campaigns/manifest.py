@@ -114,11 +114,13 @@ def read_manifest(folder: Path, check: VersionCheck = check_version) -> dict[str
     try:
         manifest = parse_json(read_file(path, _MOST_BYTES))
     except OSError as error:
-        raise unreadable(path, "the manifest of a campaign", error) from None
+        raise unreadable(path, "the manifest of a results folder", error) from None
     except ValueError as error:
-        raise InputError(f"{path}: expected the manifest of a campaign; it is cut short or altered: {error}") from None
+        raise InputError(
+            f"{path}: expected the manifest of a results folder; it is cut short or altered: {error}"
+        ) from None
     if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
-        raise InputError(f"{path}: expected the manifest of a campaign; got another file")
+        raise InputError(f"{path}: expected the manifest of a results folder; got another file")
     sessions = manifest.get("sessions")
     check(manifest, sessions[-1] if isinstance(sessions, list) and sessions else None, path)
     missing = [field for field in (*_FIXED, "num_runs", "sessions") if field not in manifest]

@@ -50,7 +50,10 @@ def init(
     builtin = list_builtin()
     if source not in builtin:
         raise usage_error(f"expected one of {', '.join(builtin)}; got {source}", "--from")
-    target = path if path.suffix in (".yaml", ".yml") else path / "scenario.yaml"
+    is_file = path.suffix in (".yaml", ".yml")
+    if path.suffix and not is_file and not path.is_dir():
+        raise usage_error(f"expected a file that ends in .yaml or .yml, or a folder; got {path}", "path")
+    target = path if is_file else path / "scenario.yaml"
     _write_start(_starting_files(load_scenario(source), target), target, overwrite)
 
 

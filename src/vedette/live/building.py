@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import replace
 from typing import Any
 
 from vedette.control import KnowsTruth, WatchedPlanner
@@ -45,8 +43,7 @@ def live_of(
             knows the targets.
     """
     model = known.scenario.model
-    # What lies beyond is left out by the loop, which counts it.
-    sites = tuple(replace(site, reach=math.inf) for site in sites_of(model))
+    sites = tuple(sites_of(model))
     for site in sites:
         if site.kind not in COMPONENTS:
             raise reject(f"sensor {site.name}", f"measurements of kind {', '.join(COMPONENTS)}", site.kind)

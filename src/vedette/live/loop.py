@@ -19,7 +19,7 @@ from vedette.live.messages import Message, read_message
 from vedette.models.arguments import reject
 from vedette.platforms.compass import Compass, PlaneCompass, courses_of
 from vedette.recorded import Conventions, Origin, Site
-from vedette.recorded.extents import PLACED, is_within, places_of
+from vedette.recorded.extents import PLACED, beyond_reach, is_within, places_of
 from vedette.simulation.loop import PLANNER, cause_of
 from vedette.tracking import LateScans, SensorScan, Timeline
 
@@ -135,12 +135,13 @@ class Live:
         return taken, (answer,)
 
     def _within(self, scan: SensorScan) -> tuple[SensorScan, int]:
-        """A scan without measurements beyond where they are taken, and how many these are."""
-        kind, pose = self.sites[scan.sensor].kind, scan.pose
-        if self.within is None or kind not in PLACED:
+        """A scan without measurements beyond where they are taken or their sensor reaches, and how many these are."""
+        site, pose = self.sites[scan.sensor], np.asarray(scan.pose)
+        if self.within is None or site.kind not in PLACED:
             return scan, 0
         measured = np.asarray(scan.measurements, np.float64).reshape(-1, 2)
-        inside = is_within(places_of(measured, np.asarray(pose), kind), self.within)
+        places = places_of(measured, pose, site.kind)
+        inside = is_within(places, self.within) & ~beyond_reach(places, pose[:2], site.reach)
         return replace(scan, measurements=measured[inside]), int(np.count_nonzero(~inside))
 
     def _on_clock(self, state: LiveState, message: Message, place: str) -> tuple[LiveState, float]:

@@ -78,8 +78,10 @@ def read_message(
         **{name: unit for name, unit in conventions.units.items() if name in names},
     }
     named = {_OF_POSE[name]: name for name in pose}
+    # The loop leaves out what lies beyond the reach, and counts it.
+    everywhere = replace(site, reach=math.inf)
     read = parse_scans(
-        Table(columns, range(1, num + 1), place), [site], replace(conventions, columns=named, units=units), origin
+        Table(columns, range(1, num + 1), place), [everywhere], replace(conventions, columns=named, units=units), origin
     )
     at = read.poses[0, 0].copy()
     at[3 : 3 + len(more)] = more

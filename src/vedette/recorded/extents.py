@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from vedette.kernels.base.types import Bools, Floats
 
@@ -37,6 +38,11 @@ def is_within(places: Floats, box: Floats) -> Bools:
     return found
 
 
+def beyond_reach(places: Floats, own: Floats, reaches: ArrayLike) -> Bools:
+    """(num,) whether places are farther than 5 % beyond the reach, m, of the sensors at `own` (num, 2) or (2,)."""
+    return np.asarray(np.hypot(*(places - own).T) > (1.0 + MARGIN) * np.asarray(reaches))
+
+
 def wild(times: Floats, places: Floats, own: Floats, reaches: Floats) -> Bools:
     """Return (num,) whether each of the rows of a recording lies beyond its sensor's reach or far beyond all others.
 
@@ -51,7 +57,7 @@ def wild(times: Floats, places: Floats, own: Floats, reaches: Floats) -> Bools:
         own: (num, 2) m, of the sensors then.
         reaches: (num,) m, inf where it is not known.
     """
-    beyond: Bools = np.hypot(*(places - own).T) > (1.0 + MARGIN) * reaches
+    beyond = beyond_reach(places, own, reaches)
     near = ~beyond
     if np.count_nonzero(near) < _FEWEST or len(np.unique(times)) < _FEWEST_TIMES:
         return beyond
