@@ -159,7 +159,7 @@ def test_lines_and_ascents_give_what_joint_actions_give() -> None:
             index = [*chosen.tolist()]
             index[s] = slice(None)
             np.testing.assert_allclose(additive.line(chosen, s).mean(axis=1), table[tuple(index)], rtol=1e-12)
-        allowed = Allowed(np.ones(9, np.bool_), np.ones((0, 0), np.bool_))
+        allowed = Allowed(np.ones(9, np.bool_), np.ones((0, 0), np.bool_), np.zeros(9, np.bool_), 3)
         end, reward, trace = additive.ascend(chosen, allowed)
         np.testing.assert_allclose(reward, table[tuple(end)], rtol=1e-12)
         assert trace.best[-1] == reward
@@ -190,7 +190,9 @@ def test_an_ascent_takes_only_what_is_allowed() -> None:
     single_mask[best[0]] = False
     together[3 + best[1], 6 + best[2]] = together[6 + best[2], 3 + best[1]] = False
     start = np.array([(best[0] + 1) % 3, (best[1] + 1) % 3, best[2]])
-    end, reward, _ = additive.ascend(start, Allowed(single_mask, together))
+    end, reward, _ = additive.ascend(
+        start, Allowed(single_mask, together, np.zeros(len(single_mask), np.bool_), len(start))
+    )
     assert end[0] != best[0]
     assert (end[1], end[2]) != (best[1], best[2])
     np.testing.assert_allclose(reward, table[tuple(end)], rtol=1e-12)

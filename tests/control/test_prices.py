@@ -63,7 +63,9 @@ def test_prices_are_subtracted_from_every_reward(reward: Any, seed: int) -> None
     alone = additive.alone(2)(np.arange(6)[:, np.newaxis])
     np.testing.assert_allclose(alone, before.alone(2)(np.arange(6)[:, np.newaxis]) - own[12:, np.newaxis], rtol=1e-12)
     if not isinstance(reward, PeecsReward):
-        end, best, _ = additive.ascend(chosen, Allowed(np.ones(18, np.bool_), np.ones((0, 0), np.bool_)))
+        end, best, _ = additive.ascend(
+            chosen, Allowed(np.ones(18, np.bool_), np.ones((0, 0), np.bool_), np.zeros(18, np.bool_), 3)
+        )
         np.testing.assert_allclose(best, values[tuple(end)], rtol=1e-12)
 
 

@@ -154,6 +154,10 @@ def _sensor(rng: Rng) -> Data:
         )
     if rng.random() < 0.2:
         sensor["scans"] = {"every": 2, "first": int(rng.integers(1, 3))}
+    if rng.random() < 0.3:
+        sensor["switchable"] = True
+    if rng.random() < 0.2:
+        sensor["price"] = float(rng.uniform(-1.0, 3.0))
     if rng.random() < 0.1:
         sensor.setdefault("scans", {})["late"] = {"up_to": 1.0, "share": 0.5}
     return sensor
@@ -343,6 +347,7 @@ def _constraint(rng: Rng) -> Data:
             {"kind": "keep_out", "region": {"x_min": 0.0, "x_max": 90.0, "y_min": 0.0, "y_max": 90.0}},
             {"kind": "keep_out", "polygon": [[0.0, 0.0], [90.0, 0.0], [0.0, 90.0]]},
             {"kind": "separation", "distance": 50.0},
+            {"kind": "max_active", "most": int(rng.integers(1, 3))},
             {"kind": "void_probability", "radius": 30.0, "probability": 0.5},
             own_part("OddOnes"),
         ],

@@ -97,6 +97,35 @@ def test_every_planner_switches_off_what_costs_too_much(planner: str) -> None:
         assert choice_words(choice_of(plan)).count("°, off") == 2
 
 
+MOST_ONE = (PLANS[0], PLANS[1][:-1] + ", constraints: [{kind: max_active, most: 1}]}")
+
+
+@pytest.mark.parametrize(
+    "planner", ["jdm", "idm", "lookahead", "told", "oracle", "random", "nearest", "assigned", "centroid"]
+)
+def test_every_planner_keeps_to_the_number_of_sensors_that_may_scan(planner: str) -> None:
+    scenario = Scenario(parse_scenario(changed((NOISE, f"{COURSES}\n  switchable: true"), MOST_ONE)))
+    found = run_scenario(scenario, planner, seed=1)
+    assert not found.off[:4].any()
+    assert (found.off[4:].sum(axis=1) >= 1).all()
+    if planner != "random":
+        assert (found.off[4:].sum(axis=1) == 1).all()
+
+
+@pytest.mark.parametrize(
+    ("keys", "number", "fault"),
+    [
+        ("price: 1.0", 1, "constraints[0].kind: expected a sensor that is switchable, for max_active, got none"),
+        ("switchable: true", 0, "constraints[0].most: expected a number of at least 1"),
+    ],
+)
+def test_a_number_that_cannot_be_kept_to_is_refused(keys: str, number: int, fault: str, tmp_path: Path) -> None:
+    path = tmp_path / "scene.yaml"
+    plans = MOST_ONE[1].replace("most: 1", f"most: {number}")
+    path.write_text(changed((NOISE, f"{COURSES}\n  {keys}"), (PLANS[0], plans)))
+    assert fault in " ".join(CliRunner().invoke(app, ["check", str(path)]).output.split())
+
+
 @pytest.mark.parametrize("compass", ["", "\n  compass: true"])
 def test_a_sensor_that_moves_from_the_start_is_on_until_its_first_decision(compass: str) -> None:
     found = run_scenario(scene(f"switchable: true\n  moves_from: start\n  price: 1.0e+9{compass}"), "jdm", seed=1)

@@ -15,7 +15,7 @@ from vedette.filters import labels_targets
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import generator, instance, reject, sequence
 from vedette.platforms import Actions
-from vedette.platforms.base import course_of
+from vedette.platforms.base import courses_of, scans_of
 from vedette.tracking import State
 
 
@@ -143,11 +143,12 @@ class WatchedPlanner:
         plan, settings = self.planner.plan(state, poses, rng=rng), self.settings
         at, times = check_poses(poses, len(self.sensors)), settings.horizon_times()
         rows = zip(self.sensors, at, plan.chosen_actions, strict=True)
-        courses = tuple(
-            course_of(f"sensors[{s}].platform", sensor.platform, pose, row, times)[np.newaxis]
-            for s, (sensor, pose, row) in enumerate(rows)
-        )
+        ways = [
+            (f"sensors[{s}].platform", own.platform, pose, row[np.newaxis], times)
+            for s, (own, pose, row) in enumerate(rows)
+        ]
+        courses, scans = tuple(courses_of(*way) for way in ways), tuple(scans_of(*way) for way in ways)
         fused = getattr(state, "fused", None)
         beliefs = beliefs_ahead(self.constraints, self.sensors, fused, settings, 1, settings.horizon_steps)
-        told = violated(self.constraints, Situation(courses, times, beliefs, at))
+        told = violated(self.constraints, Situation(courses, times, beliefs, at, scans))
         return replace(plan, notes=(*plan.notes, *told))

@@ -10,6 +10,7 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
+from vedette.control.constraints import Mask
 from vedette.control.evaluator import Evaluator
 from vedette.control.evidence import Evidence, Part
 from vedette.control.explaining import Questions
@@ -198,12 +199,24 @@ def decide_alone(
         best = 0 if races else int(allowed[first_best(evidence.evaluate(allowed)), 0])
         parts.append(Part.alone(evidence, best, others))
     if not races:
-        return plan_of(name, parts, notes, certainty=preparation.certainty)
+        return plan_of(name, _active(parts, preparation.mask), notes, certainty=preparation.certainty)
     certainty = rounds.certainty(entered)
     for s, race in enumerate(entered):
         race.note(parts[s].evidence)
         parts[s] = parts[s]._replace(chosen=race.best)
-    return _raced_plan(name, parts, notes, certainty)
+    return _raced_plan(name, _active(parts, preparation.mask), notes, certainty)
+
+
+def _active(parts: Sequence[Part], mask: Mask | None) -> Sequence[Part]:
+    """What sensors choose by themselves, where only some may scan with those off whose scans gain least."""
+    if mask is None or mask.active is None:
+        return parts
+    joint, gains = [part.chosen[0] for part in parts], list[float]()
+    for part, course, off in zip(parts, joint, mask.active.off, strict=True):
+        scanning, silent = part.evidence.evaluate(np.array([[course], [off[course]]])).tolist()
+        gains.append(scanning - silent)
+    kept = mask.active.kept(joint, gains)
+    return [part._replace(chosen=(course,)) for part, course in zip(parts, kept, strict=True)]
 
 
 def _raced_plan(name: str, parts: Sequence[Part], notes: Sequence[str], certainty: Certainty, **fields: Any) -> Plan:

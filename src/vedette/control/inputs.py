@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from vedette.control.constraints import Constraint, Mask, Situation, mask_of
+from vedette.control.constraints import Active, Constraint, Mask, Situation, mask_of
 from vedette.control.priors import predicted
 from vedette.control.rewards.base import LabelReward, PowerReward
 from vedette.control.rewards.power import ExpectedLossReward
@@ -131,7 +131,8 @@ def mask_of_decision(
     if not constraints:
         return None
     beliefs = beliefs_ahead(constraints, sensors, fused, settings, 1, settings.horizon_steps)
-    situation = Situation(tuple(own.courses for own in options), settings.horizon_times(), beliefs, poses)
+    courses, scans = tuple(own.courses for own in options), tuple(own.scans for own in options)
+    situation = Situation(courses, settings.horizon_times(), beliefs, poses, scans)
     return mask_of(constraints, situation)
 
 
@@ -170,7 +171,7 @@ def staying(options: Sequence[Options], mask: Mask | None) -> tuple[int, ...]:
     """For each sensor the course that changes its pose least, among those it may take: what it does until it decides.
 
     The course with the least change of heading, of these that with the least change of where a camera points, then of
-    position, then of all else; means over the horizon.
+    position, then of all else; means over the horizon. Where only some sensors may scan, it is off.
     """
     found = []
     for s, own in enumerate(options):
@@ -185,21 +186,29 @@ def staying(options: Sequence[Options], mask: Mask | None) -> tuple[int, ...]:
             means = change.mean(axis=1)[left]
             left = left[means <= means.min() + _SAME_CHANGE * max(1.0, means.max())]
         found.append(int(left[0]))
-    return tuple(found)
+    return tuple(found) if mask is None or mask.active is None else _silent(found, mask.active)
+
+
+def _silent(joint: Sequence[int], active: Active) -> tuple[int, ...]:
+    """The same courses without scans, where a sensor can be switched off."""
+    return tuple(int(off[course]) for course, off in zip(joint, active.off, strict=True))
 
 
 def allowed_of(mask: Mask | None, shape: Sequence[int]) -> Allowed | None:
     """The mask as the compiled ascent takes it; None where it would be too large."""
     none, num = np.ones((0, 0), np.bool_), sum(shape)
+    on, most = np.zeros(num, np.bool_), len(shape)
     if mask is None:
-        return Allowed(np.ones(num, np.bool_), none)
+        return Allowed(np.ones(num, np.bool_), none, on, most)
     single = np.concatenate(mask.single)
+    if mask.active is not None:
+        on, most = np.concatenate(mask.active.on), mask.active.most
     if not mask.together:
-        return Allowed(single, none)
+        return Allowed(single, none, on, most)
     if num > _MOST_COURSES:
         return None
     together, firsts = np.ones((num, num), np.bool_), np.concatenate([[0], np.cumsum(shape)])
     for (i, j), table in mask.together.items():
         rows, columns = slice(firsts[i], firsts[i + 1]), slice(firsts[j], firsts[j + 1])
         together[rows, columns], together[columns, rows] = table, table.T
-    return Allowed(single, together)
+    return Allowed(single, together, on, most)

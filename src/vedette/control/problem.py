@@ -109,7 +109,10 @@ def _independent(evidence: Evidence, mask: Mask | None) -> tuple[int, ...]:
     best = []
     for s, own in enumerate(means):
         best.append(first_best(np.where(np.isnan(own) | ~single_mask(mask, s, len(own)), -np.inf, own)))
-    return tuple(best)
+    if mask is None or mask.active is None:
+        return tuple(best)
+    gains = [own[course] - own[off[course]] for own, course, off in zip(means, best, mask.active.off, strict=True)]
+    return mask.active.kept(best, gains)
 
 
 # Of the targets that are likely to be detected, so many beyond the cutoff are told of. On paper-a they are up to half

@@ -53,7 +53,7 @@ class RulePlanner:
             s-th target, in the order of labels, for the s-th sensor; "centroid": the mean of all, for all sensors.
         settings: the horizon, over which courses are told apart.
         constraints: what the sensors must not do; each then takes the best of what it may, and a joint action that is
-            not allowed is moved to one near it.
+            not allowed is moved to one near it. Where only some sensors may scan, those do that come nearest.
         estimate: reads the targets off the fused belief.
         targets: of "assigned": the number of each sensor's target instead, counted from 1; those beyond the last begin
             again.
@@ -98,11 +98,13 @@ class RulePlanner:
         places = np.ascontiguousarray(np.asarray(estimate.means)[:, :2])
         beyond = Beyond.of(self.sensors, options, estimate.labels, places, graph) if graph is not None else None
         goals = self._goals(places, at[:, :2], beyond) if len(places) else [None] * len(options)
+        merits = [_merits(own, goal, graph) for own, goal in zip(options, goals, strict=True)]
         joint = tuple(
-            first_best(np.where(single_mask(mask, s, len(own.courses)), _merits(own, goal, graph), -np.inf))
-            for s, (own, goal) in enumerate(zip(options, goals, strict=True))
+            first_best(np.where(single_mask(mask, s, len(own)), own, -np.inf)) for s, own in enumerate(merits)
         )
         if mask is not None:
+            if mask.active is not None:
+                joint = mask.active.kept(joint, [own[course] for own, course in zip(merits, joint, strict=True)])
             joint = repaired(mask, joint)
         chosen = tuple(own.first_action(course) for own, course in zip(options, joint, strict=True))
         notes = (*(mask.notes if mask else ()), *(beyond.notes() if beyond else ()))

@@ -1,5 +1,6 @@
 """What sensors must not do: which of their courses, and which pairs of courses, are allowed."""
 
+from vedette.control.constraints.active import Active, MaxActive, active_of
 from vedette.control.constraints.mask import Mask, opened, repaired
 from vedette.control.constraints.masks import courses_allowed, mask_of, pairs_allowed, violated, without_course
 from vedette.control.constraints.paths import Paths, VisibilityGraph, visibility_graph
@@ -7,6 +8,7 @@ from vedette.control.constraints.protocol import (
     Constraint,
     Situation,
     Timeless,
+    WithMostActive,
     WithReach,
     WithViolations,
     WithZone,
@@ -17,9 +19,11 @@ from vedette.control.constraints.separation import Separation
 from vedette.control.constraints.void import VoidProbability, void_probability
 
 __all__ = [
+    "Active",
     "Constraint",
     "KeepOut",
     "Mask",
+    "MaxActive",
     "Paths",
     "Separation",
     "Situation",
@@ -27,9 +31,11 @@ __all__ = [
     "Timeless",
     "VisibilityGraph",
     "VoidProbability",
+    "WithMostActive",
     "WithReach",
     "WithViolations",
     "WithZone",
+    "active_of",
     "courses_allowed",
     "mask_of",
     "opened",

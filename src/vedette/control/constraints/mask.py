@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
+from vedette.control.constraints.active import Active
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Ints
 
@@ -23,12 +24,13 @@ _GIVEN = "the constraint is given up"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mask:
-    """Which courses and pairs of courses are allowed; a joint action is where all of its own are.
+    """Which courses and pairs of courses are allowed, and how many sensors may scan; a joint action is where all are.
 
     Attributes:
         single: (num_courses,) which courses each sensor may take, one array a sensor.
         together: (num_courses of i, of j) which courses of sensors i < j go together, by (i, j); others all do.
         notes: what a reader of the decision must know.
+        active: which courses scan, and how many sensors may; None: all.
 
     Raises:
         InputError: a table of another shape, or of a pair that is none.
@@ -37,6 +39,7 @@ class Mask:
     single: tuple[Bools, ...]
     together: Mapping[tuple[int, int], Bools] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    active: Active | None = None
     _beside: tuple[Mapping[int, Ints], ...] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -60,14 +63,16 @@ class Mask:
         return tuple(len(own) for own in self.single)
 
     def violations(self, actions: Ints) -> Ints:
-        """(num,) how many courses, and how many pairs of courses, of joint actions (num, num_sensors) are forbidden."""
+        """(num,) how many courses and pairs of courses of joint actions (num, num_sensors) are forbidden, and how many
+        sensors too many scan.
+        """
         found = np.zeros(len(actions), np.int64)
         for s, own in enumerate(self.single):
             if not own.all():
                 found += ~own[actions[:, s]]
         for (first, second), table in self.together.items():
             found += ~table[actions[:, first], actions[:, second]]
-        return found
+        return found if self.active is None else found + self.active.excess(actions)
 
     def allows(self, actions: Ints) -> Bools:
         """(num,) whether joint actions (num, num_sensors) are allowed."""
@@ -82,6 +87,13 @@ class Mask:
 
         at: courses; those below 0 are of sensors that are not decided, and clash with none.
         """
+        found = self.forbidden(at, sensor)
+        if self.active is not None and self.active.is_full(at, sensor):
+            found += self.active.on[sensor]
+        return found
+
+    def forbidden(self, at: Sequence[int], sensor: int) -> Ints:
+        """As `clashes`, however many sensors scan."""
         found = (~self.single[sensor]).astype(np.int64)
         for other, clash in self._beside[sensor].items():
             if at[other] >= 0:
@@ -94,18 +106,19 @@ def repaired(mask: Mask, start: Sequence[int]) -> tuple[int, ...]:
 
     One sensor after the other takes its course of fewest violations, as long as any has fewer. What is left is
     searched by branch and bound, for each group of sensors that hold each other up, with a bound on its tries:
-    within it the fewest violations are found, beyond it perhaps not.
+    within it the fewest violations are found, beyond it perhaps not. Sensors that scan beyond the number that may then
+    go on without scans, on the same courses.
     """
     at = list(start)
     _descend(mask, at)
-    troubled = [s for s in range(len(at)) if mask.clashes(at, s)[at[s]]]
+    troubled = [s for s in range(len(at)) if mask.forbidden(at, s)[at[s]]]
     settled: set[int] = set()
     for sensor in troubled:
         if sensor not in settled:
             group = _group(mask, sensor)
             settled.update(group)
             _settle(mask, at, group)
-    return tuple(at)
+    return tuple(at) if mask.active is None else mask.active.kept(at)
 
 
 def opened(mask: Mask) -> tuple[Mask, tuple[int, ...]]:
@@ -120,7 +133,11 @@ def opened(mask: Mask) -> tuple[Mask, tuple[int, ...]]:
     start = repaired(mask, [int(own.argmax()) for own in mask.single])
     courses = {s: course for s, course in enumerate(start) if not mask.single[s][course]}
     pairs = {pair for pair, table in mask.together.items() if not table[start[pair[0]], start[pair[1]]]}
-    return _forgiven(mask, courses, pairs), start
+    mask = _forgiven(mask, courses, pairs)
+    if mask.active is not None and mask.active.excess(np.array([start]))[0]:
+        too_many = f"no more than {mask.active.most} sensors were to scan, and too few can be switched off; {_GIVEN}"
+        mask = replace(mask, active=None, notes=(*mask.notes, too_many))
+    return mask, start
 
 
 def _forgiven(mask: Mask, courses: Mapping[int, int | slice], pairs: set[tuple[int, int]]) -> Mask:
@@ -135,7 +152,7 @@ def _forgiven(mask: Mask, courses: Mapping[int, int | slice], pairs: set[tuple[i
     notes += [
         f"sensors {i + 1} and {j + 1}: no courses were found that go together; {_GIVEN}" for i, j in sorted(pairs)
     ]
-    return Mask(tuple(single), together, (*mask.notes, *notes))
+    return Mask(tuple(single), together, (*mask.notes, *notes), mask.active)
 
 
 def _descend(mask: Mask, at: list[int]) -> None:
@@ -144,7 +161,7 @@ def _descend(mask: Mask, at: list[int]) -> None:
     while moved:
         moved = False
         for s in range(len(at)):
-            clashes = mask.clashes(at, s)
+            clashes = mask.forbidden(at, s)
             best = int(clashes.argmin())
             if clashes[best] < clashes[at[s]]:
                 at[s], moved = best, True
@@ -195,7 +212,7 @@ def _settle(mask: Mask, at: list[int], group: list[int]) -> None:
     """
     costs: dict[int, Ints] = {s: (~mask.single[s]).astype(np.int64) for s in group}
     alone = sum(int(costs[s][at[s]]) for s in group)
-    every = sum(int(mask.clashes(at, s)[at[s]]) for s in group)
+    every = sum(int(mask.forbidden(at, s)[at[s]]) for s in group)
     fewest = (every + alone) // 2  # each pair is counted at both its ends
 
     def is_end(node: _Decided) -> bool:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from vedette.control.constraints.active import active_of
 from vedette.control.constraints.mask import Mask, opened
 from vedette.control.constraints.protocol import Constraint, Situation, WithViolations, reach_of
 from vedette.errors import InputError
@@ -32,7 +33,8 @@ def mask_of(constraints: Sequence[Constraint], situation: Situation) -> Mask:
             raise InputError(f"constraint {constraint.name}: expected {wanted}; got {len(situation.beliefs)}")
     single, blocked = courses_allowed(constraints, situation)
     notes = tuple(f"sensor {s + 1}: {without_course(constraints)}" for s in blocked)
-    return opened(Mask(single, pairs_allowed(constraints, situation), notes))[0]
+    active = active_of(constraints, situation.courses, situation.scans)
+    return opened(Mask(single, pairs_allowed(constraints, situation), notes, active))[0]
 
 
 def without_course(constraints: Sequence[Constraint]) -> str:
@@ -73,6 +75,9 @@ def violated(constraints: Sequence[Constraint], situation: Situation) -> tuple[s
             f"sensor {s + 1}: its course violates {constraint.name}" for s, own in enumerate(single) if not own[0]
         ]
         found += [f"sensors {i + 1} and {j + 1}: their courses violate {constraint.name}" for i, j in pairs]
+    active = active_of(constraints, situation.courses, situation.scans)
+    if active is not None and (excess := int(active.excess(np.zeros((1, len(situation.courses)), np.int64))[0])):
+        found.append(f"{active.most + excess} sensors scan; expected at most {active.most}")
     return tuple(found)
 
 

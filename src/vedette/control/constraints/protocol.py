@@ -22,12 +22,14 @@ class Situation(NamedTuple):
     beliefs: the fused belief predicted to each of `times`, one Gaussian a track; () where no constraint needs it.
     poses: (num_sensors, pose_dim) where the sensors are now, from which the way to the first of `times` begins; None:
         nothing is asked of that way.
+    scans: (num_courses, num_times) whether each course lets its sensor scan, one array a sensor; (): not known.
     """
 
     courses: tuple[Floats, ...]
     times: Floats
     beliefs: tuple[Labelled, ...] = ()
     poses: Floats | None = None
+    scans: tuple[Bools, ...] = ()
 
     def ways(self, sensor: int) -> Floats:
         """(num_courses, num_points, 2) corners of the ways of one sensor: where it is now, if known, and later."""
@@ -53,7 +55,8 @@ class Situation(NamedTuple):
 class Constraint(Protocol):
     """Says which courses a sensor may take, and which courses of two sensors go together.
 
-    It may have more members: those of `WithReach`, `Timeless`, `WithViolations` and `WithZone`. Decisions over several
+    It may have more members: those of `WithReach`, `Timeless`, `WithViolations`, `WithZone` and
+    `WithMostActive`. Decisions over several
     periods show it one sensor, or two, at a time: the others have no courses then.
     """
 
@@ -115,6 +118,16 @@ class WithZone(Protocol):
     @property
     def zone(self) -> tuple[Floats, ...]:
         """Polygons (num_corners, 2), m: forbidden is what is inside of them by the even-odd rule, and their edges."""
+        ...
+
+
+@runtime_checkable
+class WithMostActive(Protocol):
+    """A constraint on how many sensors may scan after a decision."""
+
+    @property
+    def most_active(self) -> int:
+        """Number of sensors, at least 1."""
         ...
 
 

@@ -9,10 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.control.constraints import (
+    Active,
     Constraint,
     Mask,
     Situation,
     Timeless,
+    active_of,
     courses_allowed,
     mask_of,
     pairs_allowed,
@@ -47,6 +49,7 @@ class Place(NamedTuple):
 
     pose: Floats  # (pose_dim,)
     courses: Floats  # (num_courses, num_times, pose_dim)
+    scans: Bools  # (num_courses, num_times) whether the sensor scans
 
 
 @dataclass(slots=True, eq=False)
@@ -94,6 +97,11 @@ class Ahead:
         """The tables of pairs of sensors i < j of which something is forbidden; raises `InputError` as `mask_of`."""
         return pairs_allowed(self.constraints, self._situation(stage, places))
 
+    def active(self, places: Mapping[int, Place]) -> Active | None:
+        """How many sensors may scan, of all sensors' courses at a decision; None: all."""
+        found = [places[s] for s in range(len(places))]
+        return active_of(self.constraints, [own.courses for own in found], [own.scans for own in found])
+
     def moment(self, stage: int) -> int:
         """What is equal for decisions at which the same courses are allowed as far as constraints tell."""
         return -len(self.stages.times(stage)) if self._timeless else stage
@@ -105,7 +113,8 @@ class Ahead:
             self._beliefs[stage] = ahead
         poses = self.poses.copy()
         courses = [np.empty((0, num, self.poses.shape[1]))] * len(poses)
+        scans = [np.empty((0, num), np.bool_)] * len(poses)
         for s, place in places.items():
-            poses[s], courses[s] = place.pose, place.courses
+            poses[s], courses[s], scans[s] = place
         times = self.stages.period * np.arange(done + 1.0, done + num + 1.0)
-        return Situation(tuple(courses), times, self._beliefs[stage], poses)
+        return Situation(tuple(courses), times, self._beliefs[stage], poses, tuple(scans))

@@ -62,7 +62,8 @@ class CourseTree:
 
     def place(self, taken: Sequence) -> Place:
         """Where it decides after the courses taken so far, and between what."""
-        return Place(self.pose_after(taken), self.options(taken).courses)
+        options = self.options(taken)
+        return Place(self.pose_after(taken), options.courses, options.scans)
 
     def pose_after(self, taken: Sequence) -> Floats:
         """Where it decides after the courses taken so far."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from collections.abc import Sequence as Several
 from dataclasses import dataclass, field, replace
@@ -64,13 +65,15 @@ class Rules:
         single = tuple(np.zeros(len(own), bool) for own in self.mask.single)
         for own, tree in zip(single, self.trees, strict=True):
             own[list(tree.allowed(()))] = True
-        return Mask(single, self.mask.together)
+        return Mask(single, self.mask.together, active=self.mask.active)
 
     def allows(self, joint: Several[Sequence | None]) -> bool:
         """Whether sequences that sensors take together are allowed; None: what a sensor does is not asked."""
         known = [(s, own) for s, own in enumerate(joint) if own is not None]
         pairs = combinations(known, 2) if self.ahead.on_pairs else ()
-        return all(self._alone(*each) for each in known) and all(self._beside(*one, *two) for one, two in pairs)
+        if not all(self._alone(*each) for each in known) or not all(self._beside(*one, *two) for one, two in pairs):
+            return False
+        return all(self._num_active(joint, stage) <= self.most_active for stage in range(1, self._depth + 1))
 
     def after(self, sensor: int, taken: Sequence, others: Several[Sequence | None]) -> Sequence:
         """The courses of one sensor after those taken that are allowed beside the others' at that decision, maybe none.
@@ -84,6 +87,9 @@ class Rules:
             table = self._table(sensor, taken, other, own[: stage - 1])
             if table is not None:
                 found = tuple(course for course in found if table[course, own[stage - 1]])
+        beside = [None if s == sensor else own for s, own in enumerate(others)]
+        if self._num_active(beside, stage) >= self.most_active:
+            found = tuple(course for course in found if not self._scans(sensor, (*taken, course)))
         return found
 
     def kept(self, sensor: int, taken: Sequence, others: Several[Sequence | None]) -> Sequence | None:
@@ -111,6 +117,25 @@ class Rules:
                 "on that is given up"
             )
         return *self.mask.notes, *found
+
+    @property
+    def most_active(self) -> float:
+        """Number of sensors that may scan; inf: all."""
+        return math.inf if self.mask.active is None else self.mask.active.most
+
+    @property
+    def _depth(self) -> int:
+        return self.trees[0].stages.depth if self.mask.active is not None else 0
+
+    def _num_active(self, joint: Several[Sequence | None], stage: int) -> int:
+        """Number of sensors that scan after a decision, counted from 1, of those whose sequences reach so far."""
+        if self.mask.active is None:
+            return 0
+        return sum(self._scans(s, own[:stage]) for s, own in enumerate(joint) if own is not None and len(own) >= stage)
+
+    def _scans(self, sensor: int, taken: Sequence) -> bool:
+        """Whether a sensor scans after the last of the courses taken."""
+        return bool(self.trees[sensor].options(taken[:-1]).scans[taken[-1]].any())
 
     def _alone(self, sensor: int, sequence: Sequence) -> bool:
         key = (sensor, sequence)
@@ -170,7 +195,7 @@ def _furthest(trees: tuple[CourseTree, ...], ahead: Ahead, mask: Mask) -> tuple[
             own[courses] = True
         places = {s: tree.place(own) for s, (tree, own) in enumerate(zip(trees, joint, strict=True))}
         together = ahead.pairs(len(joint[0]) + 1, places) if joint[0] else mask.together
-        here = Mask(single, together)
+        here = Mask(single, together, active=mask.active and ahead.active(places))
         first = repaired(here, [own[0] for own in orders] if joint[0] else opened(mask)[1])
         if not here.allows(np.array([first]))[0]:
             return _Begun(joint, here, [[]] * num)

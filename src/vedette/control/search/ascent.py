@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vedette.control.search.problem import Joint, JointProblem, Known, best_of_all
+from vedette.control.constraints import Active
+from vedette.control.search.problem import Joint, JointProblem, Known, best_of_all, tie_of
 from vedette.models.fields import Checked, Count, Repeats, part
 
 # Beyond so many sensors, every joint action is more than a decision has time for.
@@ -29,7 +30,8 @@ class CoordinateAscent(Checked):
     maximum: no change of one sensor's action improves it, a change of two might. No joint action is evaluated twice.
 
     With a mask it goes from one allowed joint action to another. A start that is not allowed is first moved to one near
-    it that is; where none is, the mask is opened (`vedette.control.constraints.opened`).
+    it that is; where none is, the mask is opened (`vedette.control.constraints.opened`). Where only some sensors may
+    scan, no sensor alone can change which; then exchanges of two are tried at each end, and ascents go on from there.
 
     Attributes:
         num_restarts: ascents from random joint actions, after that from the independent decision.
@@ -54,14 +56,39 @@ def first_starts(known: Known, num_restarts: int, *, rng: np.random.Generator) -
 
 def ascents(known: Known, starts: Sequence[Joint]) -> list[Joint]:
     """The ends of ascents, which are known then, and so is the first start."""
-    climb = known.problem.ascend
     ends = list[Joint]()
     for start in starts:
         if ends and known.is_late():
             break
-        ends.append(_ascend(known, start) if climb is None else known.allowed(climb(start)))
+        ends.append(_climbed(known, start))
     known.rewards([starts[0], *ends])
     return ends
+
+
+def _climbed(known: Known, start: Joint) -> Joint:
+    """The end of an ascent; where only some sensors may scan, of ascents until no exchange of two improves it."""
+    climb = known.problem.ascend
+    at = _ascend(known, start) if climb is None else known.allowed(climb(start))
+    if known.mask is None or known.mask.active is None:
+        return at
+    while (better := _exchanged(known, at, known.mask.active)) is not None and not known.is_late():
+        at = _ascend(known, better) if climb is None else known.allowed(climb(better))
+    return at
+
+
+def _exchanged(known: Known, at: Joint, active: Active) -> Joint | None:
+    """The best joint action with another sensor scanning in the place of one; None: no such one is better."""
+    found, value = [at], known.values.__getitem__
+    known.rewards(found)
+    for s, course in enumerate(at):
+        if active.off[s][course] == course:
+            continue
+        without = max((joint for joint in known.line(at, s) if not active.on[s][joint[s]]), key=value)
+        for other in range(len(at)):
+            if other != s and not active.on[other][at[other]]:
+                found += known.line(without, other)
+    best = max(found, key=value)
+    return best if value(best) > value(at) + tie_of(value(at)) else None
 
 
 def _ascend(known: Known, start: Joint) -> Joint:

@@ -197,6 +197,9 @@ def _allowed(mask: Mask, most: int) -> Ints:
         for other, clash in mask.others(s).items():
             if other < s:
                 found = found[clash[found[:, other], found[:, s]] == 0]
+        if mask.active is not None:
+            scanning = sum(on[found[:, i]].astype(np.int64) for i, on in enumerate(mask.active.on[: s + 1]))
+            found = found[scanning <= mask.active.most]
         if len(found) > most:
             raise _too_many(most, f"more than that, of {s + 1} of {len(mask.single)} sensors")
     return np.ascontiguousarray(found)

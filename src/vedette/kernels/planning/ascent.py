@@ -31,6 +31,8 @@ class Allowed(NamedTuple):
 
     single: Bools  # (num_courses,)
     together: Bools  # (num_courses, num_courses) which go together; (0, 0) where all do
+    on: Bools  # (num_courses,) which count among those of which only so many sensors may take one
+    most: int  # so many
 
 
 class Ascent(NamedTuple):
@@ -84,7 +86,13 @@ def _is_allowed(table: Table, allowed: Allowed, chosen: Ints, sensor: int, cours
         for s in range(chosen.shape[0]):
             if s != sensor and not allowed.together[course, table.first_courses[s] + chosen[s]]:
                 return False
-    return True
+    if not allowed.on[course]:
+        return True
+    num = 1
+    for s in range(chosen.shape[0]):
+        if s != sensor and allowed.on[table.first_courses[s] + chosen[s]]:
+            num += 1
+    return num <= allowed.most
 
 
 @borrowing

@@ -166,6 +166,21 @@ def constraints_on_labels(model: ScenarioModel) -> Iterator[Finding]:
             yield ("control", "constraints", i, "kind"), wanted, describe(constraint.kind)
 
 
+def enough_switchable(model: ScenarioModel) -> Iterator[Finding]:
+    """Where only some sensors may scan, the others can be switched off; of custom platforms that is not known."""
+    fixed = sum(not sensor.switchable for sensor in model.sensors)
+    if any(sensor.platform.kind == "custom" for sensor in model.sensors):
+        return
+    for i, constraint in enumerate(model.control.constraints):
+        if constraint.kind != "max_active":
+            continue
+        if fixed == len(model.sensors):
+            yield ("control", "constraints", i, "kind"), "a sensor that is switchable, for max_active", "none"
+        elif constraint.most < fixed:
+            wanted = f"at least {fixed}, as so many sensors are not switchable"
+            yield ("control", "constraints", i, "most"), wanted, describe(constraint.most)
+
+
 def longer_plans(model: ScenarioModel) -> Iterator[Finding]:
     """Decisions over several periods are whole pseudo-updates apart, and sums over labels."""
     control = model.control
@@ -192,4 +207,4 @@ def targets_of_rules(model: ScenarioModel) -> Iterator[Finding]:
             yield ("planners", name, "targets"), wanted, describe(list(own.targets))
 
 
-DECISION_CHECKS = (constraints_on_labels, longer_plans, targets_of_rules)
+DECISION_CHECKS = (constraints_on_labels, enough_switchable, longer_plans, targets_of_rules)

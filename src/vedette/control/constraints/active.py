@@ -1,0 +1,111 @@
+"""How many sensors may scan after a decision."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from vedette.control.constraints.protocol import Constraint, Situation, WithMostActive
+from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.models.fields import Checked, Count, part
+
+
+@part("max_active", "constraint")
+@dataclass(frozen=True, slots=True)
+class MaxActive(Checked):
+    """At most so many sensors scan after a decision; the others take an action that switches them off.
+
+    Each course of a sensor that can be switched is there a second time without scans, so that it forbids no course and
+    no pair of courses by itself: which sensors scan is for the planner to choose.
+
+    Attributes:
+        most: number of sensors.
+
+    Raises:
+        InputError: a number below 1.
+    """
+
+    most: Count
+    name: ClassVar[str] = "max_active"
+    needs_beliefs: ClassVar[bool] = False
+    timeless = True
+    reach = 0.0
+
+    @property
+    def most_active(self) -> int:
+        """The number."""
+        return self.most
+
+    def courses(self, situation: Situation) -> tuple[Bools, ...]:
+        """All."""
+        return tuple(np.ones(len(own), np.bool_) for own in situation.courses)
+
+    def pairs(self, situation: Situation, first: int, second: int) -> Bools | None:
+        """All."""
+        return None
+
+
+class Active(NamedTuple):
+    """Which courses scan, and how many sensors may.
+
+    on: (num_courses,) whether each course scans, one array a sensor. off: (num_courses,) the course of the same poses
+    that does not scan; itself of those that do not, and of those of a sensor that cannot be switched off. most: number
+    of sensors that may scan.
+    """
+
+    on: tuple[Bools, ...]
+    off: tuple[Ints, ...]
+    most: int
+
+    def excess(self, actions: Ints) -> Ints:
+        """(num,) how many sensors too many scan in joint actions (num, num_sensors)."""
+        num = np.zeros(len(actions), np.int64)
+        for s, own in enumerate(self.on):
+            num += own[actions[:, s]]
+        return np.maximum(num - self.most, 0)
+
+    def is_full(self, at: Sequence[int], sensor: int) -> bool:
+        """Whether no further sensor may scan beside the others of a joint action; below 0: not decided, and off."""
+        return sum(bool(self.on[s][own]) for s, own in enumerate(at) if s != sensor and own >= 0) >= self.most
+
+    def kept(self, at: Sequence[int], gains: Sequence[float] | None = None) -> tuple[int, ...]:
+        """A joint action with the sensors off that scan beyond `most`, on courses of the same poses.
+
+        gains: of each sensor's scans; the largest are kept, of equal ones the first. None: those are kept that come
+        first from a sensor on that depends on the joint action, so that draws spare none.
+        """
+        scanning = [s for s, own in enumerate(at) if self.on[s][own]]
+        if len(scanning) <= self.most:
+            return tuple(at)
+        fixed = {s for s in scanning if self.off[s][at[s]] == at[s]}
+        if gains is None:
+            first = sum(at) % len(at)
+            order = sorted(scanning, key=lambda s: (s not in fixed, (s - first) % len(at)))
+        else:
+            order = sorted(scanning, key=lambda s: (s not in fixed, -gains[s], s))
+        spared = set(order[: self.most])
+        return tuple(own if s in spared else int(self.off[s][own]) for s, own in enumerate(at))
+
+
+def active_of(constraints: Sequence[Constraint], courses: Sequence[Floats], scans: Sequence[Bools]) -> Active | None:
+    """What constraints say of how many sensors may scan; None: nothing, or nothing is known of scans.
+
+    courses: (num_courses, num_times, pose_dim) of each sensor. scans: (num_courses, num_times) whether they scan.
+    """
+    numbers = [own.most_active for own in constraints if isinstance(own, WithMostActive)]
+    if not numbers or not scans:
+        return None
+    on = tuple(np.asarray(own.any(axis=1)) for own in scans)
+    return Active(on, tuple(map(_twins, courses, on)), min(numbers))
+
+
+def _twins(courses: Floats, on: Bools) -> Ints:
+    """(num_courses,) see `Active.off`."""
+    twins, silent = np.arange(len(courses)), np.flatnonzero(~on)
+    of_pose = {courses[course].tobytes(): course for course in silent[::-1].tolist()}
+    for course in np.flatnonzero(on).tolist():
+        twins[course] = of_pose.get(courses[course].tobytes(), course)
+    return twins
