@@ -348,9 +348,9 @@ decision_steps: [4, 8] -> search: {kind: cross_entropy, smoothing: 0.0}
 decision_steps: [4, 8] -> search: {kind: automatic, num_restarts: 2}
     22:37: control.search.num_restarts: expected one of kind, max_joint_actions, got an unknown key
 decision_steps: [4, 8] -> constraints: [{kind: distance}]
-    22:32: control.constraints[0].kind: expected one of keep_out, separation, stay_inside, void_probability, custom, got "distance"
+    22:32: control.constraints[0].kind: expected one of keep_out, max_active, separation, stay_inside, void_probability, custom, got "distance"
 decision_steps: [4, 8] -> constraints: [{distance: 3.0}]
-    22:25: control.constraints[0]: expected a mapping with kind: one of keep_out, separation, stay_inside, void_probability, custom, got no kind
+    22:25: control.constraints[0]: expected a mapping with kind: one of keep_out, max_active, separation, stay_inside, void_probability, custom, got no kind
 decision_steps: [4, 8] -> constraints: [{kind: separation, distance: 0.0}]
     22:54: control.constraints[0].distance: expected a number above 0, got 0.0
 decision_steps: [4, 8] -> constraints: [{kind: separation}]
@@ -364,6 +364,11 @@ decision_steps: [4, 8] -> constraints: [{kind: stay_inside, region: {x_min: 1.0,
 decision_steps: [4, 8]
 -> constraints: [{kind: separation, distance: 3.0}, {kind: void_probability, radius: 5.0, probability: 2.0}]
     22:111: control.constraints[1].probability: expected a number of at most 1, got 2.0
+decision_steps: [4, 8] -> constraints: [{kind: max_active, most: 0}]
+    22:32: control.constraints[0].kind: expected a sensor that is switchable, for max_active, got none
+    22:50: control.constraints[0].most: expected a number of at least 1, got 0
+decision_steps: [4, 8] -> constraints: [{kind: max_active, most: 1}]
+    22:32: control.constraints[0].kind: expected a sensor that is switchable, for max_active, got none
 decision_steps: [4, 8] -> lookahead: {depth: 0}
     22:30: control.lookahead.depth: expected a number of at least 1, got 0
 decision_steps: [4, 8] -> lookahead: {method: forest}

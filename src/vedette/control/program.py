@@ -79,6 +79,8 @@ class ProgramPlanner:
         if mask is not None and mask.together:
             pairs = mask.together.items()
             question["pairs"] = [{"sensors": list(pair), "allowed": table.tolist()} for pair, table in pairs]
+        if mask is not None and mask.active is not None:
+            question["max_active"] = mask.active.most
         estimate = self.estimate(state.fused, state.step)
         question |= {"estimates": _told(estimate), "tracks": _told(state.fused)}
         answer = self._program.ask(question, self.seconds)
@@ -132,6 +134,8 @@ def _joint(program: Program, answer: dict[str, Any], options: Sequence[Options],
             if not table[given[first], given[second]]:
                 wanted = f"actions[{first}] and actions[{second}] that are allowed together"
                 program.refuse(wanted, f"{given[first]} and {given[second]}")
+        if mask.active is not None and (excess := int(mask.active.excess(np.array([given]))[0])):
+            program.refuse(f"actions with at most {mask.active.most} sensors on", f"{mask.active.most + excess} on")
     return tuple(given)
 
 

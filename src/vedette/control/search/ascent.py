@@ -31,7 +31,8 @@ class CoordinateAscent(Checked):
 
     With a mask it goes from one allowed joint action to another. A start that is not allowed is first moved to one near
     it that is; where none is, the mask is opened (`vedette.control.constraints.opened`). Where only some sensors may
-    scan, no sensor alone can change which; then exchanges of two are tried at each end, and ascents go on from there.
+    scan, no sensor alone can change which; then exchanges of two are tried from the best end, and ascents go on from
+    there.
 
     Attributes:
         num_restarts: ascents from random joint actions, after that from the independent decision.
@@ -55,31 +56,34 @@ def first_starts(known: Known, num_restarts: int, *, rng: np.random.Generator) -
 
 
 def ascents(known: Known, starts: Sequence[Joint]) -> list[Joint]:
-    """The ends of ascents, which are known then, and so is the first start."""
+    """The ends of ascents, which are known then, and so is the first start.
+
+    Where only some sensors may scan, exchanges of two and ascents go on from the best end until none improves it.
+    """
     ends = list[Joint]()
     for start in starts:
         if ends and known.is_late():
             break
         ends.append(_climbed(known, start))
     known.rewards([starts[0], *ends])
+    if known.mask is not None and known.mask.active is not None:
+        best: Joint | None = max(ends, key=known.values.__getitem__)
+        while best is not None and not known.is_late():
+            ends.append(_climbed(known, best))
+            known.rewards(ends[-1:])
+            best = _exchanged(known, ends[-1], known.mask.active)
     return ends
 
 
 def _climbed(known: Known, start: Joint) -> Joint:
-    """The end of an ascent; where only some sensors may scan, of ascents until no exchange of two improves it."""
+    """The end of an ascent."""
     climb = known.problem.ascend
-    at = _ascend(known, start) if climb is None else known.allowed(climb(start))
-    if known.mask is None or known.mask.active is None:
-        return at
-    while (better := _exchanged(known, at, known.mask.active)) is not None and not known.is_late():
-        at = _ascend(known, better) if climb is None else known.allowed(climb(better))
-    return at
+    return _ascend(known, start) if climb is None else known.allowed(climb(start))
 
 
 def _exchanged(known: Known, at: Joint, active: Active) -> Joint | None:
     """The best joint action with another sensor scanning in the place of one; None: no such one is better."""
     found, value = [at], known.values.__getitem__
-    known.rewards(found)
     for s, course in enumerate(at):
         if active.off[s][course] == course:
             continue
