@@ -87,7 +87,7 @@ def _switched(actions: Any, index: int, on: bool) -> int:
 def with_most(scenario: Scenario, most: int | None) -> Scenario:
     """All sensors can be switched off, and so many scan at most; None: all."""
     given = [own.model_dump() for own in scenario.model.control.constraints]
-    more = [] if most is None else [{"kind": "max_active", "most": most}]
+    more = [] if most is None else [{"kind": "max_active", "sensors": most}]
     return with_fields(scenario, {"sensors.*.switchable": True, "control.constraints": [*given, *more]})
 
 

@@ -253,8 +253,11 @@ def sums_of(evaluator: Evaluator) -> AdditiveRewards:
     return evaluator.additive
 
 
-def additive_of(situation: Situation, reward: Any = None, seed: int = 5) -> Evaluator:
-    """The evaluator by sums over labels, of LMB beliefs; by default with K = 1."""
+def additive_of(situation: Situation, reward: Any = None, seed: int = 5, horizons: Any = ()) -> Evaluator:
+    """The evaluator by sums over labels, of LMB beliefs; by default with K = 1.
+
+    horizons: settings of those after the first; None: those of a `JointPlanner`.
+    """
     rule, state = situation.fusion.linear_rule(len(situation.sensors)), situation.state
     if getattr(situation.fusion, "shares_prediction", False):
         state = replace(state, local=(situation.fused,) * len(situation.sensors))
@@ -265,6 +268,7 @@ def additive_of(situation: Situation, reward: Any = None, seed: int = 5) -> Eval
         situation.settings,
         CauchySchwarzReward() if reward is None else reward,
         state,
+        horizons=horizons,
         rng=np.random.default_rng(seed),
     )
 

@@ -67,7 +67,7 @@ def mask_for(example: Situation, *constraints: Any) -> Mask:
 @pytest.mark.parametrize("reward", [CauchySchwarzReward("reference"), LOSS])
 def test_exhaustive_search_finds_the_best_of_what_is_allowed_and_bounds_hold(most: int, reward: Any) -> None:
     example, joint = switchable(shared(3)), all_joint_actions((6, 6, 6))
-    table = sums_of(additive_of(example, reward, seed=1))(joint).mean(axis=1)
+    table = sums_of(additive_of(example, reward, seed=1, horizons=None))(joint).mean(axis=1)
     best = table[(joint < 3).sum(axis=1) <= most].max()
     plan = decided(example, reward=reward, search=ExhaustiveSearch(), constraints=(MaxActive(most),))
     assert plan.explain().reward == pytest.approx(best, rel=1e-9)

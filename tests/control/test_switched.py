@@ -56,6 +56,9 @@ def test_parts_of_platforms_are_off_and_have_their_prices() -> None:
     later = Sequences(SWITCHED, 2.0, 2)
     row = np.array([[0.0, 0.0, -90.0, 1.0], [0.0, 1.0, 0.0, 1.0]])
     assert later.columns == ("heading_deg_1", "on_1", "heading_deg_2", "on_2")
+    words = Actions(later.columns, row).text(0)
+    assert words == "heading_deg_1 0, off at decision 1, heading_deg_2 -90, on at decision 2"
+    assert Actions.of(on_time=0.0).text(0) == "on_time 0"
     assert later.scans(POSE, row, TIMES).tolist() == [[False, False, False, True], [True] * 4]
     assert later.prices(row).tolist() == [0.5, 1.0]
     carried = Carried(Operated(Steps(10.0, 5.0), 2.0), Operated(Pointing([-45.0, 45.0]), 0.25, switchable=True))
@@ -99,7 +102,7 @@ def test_searches_find_and_bounds_hold_the_best_of_all(seed: int, reward: Any) -
     joint, settings = all_joint_actions((6, 6, 6)), replace(KNOWN, num_samples=5)
     gains = sums_of(additive_of(replace(free, settings=settings), reward)).each_alone().mean(axis=1)
     example = replace(switchable(free, float(np.ptp(gains))), settings=settings)
-    table = sums_of(additive_of(example, reward, seed=1))(joint).mean(axis=1)
+    table = sums_of(additive_of(example, reward, seed=1, horizons=None))(joint).mean(axis=1)
     assert decided(example, reward=reward).explain().reward == pytest.approx(table.max(), rel=1e-9)
     for search in (CoordinateAscent(), SequentialGreedy()):
         plan = decided(example, reward=reward, search=search)
@@ -121,14 +124,24 @@ def test_who_pays_too_much_is_off_and_who_pays_nothing_is_on(kind: Any) -> None:
 @pytest.mark.parametrize("reward", [REWARDS[0], REWARDS[2]])
 def test_looking_ahead_is_worth_what_sequences_are_as_joint_actions(reward: Any) -> None:
     """The best second action, on or off, after each first one; the second time off or on again."""
-    example = switchable(situation("lmb", settings=KNOWN, platform=Courses(30.0, (-90.0, 45.0))), 0.05)
+    example = switchable(shared(2, platform=Courses(30.0, (-90.0, 45.0))), 0.05)
     ahead = decided(example, partial(HorizonPlanner, depth=2, discount=None, budget=10_000), reward)
     sensors = tuple(replace(own, platform=Sequences(own.platform, 8.0, 2)) for own in example.sensors)
     longer = replace(example, sensors=sensors, settings=replace(KNOWN, horizon_steps=4))
-    mean = decided(longer, reward=reward).tables[0].mean.reshape((4,) * 4)
+    joint = all_joint_actions((16, 16))
+    mean = sums_of(additive_of(longer, reward, seed=1))(joint).mean(axis=1).reshape((4,) * 4)
     np.testing.assert_allclose(ahead.tables[0].mean, mean.max(axis=(1, 3)), rtol=1e-11)
     assert ahead.bound is not None
     assert ahead.bound.upper == pytest.approx(mean.max(), rel=1e-11)
+
+
+def test_a_sensor_that_is_off_goes_where_it_will_scan() -> None:
+    """Both are off; beyond the horizon they scan again, so that not all directions are worth the same."""
+    example = switchable(shared(2), 1e6)
+    plan, still = decided(example, reward=REWARDS[2]), decided(example, reward=REWARDS[0])
+    assert [row[-1] for row in plan.chosen_actions] == [0.0, 0.0]
+    assert np.ptp(plan.tables[0].mean[3:, 3:]) > 1e-3
+    assert np.ptp(still.tables[0].mean[3:, 3:]) == 0.0
 
 
 def test_an_explanation_says_who_is_off() -> None:

@@ -347,7 +347,7 @@ def _constraint(rng: Rng) -> Data:
             {"kind": "keep_out", "region": {"x_min": 0.0, "x_max": 90.0, "y_min": 0.0, "y_max": 90.0}},
             {"kind": "keep_out", "polygon": [[0.0, 0.0], [90.0, 0.0], [0.0, 90.0]]},
             {"kind": "separation", "distance": 50.0},
-            {"kind": "max_active", "most": int(rng.integers(1, 3))},
+            {"kind": "max_active", "sensors": int(rng.integers(1, 3))},
             {"kind": "void_probability", "radius": 30.0, "probability": 0.5},
             own_part("OddOnes"),
         ],

@@ -364,10 +364,10 @@ decision_steps: [4, 8] -> constraints: [{kind: stay_inside, region: {x_min: 1.0,
 decision_steps: [4, 8]
 -> constraints: [{kind: separation, distance: 3.0}, {kind: void_probability, radius: 5.0, probability: 2.0}]
     22:111: control.constraints[1].probability: expected a number of at most 1, got 2.0
-decision_steps: [4, 8] -> constraints: [{kind: max_active, most: 0}]
+decision_steps: [4, 8] -> constraints: [{kind: max_active, sensors: 0}]
     22:32: control.constraints[0].kind: expected a sensor that is switchable, for max_active, got none
-    22:50: control.constraints[0].most: expected a number of at least 1, got 0
-decision_steps: [4, 8] -> constraints: [{kind: max_active, most: 1}]
+    22:53: control.constraints[0].sensors: expected a number of at least 1, got 0
+decision_steps: [4, 8] -> constraints: [{kind: max_active, sensors: 1}]
     22:32: control.constraints[0].kind: expected a sensor that is switchable, for max_active, got none
 decision_steps: [4, 8] -> lookahead: {depth: 0}
     22:30: control.lookahead.depth: expected a number of at least 1, got 0

@@ -97,7 +97,7 @@ def test_every_planner_switches_off_what_costs_too_much(planner: str) -> None:
         assert choice_words(choice_of(plan)).count("°, off") == 2
 
 
-MOST_ONE = (PLANS[0], PLANS[1][:-1] + ", constraints: [{kind: max_active, most: 1}]}")
+MOST_ONE = (PLANS[0], PLANS[1][:-1] + ", constraints: [{kind: max_active, sensors: 1}]}")
 
 
 @pytest.mark.parametrize(
@@ -116,12 +116,12 @@ def test_every_planner_keeps_to_the_number_of_sensors_that_may_scan(planner: str
     ("keys", "number", "fault"),
     [
         ("price: 1.0", 1, "constraints[0].kind: expected a sensor that is switchable, for max_active, got none"),
-        ("switchable: true", 0, "constraints[0].most: expected a number of at least 1"),
+        ("switchable: true", 0, "constraints[0].sensors: expected a number of at least 1"),
     ],
 )
 def test_a_number_that_cannot_be_kept_to_is_refused(keys: str, number: int, fault: str, tmp_path: Path) -> None:
     path = tmp_path / "scene.yaml"
-    plans = MOST_ONE[1].replace("most: 1", f"most: {number}")
+    plans = MOST_ONE[1].replace("sensors: 1}", f"sensors: {number}}}")
     path.write_text(changed((NOISE, f"{COURSES}\n  {keys}"), (PLANS[0], plans)))
     assert fault in " ".join(CliRunner().invoke(app, ["check", str(path)]).output.split())
 

@@ -67,7 +67,8 @@ class Beyond:
         Within the horizon, a sensor that sees 250 m and goes 20 m has nothing to gain from a target 300 m off, and of
         courses worth the same the first is taken. So all sensors are taken to go on as they do, until each may have
         come to a target and each target may be reached by one of them, and the loss is the mean of those at all these
-        times. Targets that no allowed path brings into sight do not count.
+        times. Targets that no allowed path brings into sight do not count. Where an action switches a sensor off, there
+        is at least one more horizon: otherwise nothing would depend on where it goes meanwhile.
         """
         horizon = settings.horizon_steps * settings.horizon_period
         speeds = np.array([_speed(own, horizon) for own in self.options])
@@ -76,10 +77,12 @@ class Beyond:
         gaps = np.stack([self._gaps(s) for s in range(len(self.options))])
         seconds = np.maximum(gaps - self.reaches[:, np.newaxis], 0.0) / speeds[:, np.newaxis]
         beyond = _STAY * max(_longest(seconds.min(axis=0)), _longest(seconds.min(axis=1)))
+        if not all(own.scans.any(axis=1).all() for own in self.options):
+            beyond = max(beyond, horizon)
         if beyond == 0.0:
             return ()
         rate = float((speeds / self.reaches).max())
-        total = min(horizon + beyond, max(_MOST_STEPS / rate, 2.0 * horizon))
+        total = min(horizon + beyond, max(_MOST_STEPS / rate if rate > 0.0 else math.inf, 2.0 * horizon))
         num = min(max(_LEAST_STEPS, math.ceil(total * rate)), _MOST_STEPS)
         return tuple(replace(settings, horizon_steps=steps, horizon_period=total / num) for steps in (num // 2, num))
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from vedette.kernels.base.types import Floats
 from vedette.platforms import Actions
-from vedette.platforms.base import SWITCH, switch_word
+from vedette.platforms.base import switch_words
 from vedette.text import with_minus
 
 # What one sensor was sent to do, rounded for counting: name and number of each column.
@@ -99,7 +99,7 @@ def row_words(row: Row) -> str:
     """`-30°` of a heading or course, `heading -30°, speed 5, off` of more columns, `still` of none."""
     if len(row) == 1 and row[0][0] in ("heading_deg", "course_deg"):
         return f"{row[0][1]:g}°"
-    return ", ".join(switch_word(x) if column == SWITCH else _number_words(column, x) for column, x in row) or "still"
+    return ", ".join(switch_words(column, x) or _number_words(column, x) for column, x in row) or "still"
 
 
 def _number_words(column: str, number: float) -> str:

@@ -23,9 +23,12 @@ _SAME_POSE = 1e-9
 SWITCH = "on"  # the column of actions that says whether the sensor scans: 1, or 0 where it is off
 
 
-def switch_word(value: float) -> str:
-    """Of a number in the column `on`: `on` or `off`."""
-    return "on" if value else "off"
+def switch_words(column: str, value: float) -> str:
+    """`on` or `off`, of the column `on`, or `off at decision 2`, of `on_2` of a sequence; empty for other columns."""
+    name, _, decision = column.partition("_")
+    if name != SWITCH or (column != name and not decision.isdigit()):
+        return ""
+    return ("on" if value else "off") + (f" at decision {decision}" if decision else "")
 
 
 class Options(NamedTuple):
@@ -111,11 +114,9 @@ class Actions(Speaking):
         return f"of {counted(len(self), 'choice')}: {', '.join(self.columns)}"
 
     def text(self, index: int) -> str:
-        """One action in words: `heading_deg 30, speed 5`; a switch is `on` or `off`."""
+        """One action in words: `heading_deg 30, speed 5`; a switch is `on` or `off`, in sequences at which decision."""
         numbers = zip(self.columns, self.values[index].tolist(), strict=True)
-        return ", ".join(
-            switch_word(value) if name == SWITCH else f"{name} {round(value, 6):g}" for name, value in numbers
-        )
+        return ", ".join(switch_words(name, value) or f"{name} {round(value, 6):g}" for name, value in numbers)
 
 
 @runtime_checkable

@@ -22,13 +22,13 @@ class MaxActive(Checked):
     no pair of courses by itself: which sensors scan is for the planner to choose.
 
     Attributes:
-        most: number of sensors.
+        sensors: largest number of sensors that scan.
 
     Raises:
         InputError: a number below 1.
     """
 
-    most: Count
+    sensors: Count
     name: ClassVar[str] = "max_active"
     needs_beliefs: ClassVar[bool] = False
     timeless = True
@@ -37,7 +37,7 @@ class MaxActive(Checked):
     @property
     def most_active(self) -> int:
         """The number."""
-        return self.most
+        return self.sensors
 
     def courses(self, situation: Situation) -> tuple[Bools, ...]:
         """All."""

@@ -176,9 +176,9 @@ def enough_switchable(model: ScenarioModel) -> Iterator[Finding]:
             continue
         if fixed == len(model.sensors):
             yield ("control", "constraints", i, "kind"), "a sensor that is switchable, for max_active", "none"
-        elif constraint.most < fixed:
+        elif constraint.sensors < fixed:
             wanted = f"at least {fixed}, as so many sensors are not switchable"
-            yield ("control", "constraints", i, "most"), wanted, describe(constraint.most)
+            yield ("control", "constraints", i, "sensors"), wanted, describe(constraint.sensors)
 
 
 def longer_plans(model: ScenarioModel) -> Iterator[Finding]:
