@@ -85,9 +85,10 @@ def _exchanged(known: Known, at: Joint, active: Active) -> Joint | None:
     """The best joint action with another sensor scanning in the place of one; None: no such one is better."""
     found, value = [at], known.values.__getitem__
     for s, course in enumerate(at):
-        if active.off[s][course] == course:
+        silent = [joint for joint in known.line(at, s) if not active.on[s][joint[s]]]
+        if not active.on[s][course] or not silent:
             continue
-        without = max((joint for joint in known.line(at, s) if not active.on[s][joint[s]]), key=value)
+        without = max(silent, key=value)
         for other in range(len(at)):
             if other != s and not active.on[other][at[other]]:
                 found += known.line(without, other)
