@@ -1,140 +1,168 @@
-"""Error against the share of scans that are made: who scans, chosen by a plan, in turn, at random or by distance.
+"""The error where only a share of the sensors scans: which sensors scan, by the planner and by three plain rules.
 
-    python benchmarks/shifts.py                                # eight-mobile and paper-a, 10 runs
-    python benchmarks/shifts.py --scenes six-cameras --runs 20
-    python benchmarks/shifts.py --write docs/deciding.md
+    python benchmarks/shifts.py                                    # all scenes and shares, 5 runs
+    python benchmarks/shifts.py six-cameras --shares 50 --runs 20
+    python benchmarks/shifts.py --out shifts.jsonl --write docs/deciding.md
 
-All sensors can be switched off, and after each decision at most so many scan (`MaxActive`). "plan" is `jdm` under that
-constraint, which chooses courses and who scans together. The others take the courses of `jdm` without the constraint
-and then choose who scans: "in turn" the next ones in printed order, "random" any, "nearest" those that are nearest to
-an estimated target. `paper-a` is run under the default filter and fusion: where each sensor keeps its own tracks,
-covariance intersection weighs those of sensors that are off as much as the others. Runs are paired. The table has the
-share of scans that are made from the first decision on, the mean OSPA as the scenario scores it with one standard
-error, and how much more that is than with all scans, in paired runs.
+All sensors can be switched off, decide after every scan, and move by the joint decision of the expected loss. The
+number of sensors that scan after a decision adds up to the share. `planner` decides which ones, with `MaxActive`; the
+others fix them beforehand: `periodic` takes the sensors in turn, `random` draws them, `nearest` takes those nearest to
+an estimated target, and `at once` has all scan after some decisions and none after the others. Runs are paired. The
+table has the mean OSPA of the scenario in m with one standard error, and the paired differences of `planner` and of
+`at once` to the runs in which all sensors scan.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+import json
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from deciding_scenes import FILTERS, SILENT
 from pages import write_between
 
-from vedette.control import Plan, Planner
-from vedette.densities import Estimator
-from vedette.evaluation import ospa_of_run
-from vedette.platforms.base import SWITCH
+from vedette.control import MaxActive, Plan
+from vedette.evaluation.metrics import ospa_of_run
+from vedette.kernels.base.types import Bools, Floats
 from vedette.scenarios import Scenario, load_scenario, with_fields
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.simulation import simulate
 
-SEED = 1
-RULES = ("in turn", "random", "nearest")
-# As where nothing is said.
-DEFAULTS = {"paper-a": FILTERS[SILENT]}
-NUMBERS = {"eight-mobile": (4, 2, 1), "six-cameras": (3, 1), "paper-a": (1,)}
+SCENES: dict[str, dict[str, Any]] = {
+    "six-cameras": {},
+    "eight-mobile": {},
+    "paper-a": {
+        "filter": {"kind": "lmb"},
+        "fusion": {"kind": "sequential"},
+        "control.reward": {"kind": "expected_loss", "cutoff": 100.0},
+        "control.decision_steps": list(range(10, 40)),
+        **dict.fromkeys(("control.horizon_steps", "control.horizon_period")),  # up to the next decision
+    },
+}
+CHOICES, SHARES, SEED = ("planner", "periodic", "random", "nearest", "at once"), (50, 20, 10), 11
+
+
+@dataclass(frozen=True)
+class Only:
+    """A constraint: certain sensors scan, and no others."""
+
+    on: tuple[int, ...]
+    name: str = "only"
+    needs_beliefs: bool = False
+    reach: float = 0.0
+
+    def courses(self, situation: Any) -> tuple[Bools, ...]:
+        """On for the sensors that scan, off for the others."""
+        return tuple(own.any(axis=1) == (s in self.on) for s, own in enumerate(situation.scans))
+
+    def pairs(self, situation: Any, first: int, second: int) -> None:
+        """All."""
 
 
 @dataclass
-class Shift:
-    """A planner's courses, with the sensors that scan chosen by a rule of thumb.
+class Shifts:
+    """A joint planner under which a share of the sensors scans."""
 
-    Attributes:
-        planner: gives the courses.
-        most: number of sensors that scan.
-        rule: one of `RULES`.
-        estimate: reads targets off the fused belief, for the rule nearest.
-    """
+    planner: Any
+    share: float
+    choice: str
+    rng: np.random.Generator
+    decisions: int = 0
+    begun: int = 0  # sensors that were on so far
 
-    planner: Planner
-    most: int
-    rule: str
-    estimate: Estimator
-    name: str = "shift"
-    _decision: int = field(default=0, init=False)
+    @property
+    def name(self) -> str:
+        """As in plans."""
+        return self.choice
 
-    def plan(self, state: Any, poses: Any, *, rng: np.random.Generator) -> Plan:
-        """The courses, with some sensors off."""
-        plan, num = self.planner.plan(state, poses, rng=rng), len(poses)
-        if self.rule == "in turn":
-            on = (self._decision * self.most + np.arange(self.most)) % num
-        elif self.rule == "random":
-            on = rng.permutation(num)[: self.most]
-        else:
-            places = np.asarray(self.estimate(state.fused, state.step).means)[:, :2]
-            gaps = np.linalg.norm(poses[:, np.newaxis, :2] - places, axis=2).min(axis=1, initial=np.inf)
-            on = np.argsort(gaps, kind="stable")[: self.most]
-        self._decision += 1
-        chosen = tuple(
-            _switched(own, index, s in on) for s, (own, index) in enumerate(zip(plan.actions, plan.chosen, strict=True))
-        )
-        return replace(plan, chosen=chosen, questions=None, bound=None)
+    def plan(self, state: Any, poses: Floats, *, rng: np.random.Generator) -> Plan:
+        """The plan of the joint planner, with as many sensors on as the share has come to."""
+        self.decisions += 1
+        unit = len(poses) if self.choice == "at once" else 1
+        num = unit * int(self.decisions * self.share * len(poses) / unit + 1e-9) - self.begun
+        constraint: Any = MaxActive(num) if self.choice == "planner" and num else Only(self.on(num, state, poses))
+        self.begun += num
+        return replace(self.planner, constraints=(constraint,)).plan(state, poses, rng=rng)
 
-
-def _switched(actions: Any, index: int, on: bool) -> int:
-    """The action of the same course with the sensor on or off."""
-    wanted = actions.values[index].copy()
-    wanted[actions.columns.index(SWITCH)] = float(on)
-    return int(np.flatnonzero((actions.values == wanted).all(axis=1))[0])
+    def on(self, num: int, state: Any, poses: Floats) -> tuple[int, ...]:
+        """The sensors that scan, by a plain rule."""
+        size = len(poses)
+        if self.choice in ("periodic", "at once") or num == 0:
+            return tuple((self.begun + k) % size for k in range(num))
+        if self.choice == "random":
+            return tuple(self.rng.choice(size, num, replace=False).tolist())
+        places = [target.mean[:2] for target in state.fused.targets() if target.existence >= 0.5]
+        if not places:
+            return tuple(range(num))
+        gaps = np.linalg.norm(poses[:, np.newaxis, :2] - np.array(places), axis=2).min(axis=1)
+        return tuple(np.argsort(gaps, kind="stable")[:num].tolist())
 
 
-def with_most(scenario: Scenario, most: int | None) -> Scenario:
-    """All sensors can be switched off, and so many scan at most; None: all."""
-    given = [own.model_dump() for own in scenario.model.control.constraints]
-    more = [] if most is None else [{"kind": "max_active", "sensors": most}]
-    return with_fields(scenario, {"sensors.*.switchable": True, "control.constraints": [*given, *more]})
+def scenario_of(name: str) -> Scenario:
+    """The scene with sensors that can be switched off."""
+    return with_fields(load_scenario(name), {"sensors.*.switchable": True, "control.explain": False, **SCENES[name]})
 
 
-def measured(scenario: Scenario, run: int, most: int | None = None, rule: str | None = None) -> tuple[float, float]:
-    """Mean OSPA of a run, m, and the share of scans that are made from the first decision on."""
+def measured(scenario: Scenario, choice: str, share: int, run: int) -> tuple[float, float]:
+    """Mean OSPA of a run, m, and the share of the sensors that scanned after the first decision, %."""
     experiment, ospa = build_experiment(scenario), scenario.model.ospa
-    planner: Any = build_planner(scenario, "jdm", 1)
-    if rule is not None and most is not None:
-        planner = Shift(planner, most, rule, experiment.estimate)
     score = partial(ospa_of_run, cutoff=ospa.cutoff, order=ospa.order, components=ospa.components)
+    planner = Shifts(build_planner(scenario, "jdm", 1), share / 100.0, choice, np.random.default_rng([SEED, run]))
     record = simulate(experiment, planner, seed=SEED, run=run, score=score)
-    first = scenario.model.decision_steps[0]
-    scored = slice((ospa.from_step or first + 1) - 1, ospa.to_step)
-    return float(record.ospa[scored, 0].mean()), float(1.0 - record.off[first:].mean())
+    first, last = (ospa.from_step or 1) - 1, ospa.to_step or scenario.model.time.num_steps
+    scanned = ~record.off[scenario.model.decision_steps[0] :]
+    return float(np.nanmean(record.ospa[first:last, 0])), 100.0 * float(scanned.mean())
 
 
-def rows(name: str, numbers: Sequence[int], runs: int) -> Iterator[str]:
+def with_error(values: Floats, sign: str = "") -> str:
+    """Mean and standard error."""
+    return f"{values.mean():{sign}.2f} ± {values.std(ddof=1) / np.sqrt(len(values)):.2f}"
+
+
+def rows(name: str, shares: list[int], runs: int, out: Path | None) -> list[str]:
     """The lines of a scene."""
-    scene = with_fields(load_scenario(name), DEFAULTS.get(name, {}))
-    every = np.array([measured(with_most(scene, None), run) for run in range(runs)])
-    mean, error = every[:, 0].mean(), every[:, 0].std(ddof=1) / np.sqrt(runs)
-    yield f"| {name} | {len(scene.model.sensors)} | 100 % | all | {mean:.2f} ± {error:.2f} | | |"
-    for most in numbers:
-        for rule in (None, *RULES):
-            scenario = with_most(scene, most if rule is None else None)
-            found = np.array([measured(scenario, run, most, rule) for run in range(runs)])
-            gains = found[:, 0] - every[:, 0]
-            less, error = gains.mean(), gains.std(ddof=1) / np.sqrt(runs)
-            yield (
-                f"| {name} | {most} | {100.0 * found[:, 1].mean():.0f} % | {rule or 'plan'} | {found[:, 0].mean():.2f} "
-                f"| {less:+.2f} ± {error:.2f} | {100.0 * less / mean:+.0f} % |"
-            )
+    lines, scenario, found = list[str](), scenario_of(name), dict[tuple[str, int], Floats]()
+    for share in (100, *shares):
+        for choice in CHOICES if share < 100 else CHOICES[:1]:
+            values = np.array([measured(scenario, choice, share, run) for run in range(runs)])
+            found[choice, share] = values[:, 0]
+            if out is not None:
+                row = {"scene": name, "choice": choice, "share": share, "ospa": values[:, 0].tolist()}
+                with out.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps(row) + "\n")
+            print(name, share, choice, with_error(values[:, 0]), f"{values[:, 1].mean():.0f} %", flush=True)
+        if share == 100:
+            lines.append(f"| {name} | 100 | {with_error(found['planner', 100])} {'| ' * 6}|")
+            continue
+        cells = [with_error(found[choice, share]) for choice in CHOICES]
+        cells += [more(found[choice, share], found["planner", 100]) for choice in ("planner", "at once")]
+        lines.append(f"| {name} | {share} | {' | '.join(cells)} |")
+    return lines
+
+
+def more(values: Floats, of_all: Floats) -> str:
+    """The paired difference, and what share of the error it is."""
+    gap = values - of_all
+    return f"{with_error(gap, '+')} ({100.0 * gap.mean() / of_all.mean():+.0f} %)"
 
 
 def main() -> None:
+    """Run, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scenes", nargs="+", choices=tuple(NUMBERS), default=["eight-mobile", "paper-a"])
-    parser.add_argument("--runs", type=int, default=10, help="of each scene and choice; at least 2")
+    parser.add_argument("scenes", nargs="*", default=list(SCENES), help="of: " + ", ".join(SCENES))
+    parser.add_argument("--shares", type=int, nargs="+", default=list(SHARES), help="of the sensors that scan, %%")
+    parser.add_argument("--runs", type=int, default=5)
+    parser.add_argument("--out", type=Path, help="file to which the results of the runs are appended")
     parser.add_argument("--write", type=Path, help="page with the two marks between which the table goes")
     given = parser.parse_args()
-    lines = ["| scene | sensors that scan | scans | chosen | OSPA, m | more than with all, m | of it |"]
-    lines.append("| --- | ---: | ---: | --- | ---: | ---: | ---: |")
-    print("\n".join(lines), flush=True)
+    head = "| Scene | On, % | Planner | Periodic | Random | Nearest | At once | Planner, more | At once, more |"
+    lines = [head, "| --- |" + " ---: |" * 8]
     for name in given.scenes:
-        for line in rows(name, NUMBERS[name], given.runs):
-            print(line, flush=True)
-            lines.append(line)
+        lines += rows(name, given.shares, given.runs, given.out)
+    print("\n".join(lines))
     if given.write is not None:
         write_between(given.write, "shifts.py", "\n".join(lines))
 

@@ -20,6 +20,7 @@ from vedette.scenarios import Scenario, load_scenario
 from vedette.scenarios.build import build_planner
 from vedette.scenarios.dumping import dump_scenario
 from vedette.scenarios.strategy_cautions import strategy_cautions
+from vedette.simulation import RunRecord
 
 Check = Callable[[np.random.Generator], object]
 
@@ -60,6 +61,16 @@ def strategies(scenario: Scenario) -> list[str]:
     return found
 
 
+def check_limit(scenario: Scenario, name: str, record: RunRecord) -> None:
+    """No more sensors scan after decisions than `max_active` says, where all can be switched off."""
+    model = scenario.model
+    limits = [own.sensors for own in model.control.constraints if own.kind == "max_active"]
+    keeps = name in STRATEGIES[:-2] or (name in model.planners and model.planners[name].kind != "custom")
+    if limits and keeps and all(own.switchable for own in model.sensors):
+        on = (~record.off[model.decision_steps[0] :]).sum(axis=1)
+        assert on.max(initial=0) <= min(limits), f"{name}: {on} sensors scan"
+
+
 def run(scenario: Scenario) -> int:
     """Run and measure it under every strategy; the number of these."""
     names = strategies(scenario)
@@ -67,6 +78,7 @@ def run(scenario: Scenario) -> int:
         try:
             record = run_scenario(scenario, name, seed=0, num_threads=1)
             measure_run(record, scenario, own_metrics(scenario))
+            check_limit(scenario, name, record)
         except Exception as error:
             error.add_note(f"{name}: {dump_scenario(scenario.model)}")
             raise
