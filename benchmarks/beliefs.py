@@ -40,7 +40,7 @@ from scenes import Scene
 
 from calibration import ALLOWED, ENOUGH, EXISTENCES, NUMBERS, Bins, Calibration, Case, calibration, cases
 
-FILTERS = ("default", "LMB", "delta-GLMB 300")
+FILTERS = ("default", "default, detection at centres", "LMB", "delta-GLMB 300")
 VERDICTS = ("pass", "unclear", "fail")
 RUNS_OF_A_SCENE = 100_000  # numbers of runs are unlike in different scenes, so that their targets are
 

@@ -180,7 +180,7 @@ def cases(errors: Iterable[float] = ()) -> Iterator[Case]:
     filters["delta-GLMB 300"] = {"filter.kind": "delta_glmb"}
     unlabelled = {"PHD": "phd", "CPHD": "cphd", "CB-MeMBer": "cb_member"}
     filters |= {name: {"filter.kind": kind} for name, kind in unlabelled.items()}
-    filters["default, mean detection"] = {**filters["default"], "filter.detection_at": "mean"}
+    filters["default, detection at centres"] = {**filters["default"], "filter.detection_at": "centre"}
     for name, fields in filters.items():
         yield Case(name, fields)
     yield Case("central, LMB", filters["LMB"], {"kind": "central"})

@@ -44,6 +44,11 @@ class DetectionModel:
             positive("DetectionModel.reach", self.reach)
         object.__setattr__(self, "params", params_vector("DetectionModel.params", self.params))
 
+    @property
+    def is_constant(self) -> bool:
+        """Whether it is `constant_detection`, the same everywhere."""
+        return self.function is functions.constant
+
     def prob(self, states: ArrayLike, pose: ArrayLike) -> Floats:
         """(n,) detection probabilities of (n, state_dim) states."""
         table, at = state_table("states", states), pose_vector("pose", pose)

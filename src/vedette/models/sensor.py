@@ -53,9 +53,9 @@ class SensorModel:
         method: "ekf", "ukf", "ckf", or "auto": the EKF where measurements are close to linear for their noise, else a
             linearisation of its own for each measurement; the UKF where the measurement has no Jacobian.
         detection_at: of a predicted Gaussian, the filters take the probability of detection at its "centre", as the
-            paper does, or its "mean" over the Gaussian: by the model's `mean_function`, or by nodes over the position.
-            With the mean, where P_D differs over the Gaussian, a miss moves the density to where it is low, and a
-            detection has the mean P_D of the density after it.
+            paper does, or its "mean" over the Gaussian, by nodes over the position. With the mean, where P_D differs
+            over the Gaussian, a miss moves the density to where it is low, and a detection has the mean P_D of the
+            density after it.
         meas_dim: number of components of a measurement.
 
     Raises:
@@ -102,8 +102,14 @@ class SensorModel:
             implausible(field, expected, got, meant)
 
     def to_kernel(self, detection_at: str | None = None) -> Sensor:
-        """The bundle of functions and parameters that kernels take. detection_at: instead of the sensor's own."""
-        return _bundle_of(self, (self.detection_at if detection_at is None else detection_at) == "mean")
+        """The bundle of functions and parameters that kernels take.
+
+        detection_at: instead of the sensor's own; its "mean" is then by the model's `mean_function`, where it has one.
+        """
+        if self.detection.is_constant or (detection_at or self.detection_at) == "centre":
+            return _bundle_of(self, AT_CENTRE)
+        by_nodes = detection_at is None or self.detection.mean_function is None
+        return _bundle_of(self, BY_NODES if by_nodes else CLOSED_FORM)
 
     def mean_detection(self, means: ArrayLike, covs: ArrayLike, pose: ArrayLike) -> Floats:
         """(n,) mean probability of detection over each of n Gaussians, whatever `detection_at` says.
@@ -140,10 +146,9 @@ class SensorModel:
 
 
 @lru_cache(maxsize=1000)
-def _bundle_of(model: SensorModel, over_gaussian: bool) -> Sensor:
+def _bundle_of(model: SensorModel, rule: int) -> Sensor:
     """Made once a model, as kernels know a bundle that they have met."""
     jacobian, mean = model.measurement.jacobian, model.detection.mean_function
-    rule = AT_CENTRE if not over_gaussian else BY_NODES if mean is None else CLOSED_FORM
     return Sensor(
         model.measurement.function,
         _no_measurement_jacobian if jacobian is None else jacobian,
@@ -158,5 +163,5 @@ def _bundle_of(model: SensorModel, over_gaussian: bool) -> Sensor:
         model.measurement.angular,
         resolve_method("SensorModel.method", model.method, jacobian is not None, bends=not model.measurement.is_linear),
         rule,
-        _NODES if over_gaussian else _NO_NODES,
+        _NO_NODES if rule == AT_CENTRE else _NODES,
     )

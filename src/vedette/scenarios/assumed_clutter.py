@@ -136,7 +136,7 @@ def _rate(model: ScenarioModel, recording: RecordedScans, s: int, folder: FilePa
 def _looks(model: ScenarioModel, recording: RecordedScans, s: int, folder: FilePath) -> list[Look]:
     """The scans of a sensor as places; none where it measures no places or its noise is not known."""
     section = model.sensors[s]
-    sensor = section.build(model.region.build(), model.filter.gaussian_method, folder, model.filter.detection_at)
+    sensor = section.build(model.region.build(), model.filter.gaussian_method, folder, model.filter.detection_taken_at)
     kind, stds, found = section.measurement.kind, sensor.noise.least_stds, list[Look]()
     if kind not in PLACED or stds is None:
         return found

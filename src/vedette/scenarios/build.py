@@ -101,7 +101,7 @@ def build_sensors(scenario: Scenario) -> tuple[MobileSensor, ...]:
     )
     found = []
     for sensor in model.sensors:
-        known = sensor.build(region, method, folder, model.filter.detection_at)
+        known = sensor.build(region, method, folder, model.filter.detection_taken_at)
         local = model.filter.build(targets, known, folder)
         _check_own(scenario, sensor, known, local)
         found.append(MobileSensor(local, _platform(model, sensor, folder), _scan_times(model, sensor)))

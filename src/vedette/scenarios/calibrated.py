@@ -76,7 +76,7 @@ def problem_of(scenario: Scenario, *, position: bool = False, bearings: Bearings
                 within = wide if sensor.clutter.kind == "region" else region
                 more[s] = changes.get("rate", 0.0) - sensor.clutter.rate if changes else 0.0
                 sensor = sensor.model_copy(update={"clutter": sensor.clutter.model_copy(update=changes)})
-                built = sensor.build(within, method, folder, model.filter.detection_at)
+                built = sensor.build(within, method, folder, model.filter.detection_taken_at)
                 if sensor.clutter.kind in _BUILT_IN:
                     raw = at_raw_measurements(built.clutter, *bias_of(biased[s], recording.bearings[s]))
                     built = replace(built, clutter=raw)

@@ -280,7 +280,7 @@ def _spread(model: ScenarioModel, measured: Sequence[Sequence[Floats]], folder: 
     region, method = model.region.build(), model.filter.gaussian_method
     found = list[Floats]()
     for section, scans in zip(model.sensors, measured, strict=True):
-        stds = section.build(region, method, folder, model.filter.detection_at).noise.least_stds
+        stds = section.build(region, method, folder, model.filter.detection_taken_at).noise.least_stds
         if stds is None or not scans:
             continue
         found.append(place_stds(section.measurement.kind, stds, np.concatenate(scans)))

@@ -14,11 +14,9 @@ AT_CENTRE = 0
 CLOSED_FORM = 1
 BY_NODES = 2
 
-# Directions from the mean, in standard deviations, in which the probability of detection is looked at.
-_FAR, _DIAGONAL = 2.5, 2.5 * math.sqrt(0.5)
-# P_D is the same over a Gaussian if it differs by less than the first; the second is the least share of its variance
-# that a miss leaves.
-_LEAST_DIFFERENCE, _LEAST_VARIANCE = 1e-3, 0.02
+# P_D is the same over a Gaussian if it differs by no more than this at the nodes, first at every other one.
+_LEAST_DIFFERENCE, _STRIDE = 0.01, 2
+_LEAST_VARIANCE = 0.02  # share of its variance that a miss leaves
 
 
 @inlined
@@ -47,47 +45,46 @@ def _root_of_position(cov: Floats) -> tuple[float, float, float]:
 
 
 @inlined
-def _mean_of_nodes(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, state: Floats) -> float:
-    """Sum of weight * P_D at mean + L (standard deviates), L L' the covariance of the position."""
+def _over_nodes(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, state: Floats) -> tuple[float, float]:
+    """Mean of P_D over a Gaussian, and by how much it differs in different parts of it; no mean where it does not.
+
+    The sum of weight * P_D at mean + L (standard deviates), L L' the covariance of the position; the rest of the state
+    stays at its mean.
+    """
     nodes, total, root = sensor.detection_nodes, 0.0, _root_of_position(cov)
+    least, most = 1.0, 0.0
     for j in range(mean.shape[0]):
         state[j] = mean[j]
-    for i in range(nodes.shape[0]):
-        total += nodes[i, 0] * _at(sensor, pose, mean, root, nodes[i, 1], nodes[i, 2], state)
-    return min(total, 1.0)  # weights sum to 1 but for rounding
+    for first in range(_STRIDE):
+        for i in range(first, nodes.shape[0], _STRIDE):
+            found = _at(sensor, pose, mean, root, nodes[i, 1], nodes[i, 2], state)
+            total += nodes[i, 0] * found
+            least, most = min(least, found), max(most, found)
+        if most - least <= _LEAST_DIFFERENCE:
+            break
+    return min(total, 1.0), most - least  # weights sum to 1 but for rounding
+
+
+@inlined
+def detection_and_edge(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, state: Floats) -> tuple[float, bool]:
+    """Probability of detection of a Gaussian, and whether the edge of what the sensor sees passes through it.
+
+    By `sensor.detection_rule` at its mean, or the mean over it; by nodes, that at its mean where P_D differs little.
+    There is no edge but by nodes. state: (state_dim,) to be written.
+    """
+    if sensor.detection_rule == CLOSED_FORM:
+        return checked(sensor.mean_prob_detection(mean, cov, pose, sensor.detection_params)), False
+    if sensor.detection_rule == BY_NODES:
+        found, difference = _over_nodes(sensor, pose, mean, cov, state)
+        if difference > _LEAST_DIFFERENCE:
+            return found, True
+    return checked(sensor.prob_detection(mean, pose, sensor.detection_params)), False
 
 
 @inlined
 def detection_probability(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, state: Floats) -> float:
-    """Of a target at the mean, or the mean over N(mean, cov), by `sensor.detection_rule`.
-
-    By nodes the position varies and the rest of the state stays at its mean. state: (state_dim,) to be written.
-    """
-    if sensor.detection_rule == AT_CENTRE:
-        return checked(sensor.prob_detection(mean, pose, sensor.detection_params))
-    if sensor.detection_rule == CLOSED_FORM:
-        return checked(sensor.mean_prob_detection(mean, cov, pose, sensor.detection_params))
-    return _mean_of_nodes(sensor, pose, mean, cov, state)
-
-
-@inlined
-def detection_differs(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, state: Floats) -> bool:
-    """Whether P_D is another in different parts of a Gaussian; never where it is taken at its centre."""
-    if sensor.detection_rule == AT_CENTRE:
-        return False
-    root = _root_of_position(cov)
-    if root[0] == 0.0 or root[2] == 0.0:
-        return False
-    for j in range(mean.shape[0]):
-        state[j] = mean[j]
-    least = _at(sensor, pose, mean, root, 0.0, 0.0, state)
-    most = least
-    for k in range(4):
-        u, v = (1.0 - k, 0.0) if k % 2 == 0 else (0.0, 2.0 - k)
-        for far, x, y in ((_FAR, u, v), (_DIAGONAL, u - v, u + v)):
-            found = _at(sensor, pose, mean, root, far * x, far * y, state)
-            least, most = min(least, found), max(most, found)
-    return most - least > _LEAST_DIFFERENCE
+    """The first of `detection_and_edge`."""
+    return detection_and_edge(sensor, pose, mean, cov, state)[0]
 
 
 @inlined
@@ -97,7 +94,8 @@ def moments_if_missed(
     """Write mean and covariance of (1 - P_D(x)) N(x; mean, cov), normalised: of a target that was missed.
 
     Moments of the position are sums over nodes, those of the rest of the state follow by its regression on the
-    position. They stay as they were where P_D is 1 at every node. state: (state_dim,) to be written.
+    position. They stay as they were where P_D is 1 at every node, or the position is known. state: (state_dim,) to be
+    written.
     """
     n, nodes, root = mean.shape[0], sensor.detection_nodes, _root_of_position(cov)
     for j in range(n):
@@ -112,7 +110,7 @@ def moments_if_missed(
         out_mean[i] = mean[i]
         for j in range(n):
             out_cov[i, j] = cov[i, j]
-    if total <= 0.0:
+    if total <= 0.0 or root[0] == 0.0 or root[2] == 0.0:
         return
     u, v = u / total, v / total
     # The covariance of the standard deviates less I, what that of the nodes is where all are missed alike.

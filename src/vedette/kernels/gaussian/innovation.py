@@ -9,7 +9,7 @@ import numpy as np
 from vedette.errors import ModelError
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Bools, Floats, Sensor
-from vedette.kernels.gaussian.detection import detection_differs, detection_probability
+from vedette.kernels.gaussian.detection import detection_and_edge
 from vedette.kernels.gaussian.joseph import posterior_of_squares
 from vedette.kernels.gaussian.linalg import LOG_2PI, cholesky_of_size, log_det_from_factor
 from vedette.kernels.gaussian.scratch import Scratch, wrap_angle
@@ -198,8 +198,7 @@ def log_norm_of_factor(factor: Floats) -> float:
 def expect(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, at: int, out: Innovation, scratch: Scratch) -> None:
     """Fill entry `at` of `out`; noise is taken at the predicted mean (paper-notes 3), detection as the sensor says."""
     expect_measurement(sensor, pose, mean, cov, at, out, scratch)
-    out.prob_detection[at] = detection_probability(sensor, pose, mean, cov, scratch.points[0])
-    out.at_edge[at] = detection_differs(sensor, pose, mean, cov, scratch.points[0])
+    out.prob_detection[at], out.at_edge[at] = detection_and_edge(sensor, pose, mean, cov, scratch.points[0])
 
 
 @inlined

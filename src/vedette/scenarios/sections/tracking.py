@@ -53,11 +53,18 @@ class _Sensing(Section):
         description="Extended, unscented or cubature Kalman; auto: extended where Jacobians exist, but linearised "
         "again at each measurement of a target whose position is too uncertain for the sensor's noise [-].",
     )
-    detection_at: DetectionAt = Field(
-        default="centre",
+    detection_at: DetectionAt | None = Field(
+        default=None,
         description="Of a predicted Gaussian, the probability of detection at its centre, as in the paper, or its mean "
-        "over the Gaussian, where a miss also moves the density out of view: for sensors whose view ends [-].",
+        "over the Gaussian, where a miss also moves the density out of view; none: mean with kind factored_glmb, else "
+        "centre [-].",
     )
+
+    @property
+    def detection_taken_at(self) -> DetectionAt:
+        """Where the probability of detection is taken, whether it was given or not."""
+        usual: DetectionAt = "mean" if getattr(self, "kind", None) == "factored_glmb" else "centre"
+        return self.detection_at or usual
 
 
 @derived("vedette.filters.factored:FactoredGlmbFilter", only=("max_split_error", "max_factor_labels", "births"))
