@@ -159,7 +159,7 @@ def test_continued_courses_stay_outside(scene: str) -> None:
     pose = np.array([*graph.outside(np.array([start]))[0], 0.0])
     options = options_of(sensors, pose[np.newaxis], ONCE)
     times = np.arange(1.0, 40.0)
-    [later] = Beyond.of(sensors, options, *drawing(belief), graph).continued(ONCE.horizon_times(), times)
+    [later] = Beyond.of(sensors, options, *drawing(belief), graph, None).continued(ONCE.horizon_times(), times)
     allowed = ~graph.is_barred(pose[:2], options[0].courses[:, :, :2])
     distances = graph.to(np.array([goal]), pose[:2]).distances
     ends = [options[0].courses[c, -1, :2] for c in np.flatnonzero(allowed)]
@@ -183,7 +183,7 @@ def test_sensors_without_courses_have_none_beyond() -> None:
     sensors = searchers(2)
     first, second = options_of(sensors, poses, ONCE)
     options = first, second._replace(courses=second.courses[:0])
-    beyond = Beyond.of(sensors, options, *drawing(targets([85.0, 10.0])), graph)
+    beyond = Beyond.of(sensors, options, *drawing(targets([85.0, 10.0])), graph, None)
     found = beyond.continued(ONCE.horizon_times(), np.arange(1.0, 9.0))
     assert [own.courses.shape for own in found] == [(9, 8, 3), (0, 8, 3)]
 

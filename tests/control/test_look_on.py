@@ -104,13 +104,15 @@ def test_between_poses_sensors_go_straight_and_after_them_by_as_much_again() -> 
                 np.testing.assert_allclose(at[axis], within + again * (course[-1, axis] - pose[axis]), rtol=1e-12)
 
 
-def test_a_camera_stays_as_it_was_at_the_end() -> None:
-    """Until then it is as at the next pose that is known; what carries it goes on."""
+def test_a_camera_that_still_turns_turns_on() -> None:
+    """Until then it is as at the next pose that is known; one that has arrived stays, and what carries it goes on."""
     platform, pose = Carried(Courses(SPEED, (0.0,)), Pointing((90.0, -40.0), turn_rate_deg=10.0)), np.zeros(5)
     pose[4] = 0.5
     own = options_at("platform", platform, pose, HORIZON)
     found = continued(own, HORIZON, TIMES).courses
-    np.testing.assert_allclose(np.degrees(found[0, :, 3]), [40.0, 40.0, *[80.0] * 8])
+    np.testing.assert_allclose(
+        np.degrees(found[0, :, 3]), [40.0, 40.0, 80.0, 80.0, 100.0, 120.0, 160.0, -175.0, -120.0, 40.0]
+    )
     np.testing.assert_allclose(np.degrees(found[1, :, 3]), [-40.0] * 10)
     np.testing.assert_array_equal(found[:, :, 4], 0.5)
     np.testing.assert_allclose(found[:, :, 0], np.tile(SPEED * TIMES, (2, 1)))
@@ -123,7 +125,7 @@ def test_a_camera_stays_as_it_was_at_the_end() -> None:
 def looks(belief: LMB, poses: Any, sensors: Any = None) -> Any:
     of = placed(belief, poses, sensors)
     options = options_of(of.sensors, of.poses, of.settings)
-    return Beyond.of(of.sensors, options, *drawing(belief), None).horizons(of.settings)
+    return Beyond.of(of.sensors, options, *drawing(belief), None, None).horizons(of.settings)
 
 
 EAST, WEST = [0.0, 0.0, 0.0], [-3000.0, 0.0, math.pi]

@@ -34,6 +34,18 @@ def test_it_turns_the_shorter_way_at_its_rate(to, way):
         assert -math.pi < pose[3] <= math.pi
 
 
+def test_it_may_be_blind_while_it_turns():
+    """The turn of 90 degrees takes 4.5 s, none 0 s; a camera that turns at once is never blind."""
+    times, actions = np.array([0.0, 1.0, 4.5, 20.0]), np.array([[80.0], [170.0]])
+    slow = Pointing([80.0, 170.0], turn_rate_deg=20.0, blind_while_turning=True)
+    turning = slow.scans(POSE, actions, times)
+    np.testing.assert_array_equal(turning, [[False, False, True, True], [True] * 4])
+    assert Pointing([80.0, 170.0], blind_while_turning=True).scans(POSE, actions, times).all()
+    assert Pointing([80.0], turn_rate_deg=20.0).scans(POSE, actions, times).all()
+    carried = options_at("platform", Carried(Still(), slow), POSE, times[1:])
+    np.testing.assert_array_equal(carried.scans[:, 0], [False, True])
+
+
 def test_it_zooms_in_every_direction():
     platform = Pointing([0.0, 90.0], half_widths_deg=[5.0, 30.0])
     assert platform.columns == ("pointing_deg", "half_width_deg")

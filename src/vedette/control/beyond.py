@@ -10,11 +10,12 @@ import numpy as np
 
 from vedette.control.constraints import Paths, VisibilityGraph
 from vedette.control.settings import MobileSensor, PlanningSettings
-from vedette.densities import LMB
+from vedette.control.turning import seconds_to_search, seconds_to_turn, turn_rate, turned_on, views_a_second
+from vedette.densities import LMB, UndetectedIntensity
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models.functions import numbers_at
 from vedette.platforms import Options
-from vedette.platforms.camera import line_of_sight
+from vedette.platforms.camera import POINTING, is_camera, line_of_sight
 
 # Targets that exist with less probability draw no sensor from afar.
 _LEAST_EXISTENCE = 0.1
@@ -39,6 +40,7 @@ class Beyond:
         labels: (num_targets, 2) of the targets that draw sensors from afar.
         places: (num_targets, 2) m, where they are expected.
         paths: of each sensor to these places; None: nothing is forbidden at all times.
+        undetected: where else there may be targets; None: it is not known.
     """
 
     options: tuple[Options, ...]
@@ -46,6 +48,7 @@ class Beyond:
     labels: Ints
     places: Floats
     paths: tuple[Paths, ...] | None
+    undetected: UndetectedIntensity | None
 
     @classmethod
     def of(
@@ -55,11 +58,12 @@ class Beyond:
         labels: Ints,
         places: Floats,
         graph: VisibilityGraph | None,
+        undetected: UndetectedIntensity | None,
     ) -> Beyond:
         """Collect it. graph: of the zones that constraints forbid; None: there are none."""
         reaches = np.array([sight(sensor, own.pose) for sensor, own in zip(sensors, options, strict=True)])
         paths = None if graph is None else tuple(graph.to(places, own.pose[:2]) for own in options)
-        return cls(tuple(options), reaches, labels, places, paths)
+        return cls(tuple(options), reaches, labels, places, paths, undetected)
 
     def horizons(self, settings: PlanningSettings) -> tuple[PlanningSettings, ...]:
         """The settings of further horizons, half way and at the end; none where all see what there is to see.
@@ -67,21 +71,22 @@ class Beyond:
         Within the horizon, a sensor that sees 250 m and goes 20 m has nothing to gain from a target 300 m off, and of
         courses worth the same the first is taken. So all sensors are taken to go on as they do, until each may have
         come to a target and each target may be reached by one of them, and the loss is the mean of those at all these
-        times. Targets that no allowed path brings into sight do not count. Where an action switches a sensor off, there
-        is at least one more horizon: otherwise nothing would depend on where it goes meanwhile.
+        times. Targets that no allowed path brings into sight do not count. Cameras turn to targets, too, and on until
+        next to no undetected target is where none of them has looked. Where an action switches a sensor off, there is
+        at least one more horizon: otherwise nothing would depend on where it goes meanwhile.
         """
         horizon = settings.horizon_steps * settings.horizon_period
         speeds = np.array([_speed(own, horizon) for own in self.options])
-        if len(self.places) == 0 or not (speeds > 0.0).all():
+        turns = np.array([turn_rate(own, horizon) for own in self.options])
+        if not ((speeds > 0.0) | (turns > 0.0)).all():
             return ()
-        gaps = np.stack([self._gaps(s) for s in range(len(self.options))])
-        seconds = np.maximum(gaps - self.reaches[:, np.newaxis], 0.0) / speeds[:, np.newaxis]
-        beyond = _STAY * max(_longest(seconds.min(axis=0)), _longest(seconds.min(axis=1)))
-        if not all(own.scans.any(axis=1).all() for own in self.options):
+        beyond = _STAY * max(self._seconds_to_targets(speeds, turns), self._seconds_to_search(turns))
+        if len(self.places) and not all(own.scans.any(axis=1).all() for own in self.options):
             beyond = max(beyond, horizon)
         if beyond == 0.0:
             return ()
-        rate = float((speeds / self.reaches).max())
+        views = map(views_a_second, self.options, turns.tolist())
+        rate = max(float((speeds / self.reaches).max()), *views)
         total = min(horizon + beyond, max(_MOST_STEPS / rate if rate > 0.0 else math.inf, 2.0 * horizon))
         num = min(max(_LEAST_STEPS, math.ceil(total * rate)), _MOST_STEPS)
         return tuple(replace(settings, horizon_steps=steps, horizon_period=total / num) for steps in (num // 2, num))
@@ -109,6 +114,24 @@ class Beyond:
         assert self.paths is not None
         rows = zip(self.paths, self.options, strict=True)
         return np.concatenate([paths.distances(own.pose[np.newaxis, :2]) for paths, own in rows])
+
+    def _seconds_to_targets(self, speeds: Floats, turns: Floats) -> float:
+        """s until each sensor may have come to a target, and each target may be reached by one of them."""
+        if len(self.places) == 0:
+            return 0.0
+        gaps = np.stack([self._gaps(s) for s in range(len(self.options))]) - self.reaches[:, np.newaxis]
+        moving = np.full(gaps.shape, np.inf)
+        np.divide(gaps, speeds[:, np.newaxis], out=moving, where=speeds[:, np.newaxis] > 0.0)
+        moving[gaps <= 0.0] = 0.0
+        turning = [seconds_to_turn(own, rate, self.places) for own, rate in zip(self.options, turns, strict=True)]
+        seconds = np.maximum(moving, turning)
+        return max(_longest(seconds.min(axis=0)), _longest(seconds.min(axis=1)))
+
+    def _seconds_to_search(self, turns: Floats) -> float:
+        """s until cameras have looked where undetected targets are; 0 where none turns, or nothing is known of them."""
+        if self.undetected is None or not turns.any():
+            return 0.0
+        return seconds_to_search(self.options, turns.tolist(), self.reaches, self.undetected, _LEAST_EXISTENCE)
 
     def _gaps(self, s: int) -> Floats:
         """(num_targets,) m from the end of the best course of a sensor to the targets; straight where it sees them."""
@@ -192,8 +215,8 @@ def continued(own: Options, horizon: Floats, times: Floats) -> Options:
     """The options with courses (num_courses, num_times, pose_dim) at other times, s, from now on.
 
     horizon: (num_steps,) s of the poses that there are. Between them a sensor goes straight; after the last it goes on
-    by as much as it went over the whole horizon, again and again, what else its pose has stays, and it scans, even
-    where its action keeps it from scanning up to then.
+    by as much as it went over the whole horizon, again and again, a camera that still turns turns on, what else its
+    pose has stays, and it scans, even where its action keeps it from scanning up to then.
     """
     start = np.broadcast_to(own.pose, (len(own.courses), 1, len(own.pose)))
     known = np.concatenate([start, own.courses], axis=1)
@@ -206,6 +229,9 @@ def continued(own: Options, horizon: Floats, times: Floats) -> Options:
     moved = known[:, -1:, :2] - known[:, :1, :2]
     straight = known[:, after - 1, :2] * (1.0 - share) + known[:, after, :2] * share
     courses[:, :, :2] = straight + rounds[:, np.newaxis] * moved
+    if is_camera(own.pose):
+        later = rounds > 0.0
+        courses[:, later, POINTING] = turned_on(own, horizon, times[later])
     scans = (rounds > 0.0) | own.scans[:, after - 1]
     return own._replace(courses=np.ascontiguousarray(courses), scans=scans)
 

@@ -93,7 +93,7 @@ class Evaluator:
         prediction: Any = predicted(state.fused, motion, settings.horizon_steps, settings.horizon_period)
         found = [lay_out(sensors, options, rule, settings, reward, state, prediction, rng=rng)]
         due = isinstance(reward, ExpectedLossReward) if horizons is None else len(horizons) > 0
-        beyond = Beyond.of(sensors, options, *drawing(prediction), graph) if due else None
+        beyond = Beyond.of(sensors, options, *drawing(prediction), graph, state.undetected) if due else None
         notes = () if beyond is None else beyond.notes()
         if horizons is None:
             horizons = () if beyond is None else beyond.horizons(settings)

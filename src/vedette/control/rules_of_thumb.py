@@ -96,7 +96,7 @@ class RulePlanner:
         mask = mask_of_decision(self.constraints, self.sensors, options, state.fused, at, self.settings)
         estimate, graph = self.estimate(state.fused, state.step), visibility_graph(self.constraints)
         places = np.ascontiguousarray(np.asarray(estimate.means)[:, :2])
-        beyond = Beyond.of(self.sensors, options, estimate.labels, places, graph) if graph is not None else None
+        beyond = Beyond.of(self.sensors, options, estimate.labels, places, graph, None) if graph is not None else None
         goals = self._goals(places, at[:, :2], beyond) if len(places) else [None] * len(options)
         merits = [_merits(own, goal, graph) for own, goal in zip(options, goals, strict=True)]
         joint = tuple(

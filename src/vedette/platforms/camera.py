@@ -16,14 +16,19 @@ from vedette.models.measurement import wrap_angles
 from vedette.platforms.base import Platform, check_platform, prices_of, scans_of
 
 POSE_DIM = 5
+_ARRIVED = 1e-9  # rad off where it is to point
 # Of its pose; sensors that are no cameras have no half width, or one of 0.
 POINTING, HALF_WIDTH = 3, 4
 
 
+def is_camera(pose: Floats) -> bool:
+    """Whether a pose says where a camera points."""
+    return len(pose) > HALF_WIDTH and bool(pose[HALF_WIDTH] > 0.0)
+
+
 def line_of_sight(pose: Floats) -> float:
     """rad, along which a sensor looks: where a camera points, the heading of any other."""
-    is_camera = len(pose) > HALF_WIDTH and pose[HALF_WIDTH] > 0.0
-    return float(pose[POINTING] if is_camera else pose[2])
+    return float(pose[POINTING] if is_camera(pose) else pose[2])
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +43,7 @@ class Pointing:
         half_widths_deg: half widths that it may zoom to at once; none: it does not zoom [deg].
         turn_rate_deg: how fast it turns, the shorter way, counter-clockwise where both are as long; none: at once
             [deg/s].
+        blind_while_turning: whether it makes no scan before it points where it is to point.
 
     Raises:
         InputError: no pointing, or one that is not finite; half widths outside (0, 180]; a rate that is not above 0.
@@ -47,6 +53,7 @@ class Pointing:
     relative: bool = False
     half_widths_deg: Sequence[float] = ()
     turn_rate_deg: Positive | None = None
+    blind_while_turning: bool = False
 
     def __post_init__(self) -> None:
         for name in ("pointings_deg", "half_widths_deg"):
@@ -87,6 +94,13 @@ class Pointing:
         if self.half_widths_deg:
             poses[:, HALF_WIDTH] = math.radians(action[1])
         return poses
+
+    def scans(self, pose: Floats, actions: Floats, times: Floats) -> Bools:
+        """(num_actions, num_times) False where it turns and is blind; no turn takes time where it turns at once."""
+        if not self.blind_while_turning or self.turn_rate_deg is None:
+            return np.ones((len(actions), len(times)), np.bool_)
+        turns = np.abs(wrap_angles(np.radians(actions[:, :1]) - pose[POINTING]))
+        return np.asarray(turns <= np.radians(self.turn_rate_deg) * times + _ARRIVED)
 
 
 def _check(pose: Floats) -> None:
