@@ -184,6 +184,9 @@ def test_planners_search_without_a_section() -> None:
     assert anywhere(*ONE, BORN, near)[0].grid.num_cells > 16 * 16
     for more in ((ONE[1], BORN), ONE, (*ONE, BORN, ("control: {", "control: {undetected_worth: 0.0, "))):
         assert anywhere(*more) == (None, False)
+    of_sites, told = anywhere(*ONE, near)  # where a view has an edge
+    assert (of_sites.birth_rate, of_sites.expected, told) == (0.0, 0.0, True)
+    assert of_sites.grid.num_cells > 16 * 16
     given = Scenario(parse_scenario(changed(*SHORT, *ONE, BORN)), Path("f.yaml"))
     record = run_scenario(given, "jdm", seed=1)
     assert any(decision.plan.explain().of_undetected for decision in record.decisions)
@@ -209,6 +212,15 @@ def test_an_unexplained_measurement_starts_a_track_by_the_odds_of_the_intensity(
         assert labels.tolist() == [[1, 1]]
         existence.append(found[0] / (1.0 - found[0]))
     assert existence[0] / existence[1] == pytest.approx(10.0, rel=1e-6)
+
+
+def test_detection_is_its_mean_where_undetected_targets_are_an_intensity() -> None:
+    for kind, expected in (("factored_glmb", "mean"), ("lmb", "centre"), ("delta_glmb", "centre")):
+        fusion = ("fusion: {kind: cm_delta_glmb, weights: [0.5, 0.5]}", "fusion: {kind: sequential}")
+        changes = ("filter: {kind: m_delta_glmb}", f"filter: {{kind: {kind}}}"), fusion
+        given = Scenario(parse_scenario(changed(*changes)), Path("f.yaml"))
+        assert given.model.filter.detection_taken_at == expected
+        assert build_experiment(given).tracker.sensors[0].detection_at == expected
 
 
 def test_where_no_track_starts_from_measurements_estimates_are_the_same() -> None:

@@ -84,11 +84,7 @@ def facts(model: ScenarioModel) -> list[tuple[str, str]]:
         ("fusion", _fusion(model.fusion)),
         *(() if model.network is None else (("network", settings(model.network)),)),
         *(() if model.undetected is None else (("not yet found", _undetected(model.undetected)),)),
-        *(
-            (("not yet found", "searched for where targets may be born, at a learnt birth rate"),)
-            if searches(model)
-            else ()
-        ),
+        *((("not yet found", _searched(model)),) if searches(model) else ()),
         ("estimate", settings(model.estimator)),
         ("decisions", f"after {_steps(model.decision_steps)}" if model.decision_steps else "none"),
         ("horizon", f"{counted(model.horizon[0], 'step')} of {model.horizon[1]:g} s"),
@@ -130,6 +126,11 @@ def _constraint(section: Section) -> str:
         words += f", polygon of {len(polygon)} corners"
         words += f", {counted(len(holes), 'hole')}" if (holes := getattr(section, "holes", ())) else ""
     return words if area is None else f"{words}, {_bounds(area)}"
+
+
+def _searched(model: ScenarioModel) -> str:
+    at_rate = "" if model.birth.from_measurements is None else ", at a learnt birth rate"
+    return f"searched for where targets may be born{at_rate}"
 
 
 def _undetected(section: UndetectedSection) -> str:

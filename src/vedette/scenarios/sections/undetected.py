@@ -12,7 +12,7 @@ from pydantic import Field
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import NonNegative, Positive, check
 from vedette.scenarios.sections.derived import Derived, derived
-from vedette.scenarios.sections.field_of_view import reach_of
+from vedette.scenarios.sections.field_of_view import field_of_view, reach_of
 from vedette.scenarios.sections.fusion import ONE_BELIEF
 from vedette.scenarios.sections.tracking import Filter
 from vedette.scenarios.sections.world import RegionSection
@@ -70,15 +70,18 @@ def undetected_anywhere(model: ScenarioModel, birth: BirthModel) -> UndetectedMo
     """The targets that appear anywhere, for filters whose undetected targets are an intensity.
 
     Their birth rate is learnt where the section does not give it and tracks start from measurements, and where planners
-    search: with a fixed rate that is too high they never stop searching. None where `birth.from_measurements` says all
-    there is to say. birth: of the filters, without them.
+    search: with a fixed rate that is too high they never stop searching. Of births at sites alone there are none, and
+    the cells serve planners, to which undetected targets are an intensity on these. None where `birth` says all there
+    is to say. birth: of the filters, without them.
     """
     section, measured, scan = model.undetected, birth.from_measurements, model.time.step_period
     if section is not None:
         found = section.build(model.region)
         if section.birth_rate is None and measured is not None:
             found = replace(found, birth_rate="learnt")
-    elif measured is None or not (measured.is_learnt or searches(model)):
+    elif measured is None:
+        return _cells_alone(model) if searches(model) else None
+    elif not (measured.is_learnt or searches(model)):
         return None
     elif (uniform := replace(measured, expected="learnt").uniform(_cells_a_side(model))) is not None:
         found = uniform
@@ -90,11 +93,27 @@ def undetected_anywhere(model: ScenarioModel, birth: BirthModel) -> UndetectedMo
     return replace(found, prior_rate=expected / (birth.period or scan))
 
 
+def _cells_alone(model: ScenarioModel) -> UndetectedModel:
+    """Cells of the region in which no target appears."""
+    from vedette.models import CellGrid, UndetectedModel
+
+    num = _cells_a_side(model)
+    return UndetectedModel(CellGrid(model.region.build(), num, num), 0.0)
+
+
 def searches(model: ScenarioModel) -> bool:
     """Whether planners look for undetected targets without a section that says how many there are."""
-    if model.undetected is not None or model.birth.from_measurements is None or not _has_intensity(model):
+    if model.undetected is not None or not _may_be_found(model):
         return False
     return bool(model.decision_steps) and model.control.undetected_worth != 0.0
+
+
+def _may_be_found(model: ScenarioModel) -> bool:
+    """Whether there is an intensity to search by: of targets born anywhere, or at sites where a view has an edge."""
+    if not _has_intensity(model):
+        return False
+    at_sites = bool(model.birth.sites) and any(field_of_view(sensor) is not None for sensor in model.sensors)
+    return at_sites or model.birth.from_measurements is not None
 
 
 def _cells_a_side(model: ScenarioModel) -> int:
@@ -129,7 +148,7 @@ def cells_of_undetected(model: ScenarioModel) -> Iterator[Finding]:
     section = model.undetected
     if section is None:
         worth = model.control.undetected_worth
-        if worth and not (_has_intensity(model) and model.birth.from_measurements is not None):
+        if worth and not _may_be_found(model):
             wanted = "0, or a section `undetected`, which says where such targets may be"
             yield ("control", "undetected_worth"), wanted, describe(worth)
         return
