@@ -111,6 +111,20 @@ def test_a_damaged_message_is_left_out_and_told(place: int, tmp_path: Path) -> N
     assert targets.reports.notes == ("left out: 1 line damaged (first: row 3)",)
 
 
+@pytest.mark.parametrize("place", [0, 1, 3, 6])
+def test_no_damaged_letter_at_the_start_of_a_message_loses_it_without_a_word(place: int, tmp_path: Path) -> None:
+    lines = [f"!{ais(1452603741 + 10 * k, mmsi='235000001', lon=-1.1, lat=50.79).partition('!')[2]}" for k in range(3)]
+    lines = [f"{line},{1452603741 + 10 * k}" for k, line in enumerate(lines)]
+    for byte in set(range(256)) - {10, 13}:
+        letters = bytearray(lines[1], "ascii")
+        if letters[place] == byte:
+            continue
+        letters[place] = byte
+        (tmp_path / "ships.nmea").write_bytes(b"\n".join([lines[0].encode(), bytes(letters), lines[2].encode()]))
+        table = read_table(tmp_path / "ships.nmea")
+        assert table.rows == [1, 2, 3] or table.notes, chr(byte)
+
+
 def of_two_sentences(time: int | None, number: int, **said: Any) -> list[str]:
     """A report of extended class B, cut in two: the second sentence has neither a time nor a place."""
     whole = encode_dict({"type": 19, "speed": 10.0, "course": 90.0, **said}, talker_id="AI")[0].split(",")[5]

@@ -15,6 +15,7 @@ AIS_ENDINGS = (".nmea", ".ais")
 _FIRST_TIME = 3e8  # s; numbers below are no times since 1970 of an AIS message
 _MILLISECONDS = 1e11  # greater times are milliseconds
 _KNOT = 1852.0 / 3600.0  # m/s
+_SIGNS = (b"!", b"VDM,", b"VDO,")  # of an AIS message, whose first letter may be damaged
 _NO_SPEED, _NO_COURSE = 102.3, 360.0  # what AIS says where a ship does not know
 
 
@@ -128,7 +129,7 @@ def _part(line: bytes, number: int) -> _Part | None:
     from pyais.exceptions import AISBaseException
     from pyais.messages import AISSentence, NMEASentenceFactory
 
-    if not line or (line.startswith((b"$", b"#")) and b"!" not in line):
+    if not line or (line.startswith((b"$", b"#")) and not any(sign in line for sign in _SIGNS)):
         return None
     text, time = _sentence(line)
     try:
