@@ -21,7 +21,8 @@ from vedette.control import (
     KullbackLeiblerReward,
     Plan,
 )
-from vedette.control.beyond import Beyond, continued, drawing
+from vedette.control.beyond import Beyond, drawing
+from vedette.control.continuing import continued
 from vedette.control.evaluator import at_all
 from vedette.control.evidence import Evidence
 from vedette.control.inputs import options_of

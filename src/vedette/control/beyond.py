@@ -9,13 +9,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vedette.control.constraints import Paths, VisibilityGraph
+from vedette.control.continuing import continued, follow
 from vedette.control.settings import MobileSensor, PlanningSettings
-from vedette.control.turning import seconds_to_search, seconds_to_turn, turn_rate, turned_on, views_a_second
+from vedette.control.turning import seconds_to_search, seconds_to_turn, turn_rate, views_a_second
 from vedette.densities import LMB, UndetectedIntensity
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models.functions import numbers_at
 from vedette.platforms import Options
-from vedette.platforms.camera import POINTING, is_camera, line_of_sight
+from vedette.platforms.camera import line_of_sight
 
 # Targets that exist with less probability draw no sensor from afar.
 _LEAST_EXISTENCE = 0.1
@@ -174,7 +175,7 @@ class Beyond:
         for c in np.flatnonzero(steps.any(axis=1) & allowed).tolist():
             if goals[c] >= 0 and not (straight[c, goals[c]] and open_share[c] == 1.0):
                 path = paths.path(ends[c], int(goals[c]))
-                _follow(courses[c], path, rounds * advances[c], own.courses[c, -1], steps[c])
+                follow(courses[c], path, rounds * advances[c], own.courses[c, -1], steps[c])
             elif open_share[c] < 1.0:
                 share = np.minimum(rounds, open_share[c] * rounds[-1])[after, np.newaxis]
                 courses[c, after, :2] = ends[c] + share * steps[c]
@@ -211,31 +212,6 @@ def drawing(prediction: LMB) -> tuple[Ints, Floats]:
     return prediction.tracks.labels[draws], np.ascontiguousarray(prediction.tracks.means[draws, :2])
 
 
-def continued(own: Options, horizon: Floats, times: Floats) -> Options:
-    """The options with courses (num_courses, num_times, pose_dim) at other times, s, from now on.
-
-    horizon: (num_steps,) s of the poses that there are. Between them a sensor goes straight; after the last it goes on
-    by as much as it went over the whole horizon, again and again, a camera that still turns turns on, what else its
-    pose has stays, and it scans, even where its action keeps it from scanning up to then.
-    """
-    start = np.broadcast_to(own.pose, (len(own.courses), 1, len(own.pose)))
-    known = np.concatenate([start, own.courses], axis=1)
-    ends = np.concatenate([[0.0], horizon])
-    rounds = np.maximum(np.ceil(times / ends[-1] - 1e-9) - 1.0, 0.0)
-    within = times - rounds * ends[-1]
-    after = np.searchsorted(ends, within - 1e-9).clip(1, len(horizon))
-    share = ((within - ends[after - 1]) / (ends[after] - ends[after - 1]))[:, np.newaxis]
-    courses = np.where(rounds[:, np.newaxis] > 0.0, known[:, -1:], known[:, after])
-    moved = known[:, -1:, :2] - known[:, :1, :2]
-    straight = known[:, after - 1, :2] * (1.0 - share) + known[:, after, :2] * share
-    courses[:, :, :2] = straight + rounds[:, np.newaxis] * moved
-    if is_camera(own.pose):
-        later = rounds > 0.0
-        courses[:, later, POINTING] = turned_on(own, horizon, times[later])
-    scans = (rounds > 0.0) | own.scans[:, after - 1]
-    return own._replace(courses=np.ascontiguousarray(courses), scans=scans)
-
-
 def sight(sensor: MobileSensor, pose: Floats) -> float:
     """m, the distance up to which it detects at least half as well as it does anywhere, in the best direction."""
     model, dim = sensor.filter.sensor.detection, sensor.filter.targets.state_dim
@@ -245,22 +221,6 @@ def sight(sensor: MobileSensor, pose: Floats) -> float:
     states[:, :2] = pose[:2] + (_DISTANCES[:, np.newaxis, np.newaxis] * around).reshape(-1, 2)
     chances = numbers_at(model.function, states, pose, model.params).reshape(-1, _DIRECTIONS).max(axis=1)
     return float(_DISTANCES[np.flatnonzero(chances >= 0.5 * chances.max())[-1]])
-
-
-def _follow(course: Floats, corners: Floats, run: Floats, end: Floats, step: Floats) -> None:
-    """Write poses along a path into a course (num_times, pose_dim).
-
-    corners: (num_corners, 2) m, of the path. run: (num_times,) m from the end of the horizon on; 0 before. end: the
-    pose (pose_dim,) there. step: (2,) m, from the pose now to it. A sensor that heads where it goes does so on the
-    path.
-    """
-    legs = np.diff(corners, axis=0)
-    passed = np.concatenate([[0.0], np.cumsum(np.hypot(legs[:, 0], legs[:, 1]))])
-    after, run = run > 0.0, np.minimum(run, passed[-1])
-    course[after, 0], course[after, 1] = (np.interp(run[after], passed, corners[:, axis]) for axis in (0, 1))
-    if abs(math.remainder(end[2] - math.atan2(step[1], step[0]), 2.0 * math.pi)) < 1e-6:
-        leg = np.searchsorted(passed, run[after]).clip(1, len(legs)) - 1
-        course[after, 2] = np.arctan2(legs[leg, 1], legs[leg, 0])
 
 
 def _longest(seconds: Floats) -> float:
