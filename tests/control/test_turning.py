@@ -36,12 +36,12 @@ def test_how_long_it_takes_to_turn_to_places() -> None:
     """Turned step by step from -20 or 40 degrees, where the horizon ends, until the place is in view; or it stays."""
     places = np.random.default_rng(0).uniform(-200.0, 200.0, (50, 2))
     found = seconds_to_turn(OWN, math.radians(RATE), places)
-    for place, seconds in zip(places, found, strict=True):
+    for place, turn in zip(places, found, strict=True):
         bearing = math.degrees(math.atan2(*(place - POSE[:2])[::-1]))
         steps = np.arange(0.0, 12.0, 1e-3)
         turns = np.concatenate([40.0 + RATE * steps, -20.0 - RATE * steps, 10.0 + 0.0 * steps]) - bearing
         seen = np.abs((turns + 180.0) % 360.0 - 180.0) <= HALF
-        assert seconds == pytest.approx(np.tile(steps, 3)[seen].min(), abs=2e-3)
+        assert turn == pytest.approx(np.tile(steps, 3)[seen].min(), abs=2e-3)
     np.testing.assert_array_equal(seconds_to_turn(OTHER, 0.0, places), 0.0)
 
 
@@ -52,9 +52,9 @@ def test_how_long_it_takes_to_look_where_undetected_targets_are() -> None:
     west, far = grid.cells_at(np.array([[-150.0, -20.0], [290.0, 290.0]]))
     expected[[west, far]] = 0.3, 5.0
     undetected, rates, reaches = UndetectedIntensity(grid, expected), [math.radians(RATE), 0.0], np.array([250.0, 10.0])
-    seconds = seconds_to_search((OWN, OTHER), rates, reaches, undetected, 0.1)
+    search = seconds_to_search((OWN, OTHER), rates, reaches, undetected, 0.1)
     [alone] = seconds_to_turn(OWN, math.radians(RATE), grid.centres[[west]])
-    assert seconds == alone > 0.0
+    assert search == alone > 0.0
     assert seconds_to_search((OWN, OTHER), rates, reaches, undetected, 0.31) == 0.0
     assert seconds_to_search((OWN, OTHER), rates, np.array([250.0, 300.0]), undetected, 0.1) == 0.0
 
