@@ -318,6 +318,9 @@ def test_explanations_still_add_up(hidden: bool) -> None:
     assert made.expected_rewards[0][0] == why.reward
     assert why.of_undetected is not None
     assert (why.of_undetected > 0.0) == hidden
+    if hidden:
+        share = why.of_undetected / (why.of_targets.total.sum() + why.of_undetected)
+        assert f"{share:.0%} of what is gained" in str(why)
     np.testing.assert_allclose(why.baseline + why.of_targets.total.sum() + why.of_undetected, why.reward, rtol=1e-9)
     np.testing.assert_allclose(why.baseline + why.of_sensors.sum(), why.reward, rtol=1e-9)
     # The second and the third target are out of reach within the horizon.

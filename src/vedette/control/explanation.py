@@ -252,7 +252,9 @@ def _of_targets(found: Explanation) -> list[str]:
         )
         lines.append(f"{name:18s}{total:>12s}{existence:>14s}{localisation:>15s}")
     if found.of_undetected:
-        lines.append(f"{'not found before':18s}{found.of_undetected:12.4g}")
+        gained = float(gains.total.sum()) + found.of_undetected
+        share = f"  {found.of_undetected / gained:.0%} of what is gained" if gained > 0.0 else ""
+        lines.append(f"{'not found before':18s}{found.of_undetected:12.4g}{share}")
     if found.price:
         lines.append(f"{'price':18s}{-found.price:12.4g}")
     return lines
