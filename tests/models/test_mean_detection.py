@@ -189,6 +189,20 @@ def test_nodes_where_detection_falls_off_slowly():
     assert mean_detection(detection, EDGE, ELONGATED) == pytest.approx(expected, abs=3e-3)
 
 
+def test_nodes_count_where_detection_hardly_differs():
+    """The mean of planners is over all nodes, also where P_D differs by less than the .01 that filters pass over."""
+    detection, centre = (
+        models.soft_sector(0.95, 500.0, 1.0, range_slope=0.02, angle_slope=4.0),
+        np.array([270.0, 30.0]),
+    )
+    nodes = spread_nodes()
+    states = np.zeros((len(nodes), 4))
+    states[:, :2] = nodes[:, 1:] @ np.linalg.cholesky(0.002 * ELONGATED).T + centre
+    at_nodes = detection.prob(states, POSE)
+    assert 0.0 < np.ptp(at_nodes) < 0.01
+    assert mean_detection(detection, centre, 0.002 * ELONGATED) == pytest.approx(nodes[:, 0] @ at_nodes, rel=1e-12)
+
+
 def test_several_gaussians_at_once_and_none():
     detection, covs = models.limited_range(0.9, 500.0), np.stack([state_cov(ELONGATED), state_cov(4.0 * ELONGATED)])
     means = np.array([[*EDGE, 0.0, 0.0], [*POSE[:2], 1.0, 1.0]])

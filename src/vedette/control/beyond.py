@@ -72,8 +72,8 @@ class Beyond:
         Within the horizon, a sensor that sees 250 m and goes 20 m has nothing to gain from a target 300 m off, and of
         courses worth the same the first is taken. So all sensors are taken to go on as they do, until each may have
         come to a target and each target may be reached by one of them, and the loss is the mean of those at all these
-        times. Targets that no allowed path brings into sight do not count. Cameras turn to targets, too, and on until
-        next to no undetected target is where none of them has looked. Where an action switches a sensor off, there is
+        times. Targets that no allowed path brings into sight do not count. Cameras turn to targets too, and until they
+        have searched the directions of nearly all undetected targets. Where an action switches a sensor off, there is
         at least one more horizon: otherwise nothing would depend on where it goes meanwhile.
         """
         horizon = settings.horizon_steps * settings.horizon_period

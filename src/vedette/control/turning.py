@@ -14,21 +14,21 @@ from vedette.platforms.camera import HALF_WIDTH, POINTING, is_camera
 
 
 def turn_rate(own: Options, horizon: float) -> float:
-    """rad/s of the course that turns a camera most within `horizon` seconds; 0 of any other sensor."""
+    """Return the turn rate of a camera [rad/s]: that of the course with the largest turn; 0 for other sensors."""
     if not is_camera(own.pose):
         return 0.0
     return float(np.abs(wrap_angles(own.courses[:, -1, POINTING] - own.pose[POINTING])).max()) / horizon
 
 
 def views_a_second(own: Options, rate: float) -> float:
-    """How many widths of its view a camera turns in a second, at `rate` rad/s."""
+    """Return how many fields of view a camera sweeps in a second, at `rate` rad/s."""
     return rate / float(2.0 * own.pose[HALF_WIDTH]) if rate > 0.0 else 0.0
 
 
 def seconds_to_turn(own: Options, rate: float, places: Floats) -> Floats:
-    """(num_places,) s from the end of the best course until a camera that turns at `rate` rad/s points at places.
+    """Return the seconds from the end of the best course until a camera has each place in its field of view.
 
-    places: (num_places, 2) m. 0 where nothing turns.
+    Shape (num_places,); all 0 for a `rate` of 0. rate: of turning, rad/s. places: (num_places, 2) m.
     """
     if rate == 0.0:
         return np.zeros(len(places))
@@ -41,9 +41,10 @@ def seconds_to_turn(own: Options, rate: float, places: Floats) -> Floats:
 def seconds_to_search(
     options: Sequence[Options], rates: Sequence[float], reaches: Floats, undetected: UndetectedIntensity, least: float
 ) -> float:
-    """s from the end of the best courses until fewer than `least` undetected targets are where nobody has looked.
+    """Return the seconds from the end of the best courses until all directions with undetected targets are searched.
 
-    Of targets in reach of a sensor now. rates: rad/s, at which each turns. reaches: m, how far each sees.
+    Fewer than `least` of the undetected targets within reach of a sensor may then be left in directions not searched.
+    rates: turn rates of the sensors, rad/s. reaches: ranges of the sensors, m.
     """
     seconds = np.full(undetected.num_cells, np.inf)
     for own, rate, reach in zip(options, rates, reaches.tolist(), strict=True):
@@ -56,9 +57,10 @@ def seconds_to_search(
 
 
 def turned_on(own: Options, horizon: Floats, times: Floats) -> Floats:
-    """(num_courses, num_times) rad, where a camera points at times after its horizon if it goes on turning as at last.
+    """Return the pointings of a camera after its horizon, rad, shape (num_courses, num_times).
 
-    horizon: (num_steps,) s of the poses that there are. One that points where it was to point stays so.
+    The camera continues at the turn rate of its last step, so one that has reached its pointing stays there. horizon:
+    (num_steps,) s, times of the poses in `own`. times: (num_times,) s, after the horizon.
     """
     start = np.full((len(own.courses), 1), own.pose[POINTING])
     last = np.concatenate([start, own.courses[:, :, POINTING]], axis=1)[:, -2:]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.kernels.base.types import Floats, Sensor
-from vedette.kernels.gaussian.detection import AT_CENTRE, BY_NODES, CLOSED_FORM, detection_probabilities
+from vedette.kernels.gaussian.detection import AT_CENTRE, AT_EDGES, BY_NODES, CLOSED_FORM, detection_probabilities
 from vedette.kernels.gaussian.position_integrals import spread_nodes
 from vedette.models.arguments import float_array, one_of, pose_vector, reject, state_table
 from vedette.models.clutter import ClutterModel
@@ -108,8 +108,9 @@ class SensorModel:
         """
         if self.detection.is_constant or (detection_at or self.detection_at) == "centre":
             return _bundle_of(self, AT_CENTRE)
-        by_nodes = detection_at is None or self.detection.mean_function is None
-        return _bundle_of(self, BY_NODES if by_nodes else CLOSED_FORM)
+        if detection_at is None:
+            return _bundle_of(self, AT_EDGES)
+        return _bundle_of(self, BY_NODES if self.detection.mean_function is None else CLOSED_FORM)
 
     def mean_detection(self, means: ArrayLike, covs: ArrayLike, pose: ArrayLike) -> Floats:
         """(n,) mean probability of detection over each of n Gaussians, whatever `detection_at` says.

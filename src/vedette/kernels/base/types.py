@@ -88,7 +88,7 @@ class Sensor(NamedTuple):
     clutter_params: Floats
     angular: Bools  # (meas_dim,) true of angles in radians, whose residuals are wrapped to (-pi, pi]
     method: int  # as of `Motion`, or SWITCHED
-    detection_rule: int  # AT_CENTRE, CLOSED_FORM or BY_NODES of `vedette.kernels.gaussian.detection`
+    detection_rule: int  # AT_CENTRE, CLOSED_FORM, BY_NODES or AT_EDGES of `vedette.kernels.gaussian.detection`
     detection_nodes: Floats  # (num, 3) weight and two standard deviates of a node; none AT_CENTRE
 
 

@@ -13,6 +13,7 @@ from vedette.kernels.base.types import Floats, Sensor
 AT_CENTRE = 0
 CLOSED_FORM = 1
 BY_NODES = 2
+AT_EDGES = 3
 
 # P_D is the same over a Gaussian if it differs by no more than this at the nodes, first at every other one.
 _LEAST_DIFFERENCE, _STRIDE = 0.01, 2
@@ -45,18 +46,20 @@ def _root_of_position(cov: Floats) -> tuple[float, float, float]:
 
 
 @inlined
-def _over_nodes(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, state: Floats) -> tuple[float, float]:
-    """Mean of P_D over a Gaussian, and by how much it differs in different parts of it; no mean where it does not.
+def _over_nodes(
+    sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, state: Floats, stride: int
+) -> tuple[float, float]:
+    """Mean of P_D over a Gaussian, and the largest difference of P_D between its nodes.
 
     The sum of weight * P_D at mean + L (standard deviates), L L' the covariance of the position; the rest of the state
-    stays at its mean.
+    stays at its mean. With a stride above 1 the sum is incomplete where P_D is the same at every stride-th node.
     """
     nodes, total, root = sensor.detection_nodes, 0.0, _root_of_position(cov)
     least, most = 1.0, 0.0
     for j in range(mean.shape[0]):
         state[j] = mean[j]
-    for first in range(_STRIDE):
-        for i in range(first, nodes.shape[0], _STRIDE):
+    for first in range(stride):
+        for i in range(first, nodes.shape[0], stride):
             found = _at(sensor, pose, mean, root, nodes[i, 1], nodes[i, 2], state)
             total += nodes[i, 0] * found
             least, most = min(least, found), max(most, found)
@@ -69,13 +72,16 @@ def _over_nodes(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, state: 
 def detection_and_edge(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, state: Floats) -> tuple[float, bool]:
     """Probability of detection of a Gaussian, and whether the edge of what the sensor sees passes through it.
 
-    By `sensor.detection_rule` at its mean, or the mean over it; by nodes, that at its mean where P_D differs little.
-    There is no edge but by nodes. state: (state_dim,) to be written.
+    `sensor.detection_rule` selects P_D at the mean, or its mean over the Gaussian in closed form or by nodes. With
+    AT_EDGES it is the mean by nodes where P_D differs between nodes, and P_D at the mean elsewhere; only this rule
+    reports edges. state: (state_dim,) to be written.
     """
     if sensor.detection_rule == CLOSED_FORM:
         return checked(sensor.mean_prob_detection(mean, cov, pose, sensor.detection_params)), False
     if sensor.detection_rule == BY_NODES:
-        found, difference = _over_nodes(sensor, pose, mean, cov, state)
+        return _over_nodes(sensor, pose, mean, cov, state, 1)[0], False
+    if sensor.detection_rule == AT_EDGES:
+        found, difference = _over_nodes(sensor, pose, mean, cov, state, _STRIDE)
         if difference > _LEAST_DIFFERENCE:
             return found, True
     return checked(sensor.prob_detection(mean, pose, sensor.detection_params)), False
