@@ -31,6 +31,8 @@ def compared(errors: Iterable[float]) -> dict[str, Fields]:
 
 def with_filter(scenario: Scenario, fields: Fields) -> Scenario:
     """The scenario under another filter, fused by the covariance intersection of its kind of density."""
+    if scenario.model.estimates_by.kind == "map":
+        fields = {"estimator": None, **fields}  # each filter's own
     kinds = ("clmb", "cm_delta_glmb")
     if scenario.model.fusion.kind in kinds:
         fields = {**fields, "fusion.kind": kinds[fields["filter.kind"] != "lmb"]}

@@ -12,6 +12,7 @@ import pytest
 
 from vedette.errors import InputError
 from vedette.evaluation.runs import run_scenario
+from vedette.kernels.base.types import Floats
 from vedette.live import live_of
 from vedette.recorded.extents import box_of, wild
 from vedette.scenarios.calibrated import problem_of
@@ -54,8 +55,9 @@ def recorded(folder: Path, scans: list[str], detection: str = ENDLESS, more: str
     return scenario_of_recording(folder / "radar.yaml", folder / "scans.csv", folder / own if own else None)
 
 
-def ospa(found: OfRecording) -> float:
-    return float(run_scenario(found.scenario, "still", seed=0).ospa[:, 0].mean())
+def ospa(found: OfRecording) -> Floats:
+    """OSPA of each scan."""
+    return run_scenario(found.scenario, "still", seed=0).ospa[:, 0]
 
 
 WILD = [(6100.0, 45.0), (6700.0, 222.0), (7500.0, 45.0), (9000.0, 135.0), (12e3, 45.0), (3e5, 12.0), (3e6, 301.0)]
@@ -63,11 +65,13 @@ WILD = [(6100.0, 45.0), (6700.0, 222.0), (7500.0, 45.0), (9000.0, 135.0), (12e3,
 
 @pytest.mark.parametrize("detection", [ENDLESS, LIMITED])
 def test_one_row_anywhere_changes_ospa_by_less_than_one_percent(tmp_path: Path, detection: str) -> None:
+    """At each scan; a candidate on the verge of being estimated may be on its other side at one scan of the thirty."""
     plain = ospa(recorded(tmp_path, rows(), detection))
     for place in WILD:
         for time in (0.0, 35.0, 72.5):
             with_one = ospa(recorded(tmp_path, [*rows(), f"{time},R,{place[0]},{place[1]}"], detection))
-            assert with_one == pytest.approx(plain, rel=0.01), (place, time)
+            changed = np.abs(with_one - plain) > 0.01 * plain
+            assert changed.sum() <= 1, (place, time)
 
 
 def test_it_is_named_with_its_row(tmp_path: Path) -> None:

@@ -10,18 +10,19 @@ from typing import Any, Protocol
 import numpy as np
 
 from vedette.densities import checks
-from vedette.densities.checks import distinct_labels
 from vedette.densities.conversions import settled_lmb
 from vedette.densities.factored import FactoredGLMB
 from vedette.densities.glmb import GLMB
 from vedette.densities.labelled import LMB, Labelled
 from vedette.densities.multi_bernoulli import MultiBernoulli
-from vedette.densities.statistics import cardinality_distribution, heaviest_tracks, labelled
+from vedette.densities.statistics import cardinality_distribution, labelled
 from vedette.densities.telling import Target, Targets
 from vedette.densities.tracks import TrackTable, gaussian_tracks, heaviest_components
 from vedette.densities.unlabelled import IidCluster, Poisson
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.labelled.heaviest import map_tracks
+from vedette.kernels.labelled.least_ospa import least_ospa_tracks
 from vedette.models.arguments import no_gaussians
 from vedette.speaking import Tabled
 from vedette.text import counted
@@ -116,21 +117,41 @@ def map_estimate(density: Labelled) -> Estimate:
     earlier hypothesis; the smaller label. A track that is a mixture is estimated by its heaviest component,
     as the mean of two rival components may lie where the target cannot be.
     """
-    number = int(np.argmax(labelled(density).cardinality_of_labels()))
-    if isinstance(density, LMB):
-        chosen = np.sort(np.argsort(-density.existence_logit, kind="stable")[:number])
-        return _peaks(density.tracks, chosen, density.existence[chosen])
-    if isinstance(density, GLMB):
-        return _peaks(density.tracks, *density.heaviest(number))
-    chosen = heaviest_tracks(FactoredGLMB.of(density), number)
-    labels, existence = density.label_existence()
-    # Both come in increasing label order, and every chosen label is one of those.
-    _, place = distinct_labels(np.concatenate([labels, density.tracks.labels[chosen]]))
-    return _peaks(density.tracks, chosen, existence[place[len(labels) :]])
+    given: Any = labelled(density)
+    if not isinstance(given, GLMB | LMB):
+        return _peaks(given.tracks, *map_tracks(given.to_factors()))
+    number = int(np.argmax(given.cardinality_of_labels()))
+    if isinstance(given, GLMB):
+        return _peaks(given.tracks, *given.heaviest(number))
+    chosen = np.sort(np.argsort(-given.existence_logit, kind="stable")[:number])
+    return _peaks(given.tracks, chosen, given.existence[chosen])
+
+
+def least_ospa_estimate(density: Labelled) -> Estimate:
+    """The targets whose expected OSPA is least where a target is either in place or not.
+
+    With n estimated targets of which M are in place, and N targets that exist, OSPA of order p and cutoff c is then
+    c (1 - M / max(n, N))^(1/p). Estimated are the targets of the heaviest hypothesis of n targets (as by
+    `map_estimate`), for the n with the largest mean of M / max(n, N). A target is in place if its label is estimated,
+    or if it is within a Mahalanobis distance of 3 of an estimated label whose own target does not exist.
+
+    The most probable number instead counts candidates that have nothing to do with each other: of nine of probability
+    0.11 it shows one, which is wrong in eight cases of nine. Targets without a label are not counted.
+    Ties: the smaller number; then as `map_estimate`. A mixture is estimated by its heaviest component.
+    """
+    given = labelled(density)
+    return _peaks(given.tracks, *least_ospa_tracks(given.to_factors()))
 
 
 def best_estimate(density: Any, step: int) -> Estimate:
-    """An `Estimator` of every density: `map_estimate` where it has labels, else `unlabelled_estimate`."""
+    """An `Estimator` of every density: of products of GLMBs `least_ospa_estimate`, of others as `map_or_unlabelled`."""
+    if isinstance(density, FactoredGLMB):
+        return least_ospa_estimate(density)
+    return map_or_unlabelled(density, step)
+
+
+def map_or_unlabelled(density: Any, step: int) -> Estimate:
+    """An `Estimator` of every density: `map_estimate` if it has labels, else `unlabelled_estimate`."""
     return map_estimate(density) if isinstance(density, Labelled) else unlabelled_estimate(density, step)
 
 

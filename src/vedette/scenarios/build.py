@@ -74,7 +74,7 @@ def build_experiment(scenario: Scenario) -> Experiment:
             own.values[0] if section.moves_from == "start" else None
             for own, section in zip(_first_actions(scenario, sensors), model.sensors, strict=True)
         ),
-        estimate=model.estimator.build(scenario.folder),
+        estimate=model.estimates_by.build(scenario.folder),
         decision_steps=model.decision_steps,
         explain=model.control.explain,
         # Where they are what the tracker takes them for, a tracker of other sensors may stand in for this one.
@@ -309,7 +309,7 @@ def build_parts(
         control.build_constraints(folder),
         _notes_of_decisions(scenario, fusion, strategy),
         (control.lookahead or Lookahead()).build(),
-        model.estimator.build(folder),
+        model.estimates_by.build(folder),
         {"timetable": _timetable(scenario), "cutoff": model.ospa.cutoff},
         partial(told_of, scenario),
     )

@@ -85,7 +85,7 @@ def facts(model: ScenarioModel) -> list[tuple[str, str]]:
         *(() if model.network is None else (("network", settings(model.network)),)),
         *(() if model.undetected is None else (("not yet found", _undetected(model.undetected)),)),
         *((("not yet found", _searched(model)),) if searches(model) else ()),
-        ("estimate", settings(model.estimator)),
+        ("estimate", settings(model.estimates_by)),
         ("decisions", f"after {_steps(model.decision_steps)}" if model.decision_steps else "none"),
         ("horizon", f"{counted(model.horizon[0], 'step')} of {model.horizon[1]:g} s"),
         ("reward", f"{settings(control.reward)}, {_samples(control)}"),

@@ -117,8 +117,9 @@ def _central(model: ScenarioModel) -> Iterator[Finding]:
 
 
 def _estimator(model: ScenarioModel) -> Iterator[Finding]:
-    if model.filter.kind in UNLABELLED and model.estimator.kind == "marginal":
-        yield ("estimator", "kind"), f"map, as {model.filter.kind} filters have no labels", '"marginal"'
+    kind = model.estimates_by.kind
+    if model.filter.kind in UNLABELLED and kind in ("least_ospa", "marginal"):
+        yield ("estimator", "kind"), f"map, as {model.filter.kind} filters have no labels", f'"{kind}"'
 
 
 def _combinations(model: ScenarioModel) -> Iterator[Finding]:

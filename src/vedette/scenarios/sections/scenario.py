@@ -22,7 +22,7 @@ from vedette.scenarios.sections.network import NetworkSection
 from vedette.scenarios.sections.places import OriginSection, in_metres, misplaced
 from vedette.scenarios.sections.planners import STRATEGIES, AnyPlanner
 from vedette.scenarios.sections.recording import RecordingSection
-from vedette.scenarios.sections.scoring import AnyEstimator, AnyMetric, Ospa
+from vedette.scenarios.sections.scoring import AnyEstimator, AnyMetric, LeastOspaEstimator, MapEstimator, Ospa
 from vedette.scenarios.sections.sensors import Sensor, SensorDefaults
 from vedette.scenarios.sections.targets import Targets
 from vedette.scenarios.sections.tracking import AnyFilter, Filter
@@ -101,7 +101,10 @@ class ScenarioModel(Section):
     undetected: UndetectedSection | None = Field(
         default=None, description="The targets not yet found, for planners that search; none: no account of them [-]."
     )
-    estimator: AnyEstimator = Field(default=of_kind("map"), description="How estimates are read off [-].")
+    estimator: AnyEstimator | None = Field(
+        default=None,
+        description="How estimates are read off; none: least_ospa with a filter of kind factored_glmb, else map [-].",
+    )
     control: Control = Field(default=Control(), description="When and how the sensors decide [-].")
     planners: dict[Name, AnyPlanner] = Field(
         default={},
@@ -163,6 +166,13 @@ class ScenarioModel(Section):
         from vedette.platforms.compass import PlaneCompass
 
         return PlaneCompass() if self.origin is None else self.origin.build()
+
+    @property
+    def estimates_by(self) -> Any:
+        """The estimator section in use, whether it was given or not."""
+        if self.estimator is not None:
+            return self.estimator
+        return LeastOspaEstimator() if self.filter.kind == "factored_glmb" else MapEstimator()
 
     @property
     def decision_steps(self) -> tuple[int, ...]:

@@ -25,9 +25,22 @@ class MapEstimator(Section):
 
     def build(self, folder: Path) -> Estimator:
         """How estimates are read off a density after a scan, given its number, by which unlabelled ones are named."""
-        from vedette.densities import best_estimate
+        from vedette.densities import map_or_unlabelled
 
-        return best_estimate
+        return map_or_unlabelled
+
+
+class LeastOspaEstimator(Section):
+    """Best hypothesis with the number of targets that has the least expected OSPA, where a target is in place or not;
+    for filters that have labels. Candidates that are each improbable are not shown, however many there are."""
+
+    kind: Literal["least_ospa"] = Field(default="least_ospa", description="Kind of estimate [-].")
+
+    def build(self, folder: Path) -> Estimator:
+        """How estimates are read off a density after a scan, given its number."""
+        from vedette.densities import least_ospa_estimate
+
+        return lambda density, step: least_ospa_estimate(density)
 
 
 class MarginalEstimator(Section):
@@ -68,7 +81,8 @@ if TYPE_CHECKING:
 else:
     _ESTIMATOR = "vedette.densities:Estimator, a function of the density and the number of the scan"
     _METRIC = "vedette.simulation.records:Measure, a function of a run's record that gives one number a scan"
-    AnyEstimator = one_of("estimator", "densities", _ESTIMATOR, own=(MapEstimator, MarginalEstimator))
+    _OWN = (MapEstimator, LeastOspaEstimator, MarginalEstimator)
+    AnyEstimator = one_of("estimator", "densities", _ESTIMATOR, own=_OWN)
     AnyMetric = one_of("metric", "evaluation/metrics", _METRIC, own=(TrackedShare, TimeToTrack))
 
 
