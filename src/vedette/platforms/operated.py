@@ -1,13 +1,15 @@
-"""Platforms whose actions have prices, and whose sensors can be switched off."""
+"""Platforms whose actions have prices, and whose sensors can be switched off or have a budget of scanning time."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Floats
-from vedette.models.arguments import real, reject
+from vedette.models.arguments import positive, real, reject
 from vedette.platforms.base import (
     SWITCH,
     Platform,
@@ -17,6 +19,11 @@ from vedette.platforms.base import (
     prices_of,
     scans_of,
 )
+from vedette.platforms.camera import POSE_DIM
+
+# Component of a pose: seconds of scanning that are left; after those of a camera.
+LEFT = POSE_DIM
+_SLACK = 1e-9  # of rounding, relative to a time
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,14 +38,21 @@ class Operated:
         price: of every action; or the name of the column of its actions that has the price of each; None: that of the
             platform.
         switchable: whether each action is listed a second time, with the sensor off, after all those with it on.
+        budget: largest number of seconds of scanning in store; the pose has those left as its component 5. The sensor
+            scans until none is left, and then no more before its next action. None: without limit.
+        refill: seconds of scanning that the store gains each second, up to `budget`. A sensor that always scans under a
+            refill of 0.1 is on for a tenth of the time.
 
     Raises:
-        InputError: no platform, a price that is not finite, no such column, or a switch beside a column `on`.
+        InputError: no platform, a price that is not finite, no such column, a switch beside a column `on`, a budget
+            that is not above 0, or a refill that is negative or without a budget.
     """
 
     platform: Platform
     price: float | str | None = None
     switchable: bool = False
+    budget: float | None = None
+    refill: float = 0.0
 
     def __post_init__(self) -> None:
         check_platform("platform", self.platform)
@@ -48,6 +62,10 @@ class Operated:
             real("price", self.price)
         if self.switchable and SWITCH in self.platform.columns:
             raise reject("switchable", f"False, as the platform has a column {SWITCH} of its own", True)
+        if self.budget is not None:
+            positive("budget", self.budget)
+        if real("refill", self.refill) < 0.0 or (self.refill > 0.0 and self.budget is None):
+            raise reject("refill", "0, or more beside a budget", self.refill)
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -69,8 +87,11 @@ class Operated:
         return np.asarray(self.courses(pose, action[np.newaxis], times)[0])
 
     def courses(self, pose: Floats, actions: Floats, times: Floats) -> Floats:
-        """Those of the platform."""
-        return courses_of("platform", self.platform, pose, self._own(actions), times)
+        """Those of the platform, with the seconds of scanning that are left."""
+        courses = courses_of("platform", self.platform, pose, self._own(actions), times)
+        if self.budget is not None:
+            courses[..., LEFT] = self._left(pose, actions, times)
+        return courses
 
     def prices(self, actions: Floats) -> Floats:
         """(num_actions,) of each; none of those with the sensor off."""
@@ -85,7 +106,23 @@ class Operated:
     def scans(self, pose: Floats, actions: Floats, times: Floats) -> Bools:
         """(num_actions, num_times) those of the platform, where the sensor is on."""
         scans = scans_of("platform", self.platform, pose, self._own(actions), times)
-        return scans & self._is_on(actions)[:, np.newaxis]
+        scans &= self._is_on(actions)[:, np.newaxis]
+        return scans if self.budget is None else scans & (times <= self._lasts(pose) * (1.0 + _SLACK))
+
+    def _lasts(self, pose: Floats) -> float:
+        """Seconds after which a sensor that scans has none left."""
+        if len(pose) <= LEFT:
+            wanted = f"{LEFT + 1} components, the last of them the seconds left to scan"
+            raise InputError(f"pose: expected {wanted}; got {len(pose)}")
+        return float(pose[LEFT]) / (1.0 - self.refill) if self.refill < 1.0 else math.inf
+
+    def _left(self, pose: Floats, actions: Floats, times: Floats) -> Floats:
+        """(num_actions, num_times) seconds of scanning left `times` seconds after each action began."""
+        lasts, on = self._lasts(pose), self._is_on(actions)[:, np.newaxis]
+        scanning = pose[LEFT] - (1.0 - self.refill) * times
+        empty = self.refill * (times - min(lasts, times[-1]))
+        found = np.where(on, np.where(times <= lasts, scanning, empty), pose[LEFT] + self.refill * times)
+        return np.asarray(np.clip(found, 0.0, self.budget))
 
     def _own(self, actions: Floats) -> Floats:
         return np.ascontiguousarray(actions[:, :-1]) if self.switchable else actions

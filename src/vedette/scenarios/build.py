@@ -111,7 +111,7 @@ def build_sensors(scenario: Scenario) -> tuple[MobileSensor, ...]:
 def _platform(model: ScenarioModel, sensor: Sensor, folder: Path) -> Platform:
     """What carries a sensor, with its prices and switch; with an origin or a compass its actions are courses."""
     section, price = sensor.platform, sensor.price
-    platform = section.build(folder)
+    platform: Platform = section.build(folder)
     if model.by_compass and platform.columns:
         platform = ByCompass(platform, model.north())
     if isinstance(section, CustomPlatform) and isinstance(price, str) and price not in platform.columns:
@@ -120,7 +120,11 @@ def _platform(model: ScenarioModel, sensor: Sensor, folder: Path) -> Platform:
     if isinstance(section, CustomPlatform) and sensor.switchable and SWITCH in platform.columns:
         wanted = f"{section.function} to have no column {SWITCH}, as the sensor is switchable"
         raise NotGiven(section, "function", wanted, ", ".join(platform.columns))
-    return Operated(platform, price, sensor.switchable) if price is not None or sensor.switchable else platform
+    if price is None and sensor.budget is None and not sensor.switchable:
+        return platform
+    if sensor.budget is None:
+        return Operated(platform, price, sensor.switchable)
+    return Operated(platform, price, sensor.switchable, sensor.budget.seconds, sensor.budget.refill)
 
 
 def _scan_times(model: ScenarioModel, sensor: Sensor) -> Floats | None:

@@ -11,6 +11,7 @@ import numpy as np
 from vedette.control.constraints.protocol import Constraint, Situation, WithMostActive
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models.fields import Checked, Count, part
+from vedette.platforms.operated import LEFT
 
 
 @part("max_active", "constraint")
@@ -105,7 +106,8 @@ def active_of(constraints: Sequence[Constraint], courses: Sequence[Floats], scan
 def _twins(courses: Floats, on: Bools) -> Ints:
     """(num_courses,) see `Active.off`."""
     twins, silent = np.arange(len(courses)), np.flatnonzero(~on)
-    of_pose = {courses[course].tobytes(): course for course in silent[::-1].tolist()}
+    poses = np.delete(courses, LEFT, axis=2) if courses.shape[2] > LEFT else courses
+    of_pose = {poses[course].tobytes(): course for course in silent[::-1].tolist()}
     for course in np.flatnonzero(on).tolist():
-        twins[course] = of_pose.get(courses[course].tobytes(), course)
+        twins[course] = of_pose.get(poses[course].tobytes(), course)
     return twins

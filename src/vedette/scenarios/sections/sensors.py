@@ -122,6 +122,21 @@ class ScanTimes(Section):
         return np.asarray((np.arange(1, time.num_steps + 1) - first) % every == 0)
 
 
+class Budget(Section):
+    """Scanning time of a sensor. Once none is left, the sensor does not scan before its next decision.
+
+    A total for the run is `seconds` with a refill of 0; a share of the time is a small number of seconds with that
+    share as refill.
+    """
+
+    seconds: Positive = Field(description="Scanning time at the start, and the most that it can be [s].")
+    refill: float = Field(
+        default=0.0,
+        ge=0.0,
+        description="What is added each second, up to `seconds`: 0.1 lets it scan a tenth of the time [-].",
+    )
+
+
 class Sensor(Section):
     """One sensor and the platform that carries it."""
 
@@ -143,6 +158,9 @@ class Sensor(Section):
         default=False,
         description="Whether it can be switched off: each of its actions is listed a second time with `on` 0, by which "
         "it makes no measurement and no clutter until its next decision, and pays no price [-].",
+    )
+    budget: Budget | None = Field(
+        default=None, description="Of scanning time, from the first decision on; none: without limit [-]."
     )
     moves_from: Literal["first_decision", "start"] = Field(
         default="first_decision",
@@ -174,8 +192,13 @@ class Sensor(Section):
     def _a_camera_carries_a_camera(self) -> Iterator[Finding]:
         true = () if self.truth is None else (self.truth.detection, self.truth.first_detection)
         kinds = [section.kind for section in (self.detection, *true) if section is not None]
-        if "camera" in kinds and len(self.pose) < 5:
+        if "camera" in kinds and len(self.platform.components()) < 2:
             yield ("platform",), "a camera, as its detection is a camera's", self.platform.kind
+
+    @check
+    def _a_budget_is_the_sixth_component(self) -> Iterator[Finding]:
+        if self.budget is not None and len(self.platform.components()) > 2:
+            yield ("budget",), "none, as the poses of the platform have a component 5 of their own", "a budget"
 
     @check
     def _prices_stand_in_custom_columns(self) -> Iterator[Finding]:
@@ -212,7 +235,10 @@ class Sensor(Section):
     @property
     def pose(self) -> tuple[float, ...]:
         """Where it starts: [px, py, heading_rad], and what else its platform has."""
-        return (*self.position, math.radians(self.heading_deg), *self.platform.components())
+        pose = (*self.position, math.radians(self.heading_deg), *self.platform.components())
+        if self.budget is None:
+            return pose
+        return (*pose, *(0.0,) * (5 - len(pose)), self.budget.seconds)
 
     def build(
         self, region: Region, method: GaussianMethod, folder: Path, detection_at: DetectionAt = "centre"
