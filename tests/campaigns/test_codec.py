@@ -107,6 +107,7 @@ def test_the_layout_of_this_version_is_as_written_here():
         "bound_unbounded runner_up margin margin_se missing price* action_*",
         "target_gains": "decision step time_s birth_step birth_site existence_gain localisation_gain",
         "sensor_gains": "decision step time_s sensor gain without",
+        "undetected": "decision step time_s x_min_m x_max_m y_min_m y_max_m columns rows cell_*",
     }
 
 

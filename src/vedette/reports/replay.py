@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from vedette.control.plan import Plan
-from vedette.densities import Estimate
+from vedette.densities import Estimate, UndetectedIntensity
 from vedette.errors import VedetteError
 from vedette.evaluation import match_run
 from vedette.evaluation.actions import action_axis, choice_words
@@ -209,6 +209,21 @@ def drawn_decision(decision: Decision, axes: dict[str, dict[str, Any]], names: S
         "curves": _curves(plan, axes),
         "map": _map(plan),
         "why": why_data(plan, names),
+        **({} if decision.undetected is None else {"undetected": _shades(decision.undetected)}),
+    }
+
+
+def _shades(intensity: UndetectedIntensity) -> dict[str, Any]:
+    """Cells of a map as shares of the largest, in percent, and the expected number of undetected targets."""
+    grid, largest = intensity.grid, float(intensity.expected.max())
+    shares = np.zeros(grid.num_cells) if largest <= 0.0 else np.rint(100.0 * intensity.expected / largest)
+    region = grid.region
+    return {
+        "columns": grid.columns,
+        "rows": grid.rows,
+        "extent": [region.x_min, region.x_max, region.y_min, region.y_max],
+        "shares": shares.astype(int).tolist(),
+        "total": _number(intensity.total),
     }
 
 

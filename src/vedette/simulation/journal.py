@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 
 from vedette.control import Plan
-from vedette.densities import Estimate
+from vedette.densities import Estimate, UndetectedIntensity
 from vedette.errors import VedetteError
 from vedette.kernels.base.types import Bools, Floats
 from vedette.simulation.experiment import Experiment
@@ -65,10 +65,12 @@ class Journal:
         self._off.append(off)
         self.estimates.append(estimate)
 
-    def decide(self, plan: Plan) -> None:
-        """Write down the decision after the scan at hand."""
-        kept = plan.settled(explained=self.experiment.explain)
-        self._decisions.append(Decision(self.step, self.time, self._poses[-1], kept))
+    def decide(self, plan: Plan, undetected: UndetectedIntensity | None = None) -> None:
+        """Write down the decision after the scan at hand, with what is kept of its explanation."""
+        explain = self.experiment.explain
+        kept = plan.settled(explained=explain)
+        found = undetected if explain and kept.explanation is not None else None
+        self._decisions.append(Decision(self.step, self.time, self._poses[-1], kept, found))
 
     def stage(self, error: BaseException) -> str:
         """What was under way, in words."""

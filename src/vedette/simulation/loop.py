@@ -277,5 +277,5 @@ def _go(experiment: Experiment, planner: Planner | None, journal: Journal, watch
         if planner is not None and moment.step in experiment.decision_steps:
             with journal.timing("planning"):
                 plan = planner.plan(moment.state, moment.poses, rng=planner_rng)
-            journal.decide(plan)
+            journal.decide(plan, moment.state.undetected)
             world.follow(plan.chosen_actions)

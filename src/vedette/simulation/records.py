@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from vedette.control.plan import Plan
-from vedette.densities.estimates import Estimate
+from vedette.densities import Estimate, UndetectedIntensity
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.simulation.arrow import Columns
@@ -29,12 +29,14 @@ class Decision(Speaking):
         time: of that scan, s.
         poses: (num_sensors, 3 or more) poses [px, py, heading_rad, ...] of the sensors at that scan.
         plan: the choice and its evidence.
+        undetected: where undetected targets were expected, of planners that search; None: not known, or not kept.
     """
 
     step: int
     time: float
     poses: Floats
     plan: Plan
+    undetected: UndetectedIntensity | None = None
 
     def _summary(self) -> str:
         return f"after scan {self.step}, at {self.time:g} s: {self.plan.in_short()}"

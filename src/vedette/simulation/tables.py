@@ -23,6 +23,7 @@ from vedette.simulation.health import FUSION_COLUMNS, SENSOR_COLUMNS, Health
 from vedette.simulation.planned import OWN_REWARDS, PLANNED, decisions_of, planned_tables
 from vedette.simulation.records import OSPA_COLUMNS, Outline, RunRecord
 from vedette.simulation.truth import Truth
+from vedette.simulation.undetected_tables import UNDETECTED, undetected_tables, with_undetected
 
 Tables: TypeAlias = dict[str, Columns]
 
@@ -45,7 +46,7 @@ LAYOUTS: dict[str, Layout] = {
     **PLANNED,
 }
 # What a run may have beside those; of `EXPLAINED` all or none.
-OPTIONAL: dict[str, Layout] = {**OWN_REWARDS, **EXPLAINED}
+OPTIONAL: dict[str, Layout] = {**OWN_REWARDS, **EXPLAINED, **UNDETECTED}
 TIMINGS = Layout({"step": Kind.INTEGER}, {"": Kind.NUMBER})
 
 
@@ -79,7 +80,7 @@ def tables_of(record: RunRecord) -> Tables:
         "tracks": _tracks(record),
         "sensors": _sensors(record),
     }
-    planned = planned_tables(record.decisions, record.num_sensors)
+    planned = {**planned_tables(record.decisions, record.num_sensors), **undetected_tables(record.decisions)}
     if not any(decision.plan.explanation is not None for decision in record.decisions):
         return {**of_scans, **planned}
     return {**of_scans, **planned, **explained_tables(record.decisions, record.num_sensors)}
@@ -111,6 +112,10 @@ def record_of(
     """
     outline, poses = outline_of(facts, tables, timings), _poses_of(tables)
     times, decisions = outline.times, outline.decisions
+    if any(name in tables for name in EXPLAINED):
+        decisions = with_explanations(decisions, tables)
+    if "undetected" in tables:
+        decisions = with_undetected(decisions, tables["undetected"])
     return RunRecord(
         scenario=outline.scenario,
         planner=str(facts["planner"]),
@@ -123,7 +128,7 @@ def record_of(
         poses=poses,
         off=_off_of(tables, poses),
         estimates=_estimates_of(tables["tracks"], len(times)),
-        decisions=with_explanations(decisions, tables) if any(name in tables for name in EXPLAINED) else decisions,
+        decisions=decisions,
         ospa=outline.ospa,
         health=outline.health,
         timings=timings,

@@ -12,6 +12,7 @@ function drawScene(canvas, run, step, show, camera, ghost) {
   context.beginPath();
   context.rect(MARGIN.left, MARGIN.top, view.inner.width, view.inner.height);
   context.clip();
+  if (show.undetected) drawUndetected(context, view, decisionAt(run, step)?.undetected);
   drawZones(context, run, view);
   if (show.measurements) run.sensors.forEach((_, s) => drawMeasurements(context, run, view, step, s));
   if (show.trails) drawTrails(context, run, view, step);
@@ -22,6 +23,23 @@ function drawScene(canvas, run, step, show, camera, ghost) {
   drawScale(context, view);
   context.restore();
   return view;
+}
+
+// Where undetected targets were expected at the last decision: the darker, the more of them in a cell.
+function drawUndetected(context, view, cells) {
+  if (!cells) return;
+  const { columns, rows, shares } = cells;
+  const [west, east, south, north] = cells.extent;
+  const x = (column) => view.x(west + ((east - west) * column) / columns);
+  const y = (row) => view.y(south + ((north - south) * row) / rows);
+  context.fillStyle = colours.sky;
+  shares.forEach((share, cell) => {
+    if (!share) return;
+    const [column, row] = [cell % columns, Math.floor(cell / columns)];
+    context.globalAlpha = 0.6 * (share / 100);
+    context.fillRect(x(column), y(row + 1), x(column + 1) - x(column) + 0.5, y(row) - y(row + 1) + 0.5);
+  });
+  context.globalAlpha = 1;
 }
 
 // Another run with the same luck, hollow: where its sensors are and went (squares), and its estimates (diamonds).

@@ -142,6 +142,8 @@ function startReplay(root) {
     part("scrubber").max = last();
     part("rewards").hidden = !run().decisions.some((decision) => decision.curves.length);
     part("nothing").hidden = run().scans.length > 0;
+    const searches = run().decisions.some((decision) => decision.undetected);
+    for (const name of ["undetected", "undetected-key"]) part(name).hidden = !searches;
     for (const name of ["errors", "errors-title"]) part(name).hidden = !run().known;
     part("errors-title").textContent = `OSPA${run().ospa_unit && ` (${run().ospa_unit})`}`;
     for (const name of ["reward-title", "decision", "why-title", "why-not"]) part(name).hidden = !run().decisions.length;
