@@ -77,12 +77,15 @@ def rows_of(path: Path) -> list[list[str]]:
         return list(csv.reader(file))
 
 
-def tracked(words: list[str], counts: Counter[str]) -> dict[str, Any] | None:
-    """The document of `vedette track`; None where it is refused, with a place."""
+def tracked(words: list[str], counts: Counter[str], command: str = "track") -> dict[str, Any] | None:
+    """The document of `vedette track` or `vedette calibrate`; None where it is refused, with a place.
+
+    A calibration that did not converge ends with 3 and a document that has no intervals.
+    """
     with bounded(words, SECONDS):
-        result = CliRunner().invoke(app, ["track", *words, "--json"], env={"COLUMNS": "200"})
-    if result.exit_code == 0:
-        counts["tracked"] += 1
+        result = CliRunner().invoke(app, [command, *words, "--json"], env={"COLUMNS": "200"})
+    if result.exit_code in ((0, 3) if command == "calibrate" else (0,)):
+        counts[f"{command}: exit {result.exit_code}"] += 1
         found: dict[str, Any] = json.loads(result.stdout)
         return found
     if result.exception is not None and not isinstance(result.exception, SystemExit):
@@ -118,6 +121,31 @@ def test_damaged_tables_of_scans(try_cases: TryCases, folder: Path) -> None:
 
     try_cases(check, 12)
     print(dict(counts))
+
+
+def test_damaged_tables_are_calibrated_or_refused(try_cases: TryCases, folder: Path) -> None:
+    """What is printed is finite, and the file that is written is read again."""
+    rows, counts = rows_of(folder / "scans.csv"), Counter[str]()
+
+    def check(rng: np.random.Generator) -> None:
+        (folder / "s.csv").write_bytes(csv_of(rng, damaged_rows(rng, rows)))
+        (folder / "found.yaml").unlink(missing_ok=True)
+        bad_rows = pick(rng, ["refuse", "skip"])
+        words = ["s.csv", "--sensors", "radars.yaml", "--bad-rows", bad_rows, "--out", "found.yaml"]
+        found = tracked(words, counts, "calibrate")
+        if found is not None:
+            assert np.isfinite([value for value in numbers_of(found) if value is not None]).all()
+            scenario_of_recording(folder / "found.yaml", folder / "s.csv", bad_rows=bad_rows)
+
+    try_cases(check, 3)
+    print(dict(counts))
+
+
+def numbers_of(document: Any) -> list[float | None]:
+    """All numbers of a JSON document."""
+    if isinstance(document, dict | list):
+        return [n for each in (document.values() if isinstance(document, dict) else document) for n in numbers_of(each)]
+    return [document] if isinstance(document, int | float) else []
 
 
 def test_damaged_plots_of_a_radar(try_cases: TryCases, folder: Path) -> None:
