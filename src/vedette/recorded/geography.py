@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.errors import InputError
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import Bools, Floats
 from vedette.models.arguments import float_array, real, reject
 from vedette.platforms.compass import wrapped
 
@@ -62,14 +62,19 @@ class Origin:
         longitudes = float_array("longitude_deg", longitude_deg, (None,))
         latitudes = float_array("latitude_deg", latitude_deg, (len(longitudes),))
         east, north, _ = geodetic2enu(latitudes, longitudes, 0.0, self.latitude_deg, self.longitude_deg, 0.0)
-        ups = _cosines(longitudes, latitudes) @ _cosines(self.longitude_deg, self.latitude_deg)
-        if (ups <= 0.0).any():
-            index = int(np.argmin(ups))
+        beyond = self.beyond(longitudes, latitudes)
+        if beyond.any():
+            index = int(np.argmax(beyond))
             place = f"({longitudes[index]:g}, {latitudes[index]:g})"
             raise InputError(
                 f"longitude, latitude: expected points on the origin's side of the globe; got {place} degrees"
             )
         return np.stack([east, north], axis=-1)
+
+    def beyond(self, longitude_deg: Floats, latitude_deg: Floats) -> Bools:
+        """(n,) which points are on the other side of the globe."""
+        ups = _cosines(longitude_deg, latitude_deg) @ _cosines(self.longitude_deg, self.latitude_deg)
+        return np.asarray(ups <= 0.0)
 
     def nearby(self, longitude_deg: float, latitude_deg: float) -> tuple[float, float] | None:
         """As `to_plane`, of a place in degrees; None of one that is beyond `PLANE_REACH`."""

@@ -145,6 +145,15 @@ def _degrees(table: Table, given: Mapping[str, str]) -> list[Floats]:
     return degrees
 
 
+def _to_plane(table: Table, given: Mapping[str, str], origin: Origin, degrees: list[Floats]) -> Floats:
+    """(num_rows, 2) places in m."""
+    if (beyond := origin.beyond(*degrees)).any():
+        at = f"({origin.longitude_deg:g}, {origin.latitude_deg:g}) degrees"
+        wanted = f"a place on the same side of the globe as the origin, {at}"
+        raise table.fault(int(np.argmax(beyond)), given.get("latitude", "latitude"), wanted)
+    return origin.to_plane(*degrees)
+
+
 def _median_longitude(longitudes: Floats) -> float:
     """The median, also of longitudes on both sides of 180 degrees; from -180 to 180."""
     around = longitudes[0] + np.remainder(longitudes - longitudes[0] + 180.0, 360.0) - 180.0
@@ -154,7 +163,7 @@ def _median_longitude(longitudes: Floats) -> float:
 
 def _check_agreed(table: Table, found: Floats, origin: Origin) -> None:
     """That places in metres are those of the longitudes and latitudes beside them."""
-    told = origin.to_plane(*_degrees(table, {})) if len(found) else found
+    told = _to_plane(table, {}, origin, _degrees(table, {})) if len(found) else found
     apart = np.hypot(*(found - told).T)
     if (wrong := apart > ONE_PLACE + ONE_PLACE_SHARE * np.hypot(*told.T)).any():
         i = int(np.argmax(wrong))
@@ -189,4 +198,4 @@ def _positions(
     if not len(degrees[0]):
         return np.empty((0, 2)), origin_deg, None
     low, high = ((float(end(degrees[0])), float(end(degrees[1]))) for end in (np.min, np.max))
-    return Origin(*origin_deg).to_plane(*degrees), origin_deg, (low, high)
+    return _to_plane(table, given, Origin(*origin_deg), degrees), origin_deg, (low, high)
