@@ -172,7 +172,7 @@ def staying(options: Sequence[Options], mask: Mask | None) -> tuple[int, ...]:
     """For each sensor the course that changes its pose least, among those it may take: what it does until it decides.
 
     The course with the least change of heading, of these that with the least change of where a camera points, then of
-    position, then of all else except the seconds of scanning that are left; means over the horizon. Where only some
+    position, then of all else up to the seconds of scanning that are left; means over the horizon. Where only some
     sensors may scan, it is off.
     """
     found = []
@@ -181,7 +181,7 @@ def staying(options: Sequence[Options], mask: Mask | None) -> tuple[int, ...]:
         camera = len(own.pose) > HALF_WIDTH and own.pose[HALF_WIDTH] > 0.0
         angles = [2, POINTING] if camera else [2]
         off[:, :, angles] = np.abs(np.remainder(off[:, :, angles] + np.pi, 2.0 * np.pi) - np.pi)
-        rest = np.delete(off, [c for c in (0, 1, *angles, LEFT) if c < off.shape[2]], axis=2).sum(axis=2)
+        rest = np.delete(off[:, :, :LEFT], [0, 1, *angles], axis=2).sum(axis=2)
         left = np.flatnonzero(single_mask(mask, s, len(off)))
         left = left if len(left) else np.arange(len(off))
         for change in (*(off[:, :, angle] for angle in angles), np.hypot(off[:, :, 0], off[:, :, 1]), rest):

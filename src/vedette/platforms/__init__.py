@@ -7,6 +7,7 @@ from vedette.platforms.compass import Compass, PlaneCompass
 from vedette.platforms.courses import PAPER_HEADINGS_DEG, Courses
 from vedette.platforms.fleet import Fleet
 from vedette.platforms.operated import Operated
+from vedette.platforms.patrolling import Patrolling
 from vedette.platforms.sequences import Sequences
 from vedette.platforms.steps import Steps, Still, Waypoints
 
@@ -20,6 +21,7 @@ __all__ = [
     "Fleet",
     "Operated",
     "Options",
+    "Patrolling",
     "PlaneCompass",
     "Platform",
     "Pointing",

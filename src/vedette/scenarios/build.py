@@ -21,9 +21,11 @@ from vedette.filters import Filter, TwoStepFilter, labels_targets, shared_target
 from vedette.fusion import Clmb, CmDeltaGlmb, Fusion, Matched, ParallelUpdate
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models import SensorModel, TargetModel
-from vedette.platforms import Actions, ByCompass, Operated, Platform
+from vedette.platforms import Actions, ByCompass, Operated, Patrolling, Platform
 from vedette.platforms.base import SWITCH, actions_at
+from vedette.platforms.patrolling import CLOCKS
 from vedette.scenarios.loading import Scenario
+from vedette.scenarios.sections.control import revisited
 from vedette.scenarios.sections.courses import in_courses
 from vedette.scenarios.sections.custom import Custom, NotGiven
 from vedette.scenarios.sections.deciding import Lookahead
@@ -120,6 +122,9 @@ def _platform(model: ScenarioModel, sensor: Sensor, folder: Path) -> Platform:
     if isinstance(section, CustomPlatform) and sensor.switchable and SWITCH in platform.columns:
         wanted = f"{section.function} to have no column {SWITCH}, as the sensor is switchable"
         raise NotGiven(section, "function", wanted, ", ".join(platform.columns))
+    visits = revisited(model)
+    if visits is not None and section.top_speed > 0.0:
+        platform = Patrolling(platform, visits.places, visits.radius)
     if price is None and sensor.budget is None and not sensor.switchable:
         return platform
     if sensor.budget is None:
@@ -234,9 +239,14 @@ def _central_filter(scenario: Scenario, filters: tuple[Filter, ...]) -> CentralF
 
 def build_poses(scenario: Scenario) -> Floats:
     """(num_sensors, pose_dim) where they start, all as long as the longest; what is not a sensor's own is 0."""
-    poses = [sensor.pose for sensor in scenario.model.sensors]
-    longest = max(map(len, poses))
-    return np.array([(*pose, *(0.0,) * (longest - len(pose))) for pose in poses])
+    sensors, visits = scenario.model.sensors, revisited(scenario.model)
+    poses = [sensor.pose for sensor in sensors]
+    longest = max(map(len, poses)) if visits is None else CLOCKS
+    found = np.array([(*pose, *(0.0,) * (longest - len(pose))) for pose in poses])
+    if visits is None:
+        return found
+    patrols = [[0.0 if sensor.platform.top_speed > 0.0 else -1.0] * len(visits.places) for sensor in sensors]
+    return np.hstack([found, patrols])
 
 
 def _first_actions(scenario: Scenario, sensors: tuple[MobileSensor, ...]) -> tuple[Actions, ...]:
@@ -247,7 +257,9 @@ def _first_actions(scenario: Scenario, sensors: tuple[MobileSensor, ...]) -> tup
         row = section.platform.first_action(section.heading_deg)
         own = actions_at(f"sensors[{s}].platform", sensor.platform, pose)
         rows = own.values[:1] if row is None else np.array([row])
-        platform = sensor.platform.platform if isinstance(sensor.platform, Operated) else sensor.platform
+        platform: Any = sensor.platform
+        while isinstance(platform, Operated | Patrolling):
+            platform = platform.platform
         if row is not None and isinstance(platform, ByCompass):
             rows = platform.of_plane(rows, pose)
         if row is not None and isinstance(sensor.platform, Operated):

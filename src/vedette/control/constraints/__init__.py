@@ -15,6 +15,7 @@ from vedette.control.constraints.protocol import (
     reach_of,
 )
 from vedette.control.constraints.regions import KeepOut, StayInside
+from vedette.control.constraints.revisit import Revisit
 from vedette.control.constraints.separation import Separation
 from vedette.control.constraints.void import VoidProbability, void_probability
 
@@ -25,6 +26,7 @@ __all__ = [
     "Mask",
     "MaxActive",
     "Paths",
+    "Revisit",
     "Separation",
     "Situation",
     "StayInside",

@@ -20,7 +20,7 @@ from vedette.scenarios.sections.base import (
     Steps,
     check,
 )
-from vedette.scenarios.sections.deciding import AnyConstraint, AnyReward, AnySearch, Lookahead
+from vedette.scenarios.sections.deciding import AnyConstraint, AnyReward, AnySearch, Lookahead, Revisit
 from vedette.scenarios.sections.derived import Derived, derived, of_kind
 from vedette.scenarios.sections.tracking import UNLABELLED
 
@@ -207,4 +207,22 @@ def targets_of_rules(model: ScenarioModel) -> Iterator[Finding]:
             yield ("planners", name, "targets"), wanted, describe(list(own.targets))
 
 
-DECISION_CHECKS = (constraints_on_labels, enough_switchable, longer_plans, targets_of_rules)
+def revisited(model: ScenarioModel) -> Revisit | None:
+    """The constraint on places to be visited again and again; None: there is none."""
+    return next((own for own in model.control.constraints if isinstance(own, Revisit)), None)
+
+
+def one_patrol(model: ScenarioModel) -> Iterator[Finding]:
+    """Places are visited by sensors that move, and stand in one constraint, as poses have the time of each."""
+    constraints = model.control.constraints
+    numbers = [i for i, own in enumerate(constraints) if isinstance(own, Revisit)]
+    if numbers and not any(sensor.platform.top_speed > 0.0 for sensor in model.sensors):
+        yield ("control", "constraints", numbers[0], "kind"), "a sensor that moves, for revisit", "none"
+    for s, sensor in enumerate(model.sensors):
+        if numbers and len(sensor.platform.components()) > 2:
+            yield ("sensors", s, "platform"), "a pose of at most five components, beside revisit", "more"
+    for i in numbers[1:]:
+        yield ("control", "constraints", i, "kind"), "one constraint revisit with all places", "another"
+
+
+DECISION_CHECKS = (constraints_on_labels, enough_switchable, longer_plans, one_patrol, targets_of_rules)

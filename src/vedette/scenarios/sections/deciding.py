@@ -97,10 +97,26 @@ class KeepOut(Section):
             return KeepOut(area, tuple(np.array(hole) for hole in self.holes))
 
 
+class Revisit(Section):
+    """Some moving sensor is at each place at least every so many seconds."""
+
+    kind: Literal["revisit"] = Field(default="revisit", description="Kind of constraint [-].")
+    places: Annotated[tuple[Point, ...], Field(strict=False, min_length=1)] = Field(description="The places [m].")
+    radius: Positive = Field(description="Within which a sensor is at a place [m].")
+    every: Positive = Field(description="Longest time from one visit of a place to the next [s].")
+
+    def build(self, folder: Path) -> Any:
+        """The constraint."""
+        from vedette.control.constraints import Revisit
+
+        return Revisit(self.places, self.radius, self.every)
+
+
 if TYPE_CHECKING:
     AnyConstraint = Part
 else:
-    AnyConstraint = one_of("constraint", "control/constraints", "vedette.control:Constraint", own=(StayInside, KeepOut))
+    _OWN = (StayInside, KeepOut, Revisit)
+    AnyConstraint = one_of("constraint", "control/constraints", "vedette.control:Constraint", own=_OWN)
 
 
 class Lookahead(Section):

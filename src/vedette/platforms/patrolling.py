@@ -1,0 +1,96 @@
+"""Platforms that keep the time since they were last at each of some places."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vedette.errors import InputError
+from vedette.kernels.base.types import Bools, Floats
+from vedette.models.arguments import float_array, positive
+from vedette.platforms.base import Platform, check_platform, courses_of, prices_of, scans_of
+from vedette.platforms.operated import LEFT
+
+# Component of a pose: seconds since the platform was last at the first place; those of the other places follow.
+CLOCKS = LEFT + 1
+_PARTS = 16  # straight parts in which a course of any shape is followed up to the last time that is asked for
+
+
+@dataclass(frozen=True, slots=True)
+class Patrolling:
+    """A platform whose pose has the seconds since it was last within a radius of each place, from component 6 on.
+
+    Between the places that it is asked about and sixteen more, a course is taken as straight.
+
+    Attributes:
+        platform: what it may do.
+        places: (num_places, 2) m.
+        radius: m, within which it is at a place.
+
+    Raises:
+        InputError: no platform, places of another shape, or a radius that is not above 0.
+    """
+
+    platform: Platform
+    places: Sequence[tuple[float, float]]
+    radius: float
+
+    def __post_init__(self) -> None:
+        check_platform("platform", self.platform)
+        positive("radius", self.radius)
+        places = float_array("places", self.places, (None, 2))
+        object.__setattr__(self, "places", tuple(map(tuple, places.tolist())))
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Those of the platform."""
+        return tuple(self.platform.columns)
+
+    def actions(self, pose: Floats) -> Floats:
+        """Those of the platform."""
+        return np.asarray(self.platform.actions(pose))
+
+    def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
+        """That of the platform, with the seconds since it was at each place."""
+        return np.asarray(self.courses(pose, action[np.newaxis], times)[0])
+
+    def courses(self, pose: Floats, actions: Floats, times: Floats) -> Floats:
+        """Those of the platform, with the seconds since it was at each place."""
+        if len(pose) < CLOCKS + len(self.places):
+            wanted = f"{CLOCKS + len(self.places)} components, the last of them the seconds since it was at each place"
+            raise InputError(f"pose: expected {wanted}; got {len(pose)}")
+        nodes = np.union1d(times, np.linspace(0.0, times.max(), _PARTS + 1)[1:])
+        courses = courses_of("platform", self.platform, pose, actions, nodes)
+        start = np.broadcast_to(pose[:2], (len(courses), 1, 2))
+        ways, at = np.concatenate([start, courses[..., :2]], axis=1), np.concatenate([[0.0], nodes])
+        for k, place in enumerate(self.places):
+            last = np.maximum.accumulate(_last_inside(ways, at, np.array(place), self.radius), axis=1)
+            courses[..., CLOCKS + k] = np.where(last >= 0.0, nodes - last, pose[CLOCKS + k] + nodes)
+        return courses[:, np.searchsorted(nodes, times)]
+
+    def prices(self, actions: Floats) -> Floats:
+        """Those of the platform."""
+        return prices_of("platform", self.platform, actions)
+
+    def scans(self, pose: Floats, actions: Floats, times: Floats) -> Bools:
+        """Those of the platform."""
+        return scans_of("platform", self.platform, pose, actions, times)
+
+
+def _last_inside(ways: Floats, at: Floats, place: Floats, radius: float) -> Floats:
+    """(num, num_legs) last time of each straight leg within a radius of a place; -1: never.
+
+    ways: (num, num_legs + 1, 2) m, at: (num_legs + 1,) s.
+    """
+    begin, leg = ways[:, :-1] - place, np.diff(ways, axis=1)
+    square, along = (leg * leg).sum(axis=2), (leg * begin).sum(axis=2)
+    beyond = (begin * begin).sum(axis=2) - radius**2
+    moves = square > 0.0
+    root: Any = np.sqrt(np.maximum(along**2 - square * beyond, 0.0))
+    leaves = np.where(moves, (root - along) / np.where(moves, square, 1.0), 1.0)
+    enters = np.where(moves, (-root - along) / np.where(moves, square, 1.0), 0.0)
+    crosses = np.where(moves, (along**2 >= square * beyond) & (leaves >= 0.0) & (enters <= 1.0), beyond <= 0.0)
+    return np.where(crosses, at[:-1] + np.minimum(leaves, 1.0) * np.diff(at), -1.0)
