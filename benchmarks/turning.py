@@ -3,10 +3,12 @@
     python benchmarks/turning.py                       # 12 scenes, 8 runs
     python benchmarks/turning.py --scenes 3 --runs 2 --planners jdm sweep
     python benchmarks/turning.py --write docs/deciding.md
+    python benchmarks/turning.py --blind               # no scan while the camera turns
 
 Each scene is drawn: one camera that turns at 10 to 20 degrees a second and sees 24 to 40 degrees; two to five slow
 targets 100 to 300 m away in any directions; decisions every 1, 2 or 4 s with a horizon of 4 s; targets expected at
-sites (existence .9, at the first scan), or born anywhere. `sweep` turns on and on, one way, as fast as the camera can.
+sites (existence .9, at the first scan), or born anywhere. `sweep` turns on and on, one way, as fast as the camera can;
+a blind one by a field of view at a time, where it stays for a decision.
 Prints mean OSPA in m (cutoff 100 m) with one standard error, and paired differences to the first planner.
 """
 
@@ -34,7 +36,7 @@ PLANNERS = ("jdm", "sweep", "nearest", "random")
 SEED, STEPS, CUTOFF, POINTINGS, HORIZON = 7, 100, 100.0, 36, 4
 
 
-def scene(number: int) -> Scenario:
+def scene(number: int, *, blind: bool = False) -> Scenario:
     """One of the scenes; the same for a number."""
     rng = np.random.default_rng([SEED, number])
     num, every, anywhere = int(rng.integers(2, 6)), int(rng.choice([1, 2, 4])), bool(number % 2)
@@ -67,6 +69,7 @@ def scene(number: int) -> Scenario:
                     "half_width_deg": float(rng.uniform(12.0, 20.0)),
                     "pointings_deg": np.arange(-180.0, 180.0, 360.0 / POINTINGS).tolist(),
                     "turn_rate_deg": float(rng.uniform(10.0, 20.0)),
+                    "blind_while_turning": blind,
                 },
             }
         ],
@@ -77,24 +80,31 @@ def scene(number: int) -> Scenario:
 
 
 class Sweep:
-    """Turns on and on: at each decision to the pointing a third of a turn ahead, counter-clockwise."""
+    """Turns on and on: at each decision to the pointing a third of a turn ahead, counter-clockwise.
+
+    A camera that is blind while it turns goes on by its field of view once it has arrived.
+    """
 
     name = "sweep"
 
-    def __init__(self, planner: Any) -> None:
-        self.planner = planner
+    def __init__(self, planner: Any, *, blind: bool) -> None:
+        self.planner, self.blind, self.last = planner, blind, 0
 
     def plan(self, state: Any, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """Made of any plan, for its options."""
         plan: Plan = self.planner.plan(state, poses, rng=rng)
-        off = wrap_angles(np.radians(plan.actions[0].values[:, 0]) - poses[0][3] - 2.0 * np.pi / 3.0)
-        return replace(plan, chosen=(int(np.abs(off).argmin()),), questions=None, bound=None)
+        pointings, (now, half_width) = np.radians(plan.actions[0].values[:, 0]), poses[0][3:5]
+        if not self.blind or abs(wrap_angles(pointings[self.last] - now)) < 1e-6:
+            ahead = 2.0 * half_width if self.blind else 2.0 * np.pi / 3.0
+            self.last = int(np.abs(wrap_angles(pointings - now - ahead)).argmin())
+        return replace(plan, chosen=(self.last,), questions=None, bound=None)
 
 
 def errors(scenario: Scenario, planner: str, runs: int) -> Floats:
     """(runs,) mean OSPA, m."""
     experiment, score = build_experiment(scenario), partial(ospa_of_run, cutoff=CUTOFF, order=1.0)
-    given: Any = Sweep(build_planner(scenario, "random", 1)) if planner == "sweep" else None
+    blind = scenario.model.sensors[0].platform.blind_while_turning
+    given: Any = Sweep(build_planner(scenario, "random", 1), blind=blind) if planner == "sweep" else None
     made = given or build_planner(scenario, planner, 1)
     records = [simulate(experiment, made, seed=SEED, run=run, score=score) for run in range(runs)]
     return np.array([record.ospa[:, 0].mean() for record in records])
@@ -120,13 +130,14 @@ def main() -> None:
     parser.add_argument("--scenes", type=int, default=12)
     parser.add_argument("--runs", type=int, default=8, help="of each scene, at least 2")
     parser.add_argument("--planners", nargs="+", choices=PLANNERS, default=PLANNERS)
+    parser.add_argument("--blind", action="store_true", help="the camera makes no scan while it turns")
     parser.add_argument("--write", type=Path, metavar="PAGE", help="Markdown page with a place for the table")
     given = parser.parse_args()
     first = given.planners[0]
     lines = [f"| Scene | {' | '.join(given.planners)} |", f"| --- |{' ---: |' * len(given.planners)}"]
     found: dict[str, list[Floats]] = {planner: [] for planner in given.planners}
     for number in range(given.scenes):
-        scenario = scene(number)
+        scenario = scene(number, blind=given.blind)
         for planner in given.planners:
             found[planner].append(errors(scenario, planner, given.runs))
         cells = " | ".join(with_error(found[planner][-1]) for planner in given.planners)

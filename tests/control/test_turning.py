@@ -61,12 +61,30 @@ def test_how_long_it_takes_to_look_where_undetected_targets_are() -> None:
 
 def test_it_turns_on_unless_it_has_arrived() -> None:
     still = options_at("platform", CAMERA, POSE, np.array([20.0, 30.0]))
-    found = np.degrees(turned_on(OWN, HORIZON, np.array([3.0, 12.0, 15.0])))
+    pointings, scans = turned_on(OWN, HORIZON, np.array([3.0, 12.0, 15.0]))
+    found = np.degrees(pointings)
+    assert scans.all()
     by_course = {round(math.degrees(end)): own for end, own in zip(OWN.courses[:, -1, 3], found, strict=True)}
     np.testing.assert_allclose(by_course[40], [55.0, -170.0, -125.0])
     np.testing.assert_allclose(by_course[-20], [-35.0, -170.0, 145.0])
-    at_rest = turned_on(still, np.array([20.0, 30.0]), np.array([40.0]))[:, 0]
+    at_rest = turned_on(still, np.array([20.0, 30.0]), np.array([40.0]))[0][:, 0]
     np.testing.assert_allclose(at_rest, still.courses[:, -1, 3])
+
+
+def test_a_blind_camera_goes_to_its_pointing_and_from_there_on_slowly() -> None:
+    """From 10 degrees at 15 a second; then 40 degrees, its view, in 40 / 15 s of turning and a step of 1 s."""
+    blind = Pointing(np.arange(-180.0, 180.0, 10.0).tolist(), turn_rate_deg=RATE, blind_while_turning=True)
+    own = options_at("platform", blind, POSE, HORIZON)
+    pointings, scans = turned_on(own, HORIZON, np.array([3.0, 6.0, 9.0]))
+    slow = 40.0 / (1.0 + 40.0 / RATE)
+    for course in range(len(own.courses)):
+        turn = (own.actions.values[own.first_action(course), 0] - 10.0 + 180.0) % 360.0 - 180.0
+        arrived = abs(turn) / RATE
+        for k, time in enumerate((3.0, 6.0, 9.0)):
+            turned = RATE * time if time < arrived else abs(turn) + slow * (time - arrived) * (turn != 0.0)
+            off = math.degrees(pointings[course, k]) - 10.0 - math.copysign(turned, turn)
+            assert (off + 180.0) % 360.0 - 180.0 == pytest.approx(0.0, abs=1e-9)
+            assert scans[course, k] == (time >= arrived)
 
 
 def scene(**control: Any) -> Scenario:

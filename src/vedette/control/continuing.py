@@ -16,7 +16,7 @@ def continued(own: Options, horizon: Floats, times: Floats) -> Options:
     """The options with courses (num_courses, num_times, pose_dim) at other times, s, from now on.
 
     horizon: (num_steps,) s of the poses that there are. Between them a sensor goes straight; after the last it goes on
-    by as much as it went over the whole horizon, again and again, a camera that still turns turns on, what else its
+    by as much as it went over the whole horizon, again and again, a camera goes on as by `turned_on`, what else its
     pose has stays, and it scans, even where its action keeps it from scanning up to then.
     """
     start = np.broadcast_to(own.pose, (len(own.courses), 1, len(own.pose)))
@@ -31,8 +31,9 @@ def continued(own: Options, horizon: Floats, times: Floats) -> Options:
     straight = known[:, after - 1, :2] * (1.0 - share) + known[:, after, :2] * share
     courses[:, :, :2] = straight + rounds[:, np.newaxis] * moved
     if is_camera(own.pose):
-        later = rounds > 0.0
-        courses[:, later, POINTING] = turned_on(own, horizon, times[later])
+        later, scans = rounds > 0.0, (rounds > 0.0) | own.scans[:, after - 1]
+        courses[:, later, POINTING], scans[:, later] = turned_on(own, horizon, times[later])
+        return own._replace(courses=np.ascontiguousarray(courses), scans=scans)
     scans = (rounds > 0.0) | own.scans[:, after - 1]
     return own._replace(courses=np.ascontiguousarray(courses), scans=scans)
 

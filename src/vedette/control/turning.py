@@ -7,10 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from vedette.densities import UndetectedIntensity
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import Bools, Floats
 from vedette.models.measurement import wrap_angles
 from vedette.platforms import Options
+from vedette.platforms.base import SWITCH
 from vedette.platforms.camera import HALF_WIDTH, POINTING, is_camera
+
+POINTS = "pointing_deg"  # the column of actions that says where a camera points
+_ARRIVED = 1e-9  # s
 
 
 def turn_rate(own: Options, horizon: float) -> float:
@@ -56,14 +60,43 @@ def seconds_to_search(
     return float(seconds[order[last]]) if last < len(order) else 0.0
 
 
-def turned_on(own: Options, horizon: Floats, times: Floats) -> Floats:
-    """Return the pointings of a camera after its horizon, rad, shape (num_courses, num_times).
+def turned_on(own: Options, horizon: Floats, times: Floats) -> tuple[Floats, Bools]:
+    """Return the pointings of a camera after its horizon, rad, and whether it scans, both (num_courses, num_times).
 
-    The camera continues at the turn rate of its last step, so one that has reached its pointing stays there. horizon:
-    (num_steps,) s, times of the poses in `own`. times: (num_times,) s, after the horizon.
+    The camera continues at the turn rate of its last step, so one that has reached its pointing stays there. One that
+    is blind while it turns goes on to where its action points it; from there on it scans and turns as slowly as one
+    that stays a step at each field of view, so that courses that arrive earlier search more. horizon: (num_steps,) s,
+    times of the poses in `own`. times: (num_times,) s, after the horizon.
     """
+    step = horizon[-1] - (horizon[-2] if len(horizon) > 1 else 0.0)
+    if is_blind_while_turning(own):
+        return _stops(own, float(step), times)
     start = np.full((len(own.courses), 1), own.pose[POINTING])
     last = np.concatenate([start, own.courses[:, :, POINTING]], axis=1)[:, -2:]
-    step = horizon[-1] - (horizon[-2] if len(horizon) > 1 else 0.0)
     rates = wrap_angles(last[:, 1:] - last[:, :1]) / step
-    return np.asarray(wrap_angles(last[:, 1:] + rates * (times - horizon[-1])))
+    pointings = np.asarray(wrap_angles(last[:, 1:] + rates * (times - horizon[-1])))
+    return pointings, np.ones(pointings.shape, np.bool_)
+
+
+def is_blind_while_turning(own: Options) -> bool:
+    """Return whether a course of a camera that is on makes no scan at some time; then it turns."""
+    columns = own.actions.columns
+    if POINTS not in columns or own.scans.all():
+        return False
+    silent = [own.first_action(course) for course in np.flatnonzero(~own.scans.all(axis=1)).tolist()]
+    return SWITCH not in columns or bool((own.actions.values[silent, columns.index(SWITCH)] != 0.0).any())
+
+
+def _stops(own: Options, step: float, times: Floats) -> tuple[Floats, Bools]:
+    """As `turned_on`, of a camera that is blind while it turns; step: s, for which it stays."""
+    column, first = own.actions.columns.index(POINTS), own.pose[POINTING]
+    wanted = np.radians([own.actions.values[own.first_action(course), column] for course in range(len(own.courses))])
+    turns = wrap_angles(wanted - first)[:, np.newaxis]
+    rate = np.abs(wrap_angles(own.courses[:, 0, POINTING] - first)).max() / step
+    if rate == 0.0:
+        return np.repeat(wrap_angles(first + turns), len(times), axis=1), np.ones((len(turns), len(times)), np.bool_)
+    view = 2.0 * own.courses[:, -1:, HALF_WIDTH]
+    since = times - np.abs(turns) / rate
+    turned = np.where(since < 0.0, rate, view / (step + view / rate)) * since
+    scans = (since >= -_ARRIVED) | (turns == 0.0)
+    return wrap_angles(first + turns + np.sign(turns) * turned), scans
