@@ -11,7 +11,7 @@ import pytest
 from control.examples import Situation, decided
 from control.test_additive import shared
 from control.test_switched import REWARDS
-from vedette.control import IndependentPlanner
+from vedette.control import IndependentPlanner, JointPlanner
 from vedette.control.constraints import MaxActive
 from vedette.control.inputs import options_of, staying
 from vedette.errors import InputError, ScenarioError
@@ -79,9 +79,8 @@ def test_others_that_stay_scan_and_sensors_beyond_a_number_are_switched_off() ->
     example = limited(shared(2), 50.0)
     options, mask = options_of(example.sensors, example.poses, example.settings), None
     assert [options[s].scans[course].any() for s, course in enumerate(staying(options, mask))] == [True, True]
-    for kind in (None, IndependentPlanner):
-        own = {} if kind is None else {"kind": kind}
-        plan = decided(example, constraints=(MaxActive(1),), **own)
+    for kind in (JointPlanner, IndependentPlanner):
+        plan = decided(example, kind, constraints=(MaxActive(1),))
         assert sum(row[-1] for row in plan.chosen_actions) == 1.0
         assert not any("given up" in note for note in plan.notes)
 
@@ -108,7 +107,8 @@ def test_no_strategy_scans_longer_than_the_budget(planner: str) -> None:
 
 
 def test_mistakes_are_named() -> None:
-    for own in ({"budget": 0.0}, {"refill": 0.5}, {"budget": 3.0, "refill": -1.0}):
+    wrong: list[dict[str, Any]] = [{"budget": 0.0}, {"refill": 0.5}, {"budget": 3.0, "refill": -1.0}]
+    for own in wrong:
         with pytest.raises(InputError, match=list(own)[-1]):
             Operated(Still(), **own)
     with pytest.raises(InputError, match="expected 6 components, the last of them the seconds left to scan; got 3"):

@@ -27,7 +27,7 @@ def test_the_seconds_since_a_visit_are_those_of_a_dense_walk() -> None:
     rng = np.random.default_rng(4)
     for _ in range(50):
         places = rng.uniform(-60.0, 60.0, (3, 2))
-        platform = Patrolling(Courses(10.0, (0.0, 60.0, 135.0)), places, 15.0)
+        platform = Patrolling(Courses(10.0, (0.0, 60.0, 135.0)), [(x, y) for x, y in places.tolist()], 15.0)
         start = pose(*rng.uniform(-60.0, 60.0, 2), 20.0, 0.0, 7.5)
         found = options_at("platform", platform, start, TIMES).courses
         for course, heading in zip(found, np.radians([0.0, 60.0, 135.0]), strict=True):
@@ -64,14 +64,14 @@ def test_the_nearest_sensor_goes_when_it_is_time() -> None:
     assert [own.tolist() for own in constraint.courses(situation(90.0))] == [[True, False, False], [True] * 3]
 
 
-def visited(every: float = EVERY, **fields: Any) -> Scenario:
-    constraint = {"kind": "revisit", "places": [list(place) for place in PLACES], "radius": RADIUS, "every": every}
+def visited(fields: dict[str, Any] | None = None) -> Scenario:
+    constraint = {"kind": "revisit", "places": [list(place) for place in PLACES], "radius": RADIUS, "every": EVERY}
     scene = load_scenario("paper-a")
     steps = scene.model.time.num_steps
     lmb = {"filter": {"kind": "lmb"}, "fusion": {"kind": "sequential"}, "time.num_steps": 160}
     decisions = {"control.decision_steps": list(range(5, 160, 5)), "control.constraints": [constraint]}
     assert steps < 160
-    return with_fields(scene, {**lmb, **decisions, **fields})
+    return with_fields(scene, {**lmb, **decisions, **(fields or {})})
 
 
 @pytest.mark.parametrize("planner", ["jdm", "idm", "lookahead", "nearest", "random"])
@@ -89,7 +89,7 @@ def test_every_strategy_visits_in_time(planner: str) -> None:
 
 
 def test_without_the_constraint_they_are_not_visited() -> None:
-    record = run_scenario(visited(**{"control.constraints": []}), "jdm", seed=0)
+    record = run_scenario(visited({"control.constraints": []}), "jdm", seed=0)
     gaps = [np.hypot(*(record.poses[:, :, :2] - np.array(place)).transpose(2, 0, 1)).min() for place in PLACES]
     assert max(gaps) > RADIUS
 
@@ -105,7 +105,7 @@ def test_mistakes_are_named() -> None:
         options_at("platform", Patrolling(Still(), PLACES, 3.0), np.zeros(6), TIMES)
     twice = [{"kind": "revisit", "places": [[0.0, 0.0]], "radius": 3.0, "every": 9.0}] * 2
     with pytest.raises(ScenarioError, match="one constraint revisit with all places"):
-        visited(**{"control.constraints": twice})
+        visited({"control.constraints": twice})
     still = [{"name": "radar", "position": [0.0, 0.0]}]
     with pytest.raises(ScenarioError, match="a sensor that moves, for revisit"):
-        visited(sensors=still)
+        visited({"sensors": still})

@@ -36,7 +36,7 @@ def test_a_field_of_a_section_of_every_sensor_and_of_one(paper: Scenario) -> Non
 
 def test_a_whole_section(paper: Scenario) -> None:
     changed = with_fields(paper, {"estimator": {"kind": "marginal", "threshold": 0.4}})
-    assert changed.model.estimator.model_dump() == {"kind": "marginal", "threshold": 0.4}
+    assert changed.model.estimates_by.model_dump() == {"kind": "marginal", "threshold": 0.4}
 
 
 def test_a_section_may_leave_out_what_is_at_its_default(paper: Scenario) -> None:
