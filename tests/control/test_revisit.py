@@ -68,9 +68,9 @@ def visited(fields: dict[str, Any] | None = None) -> Scenario:
     constraint = {"kind": "revisit", "places": [list(place) for place in PLACES], "radius": RADIUS, "every": EVERY}
     scene = load_scenario("paper-a")
     steps = scene.model.time.num_steps
-    lmb = {"filter": {"kind": "lmb"}, "fusion": {"kind": "sequential"}, "time.num_steps": 160}
-    decisions = {"control.decision_steps": list(range(5, 160, 5)), "control.constraints": [constraint]}
-    assert steps < 160
+    lmb = {"filter": {"kind": "lmb"}, "fusion": {"kind": "sequential"}, "time.num_steps": 110}
+    decisions = {"control.decision_steps": list(range(5, 110, 5)), "control.constraints": [constraint]}
+    assert steps < 110
     return with_fields(scene, {**lmb, **decisions, **(fields or {})})
 
 
