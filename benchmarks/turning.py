@@ -88,13 +88,14 @@ class Sweep:
     name = "sweep"
 
     def __init__(self, planner: Any, *, blind: bool) -> None:
-        self.planner, self.blind, self.last = planner, blind, 0
+        self.planner, self.blind = planner, blind
+        self.last: int | None = None  # the pointing that it turns to
 
     def plan(self, state: Any, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """Made of any plan, for its options."""
         plan: Plan = self.planner.plan(state, poses, rng=rng)
         pointings, (now, half_width) = np.radians(plan.actions[0].values[:, 0]), poses[0][3:5]
-        if not self.blind or abs(wrap_angles(pointings[self.last] - now)) < 1e-6:
+        if not self.blind or self.last is None or abs(wrap_angles(pointings[self.last] - now)) < 1e-6:
             ahead = 2.0 * half_width if self.blind else 2.0 * np.pi / 3.0
             self.last = int(np.abs(wrap_angles(pointings - now - ahead)).argmin())
         return replace(plan, chosen=(self.last,), questions=None, bound=None)
@@ -104,9 +105,14 @@ def errors(scenario: Scenario, planner: str, runs: int) -> Floats:
     """(runs,) mean OSPA, m."""
     experiment, score = build_experiment(scenario), partial(ospa_of_run, cutoff=CUTOFF, order=1.0)
     blind = scenario.model.sensors[0].platform.blind_while_turning
-    given: Any = Sweep(build_planner(scenario, "random", 1), blind=blind) if planner == "sweep" else None
-    made = given or build_planner(scenario, planner, 1)
-    records = [simulate(experiment, made, seed=SEED, run=run, score=score) for run in range(runs)]
+
+    def made() -> Any:
+        """A sweep begins anew in each run."""
+        if planner == "sweep":
+            return Sweep(build_planner(scenario, "random", 1), blind=blind)
+        return build_planner(scenario, planner, 1)
+
+    records = [simulate(experiment, made(), seed=SEED, run=run, score=score) for run in range(runs)]
     return np.array([record.ospa[:, 0].mean() for record in records])
 
 
