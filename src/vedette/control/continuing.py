@@ -30,11 +30,10 @@ def continued(own: Options, horizon: Floats, times: Floats) -> Options:
     moved = known[:, -1:, :2] - known[:, :1, :2]
     straight = known[:, after - 1, :2] * (1.0 - share) + known[:, after, :2] * share
     courses[:, :, :2] = straight + rounds[:, np.newaxis] * moved
+    later = rounds > 0.0
+    scans = later | own.scans[:, after - 1]
     if is_camera(own.pose):
-        later, scans = rounds > 0.0, (rounds > 0.0) | own.scans[:, after - 1]
         courses[:, later, POINTING], scans[:, later] = turned_on(own, horizon, times[later])
-        return own._replace(courses=np.ascontiguousarray(courses), scans=scans)
-    scans = (rounds > 0.0) | own.scans[:, after - 1]
     return own._replace(courses=np.ascontiguousarray(courses), scans=scans)
 
 

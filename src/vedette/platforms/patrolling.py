@@ -16,7 +16,7 @@ from vedette.platforms.operated import LEFT
 
 # Component of a pose: seconds since the platform was last at the first place; those of the other places follow.
 CLOCKS = LEFT + 1
-_PARTS = 16  # straight parts in which a course of any shape is followed up to the last time that is asked for
+_PARTS = 16  # straight segments that approximate a course, up to the last requested time
 
 
 @dataclass(frozen=True, slots=True)

@@ -66,7 +66,7 @@ class Journal:
         self.estimates.append(estimate)
 
     def decide(self, plan: Plan, undetected: UndetectedIntensity | None = None) -> None:
-        """Write down the decision after the scan at hand, with what is kept of its explanation."""
+        """Record the decision after the current scan, with its explanation if the experiment keeps explanations."""
         explain = self.experiment.explain
         kept = plan.settled(explained=explain)
         found = undetected if explain and kept.explanation is not None else None

@@ -160,3 +160,16 @@ def with_start(ways: Floats, start: Floats) -> Floats:
     found = np.empty((len(ways), ways.shape[1] + 1, 2))
     found[:, 0], found[:, 1:] = start, ways
     return found
+
+
+def least_on_legs(x: Floats, y: Floats) -> Floats:
+    """(..., num_points - 1) least squared length of vectors that go straight and evenly from one to the next.
+
+    x, y: (..., num_points). It is least at the foot of the origin on their line, or at an end.
+    """
+    from_x, from_y = x[..., :-1], y[..., :-1]
+    leg_x, leg_y = x[..., 1:] - from_x, y[..., 1:] - from_y
+    length = leg_x * leg_x + leg_y * leg_y
+    share = -(from_x * leg_x + from_y * leg_y) / np.maximum(length, np.finfo(float).tiny)
+    share = np.minimum(np.maximum(share, 0.0), 1.0)
+    return np.asarray((from_x + share * leg_x) ** 2 + (from_y + share * leg_y) ** 2)

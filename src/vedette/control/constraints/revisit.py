@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from vedette.control.constraints.protocol import Alone, Situation
+from vedette.control.constraints.protocol import Alone, Situation, least_on_legs
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import float_array, positive
@@ -20,7 +20,7 @@ _HORIZONS = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Revisit(Alone):
-    """Some platform is at each place at least every so many seconds.
+    """Maximum time between visits of each place, by any platform.
 
     Poses have the seconds since their platforms were at each place (`Patrolling`). When the time that is left is little
     more than that of the way, the platform that is there earliest takes only courses that come to the place, or nearest
@@ -105,8 +105,4 @@ def _speed(situation: Situation, sensor: int) -> float:
 
 def _gaps(ways: Floats, place: Floats) -> Floats:
     """(num_courses,) least distance of each way from a place, m."""
-    begin, leg = ways[:, :-1] - place, np.diff(ways, axis=1)
-    square = (leg * leg).sum(axis=2)
-    share = np.clip(-(begin * leg).sum(axis=2) / np.maximum(square, np.finfo(float).tiny), 0.0, 1.0)
-    nearest = begin + share[..., np.newaxis] * leg
-    return np.asarray(np.hypot(nearest[..., 0], nearest[..., 1]).min(axis=1))
+    return np.asarray(np.sqrt(least_on_legs(ways[..., 0] - place[0], ways[..., 1] - place[1]).min(axis=1)))

@@ -7,8 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from vedette.control.constraints.protocol import Situation
-from vedette.kernels.base.types import Bools, Floats
+from vedette.control.constraints.protocol import Situation, least_on_legs
+from vedette.kernels.base.types import Bools
 from vedette.models.fields import Checked, Positive, part
 
 
@@ -51,18 +51,5 @@ class Separation(Checked):
             x, y = x[:, :, 1:], y[:, :, 1:]
         nearest = (x * x + y * y).min(axis=2)
         if x.shape[2] > 1:
-            nearest = np.minimum(nearest, _on_legs(x, y).min(axis=2))
+            nearest = np.minimum(nearest, least_on_legs(x, y).min(axis=2))
         return np.asarray(nearest >= least)
-
-
-def _on_legs(x: Floats, y: Floats) -> Floats:
-    """(..., num_points - 1) least squared length of vectors that go straight and evenly from one to the next.
-
-    x, y: (..., num_points). It is least at the foot of the origin on their line, or at an end.
-    """
-    from_x, from_y = x[..., :-1], y[..., :-1]
-    leg_x, leg_y = x[..., 1:] - from_x, y[..., 1:] - from_y
-    length = leg_x * leg_x + leg_y * leg_y
-    share = -(from_x * leg_x + from_y * leg_y) / np.maximum(length, np.finfo(float).tiny)
-    share = np.minimum(np.maximum(share, 0.0), 1.0)
-    return np.asarray((from_x + share * leg_x) ** 2 + (from_y + share * leg_y) ** 2)

@@ -98,7 +98,7 @@ class KeepOut(Section):
 
 
 class Revisit(Section):
-    """Some moving sensor is at each place at least every so many seconds."""
+    """Maximum time between visits of each place, by any moving sensor."""
 
     kind: Literal["revisit"] = Field(default="revisit", description="Kind of constraint [-].")
     places: Annotated[tuple[Point, ...], Field(strict=False, min_length=1)] = Field(description="The places [m].")
