@@ -22,7 +22,7 @@ from vedette.campaigns.journal import Writer
 from vedette.campaigns.upgrading import upgrade_results
 from vedette.cli import app
 from vedette.errors import InputError
-from vedette.evaluation.health import health_line
+from vedette.evaluation.diagnostics import diagnostics_line, run_diagnostics
 from vedette.simulation.arrow import Layout, read_table
 from vedette.simulation.storage import load_run
 from vedette.simulation.tables import LAYOUTS
@@ -90,7 +90,7 @@ def test_nothing_is_lost_and_what_was_not_known_is_not(campaign: Path, run: Path
     upgrade_results(run)
     record = load_run(run)
     assert np.isnan(record.health.factoring_error).all()
-    assert "taking labels as independent is not known" in health_line(record.health)
+    assert "independence error: not known" in diagnostics_line(run_diagnostics(record.health))
     for name in ("discarded_weight_bound", "num_tracks", "log_likelihood"):
         np.testing.assert_array_equal(getattr(record.health, name).ravel(), before[name])
     after = contents(run)

@@ -32,7 +32,7 @@ def test_every_campaign_that_comes_with_the_library_is_a_yardstick_of_its_own_na
         assert bool(yardstick.source) == bool(yardstick.published)
 
 
-@pytest.mark.parametrize("name", builtin_specs())
+@pytest.mark.parametrize("name", [name for name in builtin_specs() if name != "paper-a"])
 def test_they_resolve_to_decisions_after_every_scan_but_the_last(name: str) -> None:
     campaign = resolve(load_spec(name))
     assert campaign.compare == "planner"

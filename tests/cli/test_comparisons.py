@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from evaluation.synthetic import make_record
+from vedette.cli import comparisons
 from vedette.cli.comparisons import print_comparison
 from vedette.evaluation import Comparison, compare, strategy_rows
 
@@ -30,31 +31,36 @@ def test_every_number_is_shown_at_any_width(
     comparison = comparison_of(4)
     print_comparison(comparison)
     printed = capsys.readouterr().out
-    table = printed[: printed.index("Scenario ")]
+    table = printed[: printed.index("± is one")]
     for row in strategy_rows(comparison):
         assert all(number in table for number in row[1:])
     assert "0%, 100% tied" in table
     assert LONG not in table
     assert max(map(len, table.splitlines())) <= width
-    assert "[bold]:smile:" in printed
 
 
 def test_one_run_claims_nothing(capsys: pytest.CaptureFixture[str]) -> None:
     print_comparison(comparison_of(1))
     printed = " ".join(capsys.readouterr().out.split())
-    assert "1 paired run, mean over" in printed
+    assert "synthetic: 1 run, mean OSPA over" in printed
     assert "standard error" not in printed
-    assert "runs won" not in printed
+    assert "Won: " not in printed
     assert "unknown unknown" in printed
 
 
-def test_many_decisions_are_counted_and_not_all_printed(capsys: pytest.CaptureFixture[str]) -> None:
+def test_decisions_are_printed_if_asked_for_and_many_are_counted(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     found = comparison_of(2)
     often = [
         replace(each, decision_times=np.arange(9.0), choices=tuple(run[:1] * 9 for run in each.choices))
         for each in found.ensembles
     ]
     print_comparison(replace(found, ensembles=tuple(often)))
+    assert "jdm at " not in capsys.readouterr().out
+    monkeypatch.setattr(comparisons, "is_verbose", lambda: True)
+    print_comparison(replace(found, ensembles=tuple(often)))
     printed = capsys.readouterr().out
     assert printed.count("jdm at ") == 6
     assert "jdm: and at 3 other times\n" in printed
+    assert "[bold]:smile:" in printed

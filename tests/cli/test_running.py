@@ -109,7 +109,7 @@ def test_a_run_that_stops_at_once_writes_nothing(scenario_file, tmp_path, monkey
 
 def test_a_run_ends_with_its_health(scenario_file):
     result = call("run", scenario_file, "--planner", "still")
-    assert result.stdout.splitlines()[-1].startswith("health: ")
+    assert result.stdout.splitlines()[-1] == "diagnostics no problem found"
 
 
 def test_run_without_a_folder_writes_nothing(scenario_file, tmp_path):
@@ -121,7 +121,7 @@ def test_reproduce(scenario_file, tmp_path):
     out = tmp_path / "all"
     result = call("reproduce", scenario_file, "--runs", 2, "--planners", "idm,still", "--workers", 1, "--out", out)
     assert result.exit_code == 0, result.output
-    assert "idm at 8 s" in result.output
+    assert "idm    independent decisions, CS divergence, other sensors absent" in result.output
     results = open_results(out)
     assert [results.finished(cell) for cell in ("idm", "still")] == [(0, 1), (0, 1)]
     for name in ("report.html", "summary.md", "summary.csv", "figures/ospa.pdf", "tables/scans.parquet"):

@@ -11,7 +11,7 @@ from evaluation.synthetic import make_record
 from scripts import load
 from vedette.errors import InputError
 from vedette.evaluation import Comparison, compare, decision_rows, holm, strategy_csv, strategy_markdown, strategy_rows
-from vedette.evaluation.tables import header, strategy_latex, told_apart
+from vedette.evaluation.tables import header, significance, strategy_latex
 from vedette.evaluation.tails import Tail, tail, tails
 from vedette.simulation.records import RunRecord
 
@@ -61,18 +61,19 @@ def of_these(comparison: Comparison, *places: int) -> Comparison:
     return replace(comparison, ensembles=tuple(comparison.ensembles[place] for place in places))
 
 
-def test_what_is_told_apart_allows_for_the_number_of_strategies(comparison: Comparison) -> None:
+def test_significance_is_corrected_for_the_number_of_strategies(comparison: Comparison) -> None:
     alone = [comparison.difference(name).p_value for name in STRATEGIES[1:]]
     np.testing.assert_array_equal(comparison.p_values(), [np.nan, *holm(np.array(alone))])
-    assert told_apart(comparison) == (
-        "From jdm, at 5 % among all 3 (Holm), told apart: random, fixed; not told apart: idm."
-    )
+    assert significance(comparison) == "Significant at 5 % (Holm correction): random, fixed; not significant: idm."
     alike = of_these(comparison, 0, 2, 3, 0)
-    assert told_apart(alike) == "From jdm, at 5 % among all 3 (Holm), told apart: idm, random; not told apart: fixed."
-    all_apart = of_these(comparison, 0, 2, 3, 3)
-    assert told_apart(all_apart).endswith("(Holm), told apart: idm, random, fixed.")
-    two = replace(of_these(comparison, 0, 1), strategies=("a", "b"))
-    assert told_apart(two) == ""
+    assert significance(alike) == "Significant at 5 % (Holm correction): idm, random; not significant: fixed."
+    assert (
+        significance(of_these(comparison, 0, 2, 3, 3)) == "All 3 differences are significant at 5 % (Holm correction)."
+    )
+    assert significance(of_these(comparison, 0, 0, 0, 0)) == "No difference is significant at 5 % (Holm correction)."
+    two = replace(of_these(comparison, 0, 2), strategies=("a", "b"))
+    assert significance(two) == "The difference is significant at 5 %."
+    assert significance(replace(of_these(comparison, 0), strategies=("a",))) == ""
 
 
 def test_latex_has_the_table_with_its_letters_escaped(comparison: Comparison) -> None:
@@ -151,7 +152,7 @@ def test_markdown_is_a_table_with_a_caption(comparison: Comparison) -> None:
     table = [line for line in lines if line.startswith("|")]
     assert len(table) == 2 + len(STRATEGIES)
     assert len({line.count("|") for line in table}) == 1
-    assert "6 paired runs, mean over t = 11 to 40 s" in lines[-2]
+    assert "6 paired runs, mean OSPA over t = 11 to 40 s" in lines[-2]
     assert lines[-1] == tails(comparison)
 
 

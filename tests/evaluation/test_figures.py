@@ -201,9 +201,10 @@ def test_the_style_is_there_for_figures_of_ones_own() -> None:
 
 
 def test_overview_shows_a_run_beside_the_errors(comparison: Comparison) -> None:
-    left, right = overview_figure(make_record(), comparison).axes
+    left, right, above = overview_figure(make_record(), comparison).axes
     assert left.get_title() == "JDM, run 0"
-    assert (left.get_ylabel(), right.get_ylabel()) == ("y (m)", "OSPA (m), mean of 4 runs")
+    assert (left.get_ylabel(), right.get_ylabel(), above.get_ylabel()) == ("y (m)", "OSPA (m) minus JDM", "OSPA (m)")
+    assert right.get_xlim()[0] == comparison.decision_times[0]
 
 
 def test_ospa_parts_are_panels(comparison: Comparison) -> None:

@@ -182,7 +182,7 @@ def test_fields_and_degrees_are_drawn() -> None:
 def test_one_colour_has_one_meaning_beside_the_errors(scenario: Scenario, records: dict[str, list[RunRecord]]) -> None:
     comparison = compare(records)
     figure = overview_figure(records["idm"][0], comparison, strategy="idm", scene=scene_of(scenario, "idm"))
-    left, right = figure.axes
+    left, right, *_ = figure.axes
     of_strategies = {str(line.get_label()): line.get_color() for line in right.lines}
     assert (of_strategies["JDM"], of_strategies["IDM"]) == (colour(0), colour(1))
     coloured = {line.get_color() for line in left.lines if line.get_color() in COLOURS}

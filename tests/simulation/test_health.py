@@ -12,7 +12,8 @@ import pytest
 
 from vedette.control import FixedPlanner
 from vedette.errors import NumericalError
-from vedette.evaluation.health import health_findings, health_line, health_sums, summarise_health
+from vedette.evaluation.diagnostics import Diagnostic, diagnostics_line, run_diagnostics
+from vedette.evaluation.health import health_sums, summarise_health
 from vedette.filters import FilterInfo
 from vedette.fusion import CmDeltaGlmb
 from vedette.fusion.base import FusionInfo
@@ -121,43 +122,51 @@ def test_a_target_that_one_sensor_alone_sees_is_told_as_lost(experiment: Experim
 
     record = run(with_second(experiment, near))
     assert record.health.fusion_num_lost_labels[-1] >= 1
-    assert "GCI lost a target that one sensor was sure of" in health_line(record.health)
-    assert "of the scans GCI lost a target" in health_findings(health_sums([record.health]))[0]
+    lost = diagnostic(record.health, "Targets lost by fusion")
+    assert lost.level == "check"
+    assert lost.text == "75 % of scans, up to 4 targets"
 
 
-def test_all_exact_is_said_only_where_nothing_was_cut_off() -> None:
-    record = replace(_synthetic(), health=Health.unreported(40, 2))
-    assert health_line(record.health) == "health: all exact"
-    assert health_findings(health_sums([record.health])) == ()
+def test_every_diagnostic_is_ok_only_where_nothing_was_truncated() -> None:
+    health = Health.unreported(40, 2)
+    assert all(each.level == "ok" for each in run_diagnostics(health))
+    assert diagnostics_line(run_diagnostics(health)) == NOTHING
     for name in ("cap_met", "search_cut", "num_inexact_clusters", "num_duplicates", "num_clutter_raised"):
         health = Health.unreported(40, 2)
         getattr(health, name)[7, 1] = 1
-        assert health_line(health) != "health: all exact", name
+        assert diagnostics_line(run_diagnostics(health)) != NOTHING, name
     for name in ("fusion_num_lost_labels", "fusion_empty_intersection", "fusion_discarded_weight"):
         health = Health.unreported(40, 2)
         getattr(health, name)[7] = 1
-        assert health_line(health) != "health: all exact", name
+        assert diagnostics_line(run_diagnostics(health)) != NOTHING, name
 
 
-def test_a_bound_is_told_as_one() -> None:
-    record = _synthetic()
-    record.health.discarded_weight_bound[:] = 0.0004
-    record.health.factoring_error[:] = 0.0
-    assert "less than 1 % of a filter's weight was cut off at a scan (less than 1 % on average)" in health_line(
-        record.health
-    )
-    record.health.discarded_weight_bound[3, 1] = 0.72
-    record.health.factoring_error[2, 0] = 0.5
-    line = health_line(record.health)
-    assert "at most 72 % of a filter's weight was cut off at a scan (less than 1 % on average)" in line
-    assert "taking labels as independent moved at most 25 % of a filter's weight at a scan" in line
+def test_bounds_are_named_as_bounds() -> None:
+    health = _synthetic().health
+    health.cap_met[:] = 0
+    health.discarded_weight_bound[:] = 0.0004
+    health.factoring_error[:] = 0.0
+    small = diagnostic(health, "Posterior truncated")
+    assert (small.text, small.level) == ("weight less than 1 % (mean less than 1 %)", "note")
+    health.discarded_weight_bound[3, 1] = 0.72
+    health.factoring_error[2, 0] = 0.5
+    large = diagnostic(health, "Posterior truncated")
+    assert (large.text, large.level) == ("weight at most 72 % (mean less than 1 %)", "check")
+    assert diagnostic(health, "Independence error").text == "at most 25 % (mean less than 1 %)"
 
 
-def test_weight_that_is_unknown_is_not_said_to_be_none() -> None:
+def test_an_unknown_weight_is_not_reported_as_zero() -> None:
     health = Health.unreported(40, 2)
     health.discarded_weight_bound[:] = math.nan
     assert math.isnan(summarise_health(health_sums([health])).worst_discarded)
-    assert health_line(health) == "health: how much weight was cut off is not known"
+    assert diagnostics_line(run_diagnostics(health)) == "posterior truncated: weight not known"
+
+
+NOTHING = "no limit reached, nothing truncated"
+
+
+def diagnostic(health: Health, name: str) -> Diagnostic:
+    return next(each for each in run_diagnostics(health) if each.name == name)
 
 
 def _synthetic() -> RunRecord:

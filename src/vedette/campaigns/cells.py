@@ -18,6 +18,7 @@ from vedette.scenarios.build import build_planner
 from vedette.scenarios.dumping import dump_scenario, files_of
 from vedette.scenarios.overrides import with_fields
 from vedette.scenarios.sections import ScenarioModel
+from vedette.scenarios.sections.planners import strategy_of
 from vedette.speaking import Speaking
 from vedette.text import counted, listed, unused
 
@@ -40,6 +41,11 @@ class Cell:
     settings: dict[str, Any]
     scenario: Scenario
     planner: str
+
+    @property
+    def words(self) -> str:
+        """Description of the strategy, such as `joint decisions, expected loss`."""
+        return strategy_of(self.scenario.model, self.planner).words(self.scenario.model)
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -1,18 +1,49 @@
-"""The yardsticks that come with the library: campaigns on published scenes, with the figures published of them."""
+"""The yardsticks that come with the library: campaigns on published scenes, with the figures and claims published."""
 
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Literal, NamedTuple
 
+from vedette.campaigns.cells import Campaign
 from vedette.campaigns.results import CampaignResults
 from vedette.campaigns.scores import StrategyScore, score_markdown, score_strategies
 from vedette.campaigns.spec import CampaignSpec, load_spec
+from vedette.evaluation import Comparison
+from vedette.evaluation.actions import choice_words
+from vedette.evaluation.statistics import CONFIDENCE
 from vedette.evaluation.tails import tails
+from vedette.text import amount, with_minus
 
 _PUBLISHED = Path(__file__).with_name("published.toml")
+
+
+class PublishedOrder(NamedTuple):
+    """A published claim that strategy `better` has a smaller error than strategy `than`; `text` says it in words."""
+
+    text: str
+    better: str
+    than: str
+
+
+class PublishedDecision(NamedTuple):
+    """Published actions of a planner at a time, s, in the words of `choice_words`."""
+
+    planner: str
+    time: float
+    actions: str
+
+
+class CheckedClaim(NamedTuple):
+    """A published claim, the outcome here, and the numbers it rests on."""
+
+    claim: str
+    outcome: Literal["reproduced", "not reproduced", "undecided"]
+    evidence: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +56,7 @@ class Yardstick:
         source: where the published figures come from; empty where there are none.
         remark: what sets them apart from those of the campaign.
         published: methods as they are published, the best first.
+        claims, decisions: what else is published: orders of strategies, and actions.
     """
 
     spec: CampaignSpec
@@ -32,6 +64,8 @@ class Yardstick:
     source: str
     remark: str
     published: tuple[StrategyScore, ...]
+    claims: tuple[PublishedOrder, ...] = ()
+    decisions: tuple[PublishedDecision, ...] = ()
 
 
 @cache
@@ -45,9 +79,52 @@ def yardsticks() -> dict[str, Yardstick]:
             source=said["source"],
             remark=said["remark"],
             published=tuple(map(_published, said["rows"])),
+            claims=tuple(PublishedOrder(**each) for each in said.get("claims", ())),
+            decisions=tuple(PublishedDecision(**each) for each in said.get("decisions", ())),
         )
         for name, said in published.items()
     }
+
+
+def yardstick_of(campaign: Campaign) -> Yardstick | None:
+    """The yardstick that a campaign is a run of; None for any other campaign."""
+    found = yardsticks().get(campaign.name)
+    return found if found is not None and list(found.spec.scenarios) == list(campaign.axes["scenario"]) else None
+
+
+def checked_claims(yardstick: Yardstick, comparison: Comparison) -> tuple[CheckedClaim, ...]:
+    """The published claims on strategies that were compared, each with its outcome over the paired runs."""
+    return (*_checked_orders(yardstick, comparison), *_checked_decisions(yardstick, comparison))
+
+
+def _checked_orders(yardstick: Yardstick, comparison: Comparison) -> Iterator[CheckedClaim]:
+    for text, better, than in yardstick.claims:
+        if not {better, than} <= set(comparison.strategies) or comparison.num_runs < 2:
+            continue
+        paired = comparison.difference(than, better)
+        mean, low, high = (float(getattr(paired.summary, each)) for each in ("mean", "low", "high"))
+        shown = amount(with_minus(f"{mean:+.2f}"), comparison.unit)
+        interval = amount(with_minus(f"{low:+.2f} to {high:+.2f}"), comparison.unit)
+        evidence = f"{than} minus {better}: {shown}, 95 % interval {interval}"
+        known = paired.p_value <= 1.0 - CONFIDENCE
+        yield CheckedClaim(
+            text, "undecided" if not known else "reproduced" if mean > 0.0 else "not reproduced", evidence
+        )
+
+
+def _checked_decisions(yardstick: Yardstick, comparison: Comparison) -> Iterator[CheckedClaim]:
+    times = comparison.decision_times.tolist()
+    for planner, time, actions in yardstick.decisions:
+        if planner not in comparison.strategies or time not in times:
+            continue
+        shares = comparison.decision_shares(planner, times.index(time))
+        words = {choice_words(choice): share for choice, share in shares.items()}
+        first = next(iter(words))
+        evidence = f"chosen in {words.get(actions, 0.0):.0%} of the runs".replace("%", " %")
+        if first != actions:
+            evidence += f", ({first}) in {words[first]:.0%}".replace("%", " %")
+        claim = f"{planner} chooses ({actions}) at {time:g} s"
+        yield CheckedClaim(claim, "reproduced" if first == actions else "not reproduced", evidence)
 
 
 def _published(row: dict[str, str | float]) -> StrategyScore:

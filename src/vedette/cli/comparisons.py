@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from rich.cells import cell_len
 
 from vedette.cli.output import console as new_console
+from vedette.cli.output import is_verbose, print_names
 from vedette.text import counted, elided_apart, named_in
 
 if TYPE_CHECKING:
@@ -26,21 +27,37 @@ _SHORT_SCORES = ("worst", "difference", "N error", "tracked", "s", "runs")  # of
 _LEFT_OUT = ("NEES, 95 %", "Filter steps", "Fusions", "Rewards")  # of `vedette.campaigns.standings.header`
 _SHORT_STANDINGS = ("more", "95 %", "N error", "NEES", "ms", "lost", "runs")  # of the others
 _LONGEST_LABEL, _SHORTEST_LABEL = 24, 8
-_MOST_DECISIONS = 6  # times of them; the tables and the report have all
+_MOST_DECISIONS = 6  # decision times that are printed; the tables and the report have all
 
 
-def print_comparison(comparison: Comparison) -> None:
-    """The table of the strategies, what its numbers are, and what each strategy decided."""
-    from vedette.evaluation import decision_rows, strategy_rows
-    from vedette.evaluation.tables import caption, told_apart
+def print_comparison(comparison: Comparison, words: Sequence[str] = ()) -> None:
+    """Print the table of the strategies and what it means; with `--verbose` also its tails and the decisions.
+
+    Args:
+        comparison: of the strategies.
+        words: description of each strategy; empty where the strategies are not planners.
+    """
+    from vedette.evaluation import strategy_rows
+    from vedette.evaluation.tables import heading, legend, significance
     from vedette.evaluation.tails import tails
 
     console = new_console()
+    console.print(heading(comparison), style="bold")
     names = (named_in("OSPA", comparison.unit), *_SHORT_HEADER)
     numbers = [row[1:] for row in strategy_rows(comparison)]
     _print_rows(console, comparison.strategies, names, numbers)
-    for line in filter(None, (caption(comparison), tails(comparison), told_apart(comparison))):
-        console.print(line, style="dim")
+    sentences = " ".join(filter(None, (legend(comparison), significance(comparison))))
+    console.print(sentences, style="dim")
+    if words:
+        print_names(dict(zip(comparison.strategies, words, strict=True)))
+    if is_verbose():
+        console.print(tails(comparison), style="dim")
+        _print_decisions(console, comparison)
+
+
+def _print_decisions(console: Console, comparison: Comparison) -> None:
+    from vedette.evaluation import decision_rows
+
     labels = elided_apart(comparison.strategies, _LONGEST_LABEL)
     for label, strategy in zip(labels, comparison.strategies, strict=True):
         decisions = decision_rows(comparison, strategy)

@@ -1,4 +1,4 @@
-"""The command that shows in a minute what this is about: demo."""
+"""Command `demo`: strategies on one scene, on one page."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import os
 import sys
 import webbrowser
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -14,14 +14,17 @@ from vedette.cli.campaign import carry_out, load_workers, report_failures
 from vedette.cli.completing import lists_of_strategies, scenarios
 from vedette.cli.documents import results_document
 from vedette.cli.options import Seed, Trust, Workers
-from vedette.cli.output import note, publish, say
+from vedette.cli.output import console, publish, say
 from vedette.cli.reproducing import compared
 from vedette.cli.running import Approval, interruptible
 from vedette.extras import need
-from vedette.text import amount
+from vedette.text import counted, named_in
 
-_SCENE = "solent-patrol"
-_STRATEGIES = "jdm,nearest,oracle"
+if TYPE_CHECKING:
+    from vedette.campaigns.results import GroupComparison
+
+_SCENE = "eight-mobile"
+_STRATEGIES = "jdm,nearest,idm,random"
 
 
 def demo(
@@ -38,7 +41,10 @@ def demo(
     open_: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in a browser.")] = True,
     trust: Trust = False,
 ) -> None:
-    """Show one run of several strategies side by side, on one page: joint decisions, a rule of thumb, the oracle."""
+    """Compare strategies on one scene in the browser.
+
+    One run of each strategy, on the same targets and noise.
+    """
     need("vedette demo", "jinja2", "matplotlib", "pyarrow")
     load_workers(workers)
     from vedette.campaigns import open_results, resolve
@@ -48,16 +54,34 @@ def demo(
     outcome = carry_out(campaign, out, workers)
     opened = open_results(out)
     groups = opened.comparisons()
-    for comparison in (group.comparison for group in groups):
-        for name in comparison.strategies:
-            say(f"{name}: OSPA {amount(f'{float(comparison.summary(name).mean):.1f}', comparison.unit)}")
+    for group in groups:
+        _print_errors(group)
     with interruptible(f"{out} keeps every run; the same command writes the page"):
         page = write_demo(opened, out / "demo.html", trust=True)  # what it names has just been run
-    say(f"wrote {page}")
-    if not (open_ and _has_windows() and webbrowser.open(page.resolve().as_uri())):
-        note("open it in a browser; Play, and Beside chooses what is shown")
+    is_open = open_ and _has_windows() and webbrowser.open(page.resolve().as_uri())
+    say(f"Wrote {page} and opened it in your browser." if is_open else f"Wrote {page}. Open it in a browser.")
+    say(f"One run proves nothing; compare 30 runs with: vedette reproduce {scenario}")
     publish({**results_document(opened, groups), "page": page})
     report_failures(outcome.failed)
+
+
+def _print_errors(group: GroupComparison) -> None:
+    """Print the scene, and a line for each strategy with its mean error."""
+    from rich.table import Table
+
+    model, comparison = group.cells[0].scenario.model, group.comparison
+    times = comparison.times[comparison.counted]
+    sizes = f"{counted(len(model.sensors), 'sensor')}, {counted(len(comparison.times), 'scan')}"
+    shown = console()
+    shown.print(f"{model.name}: {sizes}. One run of each strategy, on the same targets and noise.\n", style="bold")
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for heading in ("", "strategy"):
+        table.add_column(heading)
+    table.add_column(named_in("mean OSPA", comparison.unit), justify="right")
+    for cell, name in zip(group.cells, comparison.strategies, strict=True):
+        table.add_row(name, cell.words, f"{float(comparison.summary(name).mean):.1f}")
+    shown.print(table)
+    shown.print(f"(mean over t = {times[0]:g} to {times[-1]:g} s)\n", style="dim")
 
 
 def _has_windows() -> bool:

@@ -8,14 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from vedette.campaigns.results import CampaignResults, GroupComparison
+    from vedette.scenarios import Scenario
     from vedette.simulation.records import RunRecord
 
 
-def run_document(record: RunRecord, unit: str) -> dict[str, Any]:
-    """A run: what was decided, how good it was (OSPA in `unit`), what it cost, and what was cut off."""
-    from vedette.evaluation.comparison import choices_of
+def run_document(record: RunRecord, scenario: Scenario | None) -> dict[str, Any]:
+    """Return the document of a run: decisions, mean OSPA over the scans that count, run times and diagnostics.
+
+    Without the scenario, OSPA has no unit and sensors have numbers.
+    """
+    from vedette.evaluation.comparison import choices_of, counted_scans
+    from vedette.evaluation.diagnostics import run_diagnostics
     from vedette.evaluation.ensembles import PARTS
-    from vedette.evaluation.health import health_line
 
     decisions = [
         {
@@ -28,6 +32,10 @@ def run_document(record: RunRecord, unit: str) -> dict[str, Any]:
         }
         for decision, choice in zip(record.decisions, choices_of(record), strict=True)
     ]
+    counted = counted_scans(record, scenario)
+    window = record.times[counted]
+    unit, sensors = (scenario.model.ospa.unit, scenario.model.sensor_names) if scenario else ("", ())
+    means = dict(zip(PARTS, record.ospa[counted].mean(axis=0), strict=True))
     return {
         "scenario": record.scenario,
         "planner": record.planner,
@@ -36,9 +44,12 @@ def run_document(record: RunRecord, unit: str) -> dict[str, Any]:
         "scans": record.num_scans,
         "stopped": record.stopped,
         "decisions": decisions,
-        "ospa": {"unit": unit, **dict(zip(PARTS, record.ospa.mean(axis=0), strict=True))},
+        "ospa": {"unit": unit, "from_s": window[0], "to_s": window[-1], **means},
         "seconds": {stage: seconds.sum() for stage, seconds in record.timings.items()},
-        "health": health_line(record.health),
+        "diagnostics": [
+            {"name": each.name, "level": each.level, "text": each.text}
+            for each in run_diagnostics(record.health, sensors)
+        ],
     }
 
 

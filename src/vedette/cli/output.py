@@ -1,7 +1,7 @@
 """What commands print, wherever it goes: a terminal, a file, a pipe that closes, a disk that is full.
 
-Every command takes `--json` and `--quiet` (`speaking`). What it has to tell goes through here: results by `say` and
-`console`, remarks by `note`, the document of `--json` by `publish`. Errors are printed whatever was asked for.
+Every command takes `--json`, `--quiet` and `--verbose` (`speaking`). All output goes through here: results by `say` and
+`console`, remarks by `note`, the document of `--json` by `publish`. Errors are always printed.
 """
 
 from __future__ import annotations
@@ -30,10 +30,11 @@ _FULL = (errno.ENOSPC, errno.EIO, getattr(errno, "EDQUOT", errno.ENOSPC), errno.
 
 
 class Manner(NamedTuple):
-    """How a command tells what it has to tell: as one JSON document, and without remarks."""
+    """How a command prints: one JSON document, errors only, or details as well."""
 
     as_json: bool = False
     quiet: bool = False
+    verbose: bool = False
 
 
 _PLAINLY = Manner()
@@ -41,15 +42,16 @@ _manner: ContextVar[Manner] = ContextVar("_manner", default=_PLAINLY)
 _OPTIONS = {
     "as_json": Annotated[bool, typer.Option("--json", help="Print the result as one JSON document.")],
     "quiet": Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")],
+    "verbose": Annotated[bool, typer.Option("--verbose", "-v", help="Print details as well.")],
 }
 
 
 def speaking(command: Callable[..., None]) -> Callable[..., None]:
-    """The command with the options `--json` and `--quiet`."""
+    """The command with the options `--json`, `--quiet` and `--verbose`."""
 
     @functools.wraps(command)
-    def spoken(*, as_json: bool, quiet: bool, **options: Any) -> None:
-        before = _manner.set(Manner(as_json, quiet))
+    def spoken(*, as_json: bool, quiet: bool, verbose: bool, **options: Any) -> None:
+        before = _manner.set(Manner(as_json, quiet, verbose))
         try:
             with warnings.catch_warnings():
                 if quiet:
@@ -73,6 +75,11 @@ def say(text: str = "", *, nl: bool = True, even_if_quiet: bool = False) -> None
     manner = _manner.get()
     if not manner.as_json and (even_if_quiet or not manner.quiet):
         typer.echo(_for_terminal(text, sys.stdout), nl=nl)
+
+
+def is_verbose() -> bool:
+    """Return whether details are to be printed (`--verbose`)."""
+    return _manner.get().verbose
 
 
 def note(text: str) -> None:

@@ -25,7 +25,7 @@ from vedette.extras import need
 if TYPE_CHECKING:
     from vedette.campaigns import CampaignResults, CampaignSpec
     from vedette.campaigns.results import GroupComparison
-    from vedette.campaigns.yardsticks import Yardstick
+    from vedette.campaigns.yardsticks import CheckedClaim, Yardstick
 
 YARDSTICK = "yardstick.md"
 _RUNS = 30
@@ -82,13 +82,24 @@ def reproduce(
     outcome = carry_out(campaign, folder, workers)
     opened = open_results(folder)
     groups = opened.comparisons()
-    if yardstick is None:
+    beside = yardstick if yardstick is not None and not yardstick.claims else None
+    if beside is None:
         print_results(opened, groups)
     else:
-        _print_beside_published(opened, groups, yardstick)
-    page = _write(opened, yardstick, folder)
-    published = () if yardstick is None else yardstick.published
-    publish({**results_document(opened, groups), "published": [asdict(score) for score in published], "report": page})
+        _print_beside_published(opened, groups, beside)
+    claims = () if yardstick is None else _checked(yardstick, groups)
+    if yardstick is not None:
+        _print_claims(claims)
+        _print_provenance(yardstick)
+    if beside is not None:
+        print_progress(opened)
+    page = _write(opened, beside, folder)
+    document = {
+        "published": [asdict(score) for score in (() if yardstick is None else yardstick.published)],
+        "claims": [claim._asdict() for claim in claims],
+        "report": page,
+    }
+    publish({**results_document(opened, groups), **document})
     report_failures(outcome.failed)
 
 
@@ -121,24 +132,40 @@ def _names(planners: str | None) -> tuple[str, ...] | None:
 
 
 def _list(known: dict[str, Yardstick]) -> None:
-    paper = {"paper-a": "The paper's experiment: joint, independent and random control"}
-    titles = paper | {name: yardstick.title for name, yardstick in known.items()}
+    titles = {name: yardstick.title for name, yardstick in known.items()}
     print_names(titles)
     publish([{"name": name, "title": title} for name, title in titles.items()])
 
 
 def _print_beside_published(opened: CampaignResults, groups: Sequence[GroupComparison], yardstick: Yardstick) -> None:
     from vedette.campaigns.scores import score_strategies
-    from vedette.campaigns.yardsticks import provenance
 
     for group in groups:
         if title := opened.title(group):
             say(f"{title}:")
         print_scores((*score_strategies(group), *yardstick.published), group.comparison)
         say("")
+
+
+def _print_provenance(yardstick: Yardstick) -> None:
+    from vedette.campaigns.yardsticks import provenance
+
     for line in provenance(yardstick):
-        console().print(line)
-    print_progress(opened)
+        console().print(line, style="dim")
+
+
+def _checked(yardstick: Yardstick, groups: Sequence[GroupComparison]) -> tuple[CheckedClaim, ...]:
+    from vedette.campaigns.yardsticks import checked_claims
+
+    return tuple(claim for group in groups for claim in checked_claims(yardstick, group.comparison))
+
+
+def _print_claims(claims: Sequence[CheckedClaim]) -> None:
+    if claims:
+        say("")
+        say("Published claims:")
+    for claim in claims:
+        say(f"  {claim.outcome}: {claim.claim} ({claim.evidence})")
 
 
 def _write(opened: CampaignResults, yardstick: Yardstick | None, folder: Path) -> Path:
@@ -154,5 +181,5 @@ def _write(opened: CampaignResults, yardstick: Yardstick | None, folder: Path) -
         else:  # of decisions at every scan, figures by the decision would be hundreds: `vedette report --figures`
             write_text(folder / YARDSTICK, yardstick_markdown(opened, yardstick))
         write_report(opened, page := folder / "report.html", trust=True)  # what it names has just been run
-    say(f"wrote {folder}; open {page}")
+    say(f"Wrote {folder}. Open {page} in a browser.")
     return page

@@ -14,7 +14,8 @@ from vedette.cli.documents import results_document, run_document
 from vedette.cli.errors import check_ending, named_options, usage_error
 from vedette.cli.options import ResultsFolder
 from vedette.cli.output import note, publish, say
-from vedette.cli.running import interruptible, print_run
+from vedette.cli.run_summary import print_run
+from vedette.cli.running import interruptible
 from vedette.errors import VedetteError
 from vedette.extras import need
 from vedette.text import counted
@@ -187,7 +188,7 @@ def results(
         if tex is not None:
             raise usage_error(f"expected of a campaign; {folder} holds a single run", "--tex")
         print_run(opened, scenario)
-        document = run_document(opened, "" if scenario is None else scenario.model.ospa.unit)
+        document = run_document(opened, scenario)
     else:
         opened = open_results(folder, num_workers=0)
         groups = opened.comparisons()
@@ -243,13 +244,20 @@ def print_failures(failed: Sequence[Failed | Failure], tell: Callable[[str], Non
 
 
 def print_results(opened: CampaignResults, groups: Sequence[GroupComparison]) -> None:
-    """One comparison a group of settings, then how many runs there are and how many are missing."""
+    """Print the comparison of each group of settings, then the number of finished and missing runs."""
     for group in groups:
         if title := opened.title(group):
             say(f"{title}:")
-        print_comparison(group.comparison)
+        print_comparison(group.comparison, _words_of(opened, group))
         say("")
     print_progress(opened)
+
+
+def _words_of(opened: CampaignResults, group: GroupComparison) -> tuple[str, ...]:
+    """Description of each strategy of a group; empty where planners are not what is compared."""
+    if opened.campaign.compare != "planner":
+        return ()
+    return tuple(cell.words for cell in group.cells)
 
 
 def print_progress(opened: CampaignResults) -> None:
@@ -257,14 +265,14 @@ def print_progress(opened: CampaignResults) -> None:
     campaign = opened.campaign
     missing = {cell.name: len(opened.missing(cell.name)) for cell in campaign.cells}
     total = campaign.total
-    say(f"{campaign.name}, seed {campaign.seed}: {total - sum(missing.values())} of {total} runs are finished")
+    finished = f"all {total}" if not any(missing.values()) else f"{total - sum(missing.values())} of {total}"
+    tables = opened.folder / "tables"
+    where = f"; tables in {tables}" if tables.is_dir() else ""
+    say(f"{campaign.name}, seed {campaign.seed}: {finished} runs are finished{where}")
     for cell, number in missing.items():
         if number:
-            say(f"missing of {cell}: {number}")
+            say(f"missing: {counted(number, 'run')} of {cell}")
     failures = opened.failures()
     if failures:
-        say(f"failed: {counted(len(failures), 'run')}, which the same command tries again:")
+        say(f"failed: {counted(len(failures), 'run')}; the same command tries again:")
         print_failures(failures)
-    tables = opened.folder / "tables"
-    if tables.is_dir():
-        say(f"tables: {tables}")

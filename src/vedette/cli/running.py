@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,11 +15,11 @@ from vedette.cli.documents import run_document
 from vedette.cli.errors import INTERRUPTED, named_options, usage_error
 from vedette.cli.options import Overwrite, ScenarioName, Seed, Trust
 from vedette.cli.output import complain, note, publish, say
-from vedette.cli.output import console as new_console
+from vedette.cli.run_summary import print_run
 from vedette.cli.scenario_files import warn
 from vedette.errors import InputError
 from vedette.extras import need
-from vedette.text import amount, counted
+from vedette.text import counted
 
 if TYPE_CHECKING:
     from vedette.scenarios import Scenario
@@ -137,7 +136,7 @@ def run(
         kept = out if stop is None or not _holds_whole_run(out) else None
         if kept is not None:
             save_run(record, kept, scenario_text=dump_kept(loaded), overwrite=overwrite)
-    publish({**run_document(record, loaded.model.ospa.unit), "folder": kept})
+    publish({**run_document(record, loaded), "folder": kept})
     if stop is not None and kept is None:
         end_stopped(stop, "nothing was written" if out is None else f"{out} keeps the whole run that was there")
     if out is not None:
@@ -159,54 +158,6 @@ def end_stopped(stop: RunStopped | RunInterrupted, left: str) -> NoReturn:
     complain(str(stop))
     complain(left)
     raise typer.Exit(INTERRUPTED if isinstance(stop, KeyboardInterrupt) else 1) from None
-
-
-# Of a run, so many are printed.
-_MOST_DECISIONS = 12
-
-
-def print_run(record: RunRecord, scenario: Scenario | None) -> None:
-    """What was decided in a run, how good it was, what it cost, and what was cut off.
-
-    Without the scenario, OSPA has no unit and sensors have numbers.
-    """
-    from rich.table import Table
-
-    from vedette.evaluation.actions import choice_words
-    from vedette.evaluation.certainty import certainty_lines
-    from vedette.evaluation.comparison import choices_of
-    from vedette.evaluation.health import health_line
-
-    console = new_console()
-    console.print(
-        f"{record.scenario}, {record.planner}, seed {record.seed}, run {record.run}: {record.num_scans} scans"
-    )
-    if record.decisions:
-        table = Table(box=None, pad_edge=False)
-        for heading in ("time", "actions", "expected reward"):
-            table.add_column(heading)
-        rows = list(zip(record.decisions, choices_of(record), strict=True))
-        left_out = len(rows) - _MOST_DECISIONS
-        shown = rows if left_out <= 0 else [*rows[: _MOST_DECISIONS - 1], rows[-1]]
-        for decision, choice in shown:
-            told = (f"{mean:.3f} ± {error:.3f}" for mean, error in decision.plan.expected_rewards)
-            # A joint decision of many sensors has a line a sensor, all through the one reward.
-            table.add_row(f"{decision.time:g} s", choice_words(choice), ", ".join(dict.fromkeys(told)))
-        console.print(table)
-        if left_out > 0:
-            console.print(f"({left_out} decisions between the last two are not shown; --out keeps them all)")
-        for note in dict.fromkeys(note for decision in record.decisions for note in decision.plan.notes):
-            console.print(f"note: {note}", soft_wrap=True)
-    for line in certainty_lines(record):
-        console.print(line, soft_wrap=True)
-    unit, names = (scenario.model.ospa.unit, scenario.model.sensor_names) if scenario else ("", ())
-    total, localisation, cardinality = record.ospa.mean(axis=0)
-    if not math.isnan(total):  # nobody may know the targets
-        parts = f"(localisation {localisation:.2f}, cardinality {cardinality:.2f})"
-        console.print(f"mean OSPA {amount(f'{total:.2f}', unit)} {parts}")
-    spent = ", ".join(f"{stage} {seconds.sum():.2f} s" for stage, seconds in record.timings.items())
-    console.print(f"time spent: {spent}")
-    console.print(health_line(record.health, names), soft_wrap=True)
 
 
 def warn_of_recording(record: RunRecord, scenario: Scenario) -> tuple[str, ...]:

@@ -14,12 +14,12 @@ from vedette.cli.errors import named_options, usage_error
 from vedette.cli.options import BAD_ROWS, BadRows, Overwrite, SensorsFile, Speed, Trust
 from vedette.cli.output import note, publish, say
 from vedette.cli.progress import bar
+from vedette.cli.run_summary import print_run
 from vedette.cli.running import (
     Approval,
     compile_if_cold,
     end_stopped,
     interruptible,
-    print_run,
     warn_of_recording,
 )
 from vedette.cli.scenario_files import warn
@@ -111,7 +111,7 @@ def track(
             with interruptible(f"wrote {out}, but not all of its figures"):
                 _draw(record, scenario, out)
         say(f"wrote {out}")
-    document = run_document(record, scenario.model.ospa.unit)
+    document = run_document(record, scenario)
     publish(
         {
             **document,

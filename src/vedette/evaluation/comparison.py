@@ -170,9 +170,25 @@ def compare_ensembles(
 def scored(scenario: Scenario, ensembles: Mapping[str, Ensemble]) -> Comparison:
     """The comparison over the scans that the scenario counts."""
     window, times = scenario.model.ospa, next(iter(ensembles.values())).times
-    since = None if window.from_step is None else float(np.nextafter(times[window.from_step - 1], -np.inf))
-    until = np.inf if window.to_step is None else float(times[window.to_step - 1])
+    since, until = None, np.inf
+    if window.from_step is not None:  # a run that stopped before has no such scan
+        since = np.inf if window.from_step > len(times) else float(np.nextafter(times[window.from_step - 1], -np.inf))
+    if window.to_step is not None:
+        until = float(times[min(window.to_step, len(times)) - 1])
     return compare_ensembles(ensembles, since=since, until=until, unit=window.unit)
+
+
+def counted_scans(record: RunRecord, scenario: Scenario | None) -> Bools:
+    """Return whether each scan of a run counts in its mean error, (num_scans,).
+
+    The scans are those that `scored` counts; without a scenario, those after the first decision. All count where the
+    run stopped before the first of them.
+    """
+    runs = {record.planner: ensemble_of([(record.outline(), None)])}
+    try:
+        return (compare_ensembles(runs) if scenario is None else scored(scenario, runs)).counted
+    except InputError:
+        return np.ones(record.num_scans, bool)
 
 
 def mean_of_known(values: Floats) -> Floats:

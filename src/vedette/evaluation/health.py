@@ -1,8 +1,8 @@
-"""What filters and fusion reported over a run or several, as numbers and in words."""
+"""Reports of filters and fusion, summed over one or more runs."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -11,10 +11,6 @@ import numpy as np
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.simulation.health import Health
-from vedette.text import counted
-
-# From here on what was cut off is more than a trifle.
-_MUCH = 0.01
 
 
 class HealthSums(NamedTuple):
@@ -164,19 +160,6 @@ def summarise_health(sums: HealthSums, sensors: Sequence[str] = ()) -> HealthSum
     )
 
 
-def health_line(health: Health, sensors: Sequence[str] = ()) -> str:
-    """A run's health in a line: `health: all exact`, or what was cut off, missing or left out."""
-    summary = summarise_health(health_sums([health]), sensors)
-    statements = _statements(summary, lambda share: f"{round(share * summary.num_scans)} of {summary.num_scans} scans")
-    return f"health: {'; '.join(text for text, _ in statements) or 'all exact'}"
-
-
-def health_findings(sums: HealthSums, sensors: Sequence[str] = ()) -> tuple[str, ...]:
-    """What of the health of some runs may have cost accuracy, in words; none where nothing did."""
-    statements = _statements(summarise_health(sums, sensors), lambda share: f"{percent(share)} of the scans")
-    return tuple(text for text, is_much in statements if is_much)
-
-
 def percent(share: float) -> str:
     """A share as a whole number of percent; no share but 0 and 1 is written as 0 % or 100 %."""
     if 0.0 < share < 0.01:
@@ -184,67 +167,3 @@ def percent(share: float) -> str:
     if 0.99 < share < 1.0:
         return ">99 %"
     return f"{share:.0%}".replace("%", " %")
-
-
-def _at_most(bound: float) -> str:
-    """An upper bound on a share, in words."""
-    return "less than 1 %" if bound < 0.01 else f"at most {percent(bound)}"
-
-
-def _statements(health: HealthSummary, scans: Callable[[float], str]) -> list[tuple[str, bool]]:
-    """Everything that was not exact, the gravest first, and whether it is more than a trifle."""
-    found = [*_of_fusion(health, scans), *_of_filters(health, scans)]
-    if health.duplicates:
-        found.append((f"measurements left out because they repeat another: {health.duplicates}", True))
-    if health.clutter_raised:
-        found.append((f"measurements whose clutter was raised to its floor: {health.clutter_raised}", False))
-    return found
-
-
-def _of_fusion(health: HealthSummary, scans: Callable[[float], str]) -> Iterator[tuple[str, bool]]:
-    if health.lost:
-        yield (
-            f"at {scans(health.lost)} GCI lost a target that one sensor was sure of and another was not (up to "
-            f"{counted(health.worst_lost, 'target')} at a scan)",
-            health.lost > _MUCH,
-        )
-    if health.disjoint:
-        yield f"at {scans(health.disjoint)} the sensors had no label set in common", True
-    worst = int(np.argmax(health.missing_sets))
-    if health.missing_sets[worst]:
-        share = percent(float(health.missing_sets[worst]))
-        yield f"{share} of label sets were missing at {health.sensors[worst]}", False
-    cut = health.worst_fusion_discarded
-    if cut:
-        yield f"up to {percent(cut)} of the fused weight was cut off at a scan", cut > _MUCH
-
-
-def _of_filters(health: HealthSummary, scans: Callable[[float], str]) -> Iterator[tuple[str, bool]]:
-    if health.search_cut:
-        yield f"the ranking search was cut short at {scans(health.search_cut)}", True
-    if health.inexact:
-        yield f"an LMB cluster was too large to be summed exactly at {scans(health.inexact)}", True
-    worst = health.worst_discarded
-    cap = f"a cap was met at {scans(health.cap_met)}" if health.cap_met else ""
-    if worst > 0.0:  # neither none nor unknown
-        on_average = _at_most(health.mean_discarded)
-        bound = f"{_at_most(worst)} of a filter's weight was cut off at a scan ({on_average} on average)"
-        yield f"{cap}, and {bound}" if cap else bound, worst > _MUCH
-    elif cap:
-        yield cap, True
-    elif np.isnan(worst):
-        yield "how much weight was cut off is not known", False
-    if np.isnan(health.worst_factoring):
-        yield "how much weight was moved by taking labels as independent is not known", False
-    elif health.worst_factoring:
-        mean = health.mean_factoring
-        yield (
-            f"taking labels as independent moved {_at_most(health.worst_factoring / 2.0)} of a filter's weight at a "
-            f"scan ({_at_most(mean / 2.0)} on average)",
-            mean > 10.0 * _MUCH,
-        )
-    if health.worst_dropped:
-        yield (
-            f"up to {health.worst_dropped:.2g} targets were dropped with their labels at a scan",
-            health.worst_dropped > _MUCH,
-        )

@@ -78,17 +78,20 @@ def _latex(text: str) -> str:
     return _NUMBER.sub(lambda found: f"${found[0]}$", text.translate(_ESCAPED)).replace("±", "$\\pm$")
 
 
-def told_apart(comparison: Comparison) -> str:
-    """Which strategies differ from the first when all are compared with it at once; empty where there is one other."""
+def significance(comparison: Comparison) -> str:
+    """Return which differences to the first strategy are significant at 5 %, in a sentence; empty for a single run."""
     others = list(zip(comparison.strategies, comparison.p_values(), strict=True))[1:]
-    if len(others) < 2 or comparison.num_runs < 2:
+    if not others or comparison.num_runs < 2:
         return ""
-    verdicts = {
-        "told apart": [name for name, p_value in others if p_value <= 1.0 - CONFIDENCE],
-        "not told apart": [name for name, p_value in others if p_value > 1.0 - CONFIDENCE],
-    }
-    parts = [f"{said}: {', '.join(names)}" for said, names in verdicts.items() if names]
-    return f"From {comparison.strategies[0]}, at 5 % among all {len(others)} (Holm), {'; '.join(parts)}."
+    known = [name for name, p_value in others if p_value <= 1.0 - CONFIDENCE]
+    unknown = [name for name, _ in others if name not in known]
+    corrected = " (Holm correction)" if len(others) > 1 else ""
+    if not unknown:
+        what = "The difference is" if len(others) == 1 else f"All {len(others)} differences are"
+        return f"{what} significant at 5 %{corrected}."
+    if not known:
+        return f"No difference is significant at 5 %{corrected}."
+    return f"Significant at 5 %{corrected}: {', '.join(known)}; not significant: {', '.join(unknown)}."
 
 
 def decisions_markdown(comparison: Comparison) -> str:
@@ -156,22 +159,30 @@ def _means(comparison: Comparison, strategy: str, part: str, *names: str) -> lis
 
 
 def caption(comparison: Comparison) -> str:
-    """What the numbers of the table are."""
-    counted, first = comparison.times[comparison.counted], comparison.strategies[0]
-    over = f"mean over t = {counted[0]:g} to {counted[-1]:g} s"
-    if comparison.num_runs == 1:
-        said = f"Scenario {comparison.scenario}, 1 paired run, {over}."
-        return f"{said} Difference: strategy minus {first}." if len(comparison.strategies) > 1 else said
-    return (
-        f"Scenario {comparison.scenario}, {comparison.num_runs} paired runs, {over}, ± one standard error. Difference: "
-        f"strategy minus {first}, run by run; runs won: by {first}.{_intervals(comparison)}"
-    )
+    """Return what the numbers of the table are, as a paragraph."""
+    return f"{heading(comparison)}. {legend(comparison)}".rstrip()
 
 
-def _intervals(comparison: Comparison) -> str:
-    """Which intervals are not Student's."""
-    skewed = [name for name in comparison.strategies[1:] if comparison.difference(name).is_skewed]
-    return f" Interval by bootstrap, as differences are skewed: {', '.join(skewed)}." if skewed else ""
+def heading(comparison: Comparison) -> str:
+    """Return scenario, number of runs and time window: `paper-a: 30 paired runs, mean OSPA over t = 11 to 40 s`."""
+    times = comparison.times[comparison.counted]
+    paired = "paired " if len(comparison.strategies) > 1 else ""
+    runs = f"{comparison.num_runs} {paired}runs" if comparison.num_runs > 1 else "1 run"
+    return f"{comparison.scenario}: {runs}, mean OSPA over t = {times[0]:g} to {times[-1]:g} s"
+
+
+def legend(comparison: Comparison) -> str:
+    """Return what the columns of the table mean, in sentences; empty for one run of one strategy."""
+    first, several = comparison.strategies[0], comparison.num_runs > 1
+    parts = ["± is one standard error."] if several else []
+    if len(comparison.strategies) > 1:
+        parts.append(f"Difference: strategy minus {first}, so positive values mean a larger error than {first}.")
+        if several:
+            parts.append(f"Won: share of the runs in which {first} has the smaller error.")
+    skewed = [name for name in comparison.strategies[1:] if comparison.difference(name).is_skewed] if several else []
+    if skewed:
+        parts.append(f"Bootstrap intervals, because the differences are skewed: {', '.join(skewed)}.")
+    return " ".join(parts)
 
 
 def _row(comparison: Comparison, strategy: str) -> tuple[str, ...]:

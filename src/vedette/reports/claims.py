@@ -1,4 +1,4 @@
-"""What a comparison shows, in a sentence."""
+"""Pairwise comparisons of strategies: a verdict, the paired difference and a sentence for each pair."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from vedette.evaluation.health import percent
 from vedette.evaluation.statistics import CONFIDENCE
 from vedette.text import amount, with_minus
 
-Verdict = Literal["better", "worse", "untold", "unknown"]
+Verdict = Literal["better", "worse", "unclear", "unknown"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,11 +22,12 @@ class Claim:
     """One strategy against another.
 
     Attributes:
-        verdict: of `first` against `second`: better, worse, not told apart, or unknown for want of runs. It allows for
-            the number of comparisons that are made together.
+        verdict: of `first` against `second`: better, worse, unclear (no significant difference), or unknown (one run).
+            It is corrected for the number of pairs (Holm).
         first, second: names of the strategies.
         sentence: the finding with its numbers.
-        difference: second minus first, with its interval: "+1.20 (+0.80 to +1.60)".
+        mean, low, high: paired difference in mean OSPA, second minus first, with its 95 % interval; NaN for one run.
+        difference: the same as text: "+1.20 (+0.80 to +1.60)".
         share_won: of the runs, by `first`: "93 %"; "unknown" for want of runs.
     """
 
@@ -34,6 +35,9 @@ class Claim:
     first: str
     second: str
     sentence: str
+    mean: float
+    low: float
+    high: float
     difference: str
     share_won: str
 
@@ -74,62 +78,50 @@ def _claim(pair: tuple[str, str], paired: PairedDifference, p_value: float, numb
     mean, low, high = (float(each) for each in (paired.summary.mean, paired.summary.low, paired.summary.high))
     share = "unknown" if verdict == "unknown" else percent(paired.share_won)
     interval = "" if verdict == "unknown" else f" ({low:+.2f} to {high:+.2f})"
-    return Claim(verdict, *names, sentence, with_minus(f"{mean:+.2f}{interval}"), share)
+    return Claim(verdict, *names, sentence, mean, low, high, with_minus(f"{mean:+.2f}{interval}"), share)
 
 
 def _verdict(paired: PairedDifference, p_value: float) -> Verdict:
     if paired.summary.num_runs < 2:
         return "unknown"
     if p_value > 1.0 - CONFIDENCE:
-        return "untold"
+        return "unclear"
     return "better" if float(paired.summary.mean) > 0.0 else "worse"
 
 
 def _better(first: str, second: str, paired: PairedDifference, unit: str) -> str:
     less = amount(f"{float(paired.summary.mean):.2f}", unit)
+    interval = _range(float(paired.summary.low), float(paired.summary.high), unit)
     return (
-        f"{first} has {less} less mean OSPA than {second} (95 % confidence interval of the "
-        f"paired difference {_interval(paired, unit)}, {_runs(paired)}), and is better in {_share(paired)}."
+        f"{first} has a smaller mean OSPA than {second}, by {less} (95 % interval {interval}, {_runs(paired)}). "
+        f"It is smaller in {_share(paired)}."
     )
 
 
 def _worse(first: str, second: str, paired: PairedDifference, unit: str) -> str:
-    low, high = -float(paired.summary.high), -float(paired.summary.low)
     more = amount(f"{-float(paired.summary.mean):.2f}", unit)
+    interval = _range(-float(paired.summary.high), -float(paired.summary.low), unit)
     return (
-        f"{first} has {more} more mean OSPA than {second} (95 % confidence interval of "
-        f"the paired difference {_range(low, high, unit)}, {_runs(paired)}), and is better in {_share(paired)} only."
+        f"{first} has a larger mean OSPA than {second}, by {more} (95 % interval {interval}, {_runs(paired)}). "
+        f"It is smaller in only {_share(paired)}."
     )
 
 
-def _untold(first: str, second: str, paired: PairedDifference, unit: str) -> str:
+def _unclear(first: str, second: str, paired: PairedDifference, unit: str) -> str:
     difference = amount(with_minus(f"{float(paired.summary.mean):.2f}"), unit)
+    interval = _range(float(paired.summary.low), float(paired.summary.high), unit)
     return (
-        f"{first} and {second} are not told apart: the paired difference in mean OSPA, {second} minus {first}, is "
-        f"{difference}, but {_why_untold(paired, unit)} ({_runs(paired)}); {first} is better in {_share(paired)}."
+        f"{first} and {second} do not differ significantly in mean OSPA. {second} minus {first}: {difference} "
+        f"(95 % interval {interval}, {_runs(paired)}). {first} is smaller in {_share(paired)}."
     )
-
-
-def _why_untold(paired: PairedDifference, unit: str) -> str:
-    interval = f"its 95 % confidence interval, {_interval(paired, unit)},"
-    if float(paired.summary.low) <= 0.0 <= float(paired.summary.high):
-        return f"{interval} holds 0"
-    return f"among so many comparisons {interval} is no proof"
 
 
 def _unknown(first: str, second: str, paired: PairedDifference, unit: str) -> str:
     difference = amount(with_minus(f"{float(paired.summary.mean):.2f}"), unit)
-    return (
-        f"{first} and {second} have one run in common, and one run tells nothing apart: the difference in mean OSPA, "
-        f"{second} minus {first}, is {difference} in it."
-    )
+    return f"One run proves nothing. {second} minus {first}: {difference} in mean OSPA."
 
 
-_SENTENCES = {"better": _better, "worse": _worse, "untold": _untold, "unknown": _unknown}
-
-
-def _interval(paired: PairedDifference, unit: str) -> str:
-    return _range(float(paired.summary.low), float(paired.summary.high), unit)
+_SENTENCES = {"better": _better, "worse": _worse, "unclear": _unclear, "unknown": _unknown}
 
 
 def _range(low: float, high: float, unit: str) -> str:
@@ -137,7 +129,7 @@ def _range(low: float, high: float, unit: str) -> str:
 
 
 def _runs(paired: PairedDifference) -> str:
-    return f"{paired.summary.num_runs} paired runs{', bootstrap, as they are skewed' if paired.is_skewed else ''}"
+    return f"{paired.summary.num_runs} paired runs{', bootstrap' if paired.is_skewed else ''}"
 
 
 def _share(paired: PairedDifference) -> str:

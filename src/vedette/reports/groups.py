@@ -53,6 +53,11 @@ class Strategy:
         return strategy_label(self.label)
 
     @property
+    def words(self) -> str:
+        """Description of the planner; empty where another axis than the planner is compared."""
+        return self.cell.words if self.label == self.cell.planner else ""
+
+    @property
     def scene(self) -> Scene:
         """What figures of its runs say of its scenario."""
         return scene_of(self.cell.scenario, self.cell.planner)

@@ -1,179 +1,98 @@
-"""The health of a group's runs as a table: what the filters and the fusion cut off, and what a sensor lacked."""
+"""The diagnostics of a group as a table: a check in each row, a strategy in each column."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from vedette.evaluation.health import HealthSummary, health_findings, percent, summarise_health
-from vedette.fusion.base import LOST, SURE
-from vedette.kernels.base.types import Floats
+from vedette.evaluation.diagnostics import Diagnostic, diagnostics
+from vedette.evaluation.health import percent, summarise_health
 from vedette.reports.groups import Group, Strategy
-from vedette.reports.tables import Table, nees_over_runs, nees_spread
-from vedette.scenarios.sections.fusion import ONE_BELIEF
+from vedette.reports.tables import nees_over_runs, nees_spread
 
-_TRIFLE = 0.01  # share of the targets without an estimate, below which it is not said
-_OFTEN = 0.2  # share of the scans at which covariances are too small, or too large, from which that is said
+_TRIFLE = 0.01  # share of the targets without an estimate, up to which it is not shown
+_OFTEN = 0.2  # share of the scans with inconsistent covariances, above which they are to be checked
+_NONE = "\N{EN DASH}"
 
 
 @dataclass(frozen=True, slots=True)
-class _Row:
-    """What is told, what it is, how it reads of a summary; whether it says something only where there is a fusion."""
+class DiagnosticsTable:
+    """Checks of several strategies; those that are `ok` for every strategy are left out.
 
-    name: str
-    note: str
-    text: Callable[[HealthSummary], str]
-    needs_fusion: bool = False
-
-
-def _weight(share: float) -> str:
-    return "unknown" if math.isnan(share) else percent(share)
-
-
-def _worst_sensor(shares: Floats, names: Sequence[str]) -> str:
-    worst = int(np.argmax(shares))
-    return f"{percent(float(shares[worst]))} ({names[worst]})" if shares[worst] else "0 %"
-
-
-_SCANS = "share of the scans, at any sensor"
-_ROWS = (
-    _Row("A cap was met", f"the posterior was as large as its limits allow; {_SCANS}", lambda h: percent(h.cap_met)),
-    _Row("Search cut short", f"ranking stopped at max_search_nodes; {_SCANS}", lambda h: percent(h.search_cut)),
-    _Row("Cluster not exact", f"summed over its heaviest joint choices only; {_SCANS}", lambda h: percent(h.inexact)),
-    _Row(
-        "Weight cut off at most, mean",
-        "upper bound on the share of a filter's weight that its caps left out at a scan, mean over scans and sensors; "
-        "how far it moves the estimates is another question (the report's documentation has a study of it)",
-        lambda h: _weight(h.mean_discarded),
-    ),
-    _Row("Weight cut off at most, worst", "the same at the worst scan", lambda h: _weight(h.worst_discarded)),
-    _Row(
-        "Taken as independent at most, mean",
-        "upper bound on the share of a factored filter's weight that was moved by it, mean over scans and sensors",
-        lambda h: _weight(h.mean_factoring / 2.0),
-    ),
-    _Row(
-        "Taken as independent at most, worst", "the same at the worst scan", lambda h: _weight(h.worst_factoring / 2.0)
-    ),
-    _Row(
-        "Targets dropped, worst",
-        "expected number of targets in labels that a filter dropped at a scan",
-        lambda h: f"{h.worst_dropped:.2g}",
-    ),
-    _Row("Repeated measurements", "left out, in all runs", lambda h: str(h.duplicates)),
-    _Row(
-        "Clutter raised",
-        "measurements where the clutter intensity was below its floor",
-        lambda h: str(h.clutter_raised),
-    ),
-    _Row(
-        "Label sets missing at a sensor",
-        "share of the fused label sets (CLMB: labels) that the sensor which lacks most lacks",
-        lambda h: _worst_sensor(h.missing_sets, h.sensors),
-        needs_fusion=True,
-    ),
-    _Row(
-        "Labels unknown to a sensor",
-        "share of the scans at which the sensor where that is most frequent lacks a label that another has",
-        lambda h: _worst_sensor(h.unknown_labels, h.sensors),
-        needs_fusion=True,
-    ),
-    _Row(
-        "Targets lost by the fusion",
-        f"share of the scans at which a label that a sensor is sure of ({SURE:g} or more) has an existence below "
-        f"{LOST:g} in the fused density, as another sensor lacks it or does not see there",
-        lambda h: percent(h.lost),
-        needs_fusion=True,
-    ),
-    _Row(
-        "Targets lost, worst",
-        "such labels at the worst scan",
-        lambda h: str(h.worst_lost),
-        needs_fusion=True,
-    ),
-    _Row(
-        "No label set in common",
-        "share of the scans at which no label set is held by every sensor",
-        lambda h: percent(h.disjoint),
-        needs_fusion=True,
-    ),
-    _Row(
-        "Fused weight cut off, worst",
-        "share of the fused weight beyond max_hypotheses at the worst scan",
-        lambda h: percent(h.worst_fusion_discarded),
-        needs_fusion=True,
-    ),
-)
-
-
-def health_table(group: Group) -> Table | None:
-    """What the filters and the fusion reported, a column a strategy; None where nothing has run."""
-    if not (strategies := group.strategies):
-        return None
-    has_fusion = any(each.cell.scenario.model.fusion.kind not in ONE_BELIEF for each in strategies)
-    summaries = [summarise_health(each.ensemble.health, each.scene.names) for each in strategies]
-    rows = [row for row in _ROWS if has_fusion or not row.needs_fusion]
-    caption = "What filters and fusion had to leave out, over all scans of all runs in common."
-    return Table(
-        caption,
-        ("Report", *(each.name for each in strategies)),
-        tuple((row.name, *(row.text(health) for health in summaries)) for row in rows),
-        tuple(row.note for row in rows),
-    )
-
-
-def group_health(group: Group) -> tuple[tuple[str, str], ...]:
-    """Name and findings, in a sentence, of each strategy whose filters or fusion left out more than a trifle.
-
-    So has one that lost targets, one whose covariances are too small or too large, and one with an estimate that is
-    farther off than its covariance allows.
+    Attributes:
+        strategies: names, one per column.
+        rows: one diagnostic per strategy; those of a row have the same name and meaning.
     """
-    said = (
-        (each.name, (*health_findings(each.ensemble.health, each.scene.names), *_findings(each)))
-        for each in group.strategies
-    )
-    return tuple((name, f"{'; '.join(findings)}.") for name, findings in said if findings)
+
+    strategies: tuple[str, ...]
+    rows: tuple[tuple[Diagnostic, ...], ...]
 
 
-def _findings(strategy: Strategy) -> Iterator[str]:
-    if strategy.ensemble.measures:  # the targets are known
-        yield from _lost_findings(strategy)
-        yield from _consistency_findings(strategy)
+def diagnostics_table(group: Group) -> DiagnosticsTable | None:
+    """Return the diagnostics of a group; None where every check of every strategy is `ok`."""
+    columns = [tuple(strategy_diagnostics(each)) for each in group.strategies]
+    rows = tuple(row for row in zip(*columns, strict=True) if any(each.level != "ok" for each in row))
+    return DiagnosticsTable(tuple(each.name for each in group.strategies), rows) if rows else None
 
 
-def _lost_findings(strategy: Strategy) -> Iterator[str]:
-    """Targets without an estimate, and the run where that is most frequent."""
+def strategy_diagnostics(strategy: Strategy) -> Iterator[Diagnostic]:
+    """Yield every check of a strategy: of lost targets, of covariances, of the fusion and of the filters."""
+    yield _missed(strategy)
+    yield _consistency(strategy)
+    yield _worst_estimate(strategy)
+    yield from diagnostics(summarise_health(strategy.ensemble.health, strategy.scene.names))
+
+
+def findings(found: Sequence[Diagnostic]) -> tuple[str, ...]:
+    """Return name and result of the checks that may cost accuracy."""
+    return tuple(f"{each.name}: {each.text}" for each in found if each.level == "check")
+
+
+def _missed(strategy: Strategy) -> Diagnostic:
+    name = "Targets without an estimate"
+    meaning = "Share of the targets, over the scans, that have no estimate within the cutoff; and the worst run."
     ensemble, counted = strategy.ensemble, strategy.counted
     alive = ensemble.num_targets[:, counted].sum(axis=1, dtype=np.float64)
+    if not ensemble.measures or not alive.any():  # the targets are not known, or there are none
+        return Diagnostic(name, meaning, _NONE, "ok")
     missed = ensemble.values("num_missed")[:, counted].sum(axis=1)
-    if not alive.any() or missed.sum() < _TRIFLE * alive.sum():
-        return
+    share = float(missed.sum() / alive.sum())
     shares = missed / np.maximum(alive, 1.0)
     worst = int(np.argmax(shares))
-    yield (
-        f"{percent(float(missed.sum() / alive.sum()))} of the targets, over the scans, have no estimate within the "
-        f"cutoff, most in run {ensemble.runs[worst]} ({percent(float(shares[worst]))})"
+    most = f", run {ensemble.runs[worst]}: {percent(shares[worst])}" if share and ensemble.num_runs > 1 else ""
+    return Diagnostic(name, meaning, f"{percent(share)}{most}", "check" if share >= _TRIFLE else "ok")
+
+
+def _consistency(strategy: Strategy) -> Diagnostic:
+    name = "Position NEES / 2"
+    meaning = (
+        "Normalised squared error of the estimated positions over its dimension, averaged over the runs, median over "
+        "the scans. 1 is consistent; above 1 the covariances are too small, below 1 too large."
     )
+    if not strategy.ensemble.measures:
+        return Diagnostic(name, meaning, _NONE, "ok")
+    average = nees_over_runs(strategy, 2)
+    known = strategy.counted & (average.count > 0)
+    if not known.any():
+        return Diagnostic(name, meaning, _NONE, "ok")
+    middle = float(np.median(average.mean[known])) / average.dim
+    outside = {
+        "covariances too small": float((average.mean > average.upper)[known].mean()),
+        "covariances too large": float((average.mean < average.lower)[known].mean()),
+    }
+    word, share = max(outside.items(), key=lambda each: each[1])
+    if share <= _OFTEN:
+        return Diagnostic(name, meaning, f"{middle:.2f}", "ok")
+    return Diagnostic(name, meaning, f"{middle:.2f}, {word} at {percent(share)} of scans", "check")
 
 
-def _consistency_findings(strategy: Strategy) -> Iterator[str]:
-    """Covariances that are wrong on average, and the estimate that is worst for its own, if not by chance."""
-    average, counted = nees_over_runs(strategy, 2), strategy.counted
-    known = counted & (average.count > 0)
-    for said, outside in (("small", average.mean > average.upper), ("large", average.mean < average.lower)):
-        share = float(outside[known].mean()) if known.any() else 0.0
-        if share > _OFTEN:
-            middle = float(np.median(average.mean[known])) / average.dim
-            yield (
-                f"covariances are too {said} at {percent(share)} of the scans, where 2.5 % may be by chance: position "
-                f"NEES / 2, averaged over the runs, is {middle:.2f} in the middle, and 1 is consistent"
-            )
-    spread = nees_spread(strategy)
-    if spread is not None and not spread.is_by_chance:
-        yield (
-            f"in run {spread.run} at {spread.time:g} s an estimate was far worse than its covariance says: position "
-            f"NEES / 2 of {spread.largest:.4g}, where 1 is consistent and {spread.median:.2f} is the median"
-        )
+def _worst_estimate(strategy: Strategy) -> Diagnostic:
+    name = "Largest NEES / 2"
+    meaning = "The estimate that is worst for its covariance, with its run and time; 1 is consistent."
+    spread = nees_spread(strategy) if strategy.ensemble.measures else None
+    if spread is None:
+        return Diagnostic(name, meaning, _NONE, "ok")
+    text = f"{spread.largest:.4g} in run {spread.run} at {spread.time:g} s"
+    return Diagnostic(name, meaning, text, "ok" if spread.is_by_chance else "check")

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from vedette.control import Plan, Planner
+from vedette.evaluation.diagnostics import diagnostics_line, run_diagnostics
 from vedette.evaluation.figures.scene import scene_of
-from vedette.evaluation.health import health_line
 from vedette.evaluation.scans import UNKNOWN
 from vedette.kernels.base.types import Floats
 from vedette.live import Answer, Live, LiveState
@@ -187,7 +187,7 @@ class LiveScreen:
         for place, instant in enumerate(latest):
             health.note_filters(place, instant.info.filters)
             health.note_fusion(place, instant.info.fusion)
-        return health_line(health, self._names).removeprefix("health: ")
+        return diagnostics_line(run_diagnostics(health, self._names))
 
     def _silence(self, state: LiveState) -> list[float | None]:
         """s of each sensor since its latest scan, by the clock of the scans; None before its first."""

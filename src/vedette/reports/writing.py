@@ -17,16 +17,18 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from vedette.campaigns.results import CampaignResults
+from vedette.campaigns.yardsticks import CheckedClaim, checked_claims, yardstick_of
 from vedette.errors import InputError
 from vedette.evaluation.figures.labels import elided_names
 from vedette.evaluation.figures.style import strategy_label
 from vedette.evaluation.scans import code_of_sensors
 from vedette.files import write_whole
 from vedette.kernels.base.types import Floats
-from vedette.reports.claims import Claim, all_pairs, claims
+from vedette.reports.claims import Claim, all_pairs
 from vedette.reports.drawings import Drawing, error_drawings, group_drawings, sweep_drawings, typical_records
+from vedette.reports.forest import Forest, forest_of
 from vedette.reports.groups import Group, axis_label, gather
-from vedette.reports.health import group_health, health_table
+from vedette.reports.health import DiagnosticsTable, diagnostics_table
 from vedette.reports.origin import citation, made_with, spec_toml, versions_table
 from vedette.reports.replay import replay_data
 from vedette.reports.saving import run_errors
@@ -52,9 +54,9 @@ class _Section:
     reason: str  # why there is no comparison, or nothing
     difference: str  # heading of the paired differences
     is_brief: bool
-    claims: tuple[Claim, ...]
+    forest: Forest | None
     pairs: tuple[Claim, ...]
-    health: tuple[tuple[str, str], ...]
+    diagnostics: DiagnosticsTable | None
     tables: tuple[tuple[str, Table], ...]
     figures: tuple[tuple[Drawing, Markup], ...]
 
@@ -93,7 +95,11 @@ def write_report(
     sections: list[_Section] = []
     runs: list[dict[str, Any]] = []
     errors: dict[str, Floats] = {}
+    claims: list[CheckedClaim] = []
+    yardstick = yardstick_of(results.campaign)
     for number, group in enumerate(gather(results)):
+        if yardstick is not None and group.comparison is not None:
+            claims += checked_claims(yardstick, group.comparison)
         errors.update(run_errors(group))
         is_brief = sum(section.size for section in sections) > MAX_FIGURE_BYTES
         sections.append(section_of(group, f"g{number}", is_brief))
@@ -111,6 +117,7 @@ def write_report(
         campaign=campaign,
         folder=shlex.quote(campaign.default_folder),
         compared=axis_label(campaign.compare),
+        claims=claims,
         sections=sections,
         sweeps=sweeps,
         finished=sum(len(results.finished(cell.name)) for cell in campaign.cells),
@@ -203,7 +210,6 @@ def section_of(group: Group, prefix: str, is_brief: bool = False) -> _Section:
         "Errors": error_table(group),
         "Other measures": measure_table(group),
         "Decisions": decision_table(group),
-        "Health": health_table(group),
         "Cost": cost_table(group),
     }
     comparison = group.comparison
@@ -214,9 +220,9 @@ def section_of(group: Group, prefix: str, is_brief: bool = False) -> _Section:
         reason=group.reason,
         difference=named_in("Difference", "m" if comparison is None else comparison.unit),
         is_brief=is_brief,
-        claims=() if comparison is None else claims(comparison),
+        forest=forest_of(group),
         pairs=() if comparison is None or len(comparison.strategies) < 3 else all_pairs(comparison),
-        health=group_health(group),
+        diagnostics=diagnostics_table(group),
         tables=tuple((title, table) for title, table in named.items() if table is not None),
         figures=_drawn(
             tuple(error_drawings(group) if is_brief else group_drawings(group)),

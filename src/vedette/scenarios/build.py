@@ -30,7 +30,7 @@ from vedette.scenarios.sections.courses import in_courses
 from vedette.scenarios.sections.custom import Custom, NotGiven
 from vedette.scenarios.sections.deciding import Lookahead
 from vedette.scenarios.sections.fusion import IN_FULL, OF_SCANS, ONE_BELIEF, CustomFusion
-from vedette.scenarios.sections.planners import STRATEGIES, Named, NamedIndependent, Parts, Strategy
+from vedette.scenarios.sections.planners import STRATEGIES, Named, NamedIndependent, Parts, Strategy, strategy_of
 from vedette.scenarios.sections.platforms import CustomPlatform
 from vedette.scenarios.sections.scenario import ScenarioModel
 from vedette.scenarios.sections.sensors import Sensor
@@ -294,7 +294,7 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
     if name not in (*STRATEGIES, *model.planners):
         raise InputError(f"planner: expected one of {', '.join((*STRATEGIES, *model.planners))}; got {name!r}")
     sensors = build_sensors(scenario)
-    strategy = model.planners[name] if name in model.planners else STRATEGIES[name]
+    strategy = strategy_of(model, name)
     if wanted := strategy.misfit(model, labels=labels_targets(sensors[0].filter)):
         raise InputError(f"planner {name}: expected {wanted}; got {name}")
     parts = build_parts(scenario, sensors, strategy, num_threads)

@@ -15,7 +15,6 @@ from vedette.evaluation.ensembles import PARTS
 from vedette.evaluation.figures.labels import short_labels
 from vedette.evaluation.figures.style import (
     GREY,
-    INK,
     colour,
     legend_columns,
     line_style,
@@ -72,6 +71,7 @@ def own_points(curves: Floats) -> Bools:
 
 
 _LABELS = {"total": "OSPA", "localisation": "Localisation", "cardinality": "Cardinality"}
+_FAR = 2.0  # times the second largest difference, beyond which the largest leaves the axis
 _DASH = 4.5  # line widths, of curves that lie on one another
 
 
@@ -116,25 +116,53 @@ def differences_figure(comparison: Comparison) -> Figure:
     figure = new_figure(4.05)
     above, below = figure.subplots(2, 1, sharex=True)
     draw_ospa(above, comparison, "total")
-    shown = comparison.times >= (comparison.decision_times[:1].min(initial=np.inf))
-    if shown.sum() < 2:
-        shown[:] = True
-    _close_up(above, comparison, shown)
-    below.axhline(0.0, color=INK, linewidth=0.8)
-    first = comparison.values(comparison.strategies[0])
-    for index, strategy in enumerate(comparison.strategies[1:], start=1):
-        curve = summarise(comparison.values(strategy)[:, shown] - first[:, shown])
-        below.plot(comparison.times[shown], curve.mean, color=colour(index), linestyle=line_style(index))
-        _fill(below, comparison.times[shown], curve.low, curve.high, np.ones(shown.sum(), bool), colour(index))
-    _mark_decisions(below, comparison)
-    span_times(below, comparison.times[shown])
-    below.set_xlabel("Time (s)")
-    below.set_ylabel(named_in(f"minus {short_labels(comparison.strategies)[0]}", comparison.unit))
+    _close_up(above, comparison, since_first_decision(comparison))
+    draw_differences(below, comparison)
     handles, labels = above.get_legend_handles_labels()
     figure.legend(
         handles, labels, loc="outside upper center", ncols=legend_columns(labels), columnspacing=1.2, handlelength=1.8
     )
     return figure
+
+
+def since_first_decision(comparison: Comparison) -> Bools:
+    """Return which scans are at the first decision or later, (num_scans,); all where fewer than two are."""
+    shown = comparison.times >= (comparison.decision_times[:1].min(initial=np.inf))
+    return shown if shown.sum() >= 2 else np.ones(len(shown), bool)
+
+
+def draw_differences(axes: Axes, comparison: Comparison) -> None:
+    """Draw the paired difference of each strategy to the first against time, with 95 % confidence bands.
+
+    A strategy that is much worse than all others leaves the axis at the top, so that the others can be told apart.
+    """
+    shown = since_first_decision(comparison)
+    reaches: dict[str, float] = {}
+    times = comparison.times[shown]
+    axes.axhline(0.0, color=colour(0), linewidth=1.4, label=short_labels(comparison.strategies)[0])
+    first = comparison.values(comparison.strategies[0])
+    for index, (strategy, label) in enumerate(
+        zip(comparison.strategies[1:], short_labels(comparison.strategies)[1:], strict=True), start=1
+    ):
+        curve = summarise(comparison.values(strategy)[:, shown] - first[:, shown])
+        axes.plot(times, curve.mean, color=colour(index), linestyle=line_style(index), label=label)
+        _fill(axes, times, curve.low, curve.high, np.ones(len(times), bool), colour(index))
+        reaches[label] = float(np.abs([curve.low, curve.high]).max())
+    _leave_out_the_worst(axes, reaches)
+    _mark_decisions(axes, comparison)
+    span_times(axes, times)
+    axes.set_xlabel("Time (s)")
+    axes.set_ylabel(named_in(f"minus {short_labels(comparison.strategies)[0]}", comparison.unit))
+
+
+def _leave_out_the_worst(axes: Axes, reaches: dict[str, float]) -> None:
+    """End the axis above the second largest difference where the largest is far beyond it, and say so."""
+    *_, second, worst = [("", 0.0), *sorted(reaches.items(), key=lambda each: each[1])]
+    if worst[1] > _FAR * second[1] > 0.0:
+        axes.set_ylim(axes.get_ylim()[0], 1.15 * second[1])
+        axes.text(
+            0.98, 0.02, f"{worst[0]} leaves the axis", transform=axes.transAxes, ha="right", color=GREY, fontsize=6
+        )
 
 
 def _close_up(axes: Axes, comparison: Comparison, shown: Bools) -> None:

@@ -109,6 +109,7 @@ _LABELS = {
     "oracle": "Oracle",
     "told": "JDM, true targets",
     "random": "Random",
+    "expected_loss": "Expected loss",
     "fixed": "Fixed",
     "still": "Not moving",
     "recorded": "Recorded scans",

@@ -17,7 +17,7 @@ from vedette.errors import InputError
 from vedette.evaluation.actions import angle_of
 from vedette.evaluation.comparison import Comparison
 from vedette.evaluation.figures.labels import drawn_text, short_label
-from vedette.evaluation.figures.ospa import draw_ospa
+from vedette.evaluation.figures.ospa import draw_differences, draw_ospa
 from vedette.evaluation.figures.scene import (
     Scene,
     draw_field,
@@ -39,6 +39,7 @@ from vedette.evaluation.figures.style import (
 )
 from vedette.kernels.base.types import Floats, Ints
 from vedette.simulation.records import Decision, RunRecord
+from vedette.text import named_in
 
 LARGE = 5000.0  # m, beyond which axes are in kilometres
 _MANY_SCANS = 200  # from which on estimates are drawn smaller
@@ -83,9 +84,10 @@ def tracks_figure(*records: RunRecord, titles: Sequence[str] | None = None, scen
 def overview_figure(
     record: RunRecord, comparison: Comparison, *, strategy: str = "", scene: Scene | None = None
 ) -> Figure:
-    """One picture of an experiment, as wide as a page: the tracks of one run, and the errors of all strategies.
+    """One picture of an experiment, as wide as a page: the tracks of one run, and what the decisions changed.
 
-    Colours are those of the strategies in both.
+    Right: the paired difference of each strategy to the first, from the first decision on, with 95 % confidence bands;
+    a small chart of the whole course beside it. Of one run or one strategy, the error itself.
 
     Args:
         record: the run.
@@ -99,21 +101,42 @@ def overview_figure(
     if strategy not in comparison.strategies:
         raise InputError(f"strategy: expected one of {', '.join(comparison.strategies)}; got {strategy!r}")
     figure = new_figure(TEXT_WIDTH / 2 + 0.1, width=TEXT_WIDTH)
-    left, right = figure.subplots(1, 2)
+    several = comparison.num_runs > 1 and len(comparison.strategies) > 1
+    grid = figure.add_gridspec(2, 2, height_ratios=(1.0, 3.0))
+    left, right = figure.add_subplot(grid[:, 0]), figure.add_subplot(grid[1 if several else slice(None), 1])
     scale = 1e-3 if reach_of([record]) > LARGE else 1.0
     shade = colour(comparison.strategies.index(strategy))
     draw_tracks(left, record, scale, scene, shade)
     frame_tracks(left, [record], scale, scene)
     left.set_title(f"{short_label(strategy)}, run {record.run}", pad=_TITLE_PAD)
-    draw_ospa(right, comparison, "total")
-    several = f", mean of {comparison.num_runs} runs" if comparison.num_runs > 1 else " of one run"
-    right.set_ylabel(f"{right.get_ylabel()}{several}")
-    right.set_xlabel("Time (s)")
-    # Above the panel, where it hides no curve.
-    columns = legend_columns([str(label) for label in right.get_legend_handles_labels()[1]])
-    right.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns, frameon=False)
+    above = right
+    if several:
+        _draw_gain(right, comparison)
+        above = figure.add_subplot(grid[0, 1])
+        _draw_course(above, comparison)
+    else:
+        draw_ospa(right, comparison, "total")
+        right.set_xlabel("Time (s)")
+    handles, labels = right.get_legend_handles_labels()
+    columns = legend_columns(labels)
+    above.legend(handles, labels, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns, frameon=False)
     add_legend(figure, record, scene, shade)
     return figure
+
+
+def _draw_gain(axes: Axes, comparison: Comparison) -> None:
+    """Draw the paired differences."""
+    draw_differences(axes, comparison)
+    minus = f"minus {short_label(comparison.strategies[0])}"
+    axes.set_ylabel(f"{named_in('OSPA', comparison.unit)} {minus}")
+
+
+def _draw_course(axes: Axes, comparison: Comparison) -> None:
+    """Draw the whole course of the error, small."""
+    draw_ospa(axes, comparison, "total")
+    axes.set_ylabel(named_in("OSPA", comparison.unit), fontsize=6)
+    axes.tick_params(labelsize=6)
+    axes.yaxis.set_major_locator(MaxNLocator(3))
 
 
 def draw_tracks(axes: Axes, record: RunRecord, scale: float, scene: Scene, shade: str = "") -> None:

@@ -69,6 +69,10 @@ class Strategy(Section):
         """
         return ""
 
+    def words(self, model: ScenarioModel) -> str:
+        """What it is, for a reader of results: `joint decisions, expected loss`."""
+        return "sensors do not move"
+
     def planner(self, parts: Parts, folder: Path) -> Planner | None:
         """Who decides; None: nobody."""
         return None
@@ -87,6 +91,11 @@ class _Valued(Strategy):
             return ""
         return f"nearest, assigned, centroid, oracle or custom, as {kind} filters have no labels ({LABELLING} do)"
 
+    def by_reward(self, decisions: str, model: ScenarioModel) -> str:
+        """Decisions with what they go by."""
+        reward = self.reward or model.control.reward
+        return f"{decisions}, {reward.words.removeprefix('minus ') or 'custom reward'}"
+
     def shared(self, parts: Parts, folder: Path) -> dict[str, Any]:
         """What all planners that value densities are made of."""
         reward = parts.reward if self.reward is None else self.reward.build(folder)
@@ -99,6 +108,10 @@ class NamedJoint(_Valued):
 
     kind: Literal["joint"] = Field(default="joint", description="Kind of planner [-].")
     search: AnySearch | None = Field(default=None, description="In place of control.search; none: that one [-].")
+
+    def words(self, model: ScenarioModel) -> str:
+        """Joint, and by which reward."""
+        return self.by_reward("joint decisions", model)
 
     def planner(self, parts: Parts, folder: Path) -> Planner:
         """With the search."""
@@ -117,6 +130,10 @@ class NamedTold(NamedJoint):
         """Unfit also where the true targets are not known, or lack components of a custom motion."""
         return super().misfit(model, labels=labels) or _untrue(model)
 
+    def words(self, model: ScenarioModel) -> str:
+        """Joint, with the truth."""
+        return "joint decisions, true targets given"
+
     def planner(self, parts: Parts, folder: Path) -> Planner:
         """The joint planner on beliefs about the true targets, none of which is undetected."""
         from vedette.simulation import ToldPlanner
@@ -133,6 +150,10 @@ class NamedIndependent(_Valued):
     others: Literal["stay", "absent"] | None = Field(
         default=None, description="In place of control.others; none: that one [-]."
     )
+
+    def words(self, model: ScenarioModel) -> str:
+        """Independent, by which reward, and what is assumed of other sensors."""
+        return f"{self.by_reward('independent decisions', model)}, other sensors {self.others or model.control.others}"
 
     def planner(self, parts: Parts, folder: Path) -> Planner:
         """Watched, as of pairs of sensors it knows nothing."""
@@ -158,6 +179,10 @@ class _Ahead(_Valued):
             return ""
         return "joint or another, as with control.association full decisions are no sums over labels (known has them)"
 
+    def words(self, model: ScenarioModel) -> str:
+        """Joint over several periods, and by which reward."""
+        return self.by_reward("joint decisions over several periods", model)
+
     def planner(self, parts: Parts, folder: Path) -> Planner:
         """With that search."""
         from vedette.control import HorizonPlanner
@@ -173,6 +198,13 @@ class NamedLookahead(_Ahead, Lookahead):
     def ahead(self, parts: Parts) -> dict[str, Any]:
         """As it says itself."""
         return self.build()
+
+
+_RULES = {
+    "nearest": "each sensor to its nearest target",
+    "assigned": "sensor s to target s",
+    "centroid": "all sensors to the centroid of the targets",
+}
 
 
 class NamedRule(Strategy):
@@ -191,6 +223,10 @@ class NamedRule(Strategy):
         if self.targets is not None and self.kind != "assigned":
             yield ("targets",), f"none, as the rule is {self.kind}", describe(list(self.targets))
 
+    def words(self, model: ScenarioModel) -> str:
+        """Which rule."""
+        return f"rule of thumb: {_RULES[self.kind]}"
+
     def planner(self, parts: Parts, folder: Path) -> Planner:
         """By the rule."""
         from vedette.control import RulePlanner
@@ -207,6 +243,10 @@ class NamedOracle(Strategy, Derived):
     def misfit(self, model: ScenarioModel, *, labels: bool | None = None) -> str:
         """Unfit where the true targets are not known, or lack components of a custom motion."""
         return _untrue(model)
+
+    def words(self, model: ScenarioModel) -> str:
+        """With the truth."""
+        return "best decisions for the true targets"
 
     def planner(self, parts: Parts, folder: Path) -> Planner:
         """Who waits to be told of the targets."""
@@ -225,6 +265,10 @@ class CustomPlanner(Strategy, Custom):
     spared: ClassVar[tuple[str, ...]] = ("name",)  # which the scenario gives
     gives: ClassVar[str] = "vedette.control:Planner"
 
+    def words(self, model: ScenarioModel) -> str:
+        """Which class or function."""
+        return f"custom planner {self.function}"
+
     def planner(self, parts: Parts, folder: Path) -> Planner:
         """The user's own."""
         return _watched(self.made(folder, **parts._asdict()), parts)
@@ -232,6 +276,10 @@ class CustomPlanner(Strategy, Custom):
 
 class ProgramStrategy(Strategy, ProgramSection):
     """A planner that is a program."""
+
+    def words(self, model: ScenarioModel) -> str:
+        """Which command."""
+        return f"external program {self.code}"
 
     def planner(self, parts: Parts, folder: Path) -> Planner:
         """The one that asks it."""
@@ -242,6 +290,10 @@ class ProgramStrategy(Strategy, ProgramSection):
 
 
 class _Random(Strategy):
+    def words(self, model: ScenarioModel) -> str:
+        """Random."""
+        return "random actions"
+
     def planner(self, parts: Parts, folder: Path) -> Planner:
         from vedette.control import RandomPlanner
 
@@ -249,6 +301,10 @@ class _Random(Strategy):
 
 
 class _Fixed(Strategy):
+    def words(self, model: ScenarioModel) -> str:
+        """Without decisions."""
+        return "first course kept"
+
     def planner(self, parts: Parts, folder: Path) -> Planner:
         from vedette.control import FixedPlanner
 
@@ -291,6 +347,11 @@ STRATEGIES: dict[str, Strategy] = {
     "fixed": _Fixed(),
     "still": Strategy(),
 }
+
+
+def strategy_of(model: ScenarioModel, name: str) -> Strategy:
+    """The strategy of a scenario by its name. Raises `KeyError` for an unknown one."""
+    return model.planners[name] if name in model.planners else STRATEGIES[name]
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,105 @@
+"""Summary of one run in the terminal: decisions, error, run time and diagnostics."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from vedette.cli.output import console as new_console
+from vedette.cli.output import is_verbose
+from vedette.text import amount, counted
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from vedette.scenarios import Scenario
+    from vedette.simulation.records import RunRecord
+
+_FEW_DECISIONS = 5  # printed without --verbose
+_LONGEST_ACTIONS = 36  # letters, beyond which --verbose alone prints actions
+
+
+def print_run(record: RunRecord, scenario: Scenario | None) -> None:
+    """Print the summary of a run; with `--verbose` all decisions and diagnostics.
+
+    Without the scenario, OSPA has no unit and sensors have numbers.
+    """
+    console = new_console()
+    words = f" ({_words(record, scenario)})" if record.decisions else ""
+    title = f"{record.scenario}: planner {record.planner}{words}, seed {record.seed}, run {record.run}"
+    console.print(f"{title}, {counted(record.num_scans, 'scan')}", style="bold", soft_wrap=True)
+    if record.decisions:
+        _print_decisions(console, record)
+    _print_facts(console, record, scenario)
+    _print_diagnostics(console, record, scenario)
+
+
+def _words(record: RunRecord, scenario: Scenario | None) -> str:
+    """Description of the planner; its name where the scenario does not have it."""
+    from vedette.scenarios.sections.planners import strategy_of
+
+    try:
+        return record.planner if scenario is None else strategy_of(scenario.model, record.planner).words(scenario.model)
+    except KeyError:
+        return record.planner
+
+
+def _print_decisions(console: Console, record: RunRecord) -> None:
+    from rich.table import Table
+
+    from vedette.evaluation.actions import choice_words
+    from vedette.evaluation.certainty import lead_words, optimality_words
+    from vedette.evaluation.comparison import choices_of
+
+    rows = list(zip(record.decisions, choices_of(record), strict=True))
+    left_out = 0 if is_verbose() else max(0, len(rows) - _FEW_DECISIONS)
+    table = Table(box=None, pad_edge=False)
+    for heading in ("time", "actions", "expected reward", "lead over runner-up", "optimal"):
+        table.add_column(heading)
+    for decision, choice in [*rows[: _FEW_DECISIONS - 1], rows[-1]] if left_out else rows:
+        actions = choice_words(choice)
+        rewards = dict.fromkeys(f"{mean:.3f} ± {error:.3f}" for mean, error in decision.plan.expected_rewards)
+        table.add_row(
+            f"{decision.time:g} s",
+            actions if is_verbose() or len(actions) <= _LONGEST_ACTIONS else f"of {len(choice)} sensors",
+            ", ".join(rewards),
+            lead_words(decision.plan),
+            optimality_words(decision.plan),
+        )
+    console.print(table)
+    if left_out:
+        console.print(f"{counted(left_out, 'more decision')} before the last: --verbose prints all", style="dim")
+    for note in dict.fromkeys(note for decision in record.decisions for note in decision.plan.notes):
+        console.print(f"note: {note}", soft_wrap=True)
+
+
+def _print_facts(console: Console, record: RunRecord, scenario: Scenario | None) -> None:
+    """Print the mean error over the scans that count, where the targets are known, and the run time."""
+    from vedette.evaluation.comparison import counted_scans
+
+    unit = scenario.model.ospa.unit if scenario else ""
+    counts = counted_scans(record, scenario)
+    times = record.times[counts]
+    total, localisation, cardinality = record.ospa[counts].mean(axis=0)
+    if not math.isnan(total):
+        parts = f"localisation {localisation:.2f}, cardinality {cardinality:.2f}"
+        window = f"mean over t = {times[0]:g} to {times[-1]:g} s"
+        console.print(f"mean OSPA   {amount(f'{total:.2f}', unit)} ({parts}; {window})", soft_wrap=True)
+    spent = {stage: float(seconds.sum()) for stage, seconds in record.timings.items()}
+    stages = ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in spent.items())
+    console.print(f"run time    {sum(spent.values()):.2f} s ({stages})", soft_wrap=True)
+
+
+def _print_diagnostics(console: Console, record: RunRecord, scenario: Scenario | None) -> None:
+    """Print the checks that may cost accuracy; with `--verbose` all that found something."""
+    from vedette.evaluation.diagnostics import run_diagnostics
+
+    found = run_diagnostics(record.health, scenario.model.sensor_names if scenario else ())
+    shown = [each for each in found if each.level == "check" or (is_verbose() and each.level == "note")]
+    if not shown:
+        console.print("diagnostics no problem found")
+        return
+    console.print("diagnostics, which may cost accuracy (docs: lost-tracks):")
+    for each in shown:
+        mark = "!" if each.level == "check" else " "
+        console.print(f"  {mark} {each.name}: {each.text}", soft_wrap=True)

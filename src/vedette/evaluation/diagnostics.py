@@ -1,0 +1,175 @@
+"""Diagnostics of a run or several: what filters and fusion truncated, dropped or lost, and if it matters."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from vedette.evaluation.health import HealthSummary, health_sums, percent, summarise_health
+from vedette.fusion.base import LOST, SURE
+from vedette.kernels.base.types import Floats
+from vedette.simulation.health import Health
+from vedette.text import counted
+
+Level = Literal["ok", "note", "check"]
+_MUCH = 0.01  # share or number above which a truncation is to be checked
+
+
+class Diagnostic(NamedTuple):
+    """One check of a run or several.
+
+    Attributes:
+        name: what is checked.
+        meaning: what it means, in a sentence.
+        text: the result with its numbers.
+        level: `ok`; `note`: it happened, and rarely costs accuracy; `check`: it may cost accuracy.
+    """
+
+    name: str
+    meaning: str
+    text: str
+    level: Level
+
+
+def run_diagnostics(health: Health, sensors: Sequence[str] = ()) -> tuple[Diagnostic, ...]:
+    """Return every diagnostic of one run, whose sensors are called `sensors`."""
+    return diagnostics(summarise_health(health_sums([health]), sensors))
+
+
+def diagnostics_line(found: Sequence[Diagnostic]) -> str:
+    """Return the diagnostics that are not `ok` in one line; `no limit reached, nothing truncated` where all are."""
+    shown = [f"{each.name[0].lower()}{each.name[1:]}: {each.text}" for each in found if each.level != "ok"]
+    return "; ".join(shown) or "no limit reached, nothing truncated"
+
+
+def diagnostics(health: HealthSummary) -> tuple[Diagnostic, ...]:
+    """Return every diagnostic of some runs, those of the fusion first."""
+    return (*_of_fusion(health), *_of_filters(health), *_of_measurements(health))
+
+
+def _level(value: float, much: float = 0.0) -> Level:
+    return "check" if value > much else "note" if value > 0.0 else "ok"
+
+
+def _noted(value: float) -> Level:
+    return "note" if value > 0.0 else "ok"
+
+
+def _scans(share: float) -> str:
+    return f"{percent(share)} of scans"
+
+
+def _bound(share: float) -> str:
+    """An upper bound on a share."""
+    return "less than 1 %" if share < 0.01 else f"at most {percent(share)}"
+
+
+def _worst(shares: Floats, names: Sequence[str]) -> str:
+    worst = int(np.argmax(shares))
+    return f"{percent(float(shares[worst]))} at {names[worst]}" if shares[worst] else "0 %"
+
+
+def _of_fusion(health: HealthSummary) -> Iterator[Diagnostic]:
+    most = f", up to {counted(health.worst_lost, 'target')}" if health.lost else ""
+    yield Diagnostic(
+        "Targets lost by fusion",
+        f"A label with an existence probability of {SURE:g} or more at one sensor has less than {LOST:g} after fusion, "
+        "because another sensor lacks it or does not see there.",
+        f"{_scans(health.lost)}{most}",
+        _level(health.lost, _MUCH),
+    )
+    yield Diagnostic(
+        "No common label set",
+        "No label set is held by every sensor.",
+        _scans(health.disjoint),
+        _level(health.disjoint),
+    )
+    yield Diagnostic(
+        "Fused weight truncated",
+        "Share of the fused weight beyond max_hypotheses, at the worst scan.",
+        percent(health.worst_fusion_discarded),
+        _level(health.worst_fusion_discarded, _MUCH),
+    )
+    yield Diagnostic(
+        "Label sets missing at a sensor",
+        "Share of the fused label sets (CLMB: labels) that a sensor lacks, for the sensor that lacks most.",
+        _worst(health.missing_sets, health.sensors),
+        _noted(float(health.missing_sets.max())),
+    )
+    yield Diagnostic(
+        "Labels unknown to a sensor",
+        "Share of the scans at which a sensor lacks a label that another sensor has.",
+        _worst(health.unknown_labels, health.sensors),
+        _noted(float(health.unknown_labels.max())),
+    )
+
+
+def _of_filters(health: HealthSummary) -> Iterator[Diagnostic]:
+    yield Diagnostic(
+        "Posterior truncated",
+        "The filter reached its limits, or left out improbable hypotheses. The weight is an upper bound, and "
+        "not the error: "
+        "a campaign with ten times as many hypotheses measures what the limits cost.",
+        _truncation(health),
+        _truncation_level(health),
+    )
+    yield Diagnostic(
+        "Association search cut short",
+        "The ranking of associations stopped at max_search_nodes.",
+        _scans(health.search_cut),
+        _level(health.search_cut),
+    )
+    yield Diagnostic(
+        "Cluster approximated",
+        "An LMB cluster was too large for an exact sum; the heaviest joint choices were summed.",
+        _scans(health.inexact),
+        _level(health.inexact),
+    )
+    worst, mean = health.worst_factoring / 2.0, health.mean_factoring / 2.0
+    known = not math.isnan(worst)
+    yield Diagnostic(
+        "Independence error",
+        "Upper bound on the share of the weight that a filter moves when it treats labels as independent, per scan.",
+        (f"{_bound(worst)} (mean {_bound(mean)})" if worst else "none") if known else "not known",
+        ("check" if mean > 5.0 * _MUCH else _noted(worst)) if known else "note",
+    )
+    yield Diagnostic(
+        "Targets dropped",
+        "Expected number of targets in the labels that a filter dropped, at the worst scan.",
+        f"up to {health.worst_dropped:.2g} per scan" if health.worst_dropped else "none",
+        _level(health.worst_dropped, _MUCH),
+    )
+
+
+def _truncation(health: HealthSummary) -> str:
+    if math.isnan(health.worst_discarded):
+        weight = "weight not known"
+    elif health.worst_discarded:
+        weight = f"weight {_bound(health.worst_discarded)} (mean {_bound(health.mean_discarded)})"
+    else:
+        weight = "weight 0 %"
+    return f"{weight}, limit reached at {_scans(health.cap_met)}" if health.cap_met else weight
+
+
+def _truncation_level(health: HealthSummary) -> Level:
+    if health.worst_discarded > 0.0:  # neither zero nor unknown
+        return _level(health.worst_discarded, _MUCH)
+    return "check" if health.cap_met else "note" if math.isnan(health.worst_discarded) else "ok"
+
+
+def _of_measurements(health: HealthSummary) -> Iterator[Diagnostic]:
+    yield Diagnostic(
+        "Repeated measurements",
+        "Measurements that repeat another one and were left out.",
+        str(health.duplicates),
+        _level(health.duplicates),
+    )
+    yield Diagnostic(
+        "Clutter raised",
+        "Measurements at places where the clutter intensity was raised to its floor.",
+        str(health.clutter_raised),
+        _noted(health.clutter_raised),
+    )
