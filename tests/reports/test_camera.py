@@ -158,7 +158,7 @@ def test_a_recording_without_known_targets_has_no_empty_panels(browser: Browser,
     choose(page, "scrubber", "10")
     assert text(page, "summary").startswith("2016-01-12 13:02:")
     assert "OSPA" not in text(page, "summary")
-    for part in ("errors", "errors-title", "rewards", "reward-title", "why-title", "decision", "nothing"):
+    for part in ("side", "rewards", "decision", "lost-key", "nothing"):
         assert page.evaluate(f"document.querySelector('[data-part={part}]').getClientRects().length") == 0
     assert page.evaluate("document.querySelector('[data-part=follow]').options[3].text").startswith("track ")
     found = re.search(r"([\d.]+)° N, ([\d.]+)° W", text(page, "place"))

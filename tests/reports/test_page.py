@@ -159,7 +159,7 @@ def test_a_page_that_grows_too_large_leaves_figures_and_runs_out_and_says_so(
     assert words.count("not drawn for this group") == 1
     assert words.count("Run by run") == 2
     assert words.count("Consistency") == 1
-    assert "1 more typical run is left out" in words
+    assert "1 more run is left out" in words
 
 
 def test_figures_of_very_many_lines_are_drawn_in_dots_and_say_so(

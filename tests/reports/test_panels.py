@@ -56,27 +56,59 @@ def options(page: Page, part: str) -> list[list[str]]:
     return found
 
 
-def test_a_demo_plays_all_of_them_as_it_opens(browser: Browser, results: CampaignResults, tmp_path: Path) -> None:
+def tabs(page: Page) -> list[list[str]]:
+    """Name and mean error of each tab, and whether it is the one that is shown."""
+    found: list[list[str]] = page.evaluate(
+        "[...document.querySelectorAll('.tab')].map((tab) => [tab.querySelector('.name').textContent, "
+        "tab.querySelector('.mean').textContent, tab.getAttribute('aria-pressed')])"
+    )
+    return found
+
+
+def test_a_demo_opens_where_two_strategies_differ(browser: Browser, results: CampaignResults, tmp_path: Path) -> None:
     written = write_demo(results, tmp_path / "there" / "demo.html")
     page = browser.open(written, width=1400)
-    assert [caption.split(":")[0] for caption in captions(page)] == ["JDM", "IDM", "Random"]
-    assert text(page, "play") == "Pause"
-    wait_until(page, "Number(document.getElementById('replay').dataset.step) > 2")
+    assert [caption.split(":")[0] for caption in captions(page)] == ["JDM", "IDM"]
+    jdm, idm = (results.record(name, 0).ospa[:, 0] for name in ("jdm", "idm"))
+    apart = abs(jdm - idm)
+    assert apart[int(state(page)["step"])] >= 0.9 * apart.max()
+    assert text(page, "play") == "Play"
+    counted = slice(10, 40)
+    errors = [results.record(name, 0).ospa[counted, 0].mean() for name in ("jdm", "idm", "random")]
+    shown = tabs(page)
+    assert [name for name, _, _ in shown] == ["JDM", "IDM", "Random"]
+    assert [float(mean.removesuffix(" m")) for _, mean, _ in shown] == pytest.approx(errors, abs=0.06)
+    page.click("[data-tab='2']")
+    assert [pressed for *_, pressed in tabs(page)] == ["false", "false", "true"]
     assert page.complaints() == []
-    assert "JDM, IDM, Random send their own way" in page.evaluate("document.querySelector('.lead').textContent")
+    assert "Same targets, same noise" in page.evaluate("document.querySelector('.lead').textContent")
     with pytest.raises(InputError, match="path: expected a place to write a report"):
         write_demo(results, tmp_path / "there")
 
 
-def test_one_other_run_or_all_can_stand_beside(page: Page) -> None:
-    assert options(page, "beside") == [["", "nothing"], ["1", "IDM"], ["2", "Random"], ["1 2", "all"]]
+def test_the_timeline_can_be_dragged_and_names_events(page: Page) -> None:
+    page.evaluate("document.querySelector('[data-part=errors]').scrollIntoView({block: 'center', behavior: 'instant'})")
+    box = page.evaluate(
+        "(({x, y, width, height}) => [x, y, width, height])"
+        "(document.querySelector('[data-part=errors]').getBoundingClientRect())"
+    )
+    x, y, width, height = box
+    start, end = x + 52, x + width - 12
+    page.drag(start + 5, y + height / 2, (end - start) / 2, 0)
+    assert abs(int(state(page)["step"]) - 20) <= 1
+    page.drag(start + (end - start) / 2, y + height / 2, width, 0)
+    assert state(page)["step"] == "39"
+    assert page.complaints() == []
+
+
+def test_another_run_can_stand_beside(page: Page) -> None:
+    assert options(page, "beside") == [["", "nothing"], ["1", "IDM"], ["2", "Random"]]
     assert page.evaluate(f"{CANVASES}.length") == 1
     choose(page, "beside", "1")
     assert page.evaluate(f"{CANVASES}.length") == 2
-    choose(page, "beside", "1 2")
     assert page.complaints() == []
     assert min(colours(page)) > 20
-    assert [caption.split(":")[0] for caption in captions(page)] == ["JDM", "IDM", "Random"]
+    assert [caption.split(":")[0] for caption in captions(page)] == ["JDM", "IDM"]
     sizes = page.evaluate(f"{CANVASES}.map((canvas) => [canvas.clientWidth, canvas.clientHeight].join())")
     assert len(set(sizes)) == 1
     choose(page, "beside", "")
@@ -87,8 +119,8 @@ def test_one_other_run_or_all_can_stand_beside(page: Page) -> None:
 
 
 def test_they_have_one_clock(page: Page, results: CampaignResults) -> None:
-    choose(page, "beside", "1 2")
-    errors = {name: results.record(name, 1).ospa[:, 0] for name in ("jdm", "idm", "random")}
+    choose(page, "beside", "2")
+    errors = {name: results.record(name, 1).ospa[:, 0] for name in ("jdm", "random")}
     for step in (0, 12, 25):
         choose(page, "scrubber", str(step))
         for caption, (name, ospa) in zip(captions(page), errors.items(), strict=True):

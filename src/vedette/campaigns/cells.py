@@ -18,7 +18,7 @@ from vedette.scenarios.build import build_planner
 from vedette.scenarios.dumping import dump_scenario, files_of
 from vedette.scenarios.overrides import with_fields
 from vedette.scenarios.sections import ScenarioModel
-from vedette.scenarios.sections.planners import strategy_of
+from vedette.scenarios.sections.planners import strategy_words
 from vedette.speaking import Speaking
 from vedette.text import counted, listed, unused
 
@@ -45,7 +45,7 @@ class Cell:
     @property
     def words(self) -> str:
         """Description of the strategy, such as `joint decisions, expected loss`."""
-        return strategy_of(self.scenario.model, self.planner).words(self.scenario.model)
+        return strategy_words(self.scenario.model, self.planner)
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -39,7 +39,9 @@ def report(
     runs: Annotated[
         str | None,
         typer.Option(
-            "--runs", metavar="CELL:RUN,...", help="Runs of a campaign to replay; else a typical one a strategy."
+            "--runs",
+            metavar="CELL:RUN,...",
+            help="Runs of a campaign to replay. Default: a typical run under every strategy.",
         ),
     ] = None,
     trust: Annotated[

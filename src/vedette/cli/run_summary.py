@@ -25,23 +25,23 @@ def print_run(record: RunRecord, scenario: Scenario | None) -> None:
     Without the scenario, OSPA has no unit and sensors have numbers.
     """
     console = new_console()
-    words = f" ({_words(record, scenario)})" if record.decisions else ""
-    title = f"{record.scenario}: planner {record.planner}{words}, seed {record.seed}, run {record.run}"
-    console.print(f"{title}, {counted(record.num_scans, 'scan')}", style="bold", soft_wrap=True)
+    console.print(_title(record, scenario), style="bold", soft_wrap=True)
     if record.decisions:
         _print_decisions(console, record)
     _print_facts(console, record, scenario)
     _print_diagnostics(console, record, scenario)
 
 
-def _words(record: RunRecord, scenario: Scenario | None) -> str:
-    """Description of the planner; its name where the scenario does not have it."""
-    from vedette.scenarios.sections.planners import strategy_of
+def _title(record: RunRecord, scenario: Scenario | None) -> str:
+    """Scenario, planner with its description, seed, run and number of scans."""
+    from vedette.scenarios.sections.planners import strategy_words
 
-    try:
-        return record.planner if scenario is None else strategy_of(scenario.model, record.planner).words(scenario.model)
-    except KeyError:
-        return record.planner
+    scans = counted(record.num_scans, "scan")
+    words = strategy_words(scenario.model, record.planner) if scenario else ""
+    if scenario is not None and scenario.model.recording is not None:
+        return f"{record.scenario}: {scans}"
+    planner = f"planner {record.planner}{f' ({words})' if words else ''}"
+    return f"{record.scenario}: {planner}, seed {record.seed}, run {record.run}, {scans}"
 
 
 def _print_decisions(console: Console, record: RunRecord) -> None:

@@ -171,6 +171,16 @@ def typical_records(group: Group) -> tuple[tuple[Strategy, RunRecord], ...]:
     return tuple(found)
 
 
+def paired_records(group: Group) -> tuple[tuple[Strategy, RunRecord], ...]:
+    """Return under each strategy the run that is typical of the first; without a comparison, the first run of each."""
+    comparison = group.comparison
+    if comparison is None:
+        return typical_records(group)
+    first = group.strategies[0]
+    run = int(first.ensemble.runs[typical_run(comparison, first.label)])
+    return tuple((strategy, strategy.record(run)) for strategy in group.strategies)
+
+
 def _consistency_drawings(strategies: Sequence[Strategy]) -> Iterator[Drawing]:
     """One of all strategies; where they have not the same scan times, one of each."""
     times = strategies[0].ensemble.times

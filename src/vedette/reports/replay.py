@@ -29,6 +29,8 @@ from vedette.simulation.scans import Scan
 _DIGITS = 4  # of an extent that positions are kept to: well under a pixel
 _ANGLE_DIGITS = 4
 _SIGMAS = 2.0
+_ROOM = 0.08  # of the extent, around what is shown
+_LEAST_EXTENT = 1.0  # m
 
 
 def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: bool) -> dict[str, Any]:
@@ -52,6 +54,8 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
         "cell": strategy.cell.name,
         "group": group,
         "strategy": strategy.name,
+        "words": strategy.words,
+        "mean": _mean_error(strategy, record) if is_known else None,
         "run": record.run,
         "labelled": strategy.has_labels,
         "extent": rounded_to(extent, places),
@@ -79,6 +83,12 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
     }
 
 
+def _mean_error(strategy: Strategy, record: RunRecord) -> float | None:
+    """Mean OSPA of a run over the scans that count."""
+    counted = strategy.counted[: record.num_scans]
+    return round(float(record.ospa[counted, 0].mean()), 2) if counted.any() else None
+
+
 def rounded_to(values: Any, places: int) -> list[float]:
     """Numbers as a page has them."""
     return [round(float(value), places) for value in values]
@@ -90,11 +100,19 @@ def places_of(extent: Sequence[float]) -> int:
 
 
 def _extent(record: RunRecord, scenario: Scenario) -> tuple[float, float, float, float]:
-    """x_min, x_max, y_min, y_max of region, targets and sensors, m."""
-    region = scenario.model.region
-    corners = np.array([[region.x_min, region.y_min], [region.x_max, region.y_max]])
-    points = np.concatenate([corners, record.truth.states[:, :2], record.poses[:, :, :2].reshape(-1, 2)])
-    (x_min, y_min), (x_max, y_max) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+    """x_min, x_max, y_min, y_max of sensors and targets with some room, m; of estimates where targets are not known.
+
+    A scene without extent, such as one sensor that has seen nothing, is as large as the region.
+    """
+    means = [estimate.means[:, :2] for estimate in record.estimates]
+    targets = record.truth.states[:, :2] if len(record.truth.states) else np.concatenate([np.empty((0, 2)), *means])
+    points = np.concatenate([targets, record.poses[:, :, :2].reshape(-1, 2)])
+    low, high = points.min(axis=0), points.max(axis=0)
+    size = float((high - low).max())
+    if size < _LEAST_EXTENT:
+        region = scenario.model.region
+        return region.x_min, region.x_max, region.y_min, region.y_max
+    (x_min, y_min), (x_max, y_max) = (low - _ROOM * size).tolist(), (high + _ROOM * size).tolist()
     return x_min, x_max, y_min, y_max
 
 

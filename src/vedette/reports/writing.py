@@ -20,12 +20,11 @@ from vedette.campaigns.results import CampaignResults
 from vedette.campaigns.yardsticks import CheckedClaim, checked_claims, yardstick_of
 from vedette.errors import InputError
 from vedette.evaluation.figures.labels import elided_names
-from vedette.evaluation.figures.style import strategy_label
 from vedette.evaluation.scans import code_of_sensors
 from vedette.files import write_whole
 from vedette.kernels.base.types import Floats
 from vedette.reports.claims import Claim, all_pairs
-from vedette.reports.drawings import Drawing, error_drawings, group_drawings, sweep_drawings, typical_records
+from vedette.reports.drawings import Drawing, error_drawings, group_drawings, paired_records, sweep_drawings
 from vedette.reports.forest import Forest, forest_of
 from vedette.reports.groups import Group, axis_label, gather
 from vedette.reports.health import DiagnosticsTable, diagnostics_table
@@ -34,7 +33,7 @@ from vedette.reports.replay import replay_data
 from vedette.reports.saving import run_errors
 from vedette.reports.svg import inline_png, inline_svg
 from vedette.reports.tables import Table, cost_table, decision_table, error_table, measure_table
-from vedette.text import amount, named_in
+from vedette.text import named_in
 
 # A page that a mail can carry: beyond these, groups show their errors alone, and typical runs are left out.
 MAX_FIGURE_BYTES, MAX_REPLAY_BYTES = 6_000_000, 4_000_000
@@ -82,8 +81,8 @@ def write_report(
     Args:
         results: of a finished campaign.
         path: of the file; its folder is made.
-        replays: cell and number of the runs that can be replayed; None: the typical run of each strategy, as many as
-            keep the page small.
+        replays: cell and number of the runs that can be replayed; None: the run that is typical of the first strategy,
+            under every strategy, as many as keep the page small.
         trust: run the code that the scenarios of the results name (`code_in_replays`).
 
     Raises:
@@ -150,16 +149,10 @@ def write_demo(results: CampaignResults, path: str | Path, *, trust: bool = Fals
     first = [(cell.name, 0) for cell in results.campaign.cells]
     _check_replays(results, first)
     (group,) = gather(results)
-    comparison = group.comparison
-    assert comparison is not None
     page = render(
         "demo.html",
         _replays(results, group, first, trust),
         campaign=results.campaign,
-        means=[
-            (strategy_label(name), amount(f"{comparison.run_means(name)[0]:.1f}", comparison.unit))
-            for name in comparison.strategies
-        ],
         untrusted=() if trust else code_in_replays(results),
         together=True,
     )
@@ -249,11 +242,14 @@ def _drawn(
 def _replays(
     results: CampaignResults, group: Group, replays: Sequence[tuple[str, int]] | None, trust: bool
 ) -> list[dict[str, Any]]:
-    """The typical runs of a group, or those of the chosen runs that belong to it."""
+    """Return the run typical of the first strategy under every strategy, or the chosen runs of the group."""
     if replays is None:
         return [
-            {**replay_data(strategy, record, group.title, trust=trust), "typical": group.comparison is not None}
-            for strategy, record in typical_records(group)
+            {
+                **replay_data(strategy, record, group.title, trust=trust),
+                "typical": group.comparison is not None and strategy is group.strategies[0],
+            }
+            for strategy, record in paired_records(group)
         ]
     strategies = {each.cell.name: each for each in group.strategies}
     return [

@@ -354,6 +354,12 @@ def strategy_of(model: ScenarioModel, name: str) -> Strategy:
     return model.planners[name] if name in model.planners else STRATEGIES[name]
 
 
+def strategy_words(model: ScenarioModel, name: str) -> str:
+    """Return the description of a strategy; empty for a name that a scenario does not have, such as of a recording."""
+    known = name in model.planners or name in STRATEGIES
+    return strategy_of(model, name).words(model) if known else ""
+
+
 @dataclass(frozen=True, slots=True)
 class Named:
     """A planner under the name that the scenario gives it."""

@@ -27,6 +27,9 @@ function clock(run, time) {
   return run.utc ? `${utc} (t = ${seconds})` : utc;
 }
 
+// Hours, minutes and seconds UTC of a time of a run that has dates.
+const clockTime = (run, time) => new Date(1000 * (run.utc + time)).toISOString().slice(11, 19);
+
 const labelsOf = new Map();
 // The place of a label among all labels of its run, which gives its colour; all alike where labels do not last.
 function placeOfLabel(run, label) {

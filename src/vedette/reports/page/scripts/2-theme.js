@@ -1,17 +1,23 @@
 // Colours of the page, as the style sheet has them in the light and in the dark.
-const SERIES = ["blue", "vermilion", "green", "purple", "orange", "sky"];
+const SENSORS = [1, 2, 3, 4, 5, 6].map((number) => `sensor-${number}`);
+const SERIES = ["blue", "vermilion", "green", "purple", "orange", "sky", ...SENSORS];
 let colours = {};
 
 function readColours() {
   const style = getComputedStyle(document.documentElement);
-  for (const name of ["ink", "paper", "line", "grey", ...SERIES]) {
+  for (const name of ["ink", "paper", "line", "grey", "bad", "link", ...SERIES]) {
     colours[name] = style.getPropertyValue(`--${name}`).trim();
   }
 }
 
 const seriesColour = (index) => colours[SERIES[index % SERIES.length]];
-// As in the figures: none of the first three sensors has a colour that one of the first three strategies has.
-const sensorShade = (sensor) => SERIES[(sensor + 3) % SERIES.length];
+const sensorShade = (sensor) => SENSORS[sensor % SENSORS.length];
+
+// The colour of a strategy is its place among the runs of its group, as in the figures.
+const strategyShade = (run) => {
+  const names = [...new Set(runs.filter(({ group }) => group === run.group).map(({ strategy }) => strategy))];
+  return SERIES[Math.max(0, names.indexOf(run.strategy)) % SERIES.length];
+};
 
 // Points of the colour map "cividis" of Matplotlib.
 const HEAT = [

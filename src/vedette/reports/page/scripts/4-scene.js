@@ -1,5 +1,4 @@
-// One scan of a run in the plane. Of many sensors there is no room for the names; the pointer tells them.
-const MOST_NAMED = 20;
+// One scan of a run in the plane.
 const HOLE = "hole of a no-go zone";
 const UNKNOWN = -1; // what is behind a measurement that was recorded
 const clipped = (name, most) => (name.length > most ? `${name.slice(0, most - 1)}\u2026` : name);
@@ -15,12 +14,14 @@ function drawScene(canvas, run, step, show, camera, ghost) {
   if (show.undetected) drawUndetected(context, view, decisionAt(run, step)?.undetected);
   drawZones(context, run, view);
   if (show.measurements) run.sensors.forEach((_, s) => drawMeasurements(context, run, view, step, s));
-  if (show.trails) drawTrails(context, run, view, step);
+  if (show.trails) drawTrails(context, run, view, step, show);
   if (ghost) drawGhost(context, ghost, view, Math.min(step, ghost.times.length - 1));
   run.sensors.forEach((_, s) => drawSensor(context, run, view, step, s));
-  run.truth[step].forEach((target) => drawTarget(context, run, view, target, show));
+  const tracked = new Set(run.estimates[step].map((estimate) => estimate[7]));
+  run.truth[step].forEach((target) => drawTarget(context, view, target, tracked.has(target[0])));
   run.estimates[step].forEach((estimate) => drawEstimate(context, run, view, estimate, show));
   drawScale(context, view);
+  if (show.labels) drawNames(context, run, view, step, show);
   context.restore();
   return view;
 }
@@ -103,7 +104,7 @@ function hatch(context, view) {
   context.restore();
 }
 
-function drawTrails(context, run, view, step) {
+function drawTrails(context, run, view, step, show) {
   context.lineWidth = 1.2;
   context.strokeStyle = colours.ink;
   const paths = new Map();
@@ -115,10 +116,10 @@ function drawTrails(context, run, view, step) {
   }
   for (const path of paths.values()) polyline(context, view, path);
   for (let scan = 0; scan <= step; scan += 1) {
-    for (const [label, x, y] of run.estimates[scan]) {
-      context.fillStyle = seriesColour(placeOfLabel(run, label));
+    for (const estimate of run.estimates[scan]) {
+      context.fillStyle = estimateShade(run, estimate, show);
       context.globalAlpha = 0.55;
-      disc(context, view.x(x), view.y(y), 1.6);
+      disc(context, view.x(estimate[1]), view.y(estimate[2]), 1.6);
     }
   }
   context.globalAlpha = 1;
@@ -166,7 +167,7 @@ function drawMeasurements(context, run, view, step, s) {
 }
 
 function drawSensor(context, run, view, step, s) {
-  const { name, ...seen } = run.sensors[s];
+  const seen = run.sensors[s];
   // A camera's field of view goes with its pose.
   const [x, y, heading, middle = heading, halfWidth = seen.half_width, range = seen.range] = run.poses[step][s];
   const [px, py] = [view.x(x), view.y(y)];
@@ -192,23 +193,23 @@ function drawSensor(context, run, view, step, s) {
   }
   context.fillRect(px - 5.5, py - 5.5, 11, 11);
   context.strokeRect(px - 5.5, py - 5.5, 11, 11);
-  if (run.sensors.length <= MOST_NAMED) mark(context, clipped(name, 20), px, py + (py + 24 < MARGIN.top + view.inner.height ? 17 : -17), colours.ink);
 }
 
-function drawTarget(context, run, view, [target, x, y], show) {
-  context.strokeStyle = colours.ink;
+// A target without an estimate is a red ring.
+function drawTarget(context, view, [, x, y], isTracked) {
+  context.strokeStyle = isTracked ? colours.ink : colours.bad;
   context.fillStyle = colours.paper;
-  context.lineWidth = 1.6;
-  disc(context, view.x(x), view.y(y), 4);
+  context.lineWidth = isTracked ? 1.6 : 3;
+  disc(context, view.x(x), view.y(y), isTracked ? 4 : 7);
   context.stroke();
-  if (!show.labels) return;
-  const name = run.names[target - 1];
-  if (name === undefined) mark(context, `T${target}`, view.x(x) - 13, view.y(y) - 10, colours.ink);
-  else mark(context, clipped(name, 20), view.x(x), view.y(y) - 13, colours.ink);
 }
 
-function drawEstimate(context, run, view, [label, x, y, , long, short, angle], show) {
-  const shade = seriesColour(placeOfLabel(run, label));
+// By label; beside another run in the colour of the strategy.
+const estimateShade = (run, [label], show) => (show.shade ? colours[show.shade] : seriesColour(placeOfLabel(run, label)));
+
+function drawEstimate(context, run, view, estimate, show) {
+  const [, x, y, , long, short, angle] = estimate;
+  const shade = estimateShade(run, estimate, show);
   context.strokeStyle = shade;
   context.fillStyle = shade;
   context.lineWidth = 1.4;
@@ -221,7 +222,6 @@ function drawEstimate(context, run, view, [label, x, y, , long, short, angle], s
     context.stroke();
   }
   disc(context, view.x(x), view.y(y), 3);
-  if (show.labels && run.labelled) mark(context, label, view.x(x) + 13, view.y(y) + 12, shade);
 }
 
 // Text that stays legible over whatever is behind it.

@@ -9,10 +9,11 @@ function drawRewards(canvas, run, step) {
   else drawCurves(context, width, height, decision.curves, names);
 }
 
-// Where a square map lies in its canvas.
+// Where a square map lies in its canvas, with room for its ticks.
 function mapFrame(width, height, map) {
-  const [left, top] = [46, 8];
-  const size = Math.min(width - left - 46, height - top - 34);
+  const longest = Math.max(...map.ticks[1].map((text) => text.length));
+  const [left, top] = [Math.min(24 + 7 * longest, width / 3), 8];
+  const size = Math.min(width - left - 56, height - top - 40);
   return { left, top, size, columns: map.mean.length, rows: map.mean[0].length };
 }
 

@@ -1,16 +1,7 @@
-// Runs of the same luck beside the one that is shown, each in a plane of its own: one clock, one zoom and pan.
-const MOST_BESIDE = 3;
+// Another run of the same targets and noise beside the one that is shown: one clock, one zoom and pan.
 
 // The last scan of a run at or before a time.
 const stepAt = (run, time) => Math.max(0, run.times.findLastIndex((at) => at <= time + 1e-9));
-
-// What can stand beside a run: another one of the same luck, or all of them.
-function besides(paired) {
-  const found = paired.map(([place, { strategy }]) => [place, clipped(strategy, 30)]);
-  const first = found.slice(0, MOST_BESIDE);
-  const all = first.length < found.length ? `${first.length} others` : "all";
-  return first.length > 1 ? [...found, [first.map(([place]) => place).join(" "), all]] : found;
-}
 
 // A run in the plane that holds it and others.
 function inOnePlane(run, others) {
@@ -25,12 +16,12 @@ function panelsOf(holder, attach) {
 
   function show(main, others) {
     for (const { box } of panels) box.remove();
-    panels = others.map((other, place) => {
+    panels = others.map((other) => {
       const [box, caption, canvas] = [element("div", "panel"), element("p", "note caption"), element("canvas")];
       canvas.setAttribute("role", "img");
       box.append(caption, canvas);
       holder.append(box);
-      const shade = SERIES[place];
+      const shade = strategyShade(other);
       caption.style.borderColor = `var(--${shade})`;
       const panel = { box, caption, canvas, shade, run: { ...other, extent: main.extent }, step: 0, view: null };
       attach(panel);
@@ -41,7 +32,7 @@ function panelsOf(holder, attach) {
   function draw(time, options, camera) {
     for (const panel of panels) {
       panel.step = stepAt(panel.run, time);
-      panel.view = drawScene(panel.canvas, panel.run, panel.step, options, camera, null);
+      panel.view = drawScene(panel.canvas, panel.run, panel.step, { ...options, shade: panel.shade }, camera, null);
       panel.caption.textContent = captionOf(panel.run, panel.step);
       panel.canvas.setAttribute("aria-label", panel.caption.textContent);
     }
@@ -51,6 +42,9 @@ function panelsOf(holder, attach) {
 }
 
 function captionOf(run, step) {
-  const error = run.known ? `, OSPA ${run.ospa[step][0].toFixed(1)}${run.ospa_unit && ` ${run.ospa_unit}`}` : "";
-  return `${run.strategy}: ${run.estimates[step].length} estimates${error}`;
+  if (!run.known) return `${run.strategy}: ${run.estimates[step].length} estimates`;
+  const tracked = new Set(run.estimates[step].map((estimate) => estimate[7]));
+  const number = run.truth[step].filter(([target]) => tracked.has(target)).length;
+  const error = `OSPA ${run.ospa[step][0].toFixed(1)}${run.ospa_unit && ` ${run.ospa_unit}`}`;
+  return `${run.strategy}: ${number} of ${run.truth[step].length} targets tracked, ${error}`;
 }

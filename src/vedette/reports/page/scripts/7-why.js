@@ -79,10 +79,15 @@ const sensorRows = (why, names) => why.sensors.map(([sensor, action, share, with
   title: `${names[sensor]}, ${minus(action)}: share ${short(share)}; the reward had it not scanned: ${short(without)}`,
 }));
 
+// What a sensor does, and what its scan is worth.
+const sensorSentences = (why, names) => why.sensors.map(([sensor, action, share, without]) => {
+  const worth = share ? `Its scan adds ${short(share)} to the reward, which is ${short(without)} without it.` : "Its scan adds nothing to the reward.";
+  return `${names[sensor]}: ${minus(action)}. ${worth}`;
+});
+
 // In place of the bars where there are none.
 function whyNot(decision) {
-  if (!decision) return "No decision yet.";
-  if (decision.why) return "";
+  if (!decision || decision.why) return "";
   return decision.curves.length ? "This decision was kept without why it was taken." : "This decision was not made on rewards.";
 }
 
@@ -92,12 +97,13 @@ function tellWhy(part, run, decision) {
   if (explained === key) return;
   explained = key;
   const why = decision?.why;
-  part("why-title").textContent = decision ? `Why the decision at ${clock(run, run.times[decision.scan])}` : "Why a decision";
   part("why-not").textContent = whyNot(decision);
   part("why").hidden = !why;
   if (!why) return;
+  const names = run.sensors.map(({ name }) => name);
+  part("why-words").replaceChildren(...sensorSentences(why, names).map((text) => element("li", "", text)));
   part("why-facts").replaceChildren(...why.facts.flatMap(([name, text]) => [element("dt", "", name), element("dd", "", minus(text))]));
-  for (const [name, rows] of [["targets", targetRows(why)], ["sensors", sensorRows(why, run.sensors.map(({ name }) => name))]]) {
+  for (const [name, rows] of [["targets", targetRows(why)], ["sensors", sensorRows(why, names)]]) {
     fillBars(part(`why-${name}`), rows);
     part(`why-${name}`).parentElement.hidden = rows.length === 0;
   }

@@ -1,10 +1,12 @@
 // The state of the replay, its controls, and the words beside the picture.
-const MOST_SECONDS = 60; // that runs take which play as the page opens
+const SPEEDS = [1, 10, 60]; // times real time
+const MOST_SECONDS = 20; // that a run plays at the speed that is chosen first
 
 function startReplay(root) {
   const part = (name) => root.querySelector(`[data-part="${name}"]`);
-  const state = { run: 0, step: 0, playing: false, speed: 5, view: null, pointer: null, ghost: null, shown: null };
-  const show = () => Object.fromEntries([...root.querySelectorAll("[data-show]")].map((box) => [box.dataset.show, box.checked]));
+  const state = { run: 0, step: 0, time: 0, playing: false, speed: 1, view: null, pointer: null, ghost: null, shown: null };
+  const shown = () => Object.fromEntries([...root.querySelectorAll("[data-show]")].map((box) => [box.dataset.show, box.checked]));
+  const show = () => ({ ...shown(), shade: panels.all().length ? strategyShade(run()) : null });
 
   const run = () => state.shown ?? runs[state.run];
   const { live } = runs[0]; // frames come while it is shown; to play is to stay at the latest
@@ -15,12 +17,15 @@ function startReplay(root) {
     point(panel.canvas, panel);
   });
 
+  const paired = () => runs.filter((each, place) => place !== state.run && each.group === run().group && each.run === run().run);
+
   function draw() {
     state.view = drawScene(part("scene"), run(), state.step, show(), camera.aim(state.step), state.ghost);
-    panels.draw(run().times[state.step], show(), camera.camera);
+    panels.draw(run().times[state.step], shown(), camera.camera);
     part("caption").textContent = captionOf(run(), state.step);
+    part("caption").style.borderColor = `var(--${strategyShade(run())})`;
     drawRewards(part("rewards"), run(), state.step);
-    if (run().known) drawErrors(part("errors"), run(), state.step, panels.all());
+    drawTimeline(part("errors"), run(), state.step, paired(), state.ghost ?? runs[part("beside").value || -1]);
     tell();
   }
 
@@ -36,6 +41,7 @@ function startReplay(root) {
     const lead = run().utc === null && times[state.step] !== null ? "t = " : "";
     part("summary").textContent = `${lead}${time}: ${words.join(", ")}`;
     part("decision").textContent = decisionText();
+    part("decision-notes").textContent = (decisionAt(run(), state.step)?.notes ?? []).map((note) => `Note: ${note}.`).join(" ");
     part("reward-title").textContent = run().reward ? `Reward (${run().reward})` : "Reward";
     tellWhy(part, run(), decisionAt(run(), state.step));
     part("scene").setAttribute("aria-label", `${run().strategy}, run ${run().run}, ${part("summary").textContent}`);
@@ -53,7 +59,8 @@ function startReplay(root) {
     const decision = decisionAt(run(), state.step);
     if (!decision) return "No decision yet.";
     const without = decision.curves.length ? "" : ", without rewards";
-    return `Decision at ${clock(run(), run().times[decision.scan])}${without}: ${minus(decision.actions)}.${decision.notes.map((note) => ` ${note}.`).join("")}`;
+    const actions = decision.why?.sensors.length ? "" : `: ${minus(decision.actions)}`; // the sentences say them
+    return `Decision at ${clock(run(), run().times[decision.scan])}${without}${actions}.`;
   }
 
   function underPointer() {
@@ -64,12 +71,20 @@ function startReplay(root) {
     }
     if (pointer?.part === "scene") return describeAt(run(), state.step, view, pointer.x, pointer.y, show());
     if (!pointer) return [];
+    if (pointer.part === "errors") return describeEvents(part("errors"), run(), pointer.x);
     return describeReward(part("rewards"), run(), decisionAt(run(), state.step), pointer.x, pointer.y);
   }
 
   function tellPointer() {
     const found = underPointer();
-    part("hover").textContent = found.join("\n") || "Point at a target, an estimate, a sensor, a measurement or a reward.";
+    const [hover, { width }] = [part("hover"), root.getBoundingClientRect()];
+    hover.textContent = found.join("\n");
+    hover.hidden = !found.length;
+    if (found.length) {
+      const box = root.getBoundingClientRect();
+      hover.style.left = `${Math.min(state.pointer.pageX - box.left + 14, width - Math.min(340, width))}px`;
+      hover.style.top = `${state.pointer.pageY - box.top + 16}px`;
+    }
     root.dataset.hover = found.length;
     tellPlace();
   }
@@ -92,8 +107,9 @@ function startReplay(root) {
     part("rows").replaceChildren(...rows.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
   }
 
-  function go(step) {
+  function go(step, time = null) {
     state.step = bounded(step, 0, last());
+    state.time = time ?? run().times[state.step] ?? 0;
     if (state.step === last() && !live) state.playing = false;
     draw();
   }
@@ -113,11 +129,12 @@ function startReplay(root) {
 
   // Other runs beside this one, in a plane that holds all of them.
   function accompany() {
-    const others = part("beside").value.split(" ").filter(Boolean).map((place) => runs[place]);
+    const others = part("beside").value ? [runs[part("beside").value]] : [];
     state.shown = others.length ? inOnePlane(runs[state.run], others) : null;
     panels.show(run(), others);
     part("stage").classList.toggle("beside", others.length > 0);
     part("caption").hidden = !others.length;
+    press(state.run, others.length ? Number(part("beside").value) : null);
   }
 
   function choose(index) {
@@ -127,11 +144,11 @@ function startReplay(root) {
     state.playing = false;
     offer(part("follow"), followable(run()));
     camera.camera.follow = part("follow").value;
-    const paired = runs.map((each, place) => [String(place), each]).filter(([place, each]) =>
-      Number(place) !== index && each.group === run().group && each.run === run().run);
-    offer(part("ghost"), paired.map(([place, { strategy }]) => [place, clipped(strategy, 30)]));
+    const others = paired().map((each) => [String(runs.indexOf(each)), clipped(each.strategy, 30)]);
+    offer(part("ghost"), others);
     haunt();
-    offer(part("beside"), besides(paired));
+    offer(part("beside"), others);
+    part("run").value = index;
     accompany();
     reveal();
     go(Math.min(state.step, last()));
@@ -144,9 +161,9 @@ function startReplay(root) {
     part("nothing").hidden = run().scans.length > 0;
     const searches = run().decisions.some((decision) => decision.undetected);
     for (const name of ["undetected", "undetected-key"]) part(name).hidden = !searches;
-    for (const name of ["errors", "errors-title"]) part(name).hidden = !run().known;
-    part("errors-title").textContent = `OSPA${run().ospa_unit && ` (${run().ospa_unit})`}`;
-    for (const name of ["reward-title", "decision", "why-title", "why-not"]) part(name).hidden = !run().decisions.length;
+    part("lost-key").hidden = !run().known;
+    part("side").hidden = !run().decisions.length;
+    part("stage").classList.toggle("alone", !run().decisions.length);
   }
 
   // More of the run has come, and of the oldest steps some have gone.
@@ -164,11 +181,11 @@ function startReplay(root) {
   function tick(now) {
     if (!state.playing || live) return;
     if (before === null) before = now;
-    const due = Math.floor(((now - before) / 1000) * state.speed);
-    if (due > 0) {
-      before += (due * 1000) / state.speed;
-      go(state.step + due);
-    }
+    const time = state.time + ((now - before) / 1000) * state.speed;
+    before = now;
+    const step = stepAt(run(), time);
+    if (step !== state.step) go(step, time);
+    else state.time = time;
     if (state.playing) requestAnimationFrame(tick);
   }
 
@@ -176,6 +193,7 @@ function startReplay(root) {
     if (live && wanted) state.step = last();
     else if (wanted && state.step === last()) state.step = 0;
     state.playing = wanted;
+    state.time = run().times[state.step] ?? 0;
     before = null;
     draw();
     if (wanted) requestAnimationFrame(tick);
@@ -238,11 +256,19 @@ function startReplay(root) {
   function point(canvas, panel, name = "scene") {
     const follow = (event) => {
       const box = canvas.getBoundingClientRect();
-      state.pointer = { part: name, panel, x: event.clientX - box.left, y: event.clientY - box.top };
+      const at = { pageX: event.clientX, pageY: event.clientY };
+      state.pointer = { part: name, panel, x: event.clientX - box.left, y: event.clientY - box.top, ...at };
+      if (name === "errors" && canvas.hasPointerCapture(event.pointerId)) {
+        state.playing = false;
+        go(stepAt(run(), timeAt(canvas, run(), state.pointer.x)));
+      }
       tellPointer();
     };
     canvas.addEventListener("pointermove", follow);
-    canvas.addEventListener("pointerdown", follow);
+    canvas.addEventListener("pointerdown", (event) => {
+      if (name === "errors") canvas.setPointerCapture(event.pointerId);
+      follow(event);
+    });
     canvas.addEventListener("pointerleave", () => {
       state.pointer = null;
       tellPointer();
@@ -250,6 +276,7 @@ function startReplay(root) {
   }
   point(part("scene"), null);
   point(part("rewards"), null, "rewards");
+  point(part("errors"), null, "errors");
 
   const redraw = () => {
     readColours();
@@ -258,16 +285,30 @@ function startReplay(root) {
   new ResizeObserver(redraw).observe(part("scene"));
   window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
   readColours();
+  const press = tabsOf(part("tabs"), part("run"), choose);
   choose(0);
-  if ("together" in root.dataset) {
-    part("beside").selectedIndex = part("beside").options.length - 1;
-    accompany();
-    const speeds = [...part("speed").options].map(({ value }) => Number(value));
-    state.speed = speeds.find((speed) => last() / speed <= MOST_SECONDS) ?? speeds.at(-1);
+  if (!live) {
+    const seconds = run().times.at(-1) - run().times[0];
+    state.speed = SPEEDS.find((speed) => seconds / speed <= MOST_SECONDS) ?? SPEEDS.at(-1);
     part("speed").value = state.speed;
-    play(!window.matchMedia("(prefers-reduced-motion: reduce)").matches);
+  }
+  if ("together" in root.dataset) {
+    part("beside").selectedIndex = 1;
+    accompany();
+    go(mostApart(run(), [runs[part("beside").value]]));
   }
   return { arrived, play };
+}
+
+// The first scan at which the errors of runs differ nearly as much as they ever do.
+function mostApart(run, others) {
+  if (!run.known || !others.length) return 0;
+  const apart = run.ospa.map((_, step) => {
+    const values = [run, ...others].map(({ ospa }) => ospa[step]?.[0] ?? 0);
+    return Math.max(...values) - Math.min(...values);
+  });
+  const most = Math.max(...apart);
+  return apart.findIndex((value) => value >= 0.9 * most);
 }
 
 const replay = document.getElementById("replay");
