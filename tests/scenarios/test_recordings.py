@@ -249,7 +249,7 @@ def test_the_example_is_tracked() -> None:
     place = Path(__file__).parents[2] / "examples/recording"
     made = scenario_of_recording(place / "radars.yaml", place / "scans.csv", place / "truth.csv")
     record = run_scenario(made.scenario, "still", seed=0)
-    assert (record.num_scans, record.estimates[-1].num_targets) == (98, 3)
+    assert (record.num_scans, record.estimates[-1].num_targets) == (195, 3)
     assert record.ospa[:, 0].mean() < 40.0
 
 
