@@ -199,7 +199,7 @@ def test_radars_without_common_targets_are_named(tmp_path: Path) -> None:
     problem = problem_of(scenario_of_recording(tmp_path / "radars.yaml", tmp_path / "scans.csv").scenario)
     why = {(each.parameter.sensor, each.parameter.name): each.why for each in calibrate(problem).found}
     for one in ((0, "bearing_deg"), (1, "bearing_deg"), (1, "clock")):
-        assert "no other sensor sees enough of the same targets" in why[one]
+        assert "no other sensor observes enough of the same targets" in why[one]
     assert "rotation" in why[0, "bearing_deg"]
     assert "shift in time" in why[1, "clock"]
     assert why[0, "noise.std.1"] == ""
@@ -274,7 +274,10 @@ def test_where_a_radar_really_is_is_found_by_targets_all_around(tmp_path: Path) 
     calibration = biases_of(two_radars(tmp_path, targets))
     found = {(each.parameter.sensor, each.parameter.name): each for each in calibration.found}
     assert (calibration.rank, len(found)) == (5, 6)
-    assert found[1, "clock"].why == "what it sees with others hardly moves in so short a time"
+    assert (
+        found[1, "clock"].why
+        == "not identifiable: the targets that other sensors observe too hardly move in so short a time"
+    )
     for name, truth in (("x", 80.0), ("y", -60.0), ("range", 0.0), ("bearing_deg", 0.0)):
         one = found[1, name]
         assert abs(one.value - truth) < 3.0 * one.std, name
@@ -286,8 +289,8 @@ def test_of_far_targets_in_one_direction_a_place_is_like_a_range(tmp_path: Path)
     targets = [(1600.0, 9000.0, 5.0, 3.0), (1400.0, 9600.0, -4.0, 4.0), (1500.0, 8400.0, 3.0, -6.0)]
     calibration = biases_of(two_radars(tmp_path, targets))
     why = {(each.parameter.sensor, each.parameter.name): each.why for each in calibration.found}
-    assert why[1, "range"].startswith("it cannot be told apart from y of b")
-    assert why[1, "y"].startswith("it cannot be told apart from range of b")
+    assert why[1, "range"].startswith("not identifiable separately from y bias of b")
+    assert why[1, "y"].startswith("not identifiable separately from range bias of b")
     assert (why[1, "bearing_deg"], why[1, "x"]) == ("", "")
     assert calibration.rank == 5
 

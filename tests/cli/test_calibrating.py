@@ -29,9 +29,12 @@ def test_what_is_found_is_printed_and_its_file_is_tracked_with(place: Path) -> N
     result = call("calibrate", "scans.csv", "--sensors", "radars.yaml", "--out", "new/found.yaml")
     assert result.exit_code == 0, result.output
     assert "boat" in result.stdout
-    assert "noise.sigma_bearing_deg" in result.stdout
-    assert "clocks are against that of the first sensor" in result.stdout
-    assert "wrote new/found.yaml" in result.stdout
+    assert "bearing noise std  deg" in result.stdout
+    stars = [line.split()[:3] for line in result.stdout.splitlines() if line.rstrip().endswith(" *")]
+    assert ["boat", "range", "bias"] in stars
+    assert "Clock offsets are relative to Calshot, the first sensor." in result.stdout
+    assert "Wrote new/found.yaml. Use it with: vedette track scans.csv --sensors new/found.yaml" in result.stdout
+    assert "Nothing was written" not in result.stdout
     scores = []
     for sensors in ("radars.yaml", "new/found.yaml"):
         tracked = call("track", "scans.csv", "--sensors", sensors, "--truth", "truth.csv")
@@ -44,12 +47,12 @@ def test_windows_are_printed_side_by_side_and_the_last_is_written(place: Path) -
     words = ("calibrate", "scans.csv", "--sensors", "radars.yaml", "--window", "60", "--out", "found.yaml")
     result = call(*words)
     assert result.exit_code == 0, result.output
-    assert "from, s" in result.stdout
+    assert "from (s)" in result.stdout
     assert result.stdout.count("\nboat ") == 2 * 7  # a row a parameter and window
     told = json.loads(call(*words, "--overwrite", "--json").stdout)
     assert [each["begin_s"] for each in told["windows"]] == [0.0, told["windows"][0]["end_s"]]
     assert told["windows"][1]["end_s"] == pytest.approx(2.0 * told["windows"][0]["end_s"])
-    last = {(row["sensor"], row["parameter"]): row["found"] for row in told["windows"][1]["found"]}
+    last = {(row["sensor"], row["parameter"]): row["estimate"] for row in told["windows"][1]["parameters"]}
     written = read_yaml((place / "found.yaml").read_text("utf-8"), "found.yaml").data
     assert written["sensors"][1]["bias"]["range"] == pytest.approx(last["boat", "range"], rel=1e-6)
 
@@ -59,15 +62,15 @@ def test_a_search_that_did_not_converge_has_no_intervals(place: Path, monkeypatc
     words = ("calibrate", "scans.csv", "--sensors", "radars.yaml", "--out", "found.yaml", "--overwrite")
     result = call(*words)
     assert result.exit_code == 3, result.output
-    assert "the search did not converge" in result.stderr
-    assert " to " not in result.stdout.split("clocks are against")[0]
-    assert (place / "found.yaml").read_text("utf-8").startswith("# The search did not converge")
+    assert "Warning: the optimiser stopped before it converged." in result.stderr
+    assert " to " not in result.stdout.split("Clock offsets")[0]
+    assert (place / "found.yaml").read_text("utf-8").startswith("# The optimiser stopped before it converged")
     assert set(read_yaml((place / "found.yaml").read_text("utf-8"), "found.yaml").data) >= {"sensors"}
     result = call(*words, "--json")
     assert result.exit_code == 3, result.output
     told = json.loads(result.stdout)
     assert told["converged"] is False
-    assert {row["low"] for row in told["found"]} == {row["high"] for row in told["found"]} == {None}
+    assert {row["low"] for row in told["parameters"]} == {row["high"] for row in told["parameters"]} == {None}
 
 
 def test_what_is_there_is_not_overwritten_unasked(place: Path) -> None:

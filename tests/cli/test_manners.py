@@ -58,7 +58,7 @@ CALLS: list[tuple[tuple[str, ...], set[str]]] = [
     (("live", "--sensors", "short.yaml"), {"lines", "errors", "scans", "dropped"}),
     (
         ("calibrate", "scans.csv", "--sensors", "radars.yaml", "--out", "found.yaml"),
-        {"found", "log_likelihood", "written"},
+        {"parameters", "assumptions", "log_likelihood", "written"},
     ),
     (("report", "tracked"), {"page", "figures"}),
     (("video", "run", "--out", "run.gif", "--fps", "2", "--size", "200"), {"video", "frames", "seconds"}),

@@ -209,18 +209,18 @@ def _judged(problem: Problem, at: Floats, cov: Floats, lost: Floats, apart: Sequ
 
 
 def _why(problem: Problem, i: int, partners: list[int], is_apart: bool) -> str:
-    """Why a parameter cannot be found, by those that cannot be told from it."""
-    own = problem.parameters[i]
-    names = [f"{problem.parameters[j].name} of {problem.sites[problem.parameters[j].sensor].name}" for j in partners]
+    """Return why a parameter is not identifiable; partners: the parameters that it cannot be separated from."""
+    own, alone = problem.parameters[i], len(problem.sites) == 1
+    names = [f"{problem.parameters[j].label} of {problem.sites[problem.parameters[j].sensor].name}" for j in partners]
     if own.kind != "bias":
-        return "the recording says next to nothing of it"
-    if len(problem.sites) == 1 or is_apart:
+        return "not identifiable: the recording contains almost no information about this parameter"
+    if alone or is_apart:
         what = {"bearing": "a rotation", "clock": "a shift in time"}.get(own.component, "a shift")
-        alone = len(problem.sites) == 1
-        told = "there is no other sensor" if alone else "no other sensor sees enough of the same targets"
+        lacking = "there is no other sensor" if alone else "no other sensor observes enough of the same targets"
         beside = f" (with {', '.join(names)})" if names else ""
-        return f"{told} to tell it{beside} from {what} of all that this one sees"
+        return f"not identifiable: {lacking} to separate it{beside} from {what} of all targets"
     if names:
-        return f"it cannot be told apart from {', '.join(names)}: together they move all that is seen"
-    still = own.component == "clock"
-    return f"what it sees with others {'hardly moves in so short a time' if still else 'says next to nothing of it'}"
+        return f"not identifiable separately from {', '.join(names)}: together they shift all measurements alike"
+    if own.component == "clock":
+        return "not identifiable: the targets that other sensors observe too hardly move in so short a time"
+    return "not identifiable: the targets that other sensors observe too contain almost no information about it"

@@ -27,7 +27,7 @@ class Parameter:
         kind: what it is of.
         component: what of: of a bias a field of `vedette.models.Bias`, of noise a component of the measurement.
         name: as the file about sensors has it: "range", "noise.sigma_range".
-        unit: "m", "deg", "s", "".
+        unit: "m", "deg", "s", "per scan", "".
         start: what it is taken for before anything is known.
         per_si: its value where the SI value is 1; negative where it counts the other way.
         scale: of what its intervals are symmetric: itself, its logarithm or its log-odds.
@@ -43,6 +43,15 @@ class Parameter:
     per_si: float
     scale: Scale
     unknown: float
+
+    @property
+    def label(self) -> str:
+        """The name in words, such as "range bias"."""
+        if self.kind == "bias":
+            return "clock offset" if self.component == "clock" else f"{self.component} bias"
+        return {"noise": f"{self.component} noise std", "detection": "detection prob.", "clutter": "clutter rate"}[
+            self.kind
+        ]
 
     def to_free(self, value: float) -> float:
         """On the scale."""

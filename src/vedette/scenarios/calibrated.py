@@ -34,7 +34,7 @@ _UNKNOWN = {"range": 1000.0, "bearing": 10.0, "clock": 5.0, "x": 1000.0, "y": 10
 _UNKNOWN_LOG, _UNKNOWN_ODDS = 1.0, 4.0
 _WIDER = 3.0  # times the region, along each axis: noise at its edge stays in it
 _BUILT_IN = ("region", "around_sensor", "measurement_space")  # clutter that can be had at the raw measurement
-_NOT_CONVERGED = "# The search did not converge: these values may not be those of the maximum of the likelihood."
+_NOT_CONVERGED = "# The optimiser stopped before it converged: these values may be inaccurate."
 _LEAST_RATE, _SUREST = 0.01, 0.98  # to start from
 
 
@@ -166,7 +166,7 @@ def _of_models(s: int, sensor: Sensor) -> Iterator[Parameter]:
         yield Parameter(s, "detection", "", "detection.probability", "", start, 1.0, "logit", _UNKNOWN_ODDS)
     if (rate := getattr(sensor.clutter, "rate", None)) is not None:
         start = max(rate, _LEAST_RATE)
-        yield Parameter(s, "clutter", "", "clutter.rate", "a scan", start, 1.0, "log", _UNKNOWN_LOG)
+        yield Parameter(s, "clutter", "", "clutter.rate", "per scan", start, 1.0, "log", _UNKNOWN_LOG)
 
 
 def _with_values(
