@@ -20,8 +20,8 @@ FILES = Path(__file__).parent / "recording"
 def main() -> tuple[OfRecording, RunRecord]:
     found = scenario_of_recording(FILES / "radars.yaml", FILES / "scans.csv", FILES / "truth.csv")
     record = run_scenario(found.scenario, "still", seed=0)
-    for text in found.assumed:
-        print("not said, so", text)
+    for section, text in found.assumed.items():
+        print(f"assumed {section}: {text}")
     print(f"{found.recording.num_measurements} measurements in {record.num_scans} scans,", end=" ")
     print(f"{record.estimates[-1].num_targets} ships at the end, OSPA {record.ospa[:, 0].mean():.1f} m")
     return found, record

@@ -154,7 +154,7 @@ def test_more_runs_of_the_same_campaign() -> None:
     ("text", "message"),
     [
         ("name =", r"spec\.toml: expected TOML; Invalid value"),
-        ("", r"(?s)spec\.toml: name: expected a value, as it is required, got nothing.*scenarios.*runs"),
+        ("", r"(?s)spec\.toml: name: required key is missing.*scenarios.*runs"),
         (SMALL + "planners = []", r"planners: expected a list of at least 1, got an empty list"),
         (
             SMALL + 'planner = ["jdm"]',

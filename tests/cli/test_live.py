@@ -37,7 +37,7 @@ def test_lines_in_lines_out(place: Path) -> None:
     assert sum("tracks" in answer for answer in answers) == 17
     assert [answer["plan"]["time"] for answer in answers if "plan" in answer] == [5.0]
     assert [answer["line"] for answer in answers if "error" in answer] == [17]
-    assert "not said, so survival: 0.999 a second" in result.stderr
+    assert "  survival    0.999 per second" in result.stderr
     document = json.loads(call("--decide-every", "5", "--json", lines=lines).stdout)
     assert (document["lines"], document["errors"], document["scans"], document["decisions"]) == (18, 1, 17, 1)
 

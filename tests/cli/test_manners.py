@@ -54,7 +54,10 @@ CALLS: list[tuple[tuple[str, ...], set[str]]] = [
     (("schema", "--out", "schema.json"), {"written"}),
     (("run", "short.yaml", "--planner", "still", "--out", "run"), {"decisions", "ospa", "seconds", "health", "folder"}),
     (("results", "run"), {"decisions", "ospa", "written"}),
-    (("track", "scans.csv", "--sensors", "radars.yaml", "--out", "tracked"), {"ospa", "assumed", "skipped", "folder"}),
+    (
+        ("track", "scans.csv", "--sensors", "radars.yaml", "--out", "tracked"),
+        {"ospa", "assumptions", "skipped", "folder"},
+    ),
     (("live", "--sensors", "short.yaml"), {"lines", "errors", "scans", "dropped"}),
     (
         ("calibrate", "scans.csv", "--sensors", "radars.yaml", "--out", "found.yaml"),

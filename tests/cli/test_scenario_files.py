@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner, Result
 
+from recordings import SENSORS
 from scenarios.minimal import MINIMAL
 from vedette import __version__
 from vedette.cli import app
@@ -73,7 +74,7 @@ def test_init_writes_a_commented_file_that_passes_check(name: str, tmp_path: Pat
     assert json.loads((file.parent / "vedette.schema.json").read_text(encoding="utf-8")) == json_schema()
     checked = vedette("check", str(file))
     assert checked.exit_code == 0
-    assert checked.stdout.startswith(f"{file}: ok: {name}, ")
+    assert checked.stdout.startswith(f"{file}: valid (")
     assert checked.stdout.count("\n") == 1
 
 
@@ -87,7 +88,7 @@ def test_generate_writes_a_commented_file_that_passes_check(tmp_path: Path) -> N
     assert text.startswith("# yaml-language-server: $schema=vedette.schema.json\n# Targets that start apart and meet")
     checked = vedette("check", str(file))
     assert (checked.exit_code, checked.stderr) == (0, "")
-    assert checked.stdout.startswith(f"{file}: ok: crowd-limited-3-seed-2, ")
+    assert checked.stdout.startswith(f"{file}: valid (")
     again = vedette(*words)
     assert (again.exit_code, again.stderr) == (1, f"{file}: already there; --overwrite replaces it\n")
     assert vedette(*words, "--force").exit_code == 0
@@ -127,7 +128,7 @@ def test_crowd_writes_a_commented_file_that_passes_check(tmp_path: Path, monkeyp
     )
     checked = vedette("check", *map(str, files))
     assert (checked.exit_code, checked.stderr) == (0, "")
-    assert checked.stdout.startswith(f"{files[0]}: ok: crowd-10000-density-4, ")
+    assert checked.stdout.startswith(f"{files[0]}: valid (")
     assert vedette("crowd", "--targets", "10000", "--density", "4").exit_code == 1
 
 
@@ -207,9 +208,30 @@ def test_check_tells_all_faults_of_all_files(tmp_path: Path) -> None:
     assert first == f'{bad}:2:19: time.num_steps: expected a whole number, got "x"'
     assert second.startswith(f"{bad}:23:8: ospa.cutof: expected one of")
     assert third == (
-        f"{good}: ok: small, 20 scans, 1 target, 2 sensors, m_delta_glmb filter, cm_delta_glmb fusion, 2 decisions"
+        f"{good}: valid (20 scans, 1 target, 2 sensors; filter m_delta_glmb, fusion cm_delta_glmb, 2 decisions)"
     )
     assert fourth.startswith(f"{absent}: no such file; expected a YAML file or one of ")
+
+
+def test_check_knows_sensors_files(tmp_path: Path) -> None:
+    file = tmp_path / "radars.yaml"
+    file.write_text(SENSORS, encoding="utf-8")
+    result = vedette("check", str(file))
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert result.stdout.splitlines() == [
+        f"{file}: valid sensors file: 2 sensors (Calshot, boat), bearing and range",
+        "  not given, will be assumed: region, motion, survival, birth, clutter",
+        f"  use it with: vedette track SCANS --sensors {file}",
+    ]
+    checked = json.loads(vedette("check", str(file), "--json").stdout)["files"][0]
+    assert (checked["kind"], checked["valid"], checked["not_given"][-1]) == ("sensors", True, "clutter")
+    file.write_text(SENSORS.replace("bearings: north", "bearings: up").replace("eta_range: 0.0", "eta_range: x"))
+    result = vedette("check", str(file))
+    assert result.exit_code == 1
+    assert result.stdout.splitlines() == [
+        f'{file}:2:67: recording.bearings: expected one of east, north, got "up"',
+        f'{file}:5:64: sensor_defaults.noise.eta_range: expected a number, got "x"',
+    ]
 
 
 def test_check_without_files_is_wrong_use() -> None:

@@ -27,8 +27,10 @@ def test_scans_become_tracks_results_and_a_picture(place: Path) -> None:
     result = call("scans.csv", "--sensors", "radars.yaml", "--truth", "truth.csv", "--out", "out")
     assert result.exit_code == 0, result.output
     assert "mean OSPA" in result.stdout
-    assert "tracks, 3 of them of 10 estimates or more" in result.stdout
-    assert "not said, so birth: 0.5 a scan, anywhere in the region" in result.stderr
+    assert " (3 with at least 10 estimates), " in result.stdout
+    assert "Wrote out: tracks/tracks.csv, tracks/tracks.geojson, figures/, 8 tables" in result.stdout
+    assert "\nAssumed, because radars.yaml does not give it:\n  region      x -" in result.stderr
+    assert "\n  birth       0.5 new targets per scan, from measurements that no track" in result.stderr
     assert {path.name for path in (place / "out").iterdir()} >= {"tracks", "figures", "manifest.json", "scenario.yaml"}
     assert {path.name for path in (place / "out/tracks").iterdir()} == {"tracks.csv", "tracks.geojson"}
     assert load_run(place / "out").planner == "recorded"
@@ -142,7 +144,7 @@ def test_a_sensor_that_never_scanned_is_told(place: Path) -> None:
     (place / "scans.csv").write_text("\n".join(row for row in rows if ",boat," not in row), "utf-8")
     result = call("scans.csv", "--sensors", "radars.yaml")
     assert result.exit_code == 0, result.output
-    assert "clutter of boat: 1 a scan, as it has no scan in the recording" in result.stderr
+    assert "boat 1 per scan (no scan in the recording)" in result.stderr
 
 
 def test_without_truth_no_error_is_told(place: Path) -> None:

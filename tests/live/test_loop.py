@@ -245,10 +245,10 @@ def test_without_a_region_it_is_as_far_as_the_sensors_see(tmp_path: Path, old: s
     assert found == answered(small(tmp_path, said), walk(8))
     assert len(json.loads(found[-1])["tracks"]) == 1
     words = scenario_of_sensors(tmp_path / "small.yaml").assumed
-    assert not any(each.startswith("region") for each in words)  # it was said
+    assert "region" not in words  # it is given
     (tmp_path / "small.yaml").write_text(text, "utf-8")
     words = scenario_of_sensors(tmp_path / "small.yaml").assumed
-    assert any(each.startswith("region: x from -600 to 700 m, y from -600 to 600 m, as far as") for each in words)
+    assert words["region"].startswith("x -600 to 700 m, y -600 to 600 m (as far as")
 
 
 @pytest.mark.parametrize("num", [2_000, pytest.param(10_000, marks=pytest.mark.slow)])

@@ -16,7 +16,7 @@ from vedette.scenarios import parse_scenario
 # Time, region, motion, survival, births and targets.
 WORLD = r"""
 name: small -> nane: small
-    1:1: name: expected a value, as it is required, got nothing
+    1:1: name: required key is missing
     1:1: nane: expected one of birth, coastline, control, description, estimator, filter, format, fusion, metrics, motion, name, network, origin, ospa, planners, recording, region, sensor_defaults, sensors, survival, targets, time, undetected, got an unknown key (did you mean name?)
 name: small -> name: ''
     1:7: name: expected a name of one or more printable characters, got ""
@@ -31,7 +31,7 @@ num_steps: 20 -> num_steps: 0
 step_period: 0.5 -> step_period: fast
     2:36: time.step_period: expected a number, got "fast"
 num_steps: 20, step_period -> step_period
-    2:1: time.num_steps: expected a value, as it is required, got nothing
+    2:1: time.num_steps: required key is missing
 x_max: 100.0 -> x_max: -200.0
     3:32: region.x_max: expected a number above x_min, -100, got -200.0
 y_max: 50.0 -> y_max: .nan
@@ -113,7 +113,7 @@ position: [0.0, 40.0] -> position: [0.0, 40.0, 1.0]
 heading_deg: 4.0 -> platform: {kind: waypoints, speed: 1.0, points: [[0.0, 1.0], [2.0]]}
     17:103: sensors[0].platform.points[1]: expected a list of 2, got a list of 1
 position: [0.0, 40.0], heading_deg -> heading_deg
-    17:5: sensors[0].position: expected a value, as it is required, got nothing
+    17:5: sensors[0].position: required key is missing
 name: south -> name: north
     18:12: sensors[1].name: expected each name once, got "north" again
 heading_deg: 4.0 -> platform: {kind: courses, speed: -4.0}
@@ -313,7 +313,7 @@ UNDETECTED = r"""
 to_step: 20} -> to_step: 20}\nundetected: {cell: 0.0, expected: 5.0, speed: 1.0}
     24:20: undetected.cell: expected a number above 0, got 0.0
 to_step: 20} -> to_step: 20}\nundetected: {expected: 5.0, speed: 1.0}
-    24:1: undetected.cell: expected a value, as it is required, got nothing
+    24:1: undetected.cell: required key is missing
 to_step: 20} -> to_step: 20}\nundetected: {cell: 9.0, expected: -1.0, speed: 1.0}
     24:35: undetected.expected: expected a number of at least 0, got -1.0
 to_step: 20} -> to_step: 20}\nundetected: {cell: 9.0, expected: 1.0, speed: 1.0, enters: sea}
@@ -354,7 +354,7 @@ decision_steps: [4, 8] -> constraints: [{distance: 3.0}]
 decision_steps: [4, 8] -> constraints: [{kind: separation, distance: 0.0}]
     22:54: control.constraints[0].distance: expected a number above 0, got 0.0
 decision_steps: [4, 8] -> constraints: [{kind: separation}]
-    22:25: control.constraints[0].distance: expected a value, as it is required, got nothing
+    22:25: control.constraints[0].distance: required key is missing
 decision_steps: [4, 8] -> constraints: [{kind: keep_out}]
     22:25: control.constraints[0]: expected either region, polygon or geojson, got none
 decision_steps: [4, 8] -> constraints: [{kind: keep_out, polygon: [[0, 0], [1, 1]]}]
@@ -421,7 +421,7 @@ decision_steps: [4, 8] -> decision_steps: [4, 50], num_samples: 0
     22:31: control.decision_steps[1]: expected a step up to the last, 20, got 50
     22:49: control.num_samples: expected a number of at least 1, got 0
 kind: constant, std -> kind: constant, sdt
-    15:3: sensor_defaults.noise.std: expected a value, as it is required, got nothing
+    15:3: sensor_defaults.noise.std: required key is missing
     15:27: sensor_defaults.noise.sdt: expected one of kind, std, got an unknown key (did you mean std?)
 heading_deg: 4.0 -> noise: {kind: constant, std: [1.0]}
     17:71: sensors[0].noise.std: expected 2 numbers, as a bearing_range measurement has, got a list of 1

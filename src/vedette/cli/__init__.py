@@ -10,6 +10,7 @@ from vedette import __version__
 from vedette.cli.benchmarking import benchmark
 from vedette.cli.calibrating import calibrate
 from vedette.cli.campaign import campaign
+from vedette.cli.checking import check
 from vedette.cli.demo import demo
 from vedette.cli.errors import Commands
 from vedette.cli.live import live
@@ -18,7 +19,7 @@ from vedette.cli.output import speaking
 from vedette.cli.reproducing import reproduce
 from vedette.cli.results import report, results, upgrade
 from vedette.cli.running import run
-from vedette.cli.scenario_files import check, crowd, generate, init, list_, schema
+from vedette.cli.scenario_files import crowd, generate, init, list_, schema
 from vedette.cli.show import show
 from vedette.cli.tracking import track
 from vedette.cli.video import video

@@ -23,7 +23,7 @@ NOT_CONVERGED = 3  # exit status
 
 
 def calibrate(
-    scans: Annotated[Path, typer.Argument(metavar="SCANS", help="CSV or Parquet file with a row a measurement.")],
+    scans: Annotated[Path, typer.Argument(metavar="SCANS", help="CSV or Parquet file with one row per measurement.")],
     sensors: SensorsFile,
     out: Annotated[
         Path | None,

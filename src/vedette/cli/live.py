@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
+from vedette.cli.assumptions import note_assumptions
 from vedette.cli.compiling import compiling
 from vedette.cli.completing import strategies
 from vedette.cli.errors import usage_error
@@ -86,8 +87,7 @@ def live(
     check_planner(known.scenario, planner, "--planner")
     Approval(trust)(known.scenario)
     warn(known.scenario)
-    for text in known.assumed:
-        note(f"not said, so {text}")
+    note_assumptions(known.assumed, sensors)
     loop = live_of(known, planner, window=window, ahead=ahead, decide_every=decide_every, seed=seed)
     screen = None
     if any(place.kind == "ws" for place in places):

@@ -1,4 +1,4 @@
-"""Commands about scenario files: list, init, generate, crowd, check, schema."""
+"""Commands about scenario files: list, init, generate, crowd, schema."""
 
 from __future__ import annotations
 
@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from vedette.cli import completing
 from vedette.cli.completing import built_in_scenarios, one_of
 from vedette.cli.errors import check_ending, usage_error
 from vedette.cli.options import Overwrite, SceneFile
 from vedette.cli.output import note, print_names, publish, say
-from vedette.errors import InputError, ScenarioError
+from vedette.errors import InputError
 
 if TYPE_CHECKING:
     from vedette.scenarios import Scenario
@@ -167,57 +166,6 @@ def _starting_files(scenario: Scenario, target: Path) -> dict[Path, str]:
         about = (scenario.folder / "../data/README.md").read_text(encoding="utf-8")
         files[target.with_name(f"{next(iter(names))}.README.md")] = about
     return {target: _with_schema(text.replace("../data/", "")), **files}
-
-
-def check(
-    files: Annotated[
-        list[Path], typer.Argument(metavar="FILE...", help="Scenario files.", autocompletion=completing.scenarios)
-    ],
-) -> None:
-    """Name every fault of scenario files.
-
-    Each by file, line, column and field, with what was expected and what came. Code of your own is imported, made and
-    tried for three scans, and what it lacks is said; code that others may have written is not. Warnings, of what is
-    valid but costs accuracy or may not be meant, go to standard error and leave the exit status at 0.
-    """
-    from vedette.scenarios import load_scenario
-    from vedette.scenarios.strategy_cautions import strategy_cautions
-    from vedette.scenarios.summary import one_line
-
-    found: list[dict[str, object]] = []
-    for file in files:
-        summary, faults, warnings = None, list[str](), list[str]()
-        try:
-            scenario = load_scenario(file)
-            if lacking := code_faults(scenario):
-                raise ScenarioError(lacking)
-            summary = one_line(scenario)
-            say(f"{file}: {summary}")
-            warnings = warn(scenario, strategy_cautions(scenario))
-        except (ScenarioError, InputError) as error:
-            say(str(error), even_if_quiet=True)
-            faults = error.faults if isinstance(error, ScenarioError) else [str(error)]
-        found.append({"file": file, "valid": not faults, "summary": summary, "faults": faults, "warnings": warnings})
-    publish({"files": found})
-    if not all(each["valid"] for each in found):
-        raise typer.Exit(1)
-
-
-def code_faults(scenario: Scenario) -> list[str]:
-    """What is wrong with the code that a scenario names; a warning where others may have written it."""
-    from vedette.scenarios.trust import code_of, not_own
-
-    code = code_of(scenario.model)
-    if not code:
-        return []
-    if reason := not_own(scenario):
-        note(f"{scenario.path}: warning: {', '.join(code)} is not imported, as {reason}")
-        return []
-    from vedette.cli.compiling import compiling
-    from vedette.scenarios import code_checks
-
-    with compiling():
-        return code_checks.code_faults(scenario)
 
 
 def warn(scenario: Scenario, further: Iterable[tuple[Place, str]] = ()) -> list[str]:

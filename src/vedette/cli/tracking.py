@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from vedette.cli.assumptions import note_assumptions
 from vedette.cli.compiling import compiling
 from vedette.cli.completing import one_of
 from vedette.cli.documents import run_document
@@ -38,14 +39,15 @@ _LASTING = 10  # estimates of a track that is more than a moment's
 
 
 def track(
-    scans: Annotated[Path, typer.Argument(metavar="SCANS", help="CSV or Parquet file with a row a measurement.")],
+    scans: Annotated[Path, typer.Argument(metavar="SCANS", help="CSV or Parquet file with one row per measurement.")],
     sensors: SensorsFile,
     truth: Annotated[
-        Path | None, typer.Option("--truth", metavar="FILE", help="The targets' own reports, to be scored against.")
+        Path | None,
+        typer.Option("--truth", metavar="FILE", help="Reports of the targets themselves, to compute errors."),
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="DIR", help="Folder for results, tracks, figures; none: only print."),
+        typer.Option("--out", metavar="DIR", help="Folder for results, tracks and figures; default: print only."),
     ] = None,
     overwrite: Overwrite = False,
     formats: Annotated[
@@ -53,7 +55,7 @@ def track(
         typer.Option(
             "--format",
             metavar="NAME",
-            help="Of the tracks: csv and geojson (default), parquet, czml, mcap; may be repeated.",
+            help="Of the tracks: csv and geojson (default), parquet, czml, mcap. May be repeated.",
             autocompletion=one_of(*FORMATS),
         ),
     ] = None,
@@ -79,6 +81,8 @@ def track(
             check_free(out, overwrite)
     found, cautions = read_recording(sensors, scans, truth, speed=speed, bad_rows=bad_rows, trust=trust)
     scenario, recording, assumed = found
+    if "clutter" in assumed:
+        note("`vedette calibrate` estimates clutter, noise and detection from the same scans.")
     on_earth = [name for name in formats or () if name in ON_EARTH]
     if on_earth and scenario.model.origin is None:  # before there is a folder with a part of what was asked for
         raise usage_error(f"expected an origin in {sensors}, as {on_earth[0]} has degrees; got none", "--format")
@@ -91,8 +95,9 @@ def track(
             end_stopped(error, "nothing was written")
         print_run(record, scenario)
         warned = warn_of_recording(record, scenario)
-        tracks = _summary(record)
-        say(f"{counted(recording.num_measurements, 'measurement')}, {tracks}")
+        sizes = counted(record.num_scans, "scan"), counted(recording.num_measurements, "measurement")
+        say(f"{scans}: {', '.join(sizes)}, {counted(len(scenario.model.sensors), 'sensor')}")
+        say(f"  tracks      {_tracks(record)}")
         table = table_of_run(record, scenario)
         written: list[Path] = []
         if out is not None:
@@ -110,12 +115,12 @@ def track(
         else:
             with interruptible(f"wrote {out}, but not all of its figures"):
                 _draw(record, scenario, out)
-        say(f"wrote {out}")
+        say(f"Wrote {out}: {', '.join(_contents(out, written))}")
     document = run_document(record, scenario)
     publish(
         {
             **document,
-            "assumed": assumed,
+            "assumptions": assumed,
             "skipped": recording.skipped,
             "warnings": [*cautions, *warned],
             "folder": out,
@@ -139,12 +144,19 @@ def read_recording(
         note(f"skipped: {text}")
     if len(found.recording.skipped) > _SHOWN_ROWS:
         note(f"skipped: {len(found.recording.skipped) - _SHOWN_ROWS} more rows")
-    for text in found.assumed:
-        note(f"not said, so {text}")
+    note_assumptions(found.assumed, sensors)
     return found, cautions
 
 
-def _summary(record: RunRecord) -> str:
+def _contents(out: Path, written: list[Path]) -> list[str]:
+    """Name what is in the folder: the files of tracks, figures, and the number of tables."""
+    names = [file.relative_to(out).as_posix() for file in written]
+    figures = ["figures/"] if (out / "figures").is_dir() else []
+    tables = len(list(out.glob("*.arrow")))
+    return [*names, *figures, *([counted(tables, "table")] if tables else [])]
+
+
+def _tracks(record: RunRecord) -> str:
     """How many tracks there were, and how many of them lasted."""
     seen: dict[tuple[int, ...], int] = {}
     for estimate in record.estimates:
@@ -152,7 +164,7 @@ def _summary(record: RunRecord) -> str:
             seen[label] = seen.get(label, 0) + 1
     lasting = sum(number >= _LASTING for number in seen.values())
     mean = sum(seen.values()) / max(record.num_scans, 1)
-    return f"{counted(len(seen), 'track')}, {lasting} of them of {_LASTING} estimates or more; {mean:.1f} at a time"
+    return f"{len(seen)} ({lasting} with at least {_LASTING} estimates), {mean:.1f} present on average"
 
 
 def _draw(record: RunRecord, scenario: Scenario, out: Path) -> None:

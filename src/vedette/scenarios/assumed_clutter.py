@@ -18,6 +18,8 @@ _FASTER = 1.5  # times the speed that targets hardly exceed, which still count a
 _NEAR = 2.5 * math.sqrt(2.0)  # noise stds between two measurements of a target that stands still
 _WIDER = 3.0  # times the radius of a neighbourhood, up to which chance neighbours are counted
 _WORST = 0.25  # standard error of the share of measurements that are of targets, at most
+_ESTIMATED = "estimated from the measurements without a neighbour in the scans before and after"
+_HALF = "half of the measurements, as the recording is too short, or has no positions, to estimate it"
 _LEAST = 0.1  # a scan; the least rate that is assumed
 
 
@@ -101,36 +103,33 @@ def assumed_clutter(
     recording: RecordedScans,
     folder: FilePath,
     speed: float,
-    words: list[str],
+    words: dict[str, str],
 ) -> dict[str, Any]:
-    """Return the section `sensors`, with a rate of clutter where none is given; adds to `words` what was assumed."""
+    """Return the section `sensors`, with a clutter rate where none is given; adds to `words` how it was found."""
     defaults = said.get("sensor_defaults")
     shared = isinstance(defaults, Mapping) and "clutter" in defaults
-    sensors = []
+    sensors, rates = [], dict[str, list[str]]()
     for s, sensor in enumerate(said["sensors"]):
         if shared or "clutter" in sensor:
             sensors.append(sensor)
             continue
         rate, why = _rate(model, recording, s, folder, speed)
         sensors.append({**sensor, "clutter": {"kind": "region", "rate": rate}})
-        words.append(f"clutter of {model.sensor_names[s]}: {rate:g} a scan, {why}")
+        rates.setdefault(why, []).append(f"{model.sensor_names[s]} {rate:g}")
+    if rates:
+        words["clutter"] = "; ".join(f"{', '.join(each)} per scan ({why})" for why, each in rates.items())
     return {"sensors": sensors}
 
 
 def _rate(model: ScenarioModel, recording: RecordedScans, s: int, folder: FilePath, speed: float) -> tuple[float, str]:
-    """The rate of clutter of a sensor, a scan, and how it was found."""
+    """Return the clutter rate of a sensor, per scan, and how it was found."""
     counts = [len(scan) for scans in recording.scans if (scan := scans[s]) is not None]
     if not counts:
-        return 1.0, "as it has no scan in the recording"
-    mean = float(np.mean(counts))
-    share = target_share(_looks(model, recording, s, folder), speed)
-    why = f"of {mean:.3g} measurements, estimated from how many have a neighbour in the scans before and after"
+        return 1.0, "no scan in the recording"
+    share, why = target_share(_looks(model, recording, s, folder), speed), _ESTIMATED
     if math.isnan(share):
-        share, why = (
-            0.5,
-            f"half of its {mean:.3g} measurements, as the recording is too short, or not of places, to estimate it",
-        )
-    return max(_LEAST, round((1.0 - share) * mean, 2)), why
+        share, why = 0.5, _HALF
+    return max(_LEAST, round((1.0 - share) * float(np.mean(counts)), 2)), why
 
 
 def _looks(model: ScenarioModel, recording: RecordedScans, s: int, folder: FilePath) -> list[Look]:

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from vedette.scenarios.faults import Path, Told, describe
+from vedette.scenarios.faults import MISSING, Path, Told, describe
 from vedette.scenarios.sections.base import IN_PART, Section, Unread
 from vedette.scenarios.sections.courses import COURSES
 
@@ -194,7 +194,7 @@ def _translate(error: ErrorDetails, annotation: Any, path: Path) -> Told:
         case "missing" if inside:
             return Told(path[:-1], *_length_fault(error, _inside(error["loc"][:-1], annotation)[1]))
         case "missing":
-            return Told(path, "a value, as it is required", "nothing")
+            return Told(path, "a value", MISSING)
         case "literal_error" if isinstance(error["input"], str):
             return Told(
                 path,

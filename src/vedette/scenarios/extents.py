@@ -76,7 +76,7 @@ def beyond_region(model: ScenarioModel, recording: RecordedScans) -> Iterator[tu
 
 def region_in_words(region: Mapping[str, float]) -> str:
     """Its edges, with units."""
-    return "x from {x_min:g} to {x_max:g} m, y from {y_min:g} to {y_max:g} m".format(**region)
+    return "x {x_min:g} to {x_max:g} m, y {y_min:g} to {y_max:g} m".format(**region)
 
 
 def _measured(model: ScenarioModel, recording: RecordedScans) -> Iterator[tuple[int, int, Floats]]:

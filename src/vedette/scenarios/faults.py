@@ -12,6 +12,7 @@ Path = tuple[str | int, ...]
 Place = tuple[int, int]  # line and column, from 1
 Finding = tuple[Path, str, str]  # path, expected, got
 
+MISSING = "no such key"  # what a fault got where a required key is missing
 _LONGEST = 60
 
 
@@ -25,9 +26,10 @@ class Told(NamedTuple):
 
     @property
     def message(self) -> str:
-        """`field: expected ..., got ... (hint)`."""
+        """`field: expected ..., got ... (hint)`, or `field: required key is missing`."""
         field = f"{format_path(self.path)}: " if self.path else ""
-        return printable(f"{field}expected {self.expected}, got {self.got}" + (f" ({self.hint})" if self.hint else ""))
+        what = "required key is missing" if self.got == MISSING else f"expected {self.expected}, got {self.got}"
+        return printable(f"{field}{what}" + (f" ({self.hint})" if self.hint else ""))
 
 
 class Fault(NamedTuple):

@@ -11,7 +11,7 @@ from vedette.scenarios.sections.base import Section
 from vedette.scenarios.sections.birth import Birth
 from vedette.scenarios.sections.control import Control
 from vedette.scenarios.sections.courses import as_courses
-from vedette.scenarios.sections.fusion import OF_SCANS, AnyFusion, CustomFusion
+from vedette.scenarios.sections.fusion import AnyFusion, CustomFusion
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.tracking import AnyFilter, Filter
 from vedette.scenarios.sections.true_sensors import BiasSection
@@ -24,22 +24,13 @@ if TYPE_CHECKING:
 
 
 def one_line(scenario: Scenario) -> str:
-    """The scenario on one line."""
+    """The scenario on one line: `40 scans, 4 targets, 2 sensors; filter delta_glmb, fusion ...`."""
     model = scenario.model
     targets = model.targets
     what = counted(len(targets.tracks), "target") if targets.kind == "scripted" else f"{targets.kind} targets"
     decisions = counted(len(model.decision_steps), "decision")
-    return (
-        f"ok: {model.name}, {counted(model.time.num_steps, 'scan')}, {what}, {counted(len(model.sensors), 'sensor')}, "
-        f"{_tracker(model)}, {decisions}"
-    )
-
-
-def _tracker(model: ScenarioModel) -> str:
-    kinds = model.filter.kind, model.fusion.kind
-    if kinds[1] in OF_SCANS:
-        return f"{kinds[1]} {kinds[0]} filter"
-    return f"{kinds[0]} filter, {kinds[1]} fusion"
+    sizes = f"{counted(model.time.num_steps, 'scan')}, {what}, {counted(len(model.sensors), 'sensor')}"
+    return f"{sizes}; filter {model.filter.kind}, fusion {model.fusion.kind}, {decisions}"
 
 
 def settings(section: Section, told: Mapping[str, tuple[str, object]] | None = None) -> str:

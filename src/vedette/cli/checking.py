@@ -1,0 +1,91 @@
+"""The command that checks scenario files and sensors files: check."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from vedette.cli import completing
+from vedette.cli.output import note, publish, say
+from vedette.cli.scenario_files import warn
+from vedette.errors import InputError, ScenarioError
+
+if TYPE_CHECKING:
+    from vedette.scenarios import Scenario
+
+
+def check(
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="FILE...", help="Scenario files and sensors files.", autocompletion=completing.scenarios
+        ),
+    ],
+) -> None:
+    """Check scenario files and sensors files.
+
+    Prints every fault with its file, line, column and field, with what was expected and what was found. A sensors file
+    has `sensors`, but neither `time` nor `targets`; `vedette track` uses it. Python code that a scenario names is
+    imported and run for three scans, unless other users can modify it. Warnings, of what is valid but may cost
+    accuracy, go to standard error and leave the exit status at 0.
+    """
+    from vedette.scenarios.sensors_file import is_sensors_file
+
+    found: list[dict[str, Any]] = []
+    for file in files:
+        faults = list[str]()
+        rest: dict[str, Any] = {"kind": "scenario", "summary": None, "warnings": []}
+        try:
+            rest = _check_sensors(file) if is_sensors_file(file) else _check_scenario(file)
+        except (ScenarioError, InputError) as error:
+            say(str(error), even_if_quiet=True)
+            faults = error.faults if isinstance(error, ScenarioError) else [str(error)]
+        found.append({"file": file, "valid": not faults, "faults": faults, **rest})
+    publish({"files": found})
+    if not all(each["valid"] for each in found):
+        raise typer.Exit(1)
+
+
+def _check_scenario(file: Path) -> dict[str, Any]:
+    """Print a summary of a valid scenario, and return its part of the document."""
+    from vedette.scenarios import load_scenario
+    from vedette.scenarios.strategy_cautions import strategy_cautions
+    from vedette.scenarios.summary import one_line
+
+    scenario = load_scenario(file)
+    if lacking := code_faults(scenario):
+        raise ScenarioError(lacking)
+    summary = one_line(scenario)
+    say(f"{file}: valid ({summary})")
+    return {"kind": "scenario", "summary": summary, "warnings": warn(scenario, strategy_cautions(scenario))}
+
+
+def _check_sensors(file: Path) -> dict[str, Any]:
+    """Print a summary of a valid sensors file and how to use it, and return its part of the document."""
+    from vedette.scenarios.sensors_file import check_sensors_file
+
+    valid = check_sensors_file(file)
+    say(f"{file}: valid sensors file: {valid.summary}")
+    if valid.not_given:
+        say(f"  not given, will be assumed: {', '.join(valid.not_given)}")
+    say(f"  use it with: vedette track SCANS --sensors {file}")
+    return {"kind": "sensors", "summary": valid.summary, "not_given": valid.not_given, "warnings": []}
+
+
+def code_faults(scenario: Scenario) -> list[str]:
+    """Return the faults of the code that a scenario names; a warning where others may have written it."""
+    from vedette.scenarios.trust import code_of, not_own
+
+    code = code_of(scenario.model)
+    if not code:
+        return []
+    if reason := not_own(scenario):
+        note(f"{scenario.path}: warning: {', '.join(code)} is not imported, as {reason}")
+        return []
+    from vedette.cli.compiling import compiling
+    from vedette.scenarios import code_checks
+
+    with compiling():
+        return code_checks.code_faults(scenario)

@@ -1,0 +1,106 @@
+"""Sections that a sensors file does not give, assumed from its scans, with a description of each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+from vedette.errors import InputError
+from vedette.kernels.base.types import Floats
+from vedette.recorded import RecordedScans
+from vedette.scenarios.assumed_clutter import assumed_clutter, place_stds
+from vedette.scenarios.extents import measured_region, region_in_words
+from vedette.scenarios.sections import ScenarioModel
+
+_EXISTENCE = 0.03  # of a birth where something was measured
+_EXPECTED = 0.5  # births from measurements, in the region between two scans
+_LOST_PER_SECOND = 0.001
+_BIRTH_STDS = 2.0  # of the noise across, where most was measured
+
+
+def assumed_sections(
+    given: Mapping[str, Any],
+    model: ScenarioModel,
+    recording: RecordedScans,
+    folder: FilePath,
+    speed: float,
+    words: dict[str, str],
+) -> dict[str, Any]:
+    """Return the sections that are not given, by the scans; adds to `words` a description of each."""
+    found: dict[str, Any] = {"time": _time(recording)}
+    if "region" not in given:
+        found["region"] = region = measured_region(model, recording)
+        words["region"] = f"{region_in_words(region)} (box around all measurements and sensors)"
+    found |= assumed_motion(given, speed, words)
+    if "birth" not in given:
+        measured = [
+            [scan for scans in recording.scans if (scan := scans[s]) is not None and len(scan)]
+            for s in range(len(model.sensors))
+        ]
+        found |= assumed_birth(model, measured, folder, speed, words)
+    return found | assumed_clutter(given, model, recording, folder, speed, words)
+
+
+def assumed_motion(given: Mapping[str, Any], speed: float, words: dict[str, str]) -> dict[str, Any]:
+    """Return the motion and the survival of targets, of these what is not given."""
+    found: dict[str, Any] = {}
+    if "motion" not in given:
+        # Held over the times between scans of several sensors, it would be the less the more often some of them scans.
+        found["motion"] = {"kind": "constant_velocity", "sigma_v": speed / 20.0, "acceleration": "continuous"}
+        words["motion"] = (
+            f"constant velocity, process noise {speed / 20.0:g} m/s^1.5 (for speeds up to {speed:g} m/s; --speed)"
+        )
+    if "survival" not in given:
+        found["survival"] = {"kind": "constant", "probability": 1.0 - _LOST_PER_SECOND, "period": 1.0}
+        words["survival"] = f"{1.0 - _LOST_PER_SECOND:g} per second"
+    return found
+
+
+def assumed_birth(
+    model: ScenarioModel, measured: Sequence[Sequence[Floats]], folder: FilePath, speed: float, words: dict[str, str]
+) -> dict[str, Any]:
+    """Return births from measurements; measured: the scans of each sensor."""
+    std = _BIRTH_STDS * _spread(model, measured, folder)
+    words["birth"] = (
+        f"{_EXPECTED:g} new targets per scan, from measurements that no track explains (std {std:.3g} m, {speed:g} m/s)"
+    )
+    return {"birth": measured_birth(std, speed, model.motion.state_dim)}
+
+
+def measured_birth(std: float, speed: float, state_dim: int) -> dict[str, Any]:
+    """Return a section `birth` with births from measurements; std: of positions, m. speed: std of velocities, m/s."""
+    rest = [0.1] * (state_dim - 4)  # a turn rate, rad/s
+    stds = [std, std, speed, speed, *rest]
+    return {"sites": [], "from_measurements": {"expected": _EXPECTED, "max_existence": _EXISTENCE, "std": stds}}
+
+
+def given_state_dim(given: Mapping[str, Any]) -> int:
+    """Return the dimension of the state by a section `motion`, if it is given."""
+    motion = given.get("motion")
+    found = motion.get("state_dim") if isinstance(motion, Mapping) else None
+    turns = isinstance(motion, Mapping) and motion.get("kind") == "coordinated_turn"
+    return found if isinstance(found, int) else 4 + turns
+
+
+def _time(recording: RecordedScans) -> dict[str, Any]:
+    """A regular time that says as much of the recording's as one can."""
+    gaps = np.diff(recording.times)
+    period = float(np.median(gaps)) if len(gaps) else 1.0
+    return {"num_steps": len(recording.times), "step_period": period, "start": float(recording.times[0])}
+
+
+def _spread(model: ScenarioModel, measured: Sequence[Sequence[Floats]], folder: FilePath) -> float:
+    """Standard deviation of where was measured, m: the upper quartile over all measurements that say a place."""
+    region, method = model.region.build(), model.filter.gaussian_method
+    found = list[Floats]()
+    for section, scans in zip(model.sensors, measured, strict=True):
+        stds = section.build(region, method, folder, model.filter.detection_taken_at).noise.least_stds
+        if stds is None or not scans:
+            continue
+        found.append(place_stds(section.measurement.kind, stds, np.concatenate(scans)))
+    if not sum(map(len, found)):
+        raise InputError("birth: expected it in the file about sensors, as what they measure says no places; got none")
+    return float(np.quantile(np.concatenate(found), 0.75))

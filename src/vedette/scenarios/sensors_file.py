@@ -1,0 +1,123 @@
+"""Sensors files: YAML files with `sensors` and any other section of a scenario, but without its time and targets."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path as FilePath
+from typing import Any, NamedTuple
+
+from vedette.errors import InputError, ScenarioError
+from vedette.reading import read_text
+from vedette.scenarios.assumptions import given_state_dim, measured_birth
+from vedette.scenarios.diagnostics import read_section
+from vedette.scenarios.faults import Fault, describe
+from vedette.scenarios.loading import diagnose, place_fault
+from vedette.scenarios.sections import ScenarioModel
+from vedette.scenarios.sections.recording import RecordingSection
+from vedette.scenarios.sections.sensing import COMPONENTS
+from vedette.scenarios.yaml_reader import MOST_BYTES, Document, read_yaml
+from vedette.text import counted
+
+# Sections of a scenario that a sensors file need not give.
+STAND_INS: dict[str, Any] = {
+    "time": {"num_steps": 1},
+    "region": {"x_min": -1e6, "x_max": 1e6, "y_min": -1e6, "y_max": 1e6},
+}
+ENDLESS = 1_000_000  # steps, the most of a scenario
+_NAMED = 5  # sensors, in a summary
+_ASSUMED = ("region", "motion", "survival", "birth")  # each is assumed from the scans unless it is given
+
+
+class SensorsFile(NamedTuple):
+    """A valid sensors file.
+
+    names: of the sensors. quantities: that they measure, such as "bearing". not_given: sections that `vedette track`
+    assumes.
+    """
+
+    names: tuple[str, ...]
+    quantities: tuple[str, ...]
+    not_given: tuple[str, ...]
+
+    @property
+    def summary(self) -> str:
+        """`2 sensors (Calshot, boat), bearing and range`."""
+        named = ", ".join(self.names[:_NAMED]) + (", ..." if len(self.names) > _NAMED else "")
+        return f"{counted(len(self.names), 'sensor')} ({named}), {' and '.join(self.quantities)}"
+
+
+def is_sensors_file(path: FilePath) -> bool:
+    """Return True if the file is YAML with `sensors`, but has neither `time` nor `targets`."""
+    if not path.is_file() or path.suffix.lower() == ".toml":
+        return False
+    data = read_yaml(read_text(path, "sensors file", MOST_BYTES), str(path)).data
+    return isinstance(data, Mapping) and "sensors" in data and not data.keys() & {"time", "targets"}
+
+
+def check_sensors_file(path: FilePath) -> SensorsFile:
+    """Check a sensors file without scans.
+
+    Raises:
+        InputError: the file cannot be read.
+        ScenarioError: with every fault of the file.
+    """
+    document = read_sensors_file(path)
+    given = {key: value for key, value in document.data.items() if key != "recording"}
+    data = {**STAND_INS, "name": path.stem, "birth": measured_birth(100.0, 10.0, given_state_dim(given)), **given}
+    data |= {"time": {"num_steps": ENDLESS}, "targets": {"kind": "scripted", "tracks": []}}
+    model, faults = diagnose(replace(document, data=data), path.parent)
+    if "recording" in document.data:
+        own = document.data["recording"]
+        _, found = read_section(RecordingSection, {"path": "scans.csv", **own} if isinstance(own, Mapping) else {})
+        faults += [place_fault(document, each._replace(path=("recording", *each.path))) for each in found]
+    if model is None or faults:
+        faults.sort(key=lambda fault: fault.place)
+        raise ScenarioError([_in_words_of_user(fault, document, data, path) for fault in faults])
+    return SensorsFile(model.sensor_names, _quantities(model), _not_given(document.data))
+
+
+def _quantities(model: ScenarioModel) -> tuple[str, ...]:
+    kinds = dict.fromkeys(sensor.measurement.kind for sensor in model.sensors)
+    return tuple(dict.fromkeys(name for kind in kinds for name in COMPONENTS.get(kind, (kind,))))
+
+
+def _not_given(given: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the sections that are assumed; clutter is if any sensor has none."""
+    shared = given.get("sensor_defaults") or {}
+    has_clutter = "clutter" in shared or all("clutter" in sensor for sensor in given["sensors"])
+    return (*(name for name in _ASSUMED if name not in given), *(() if has_clutter else ("clutter",)))
+
+
+def read_sensors_file(sensors: FilePath) -> Document:
+    """Read a sensors file; raises `InputError` if it is no mapping."""
+    document = read_yaml(read_text(sensors, "sensors file", MOST_BYTES), str(sensors))
+    if not isinstance(document.data, Mapping):
+        raise InputError(f"{sensors}: expected a mapping with `sensors`; got {describe(document.data)}")
+    return document
+
+
+def model_of_sensors(document: Document, data: Mapping[str, Any], sensors: FilePath) -> ScenarioModel:
+    """Return the scenario of a document with other data; raises `ScenarioError` for its faults."""
+    model, faults = diagnose(replace(document, data=data), sensors.parent)
+    if model is None:
+        raise ScenarioError([_in_words_of_user(fault, document, data, sensors) for fault in faults])
+    return model
+
+
+def _in_words_of_user(fault: Fault, document: Document, data: Mapping[str, Any], sensors: FilePath) -> str:
+    """Return the message of a fault, without fields and places that the sensors file does not have."""
+    path = fault.told.path
+    if path == ("recording",):
+        got = fault.told.got
+        return got if data["recording"]["path"] in got else f"{sensors}: recording.{got}"
+    if path[:1] == ("targets",) and "targets" not in document.data:
+        file, got = data["targets"]["path"], fault.told.got
+        if path == ("targets", "path"):
+            return got if file in got else f"{file}: {got}"
+        where = ".".join(map(str, path))
+        return f"{file}: {where}: expected {fault.told.expected}, got {got} (it belongs in {sensors})"
+    if path[:1] == ("sensors",) and path[-2:] == ("measurement", "kind") and "birth" not in document.data:
+        wanted = "a measurement that says where a target is, or births at sites: give one wide site in birth.sites"
+        fault = Fault(fault.place, fault.told._replace(expected=wanted))
+    return fault.message(str(sensors))
