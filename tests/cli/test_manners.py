@@ -93,6 +93,7 @@ def test_json_is_one_document_and_quiet_is_silence(place: Path) -> None:
         assert result.exit_code == 0, result.output
         document = json.loads(result.stdout)
         assert keys <= set(document), words
+        assert next(iter(document.items())) == ("version", 1)
         for path in (*document.get("written", ()), *filter(None, (document.get("folder"), document.get("page")))):
             assert Path(path).exists()
     for words in LISTS:

@@ -109,7 +109,7 @@ def test_a_terminal_of_60_columns_breaks_no_word(tmp_path: Path) -> None:
     os.close(leader)
     assert done.returncode == 0
     assert max(map(len, lines[1:])) <= 60  # the first is the path, which has no place to break
-    assert " ".join(lines).split()[-3:] == ["filter,", "1", "decision"]
+    assert " ".join(lines).split()[-3:] == ["sequential,", "1", "decision)"]
 
 
 @posix

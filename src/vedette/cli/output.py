@@ -26,6 +26,7 @@ import typer
 if TYPE_CHECKING:
     from rich.console import Console
 
+FORMAT_VERSION = 1  # of the documents of `--json`; incremented where a key is renamed or removed
 _FULL = (errno.ENOSPC, errno.EIO, getattr(errno, "EDQUOT", errno.ENOSPC), errno.EFBIG)
 
 
@@ -108,8 +109,13 @@ def folded(text: str, width: int) -> str:
     return text.replace(line, textwrap.fill(line, width, break_long_words=False, break_on_hyphens=False))
 
 
-def publish(document: Any) -> None:
-    """The result as data, where it is asked for: one call a command. Numbers that are none become null."""
+def publish(document: Mapping[str, Any] | list[dict[str, Any]]) -> None:
+    """Print the result of a command as data, if `--json` is given; called once. A mapping gets the format's version."""
+    print_json({"version": FORMAT_VERSION, **document} if isinstance(document, Mapping) else document)
+
+
+def print_json(document: Any) -> None:
+    """Print a document as it is, if `--json` is given. Numbers that are not finite become null."""
     if _manner.get().as_json:
         typer.echo(json.dumps(_plain(document), indent=2, ensure_ascii=False, allow_nan=False))
 

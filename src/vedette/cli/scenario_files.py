@@ -13,7 +13,7 @@ import typer
 from vedette.cli.completing import built_in_scenarios, one_of
 from vedette.cli.errors import check_ending, usage_error
 from vedette.cli.options import Overwrite, SceneFile
-from vedette.cli.output import note, print_names, publish, say
+from vedette.cli.output import note, print_json, print_names, publish, say
 from vedette.errors import InputError
 
 if TYPE_CHECKING:
@@ -189,7 +189,7 @@ def schema(
     text = _schema_text()
     if out is None:
         say(text, nl=False)
-        publish(json.loads(text))
+        print_json(json.loads(text))
     else:
         write_text(out, text)
         say(f"wrote {out}")
