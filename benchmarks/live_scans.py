@@ -9,7 +9,7 @@ of this process, the reading of the JSON included, without pipe or network. A li
 under plans: its time is from the line to the plan, with the explanation; what it took of processors, all threads
 together, is more than that on an idle machine, and less on a busy one. The first run is not counted. What is printed
 are quantiles over all lines of all runs, and the lines a second that were taken without plans. Sensors see 250 m
-(`limited`) or all of the region (`full`). Decisions are made to the end, and with the limit of `--plan-within`.
+(`limited`) or all of the region (`full`). Decisions are made to the end, and with the limit of `--planning-timeout`.
 """
 
 from __future__ import annotations

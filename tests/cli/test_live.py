@@ -48,7 +48,7 @@ PROGRAM = [sys.executable, "-c", "from vedette.cli import app; app(prog_name='ve
 def test_after_a_kill_it_goes_on_and_the_record_replays_to_the_same_bytes(place: Path) -> None:
     lines = walk(10)
     words = [*PROGRAM, *WORDS, "--decide-every", "4", "--planner", "idm"]
-    kept = [*words, "--snapshot", "state", "--every", "0", "--record", "came"]
+    kept = [*words, "--snapshot", "state", "--snapshot-interval", "0", "--record", "came"]
     with subprocess.Popen(kept, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
         assert process.stdin is not None
         assert process.stdout is not None

@@ -25,7 +25,7 @@ class Loop:
 
     def __init__(self, folder: Path, port: int = 0, *options: str) -> None:
         listen = (*OPTIONS, "--listen", f"ws://127.0.0.1:{port}", *options)
-        words = [*PROGRAM, *WORDS, *listen, "--snapshot", "state", "--every", "0", "--record", "came"]
+        words = [*PROGRAM, *WORDS, *listen, "--snapshot", "state", "--snapshot-interval", "0", "--record", "came"]
         self.process = subprocess.Popen(words, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
         errors: IO[bytes] | None = self.process.stderr
         assert errors is not None

@@ -32,6 +32,9 @@ def test_help_names_every_command() -> None:
     assert result.exit_code == 0
     for command in ("list", "init", "generate", "crowd", "check", "show", "schema"):
         assert f"  {command} " in result.stdout
+    groups = [line for line in result.stdout.splitlines() if line.endswith(":") and not line.startswith(" ")]
+    assert groups == ["Options:", "Start here:", "Your data:", "Scenarios:", "Runs and campaigns:"]
+    assert "..." not in result.stdout.split("Start here:")[1]
 
 
 def test_help_imports_nothing_heavy() -> None:

@@ -163,5 +163,8 @@ def load_spec(name_or_path: Path | str) -> CampaignSpec:
 
     Raises `InputError` as `parse_spec`, and where there is no such file.
     """
-    path = builtin_specs().get(str(name_or_path), Path(name_or_path))
+    builtin = builtin_specs()
+    path = builtin.get(str(name_or_path), Path(name_or_path))
+    if not path.exists():
+        raise InputError(f"{path}: no such file; expected a campaign file or one of {', '.join(builtin)}")
     return parse_spec(read_text(path, "campaign file", _MOST_BYTES), str(path))

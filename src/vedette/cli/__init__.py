@@ -1,7 +1,8 @@
-"""The command line: a thin face over the library. Each command imports what it needs when it runs."""
+"""The command line: a thin layer over the library. Each command imports what it needs when it runs."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Annotated
 
 import typer
@@ -30,7 +31,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
-    help="Track an unknown number of targets with mobile sensors, and decide where the sensors should go next.",
+    help="Track targets with mobile sensors, and decide where the sensors should go next.",
 )
 
 
@@ -49,23 +50,38 @@ def main(
     """Options that come before the command."""
 
 
-app.command("list")(speaking(list_))
-app.command()(speaking(demo))
-app.command()(speaking(init))
-app.command()(speaking(generate))
-app.command()(speaking(crowd))
-app.command()(speaking(check))
-app.command()(speaking(show))
-app.command()(speaking(schema))
-app.command()(speaking(run))
-app.command()(speaking(track))
-app.command()(speaking(live))
-app.command()(speaking(calibrate))
-app.command()(speaking(reproduce))
-app.command()(speaking(benchmark))
-app.command()(speaking(campaign))
-app.command()(speaking(merge))
-app.command()(speaking(results))
-app.command()(speaking(report))
-app.command()(speaking(video))
-app.command()(speaking(upgrade))
+# By group, as `vedette --help` lists them; a summary has at most 55 characters.
+_COMMANDS: dict[str, list[tuple[Callable[..., None], str]]] = {
+    "Start here": [
+        (demo, "Compare strategies on one scene in the browser"),
+        (reproduce, "Compare strategies over many runs, with a report"),
+        (init, "Write a commented scenario file"),
+    ],
+    "Your data": [
+        (track, "Track recorded scans"),
+        (live, "Track scans as they arrive"),
+        (calibrate, "Estimate sensor biases, noise, detection, clutter"),
+    ],
+    "Scenarios": [
+        (list_, "List built-in scenarios"),
+        (show, "Show a scenario as tables or as a picture"),
+        (check, "Check scenario files and sensors files"),
+        (generate, "Generate a scene with many sensors"),
+        (crowd, "Generate a scene with many targets, one sensor"),
+        (schema, "Print the JSON schema of scenario files"),
+    ],
+    "Runs and campaigns": [
+        (run, "Run a scenario once"),
+        (campaign, "Run or resume a campaign"),
+        (results, "Print or export results"),
+        (report, "Write an HTML report"),
+        (video, "Write a video of a run"),
+        (merge, "Merge results of shards"),
+        (upgrade, "Convert results to the current format"),
+        (benchmark, "Compare your planner or tracker with built-in ones"),
+    ],
+}
+for _group, _members in _COMMANDS.items():
+    for _command, _summary in _members:
+        _name = _command.__name__.rstrip("_")
+        app.command(_name, short_help=_summary, rich_help_panel=_group)(speaking(_command))

@@ -30,27 +30,31 @@ def benchmark(
         list[str] | None, typer.Option("--planner", metavar="NAME=WHAT", help=f"A planner: {_WHAT}")
     ] = None,
     trackers: Annotated[
-        list[str] | None, typer.Option("--tracker", metavar="NAME=WHAT", help="A tracker, likewise.")
+        list[str] | None, typer.Option("--tracker", metavar="NAME=WHAT", help="A tracker, in the same form.")
     ] = None,
     names: Annotated[
-        str | None, typer.Option("--scenes", metavar="LIST", help="Scenes of --list; else all that suit the entrants.")
+        str | None,
+        typer.Option("--scenes", metavar="LIST", help="Scenes of --list; default: all that suit the entrants."),
     ] = None,
     runs: Annotated[
-        int | None, typer.Option("--runs", min=1, help="Paired runs on each scene, 30; with --quick 2.")
+        int | None,
+        typer.Option("--runs", metavar="N", min=1, help="Paired runs per scene; default: 30, with --quick 2."),
     ] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="The small scenes alone, in a minute.")] = False,
-    seconds: Annotated[float, typer.Option("--seconds", min=1e-3, help="That a program may take for an answer.")] = 1.0,
+    quick: Annotated[bool, typer.Option("--quick", help="Only the small scenes; takes a minute.")] = False,
+    seconds: Annotated[
+        float, typer.Option("--seconds", metavar="SECONDS", min=1e-3, help="Time limit of a program for each answer.")
+    ] = 1.0,
     seed: Seed = 0,
     workers: Workers = 0,
     out: Annotated[
-        Path, typer.Option("--out", metavar="DIR", help="Folder for all of it; more may be added at any time.")
+        Path, typer.Option("--out", metavar="DIR", help="Results folder; later calls may add entrants.")
     ] = Path("benchmark"),
-    list_: Annotated[bool, typer.Option("--list", help="List the scenes, and stop.")] = False,
+    list_: Annotated[bool, typer.Option("--list", help="List the scenes and exit.")] = False,
     trust: Trust = False,
 ) -> None:
-    """Put your planners and trackers beside the library's own, rules of thumb and oracles, on the same scenes.
+    """Compare your planners and trackers with the built-in ones, rules of thumb and oracles, on the same scenes.
 
-    Runs that the folder holds are not run again. Ends with a table for each scene, and a page.
+    Runs that are already in the folder are skipped. Prints a table per scene and writes a page.
     """
     need("vedette benchmark", "jinja2", "matplotlib", "pyarrow")
     if not list_:

@@ -29,12 +29,13 @@ def campaign(
     spec: Annotated[
         Path,
         typer.Argument(
-            help="Campaign file (TOML), or the name of a campaign of `reproduce --list`.",
+            metavar="SPEC",
+            help="Campaign file (TOML), or a built-in campaign.",
             autocompletion=completing.campaigns,
         ),
     ],
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results; else named after the campaign.")
+        Path | None, typer.Option("--out", metavar="DIR", help="Results folder; default: named after the campaign.")
     ] = None,
     workers: Workers = 0,
     scheduler: Annotated[
@@ -42,31 +43,35 @@ def campaign(
         typer.Option(
             "--scheduler",
             metavar="ADDRESS",
-            help="Dask scheduler, tcp://host:port, or the .json that it writes; --workers: that are waited for.",
+            help="Dask scheduler: tcp://host:port or its .json file. --workers: number of workers to wait for.",
         ),
     ] = None,
     runs: Annotated[
-        int | None, typer.Option("--runs", min=1, help="Runs of each cell, in place of the file's.")
+        int | None, typer.Option("--runs", metavar="N", min=1, help="Number of runs per cell; default: as in the file.")
     ] = None,
     redo_damaged: Annotated[
-        bool, typer.Option("--redo-damaged", help="Run again what was altered since it was kept, in its place.")
+        bool, typer.Option("--redo-damaged", help="Rerun results whose checksum does not match.")
     ] = False,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be run, and stop.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Print the plan and exit.")] = False,
     shard: Annotated[
         str | None,
         typer.Option(
-            "--shard", metavar="NUMBER/COUNT", help="Run one share, such as 17/1000, in a folder of its own in DIR."
+            "--shard", metavar="NUMBER/COUNT", help="Run one share of the campaign (e.g. 17/1000) in its own folder."
         ),
     ] = None,
     slurm: Annotated[
-        int | None, typer.Option("--slurm", metavar="COUNT", min=1, help="Print a job array of so many shards; stop.")
+        int | None,
+        typer.Option("--slurm", metavar="COUNT", min=1, help="Print a Slurm job array with COUNT shards and exit."),
     ] = None,
     time: Annotated[
-        str | None, typer.Option("--time", metavar="TIME", help="That a task of --slurm may take: 4h, 90m, 1d12h.")
+        str | None, typer.Option("--time", metavar="TIME", help="Time limit of each Slurm task: 4h, 90m, 1d12h.")
     ] = None,
     trust: Trust = False,
 ) -> None:
-    """Run a campaign, or go on with one: every run that its folder does not hold yet."""
+    """Run a campaign, or resume one.
+
+    Runs that are already in the results folder are skipped.
+    """
     need("vedette campaign", "pyarrow")
     if (slurm is None) != (time is None):
         raise usage_error("expected both or neither", "--slurm and --time")

@@ -19,9 +19,7 @@ if TYPE_CHECKING:
 def check(
     files: Annotated[
         list[Path],
-        typer.Argument(
-            metavar="FILE...", help="Scenario files and sensors files.", autocompletion=completing.scenarios
-        ),
+        typer.Argument(metavar="FILE", help="Scenario files and sensors files.", autocompletion=completing.scenarios),
     ],
 ) -> None:
     """Check scenario files and sensors files.

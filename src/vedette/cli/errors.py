@@ -29,6 +29,17 @@ class Commands(TyperGroup):
         accept_any_letter()
         return super().main(*args, **options)
 
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the summaries of the commands, group by group."""
+        groups: dict[str | None, list[tuple[str, str]]] = {}
+        longest = max(map(len, self.commands))
+        for name, command in self.commands.items():
+            row = name.ljust(longest), command.get_short_help_str(limit=formatter.width)
+            groups.setdefault(getattr(command, "rich_help_panel", None), []).append(row)
+        for title, rows in groups.items():
+            with formatter.section(title):
+                formatter.write_dl(rows)
+
     def invoke(self, ctx: Any) -> Any:
         """Run a command; what it raises becomes a line and a status."""
         try:

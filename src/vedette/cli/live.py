@@ -1,4 +1,4 @@
-"""The command that tracks scans while they come in: live."""
+"""The command that tracks scans as they arrive: live."""
 
 from __future__ import annotations
 
@@ -29,50 +29,92 @@ if TYPE_CHECKING:
 def live(
     sensors: Annotated[
         Path,
-        typer.Option("--sensors", metavar="FILE", help="YAML file about the sensors, or a scenario."),
+        typer.Option("--sensors", metavar="FILE", help="Sensors file or scenario (YAML)."),
     ],
-    window: Annotated[float, typer.Option("--window", min=0.001, help="s that a scan may be late.")] = 30.0,
-    ahead: Annotated[
+    max_delay: Annotated[
         float,
-        typer.Option("--ahead", min=0.001, help="s that a scan may be ahead of all others, unless several agree."),
+        typer.Option(
+            "--max-delay",
+            metavar="SECONDS",
+            min=0.001,
+            help="Accept scans up to this late; older ones are dropped.",
+        ),
+    ] = 30.0,
+    max_lead: Annotated[
+        float,
+        typer.Option(
+            "--max-lead",
+            metavar="SECONDS",
+            min=0.001,
+            help="Reject a time stamp further ahead than this, unless several sensors agree.",
+        ),
     ] = 60.0,
     speed: Speed = 10.0,
     planner: Annotated[
         str,
-        typer.Option("--planner", help="Who decides, see `vedette run`; still: nobody.", autocompletion=strategies),
+        typer.Option(
+            "--planner",
+            metavar="NAME",
+            help='Planner, as in `vedette run`; "still": no decisions.',
+            autocompletion=strategies,
+        ),
     ] = "jdm",
     decide_every: Annotated[
         float | None,
-        typer.Option("--decide-every", metavar="S", min=0.001, help="s between decisions; none: as `control` says."),
+        typer.Option(
+            "--decide-every",
+            metavar="SECONDS",
+            min=0.001,
+            help="Interval between decisions; default: `control` in the scenario.",
+        ),
     ] = None,
-    plan_within: Annotated[
+    planning_timeout: Annotated[
         float | None,
-        typer.Option("--plan-within", metavar="S", min=0.001, help="s after which a decision takes the best so far."),
+        typer.Option(
+            "--planning-timeout",
+            metavar="SECONDS",
+            min=0.001,
+            help="Use the best action found so far after this time; default: no limit.",
+        ),
     ] = None,
     snapshot: Annotated[
-        Path | None, typer.Option("--snapshot", metavar="FILE", help="Keeps the state, and is gone on from.")
+        Path | None,
+        typer.Option(
+            "--snapshot", metavar="FILE", help="Save the state to FILE regularly, and resume from it if it exists."
+        ),
     ] = None,
-    every: Annotated[float, typer.Option("--every", metavar="S", min=0.0, help="s between snapshots.")] = 10.0,
+    snapshot_interval: Annotated[
+        float,
+        typer.Option("--snapshot-interval", metavar="SECONDS", min=0.0, help="Interval between snapshots."),
+    ] = 10.0,
     record: Annotated[
-        Path | None, typer.Option("--record", metavar="FILE", help="Keeps the lines as they came, and is gone on from.")
+        Path | None,
+        typer.Option("--record", metavar="FILE", help="Append every input line to FILE; replayed on resume."),
     ] = None,
     listen: Annotated[
         list[str] | None,
         typer.Option(
             "--listen",
-            metavar="WHERE",
-            help="Where lines come from, several times if need be: stdin (if nothing is said), tcp://HOST:PORT, or "
-            "ws://HOST:PORT, where a page shows what is believed, too.",
+            metavar="ADDRESS",
+            help="stdin (default), tcp://HOST:PORT, or ws://HOST:PORT (also serves a web page). May be repeated.",
         ),
     ] = None,
     token: Annotated[
         str | None,
-        typer.Option("--token", envvar="VEDETTE_TOKEN", help="What clients must know; a must beyond loopback."),
+        typer.Option(
+            "--token",
+            metavar="TEXT",
+            envvar="VEDETTE_TOKEN",
+            help="Token that clients must send. Required for addresses other than loopback.",
+        ),
     ] = None,
     seed: Seed = 0,
     trust: Trust = False,
 ) -> None:
-    """Track scans while they come in, a line of JSON each; estimates, and plans when they are due, as lines go out."""
+    """Track scans as they arrive.
+
+    Reads one JSON line per scan; writes estimates, and plans when a decision is due.
+    """
     from vedette.live import Keeping, live_of
     from vedette.live.serving import check_address
     from vedette.scenarios.of_recording import scenario_of_sensors
@@ -83,25 +125,25 @@ def live(
             check_address(place.host, token)
     if any(place.kind == "ws" for place in places):
         need("vedette live --listen ws://", "websockets", "jinja2", "matplotlib", "pyarrow")
-    known = scenario_of_sensors(sensors, speed=speed, decide_every=decide_every, plan_within=plan_within)
+    known = scenario_of_sensors(sensors, speed=speed, decide_every=decide_every, plan_within=planning_timeout)
     check_planner(known.scenario, planner, "--planner")
     Approval(trust)(known.scenario)
     warn(known.scenario)
     note_assumptions(known.assumed, sensors)
-    loop = live_of(known, planner, window=window, ahead=ahead, decide_every=decide_every, seed=seed)
+    loop = live_of(known, planner, window=max_delay, ahead=max_lead, decide_every=decide_every, seed=seed)
     screen = None
     if any(place.kind == "ws" for place in places):
         from vedette.reports.live import LiveScreen
 
         screen = LiveScreen(known.scenario, loop, lambda: keeping.state)
         loop = screen.live
-    options = (window, ahead, speed, planner if loop.planner else "", decide_every, plan_within, seed)
+    options = (max_delay, max_lead, speed, planner if loop.planner else "", decide_every, planning_timeout, seed)
     of = hashlib.sha256(repr(options).encode() + sensors.read_bytes()).hexdigest()
     import asyncio
 
     with interruptible("what came is kept where --snapshot or --record say so"):
         compile_if_cold(known.scenario)
-        keeping = Keeping(loop, of=of, snapshot=snapshot, every=every, record=record, tell=note)
+        keeping = Keeping(loop, of=of, snapshot=snapshot, every=snapshot_interval, record=record, tell=note)
         try:
             with compiling():
                 for answers in keeping.resume():

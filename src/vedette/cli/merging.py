@@ -21,16 +21,16 @@ _SHOWN_COMMANDS = 3
 
 def merge(
     folders: Annotated[
-        list[Path], typer.Argument(metavar="DIR...", help="Results folders of shards, or folders that they are in.")
+        list[Path], typer.Argument(metavar="DIR", help="Results folders of shards, or folders that contain them.")
     ],
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results; else named after the campaign.")
+        Path | None, typer.Option("--out", metavar="DIR", help="Results folder; default: named after the campaign.")
     ] = None,
     tables: Annotated[
-        bool, typer.Option("--tables/--no-tables", help="Write the tables for other tools when no run is missing.")
+        bool, typer.Option("--tables/--no-tables", help="Write tables for other tools if no run is missing.")
     ] = True,
 ) -> None:
-    """Make one results folder of those of shards, and name the shards that are missing."""
+    """Merge the results folders of shards into one, and name missing shards."""
     need("vedette merge", "pyarrow")
     from vedette.campaigns import merging
     from vedette.campaigns.shards import ranges

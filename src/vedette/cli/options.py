@@ -1,4 +1,4 @@
-"""Arguments and options that several commands share, each said once."""
+"""Arguments and options that several commands share."""
 
 from __future__ import annotations
 
@@ -11,35 +11,45 @@ from vedette.cli import completing
 
 ScenarioName = Annotated[
     str,
-    typer.Argument(help="Name of a built-in scenario, or a scenario file.", autocompletion=completing.scenarios),
+    typer.Argument(
+        metavar="SCENARIO", help="A built-in scenario, or a scenario file.", autocompletion=completing.scenarios
+    ),
 ]
 SceneFile = Annotated[
-    Path | None, typer.Argument(help="File to write, or a folder; none: a file named after the scene.")
+    Path | None, typer.Argument(metavar="FILE", help="File to write, or a folder; default: named after the scene.")
 ]
 ResultsFolder = Annotated[
-    Path, typer.Argument(metavar="DIR", help="Results folder of a campaign, finished or not; or of a single run.")
+    Path, typer.Argument(metavar="DIR", help="Results folder of a campaign, finished or not, or of a single run.")
 ]
-Overwrite = Annotated[bool, typer.Option("--overwrite", "--force", help="Replace what is there.")]
-Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed; with the run number it fixes every random number.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", "--force", help="Replace existing files.")]
+Seed = Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Random seed.")]
 Workers = Annotated[
-    int, typer.Option("--workers", min=0, help="Processes on this machine; 1: this one; 0: one a processor.")
+    int,
+    typer.Option("--workers", metavar="N", min=0, help="Worker processes; 1: no extra process, 0: one per CPU."),
 ]
 Trust = Annotated[
-    bool, typer.Option("--trust", help="Run code that a scenario names also where others may have written it.")
+    bool, typer.Option("--trust", help="Run Python code named in a scenario that other users can modify.")
 ]
 BAD_ROWS = ("refuse", "skip")
 SensorsFile = Annotated[
-    Path, typer.Option("--sensors", metavar="FILE", help="YAML file about the sensors: where they are, what they see.")
+    Path,
+    typer.Option("--sensors", metavar="FILE", help="Sensors file (YAML): where the sensors are and what they measure."),
 ]
 Speed = Annotated[
     float,
-    typer.Option("--speed", min=0.001, help="m/s that targets hardly exceed, where motion or births are not said."),
+    typer.Option(
+        "--speed",
+        metavar="M/S",
+        min=0.001,
+        help="Largest expected target speed; used for motion and birth if the sensors file gives neither.",
+    ),
 ]
 BadRows = Annotated[
     str,
     typer.Option(
         "--bad-rows",
-        help="refuse (default) or skip rows that cannot be read.",
+        metavar="NAME",
+        help="Rows that cannot be read: refuse or skip.",
         autocompletion=completing.one_of(*BAD_ROWS),
     ),
 ]

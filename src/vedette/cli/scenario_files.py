@@ -24,7 +24,7 @@ SCHEMA_FILE = "vedette.schema.json"
 
 
 def list_() -> None:
-    """List the scenarios that come with Vedette."""
+    """List the built-in scenarios."""
     from vedette.scenarios import list_builtin, load_scenario
 
     described = {name: load_scenario(name).model.description for name in list_builtin()}
@@ -33,17 +33,14 @@ def list_() -> None:
 
 
 def init(
-    path: Annotated[Path, typer.Argument(help="File to write, or a folder for scenario.yaml.")] = Path("scenario.yaml"),
+    path: Annotated[Path, typer.Argument(metavar="FILE", help="File to write, or a folder.")] = Path("scenario.yaml"),
     source: Annotated[
         str,
         typer.Option("--from", metavar="NAME", help="Scenario to start from.", autocompletion=built_in_scenarios),
     ] = "shore-radar",
     overwrite: Overwrite = False,
 ) -> None:
-    """Write a scenario file to start from.
-
-    It is commented; a JSON schema for editors is written beside it.
-    """
+    """Write a commented scenario file to start from, and next to it a JSON schema for editors."""
     from vedette.scenarios import list_builtin, load_scenario
 
     builtin = list_builtin()
@@ -58,16 +55,17 @@ def init(
 
 def generate(
     path: SceneFile = None,
-    sensors: Annotated[int, typer.Option("--sensors", min=1, max=1000, help="Number of sensors.")] = 5,
+    sensors: Annotated[int, typer.Option("--sensors", metavar="N", min=1, max=1000, help="Number of sensors.")] = 5,
     targets: Annotated[
-        int | None, typer.Option("--targets", min=1, max=2000, help="Number of targets; else two a sensor.")
+        int | None,
+        typer.Option("--targets", metavar="N", min=1, max=2000, help="Number of targets; default: 2 per sensor."),
     ] = None,
     pattern: Annotated[
         str,
         typer.Option(
             "--pattern",
             metavar="NAME",
-            help="spread: targets part in groups; crowd: they meet.",
+            help="spread: groups of targets separate; crowd: they meet.",
             autocompletion=one_of("spread", "crowd"),
         ),
     ] = "spread",
@@ -76,19 +74,19 @@ def generate(
         typer.Option(
             "--view",
             metavar="NAME",
-            help="limited: sensors see 250 m; full: everything.",
+            help="limited: sensors see 250 m; full: they see everything.",
             autocompletion=one_of("limited", "full"),
         ),
     ] = "limited",
     decide_every: Annotated[
-        int, typer.Option("--decide-every", min=1, max=59, help="Scans between decisions, and the horizon.")
+        int, typer.Option("--decide-every", metavar="N", min=1, max=59, help="Scans between decisions, and horizon.")
     ] = 1,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Of places and courses.")] = 0,
+    seed: Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Random seed of positions and courses.")] = 0,
     overwrite: Overwrite = False,
 ) -> None:
-    """Write a scene of any number of sensors, made from a seed.
+    """Generate a scene with many sensors, from a seed.
 
-    A square of 500 m a sensor, so that scenes of few and of many sensors compare.
+    The region has 500 m x 500 m per sensor, so that scenes with few and with many sensors compare.
     """
     from vedette.scenarios.generated import PATTERNS, VIEWS, GeneratedScene, scene_text
 
@@ -103,26 +101,31 @@ def generate(
 
 def crowd(
     path: SceneFile = None,
-    targets: Annotated[int, typer.Option("--targets", min=1, max=100_000, help="Number of targets.")] = 100,
-    density: Annotated[float, typer.Option("--density", min=1e-3, max=1e6, help="Targets a square kilometre.")] = 25.0,
+    targets: Annotated[
+        int, typer.Option("--targets", metavar="N", min=1, max=100_000, help="Number of targets.")
+    ] = 100,
+    density: Annotated[
+        float, typer.Option("--density", metavar="N", min=1e-3, max=1e6, help="Targets per square kilometre.")
+    ] = 25.0,
     clutter: Annotated[
-        float, typer.Option("--clutter", min=0.0, max=100.0, help="False measurements a target and scan.")
+        float,
+        typer.Option("--clutter", metavar="N", min=0.0, max=100.0, help="False measurements per target and scan."),
     ] = 0.3,
     measured: Annotated[
         str,
         typer.Option(
             "--measured",
             metavar="NAME",
-            help="position, or bearing_range from outside.",
+            help="position, or bearing_range from outside the square.",
             autocompletion=one_of("position", "bearing_range"),
         ),
     ] = "position",
-    steps: Annotated[int, typer.Option("--steps", min=1, max=10_000, help="Number of scans.")] = 40,
+    steps: Annotated[int, typer.Option("--steps", metavar="N", min=1, max=10_000, help="Number of scans.")] = 40,
     overwrite: Overwrite = False,
 ) -> None:
-    """Write a scene of any number of targets before one sensor.
+    """Generate a scene with many targets and one sensor.
 
-    A square whose area grows with their number, so that crowds of few and of many targets compare.
+    The area of the region grows with the number of targets, so that small and large crowds compare.
     """
     from vedette.scenarios.generated_crowd import MEASURED, GeneratedCrowd, crowd_text
 
@@ -179,11 +182,11 @@ def warn(scenario: Scenario, further: Iterable[tuple[Place, str]] = ()) -> list[
 
 
 def schema(
-    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="File to write; none: the screen.")] = None,
+    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="File to write; default: print.")] = None,
 ) -> None:
     """Print the JSON schema of scenario files.
 
-    It describes every field, and editors that know it complete and check as one writes.
+    It describes every field. Editors use it to complete and check scenario files.
     """
     check_ending(out, "--out", "json")
     text = _schema_text()

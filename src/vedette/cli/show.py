@@ -27,11 +27,9 @@ PICTURE_FORMATS = ("png", "pdf", "svg")
 def show(
     scenario: ScenarioName,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="FILE", help="Draw a picture: a .png, .pdf or .svg file.")
+        Path | None, typer.Option("--out", metavar="FILE", help="Draw a picture (.png, .pdf or .svg).")
     ] = None,
-    resolved: Annotated[
-        bool, typer.Option("--resolved", help="Print YAML instead, with every default written out.")
-    ] = False,
+    resolved: Annotated[bool, typer.Option("--resolved", help="Print YAML with every default instead.")] = False,
     trust: Trust = False,
 ) -> None:
     """Show a scenario as tables and as a picture.

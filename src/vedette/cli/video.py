@@ -18,18 +18,24 @@ from vedette.text import counted
 
 def video(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Results folder of a single run.")],
-    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="A .mp4 file (by ffmpeg) or a .gif file.")],
-    fps: Annotated[float, typer.Option("--fps", min=0.1, max=120.0, help="Frames a second.")] = 10.0,
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="A .mp4 file (needs ffmpeg) or a .gif file.")],
+    fps: Annotated[float, typer.Option("--fps", metavar="N", min=0.1, max=120.0, help="Frames per second.")] = 10.0,
     speed: Annotated[
-        float | None, typer.Option("--speed", min=1e-3, help="Seconds of the run in a second of the video.")
+        float | None,
+        typer.Option("--speed", metavar="FACTOR", min=1e-3, help="Seconds of the run per second of video."),
     ] = None,
     seconds: Annotated[
         float | None,
-        typer.Option("--seconds", min=0.1, help="Length of the video; else a fifth of a second a scan, 2 to 60 s."),
+        typer.Option(
+            "--seconds",
+            metavar="SECONDS",
+            min=0.1,
+            help="Length of the video; default: 0.2 s per scan, but 2 to 60 s.",
+        ),
     ] = None,
-    size: Annotated[int, typer.Option("--size", min=200, max=4000, help="Width in pixels.")] = 800,
+    size: Annotated[int, typer.Option("--size", metavar="PIXELS", min=200, max=4000, help="Width of the video.")] = 800,
     trust: Annotated[
-        bool, typer.Option("--trust", help="Run code that the scenario of the run names, to draw measurements.")
+        bool, typer.Option("--trust", help="Run Python code named in the scenario, to draw measurements.")
     ] = False,
 ) -> None:
     """Show a run as a video: targets, estimates, sensors and measurements, scan by scan."""
