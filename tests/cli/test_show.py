@@ -14,6 +14,7 @@ from vedette.cli import app
 from vedette.cli.picture import scenario_figure
 from vedette.cli.show import truth_of
 from vedette.scenarios import list_builtin, load_scenario, parse_scenario
+from vedette.scenarios.wording import scans_in_words
 
 
 def show(*words: str, columns: int = 80) -> Result:
@@ -34,11 +35,40 @@ def test_the_tables_have_the_numbers() -> None:
     text = show("paper-a").stdout
     for line in (
         "scans 40, every 1 s from 1 to 40 s",
-        "sensor 1 -745 830 0 courses first decision",
+        "sensor 1 -745 830 0 courses",
+        "decisions after scans 10, 20, 30",
+        "sensors move from the first decision on",
         "clutter region, rate 25",
         "2 1 40 -180 -205 -5.5 -19.0",
     ):
         assert line in [" ".join(row.split()) for row in text.splitlines()]
+
+
+def test_eight_mobile_is_described_in_words() -> None:
+    lines = [" ".join(row.split()) for row in show("eight-mobile", columns=120).stdout.splitlines()]
+    for line in (
+        "decisions after every scan but the last (99)",
+        "objective expected loss (cutoff 100 m, order 1; no sampling)",
+        "search coordinate ascent, 2 restarts",
+        "platform steps of 15 m at 15 m/s in 8 directions, or stay",
+        "noise constant, std x 2 m, y 2 m",
+    ):
+        assert line in lines
+
+
+@pytest.mark.parametrize(
+    ("steps", "words"),
+    [
+        ((1, 2, 3), "every scan but the last (3)"),
+        ((1, 2, 3, 4), "every scan (4)"),
+        ((2,), "scan 2"),
+        ((1, 4), "scans 1, 4"),
+        (tuple(range(2, 200, 3)), "every 3rd scan from 2 to 197 (66)"),
+        ((1, 2, 4, 9, 11), "5 scans from 1 to 11"),
+    ],
+)
+def test_the_scans_of_decisions_are_named_in_a_few_words(steps: tuple[int, ...], words: str) -> None:
+    assert scans_in_words(steps, 4) == words
 
 
 def test_sensors_that_differ_are_each_described(tmp_path: Path) -> None:
@@ -104,8 +134,8 @@ def test_a_faulty_scenario_is_told_without_a_traceback(tmp_path: Path) -> None:
 
 def test_zones_biases_and_late_scans_are_told_in_a_few_words() -> None:
     lines = " ".join(show("solent-patrol").stdout.split())
-    assert "constraint keep_out, polygon of 21 corners" in lines
-    assert "constraint stay_inside, x -3000 to 3000 m, y -3000 to 3000 m" in lines
-    assert "boat 2: late share 0.8, up_to 30 s, start 600 s, end 1200 s" in lines
+    assert "constraint keep out, polygon of 21 corners" in lines
+    assert "constraint stay inside, x -3000 to 3000 m, y -3000 to 3000 m" in lines
+    assert "boat 2: late share 0.8, up to 30 s, start 600 s, end 1200 s" in lines
     assert "origin lon -1.1171 deg, lat 50.7865 deg" in lines
-    assert "sigma_v 0.15 m/s^1.5, acceleration continuous" in lines
+    assert "process noise 0.15 m/s^1.5, acceleration continuous" in lines

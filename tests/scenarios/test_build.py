@@ -322,7 +322,7 @@ def test_one_filter_may_take_the_scans_of_all_sensors(kind: str, container: type
     planner: Any = build.build_planner(loaded, "jdm")
     assert planner.fusion == ParallelUpdate()
     assert {type(sensor.filter.initial()) for sensor in planner.sensors} == {type(tracker.initial().fused)}
-    assert f"2 sensors, central {kind} filter, " in one_line(loaded)
+    assert f"2 sensors; filter {kind}, fusion central, " in one_line(loaded)
     assert ("fusion", "central: one filter takes the scans of all sensors") in facts(loaded.model)
     assert not any("GCI" in caution for caution in cautions(loaded))
 

@@ -93,8 +93,8 @@ def test_show_says_what_is_sent_and_where_targets_are_born() -> None:
         (FILTER, "kind: lmb"), (FUSION, "fusion: {kind: sequential}\nnetwork: {radio_range: 80.0}"), (SITES, MEASURED)
     )
     told = dict(facts(parse_scenario(text, "f.yaml")))
-    assert told["network"] == "radio_range 80 m, loss 0, delay 0"
-    assert told["births"] == "no site; 0.4 a scan from measurements"
+    assert told["network"] == "radio range 80 m, loss 0, delay 0"
+    assert told["births"] == "no site; 0.4 per scan from measurements"
 
 
 def test_beliefs_that_are_late_and_births_that_are_later_are_warned_of(tmp_path: Path) -> None:

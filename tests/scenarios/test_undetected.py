@@ -249,7 +249,7 @@ def test_a_birth_rate_is_learnt() -> None:
     told = dict(facts(parse_scenario(changed(*ONE, born))))
     assert told["births"] == "1 site, steps 1, 5; at a learnt rate from measurements"
     assert dict(facts(scenario(rate, *ONE, BORN).model))["not yet found"].startswith(
-        "cell 30 m, expected 1, birth_rate learnt"
+        "cell 30 m, expected 1, birth rate learnt"
     )
     with pytest.raises(ScenarioError, match=r"from_measurements\.expected: expected a number, as only one belief"):
         parse_scenario(changed(ONE[1], born, ("m_delta_glmb", "lmb")))

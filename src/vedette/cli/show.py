@@ -96,17 +96,19 @@ def _sensors(scenario: Scenario) -> Table:
     from rich.text import Text
 
     from vedette.scenarios.sections.courses import start_course
+    from vedette.scenarios.summary import moves_from
 
     model = scenario.model
+    starts = [] if moves_from(model) else ["moves from"]
     direction = "course\n(deg)" if model.by_compass else "heading\n(deg)"
-    table = _numbers_table("sensors", "name", "x\n(m)", "y\n(m)", direction, "platform", "moves from")
+    table = _numbers_table("sensors", "name", "x\n(m)", "y\n(m)", direction, "platform", *starts)
     for name, sensor in zip(model.sensor_names, model.sensors, strict=True):
         heading = sensor.heading_deg
         if model.by_compass:
             heading = start_course(heading, model.north(), sensor.position)
         place = (f"{sensor.position[0]:g}", f"{sensor.position[1]:g}")
         start = "-" if sensor.platform.kind == "still" else sensor.moves_from.replace("_", " ")
-        table.add_row(Text(name), *place, f"{heading:g}", sensor.platform.kind, start)
+        table.add_row(Text(name), *place, f"{heading:g}", sensor.platform.kind, *[start for _ in starts])
     return table
 
 

@@ -12,11 +12,14 @@ from vedette.scenarios.sections.birth import Birth
 from vedette.scenarios.sections.control import Control
 from vedette.scenarios.sections.courses import as_courses
 from vedette.scenarios.sections.fusion import AnyFusion, CustomFusion
+from vedette.scenarios.sections.platforms import Steps
+from vedette.scenarios.sections.sensing import COMPONENTS
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.tracking import AnyFilter, Filter
 from vedette.scenarios.sections.true_sensors import BiasSection
 from vedette.scenarios.sections.undetected import UndetectedSection, searches
 from vedette.scenarios.sections.world import RegionSection
+from vedette.scenarios.wording import in_words, plain_values, scans_in_words, settings, short
 from vedette.text import counted
 
 if TYPE_CHECKING:
@@ -31,33 +34,6 @@ def one_line(scenario: Scenario) -> str:
     decisions = counted(len(model.decision_steps), "decision")
     sizes = f"{counted(model.time.num_steps, 'scan')}, {what}, {counted(len(model.sensors), 'sensor')}"
     return f"{sizes}; filter {model.filter.kind}, fusion {model.fusion.kind}, {decisions}"
-
-
-def settings(section: Section, told: Mapping[str, tuple[str, object]] | None = None) -> str:
-    """A section's kind and its plain values with their units: `constant_velocity, sigma_v 5 m/s^2`.
-
-    told: other names and values of some of its fields.
-    """
-    words: list[str] = []
-    for name, field in type(section).model_fields.items():
-        name, value = (told or {}).get(name, (name, getattr(section, name)))
-        if name == "kind":
-            words.insert(0, str(value))
-        elif value not in (None, ()) and not isinstance(value, Section | dict):
-            unit = (field.description or "").rpartition("[")[2].rstrip("].")
-            words.append(f"{name} {short(value)}" + (f" {unit}" if unit not in ("-", "") else ""))
-    return ", ".join(words)
-
-
-def short(value: object) -> str:
-    """A value without needless digits."""
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, float):
-        return f"{value:g}"
-    if isinstance(value, tuple):
-        return ", ".join(short(item) for item in value)
-    return str(value)
 
 
 def facts(model: ScenarioModel) -> list[tuple[str, str]]:
@@ -77,11 +53,15 @@ def facts(model: ScenarioModel) -> list[tuple[str, str]]:
         *(() if model.undetected is None else (("not yet found", _undetected(model.undetected)),)),
         *((("not yet found", _searched(model)),) if searches(model) else ()),
         ("estimate", settings(model.estimates_by)),
-        ("decisions", f"after {_steps(model.decision_steps)}" if model.decision_steps else "none"),
+        (
+            "decisions",
+            f"after {scans_in_words(model.decision_steps, time.num_steps)}" if model.decision_steps else "none",
+        ),
         ("horizon", f"{counted(model.horizon[0], 'step')} of {model.horizon[1]:g} s"),
-        ("reward", f"{settings(control.reward)}, {_samples(control)}"),
+        ("objective", _objective(control)),
         ("search", settings(control.search)),
         *(("constraint", _constraint(section)) for section in control.constraints),
+        *((("sensors move", start),) if (start := moves_from(model)) else ()),
         ("pseudo-scans", f"{control.ideal_measurements} measurements"),
         ("OSPA", settings(model.ospa)),
         *((f"planner {name}", settings(section)) for name, section in model.planners.items()),
@@ -95,9 +75,22 @@ def _motion(section: Section) -> str:
     return settings(section).replace("m/s^2", "m/s^1.5") if continuous else settings(section)
 
 
+def moves_from(model: ScenarioModel) -> str | None:
+    """Return since when the sensors move; None if none does, or not all since the same time."""
+    starts = {sensor.moves_from for sensor in model.sensors if sensor.platform.kind != "still"}
+    words = {"first_decision": "from the first decision on", "start": "from the start on"}
+    return words[starts.pop()] if len(starts) == 1 else None
+
+
+def _objective(control: Control) -> str:
+    """The reward as `expected loss (cutoff 100 m, order 1; no sampling)`."""
+    values = "; ".join(filter(None, (", ".join(plain_values(control.reward)), _samples(control))))
+    return f"{in_words(control.reward.kind)} ({values})"
+
+
 def _samples(control: Control) -> str:
     if control.reward.kind == "expected_loss":
-        return "no samples"
+        return "no sampling"
     if control.confidence is None:
         return counted(control.num_samples, "sample")
     near = f", to {100.0 * control.indifference:g} %" if control.indifference else ""
@@ -130,7 +123,7 @@ def _undetected(section: UndetectedSection) -> str:
 
 def _filter(section: AnyFilter) -> str:
     assignment = f", {section.assignment.kind} assignment" if isinstance(section, Filter) else ""
-    return settings(section) + assignment
+    return ", ".join([section.kind, *plain_values(section)]) + assignment
 
 
 def _births(section: Birth) -> str:
@@ -138,7 +131,7 @@ def _births(section: Birth) -> str:
     measured = section.from_measurements
     if measured is None:
         return sites
-    number = "at a learnt rate" if isinstance(measured.expected, str) else f"{measured.expected:g} a scan"
+    number = "at a learnt rate" if isinstance(measured.expected, str) else f"{measured.expected:g} per scan"
     return f"{sites}; {number} from measurements"
 
 
@@ -174,15 +167,36 @@ def _steps(steps: Literal["every"] | Sequence[int]) -> str:
 def sensing(sensor: Sensor, north: Compass | None = None) -> list[tuple[str, str]]:
     """What carries a sensor, what it measures, and how well; its directions by a compass where there is one."""
     carriers = [section for section in (sensor.platform, getattr(sensor.platform, "carrier", None)) if section]
-    words = [settings(one, None if north is None else as_courses(one, north, sensor.position)) for one in carriers]
+    words = [_platform(one, None if north is None else as_courses(one, north, sensor.position)) for one in carriers]
+    truth = _in_truth(sensor)
+    assumed = "assumed: " if any(name.startswith("true ") and name.endswith("detection") for name, _ in truth) else ""
     return [
         ("platform", ", on: ".join(words)),
-        ("measures", sensor.measurement.kind),
-        ("noise", settings(sensor.noise)),
-        ("detection", settings(sensor.detection)),
+        ("measures", in_words(sensor.measurement.kind)),
+        ("noise", _noise(sensor.noise, sensor.measurement.kind)),
+        ("detection", assumed + settings(sensor.detection)),
         ("clutter", settings(sensor.clutter)),
-        *_in_truth(sensor),
+        *truth,
     ]
+
+
+def _platform(section: Section, replaced: Mapping[str, tuple[str, object]] | None) -> str:
+    if isinstance(section, Steps):
+        way = f"steps of {section.length:g} m at {section.speed:g} m/s in {len(section.directions_deg)} directions"
+        return f"{way}, or stay" if section.stay else way
+    return settings(section, replaced)
+
+
+def _noise(section: Section, measured: str) -> str:
+    """Its settings; a standard deviation for each component has the component's name and unit."""
+    stds, components = getattr(section, "std", ()), COMPONENTS.get(measured, ())
+    if not isinstance(stds, tuple) or len(stds) != len(components):
+        return settings(section)
+    units = ("rad" if name == "bearing" else "m" for name in components)
+    named = ", ".join(f"{name} {std:g} {unit}" for name, std, unit in zip(components, stds, units, strict=True))
+    return ", ".join(
+        [f"{in_words(getattr(section, 'kind', ''))}, std {named}", *plain_values(section, {"std": ("std", None)})]
+    )
 
 
 def _in_truth(sensor: Sensor) -> list[tuple[str, str]]:
@@ -193,7 +207,11 @@ def _in_truth(sensor: Sensor) -> list[tuple[str, str]]:
     if truth is not None:
         parts = {name: getattr(truth, name) for name in type(truth).model_fields}
         sections = [(name, value) for name, value in parts.items() if isinstance(value, Section)]
-        found += [(f"true {name.replace('_', ' ')}", settings(value)) for name, value in sections]
+        kind = sensor.measurement.kind
+        found += [
+            (f"true {in_words(name)}", _noise(value, kind) if name == "noise" else settings(value))
+            for name, value in sections
+        ]
         found += [("detection of", "the measurement")] if truth.detection_of == "measurement" else []
     scans = sensor.scans
     if scans.period is not None:
