@@ -98,7 +98,7 @@ def test_a_folder_that_cannot_be_written_is_told_before_the_work(place: Path, mo
 def test_a_folder_is_no_recording(place: Path) -> None:
     assert call("track . --sensors radars.yaml").stderr == ".: a folder; expected a file of scans\n"
     told = call("track scans.csv --sensors .").stderr
-    assert told == ".: expected a file about sensors; got a folder\n"
+    assert told == ".: expected a sensors file; got a folder\n"
 
 
 def test_a_sensors_file_of_something_else_is_told_in_words(place: Path) -> None:

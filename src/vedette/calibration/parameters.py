@@ -26,7 +26,7 @@ class Parameter:
         sensor: its number, from 0.
         kind: what it is of.
         component: what of: of a bias a field of `vedette.models.Bias`, of noise a component of the measurement.
-        name: as the file about sensors has it: "range", "noise.sigma_range".
+        name: as in the sensors file: "range", "noise.sigma_range".
         unit: "m", "deg", "s", "per scan", "".
         start: what it is taken for before anything is known.
         per_si: its value where the SI value is 1; negative where it counts the other way.

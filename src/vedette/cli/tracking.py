@@ -63,7 +63,11 @@ def track(
     bad_rows: BadRows = "refuse",
     trust: Trust = False,
 ) -> None:
-    """Track recorded scans: estimates, whole tracks, health, figures; with the targets' reports, errors too."""
+    """Track recorded scans.
+
+    Prints tracks and diagnostics, and errors if the targets' own reports are given. --out writes tracks, tables and
+    figures.
+    """
     from vedette.evaluation.runs import run_scenario
     from vedette.evaluation.track_table import check_format, table_of_run, write_tracks
     from vedette.scenarios.dumping import dump_kept

@@ -102,5 +102,5 @@ def _spread(model: ScenarioModel, measured: Sequence[Sequence[Floats]], folder: 
             continue
         found.append(place_stds(section.measurement.kind, stds, np.concatenate(scans)))
     if not sum(map(len, found)):
-        raise InputError("birth: expected it in the file about sensors, as what they measure says no places; got none")
+        raise InputError("birth: expected in the sensors file, as its sensors measure no positions; got none")
     return float(np.quantile(np.concatenate(found), 0.75))

@@ -1,4 +1,4 @@
-"""What a file about sensors says of them, as parameters to be found; and the file with what was found."""
+"""Parameters of the sensors in a sensors file that `calibrate` estimates, and the file with the estimates."""
 
 from __future__ import annotations
 
@@ -186,9 +186,10 @@ def _with_values(
 
 
 def calibrated_text(scenario: Scenario, sensors: FilePath, calibration: Calibration, folder: FilePath) -> str:
-    """The file about the sensors with what was found in it at each.
+    """Return the sensors file with the estimates.
 
-    What was not found stays as it was; comments are lost. A first line says so where the search did not converge.
+    Parameters that are not identifiable keep their values; comments are lost. The first line is a comment if the
+    optimiser did not converge.
 
     Args:
         scenario: of the recording.
@@ -196,7 +197,7 @@ def calibrated_text(scenario: Scenario, sensors: FilePath, calibration: Calibrat
         calibration: what was found.
         folder: where the new file is to stand; elsewhere than the old one, files that it names get absolute paths.
     """
-    said = dict(read_yaml(read_text(sensors, "file about sensors", MOST_BYTES), str(sensors)).data)
+    said = dict(read_yaml(read_text(sensors, "sensors file", MOST_BYTES), str(sensors)).data)
     biases = [sensor.bias.model_dump(exclude_defaults=True) for sensor in scenario.model.sensors]
     parameters = [each.parameter for each in calibration.found]
     values = [float(f"{each.value:.7g}") for each in calibration.found]  # digits far beyond what is known

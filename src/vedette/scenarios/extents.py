@@ -37,7 +37,7 @@ def measured_region(model: ScenarioModel, recording: RecordedScans) -> dict[str,
     places = [own for _, _, own in measured]
     corners = np.concatenate([*places, recording.poses[:, :, :2].reshape(-1, 2)])
     if np.ptp(corners, axis=0).max() <= 0.0:
-        raise InputError("region: expected it in the file about sensors, as what they measure says no places; got none")
+        raise InputError("region: expected in the sensors file, as its sensors measure no positions; got none")
     return _edges(box_of(corners))
 
 

@@ -1,4 +1,4 @@
-"""A scenario of scans that were recorded, or are to come: what a file about the sensors says, the rest of the scans."""
+"""Scenarios of recorded scans and of scans to come: a sensors file, and what it does not give from the scans."""
 
 from __future__ import annotations
 
@@ -46,13 +46,13 @@ def scenario_of_recording(
         sensors: a YAML file with `sensors`, and whatever else of a scenario is known: `origin`, `recording` (columns,
             units, conventions), `motion`, `survival`, `birth`, `filter`, `fusion`, ...; of `control` the constraints.
         scans: the CSV or Parquet file of the scans.
-        truth: the file of the targets' own reports; None: as the file about sensors says, or unknown.
+        truth: the file of the targets' own reports; None: as in the sensors file, or unknown.
         speed: m/s that targets hardly exceed; motion and births go by it where nothing is said of them.
         bad_rows: "refuse" or "skip", see `vedette.recorded.Conventions`.
 
     Raises:
         InputError: a file that is not there, or rows that cannot be read.
-        ScenarioError: with every fault of the file about sensors.
+        ScenarioError: with every fault of the sensors file.
     """
     for file, what in ((scans, "scans"), (truth, "the targets' reports")):
         if file is not None and (file.is_dir() or not file.exists()):
