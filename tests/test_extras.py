@@ -235,7 +235,7 @@ def test_tracks_are_written_without_any_extra(tmp_path: Path) -> None:
     command = ["track", "scans.csv", "--sensors", "radars.yaml", "--out", "run"]
     ((status, printed, told, _),) = outcomes([command], tmp_path)
     assert status == 0, told
-    assert "wrote run" in printed
+    assert "Wrote run: tracks/tracks.csv" in printed
     assert "needs pyarrow, which is not installed: pip install 'vedette[campaigns]'" in told
     assert "needs matplotlib, which is not installed: pip install 'vedette[report]'" in told
     found = sorted(path.relative_to(tmp_path).as_posix() for path in (tmp_path / "run").rglob("*.*"))

@@ -36,6 +36,8 @@ def test_any_mistake_is_told_with_its_place(seed: int, tmp_path: Path) -> None:
 
 
 def line_of(fault: str) -> int:
-    match = re.fullmatch(r"f\.yaml:(\d+):\d+:( \S.*?:)? expected .+, got .+", fault, re.DOTALL)
+    match = re.fullmatch(
+        r"f\.yaml:(\d+):\d+:( \S.*?:)? (required key is missing|expected .+, got .+)", fault, re.DOTALL
+    )
     assert match, fault
     return int(match[1])
