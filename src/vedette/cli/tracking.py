@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -68,18 +69,9 @@ def track(
     Prints tracks and diagnostics, and errors if the targets' own reports are given. --out writes tracks, tables and
     figures.
     """
-    from vedette.evaluation.runs import run_scenario
-    from vedette.evaluation.track_table import check_format, table_of_run, write_tracks
-    from vedette.scenarios.dumping import dump_kept
-    from vedette.simulation.loop import RunInterrupted, RunStopped
-    from vedette.simulation.storage import check_free, save_run
+    from vedette.simulation.storage import check_free
 
-    for name in formats or ():
-        if name not in FORMATS:
-            raise usage_error(f"expected one of {', '.join(FORMATS)}; got {name}", "--format")
-        check_format(Path(f"tracks.{name}"))
-    if formats and out is None:
-        raise usage_error("expected with --out, which names the folder", "--format")
+    _check_formats(formats or (), out)
     if out is not None:
         with named_options({"directory": "--out"}):
             check_free(out, overwrite)
@@ -90,29 +82,16 @@ def track(
     on_earth = [name for name in formats or () if name in ON_EARTH]
     if on_earth and scenario.model.origin is None:  # before there is a folder with a part of what was asked for
         raise usage_error(f"expected an origin in {sensors}, as {on_earth[0]} has degrees; got none", "--format")
+    written: list[Path] = []
     with interruptible("nothing was written"):
-        compile_if_cold(scenario)
-        try:
-            with compiling(), bar("scans", len(recording.times)) as watch:
-                record = run_scenario(scenario, "still", seed=0, watch=watch)
-        except (RunStopped, RunInterrupted) as error:
-            end_stopped(error, "nothing was written")
+        record = _tracked(scenario, len(recording.times))
         print_run(record, scenario)
         warned = warn_of_recording(record, scenario)
         sizes = counted(record.num_scans, "scan"), counted(recording.num_measurements, "measurement")
         say(f"{scans}: {', '.join(sizes)}, {counted(len(scenario.model.sensors), 'sensor')}")
         say(f"  tracks      {_tracks(record)}")
-        table = table_of_run(record, scenario)
-        written: list[Path] = []
         if out is not None:
-            if lacking := without("vedette track --out: a folder of results", "pyarrow"):
-                note(f"{lacking}; the tracks are written without it")
-            else:
-                save_run(record, out, scenario_text=dump_kept(scenario), overwrite=overwrite)
-            usual = ("csv", "geojson") if scenario.model.origin is not None else ("csv",)
-            for name in dict.fromkeys(formats or usual):
-                write_tracks(out / "tracks" / f"tracks.{name}", table)
-                written.append(out / "tracks" / f"tracks.{name}")
+            written = _save(record, scenario, out, formats, overwrite=overwrite)
     if out is not None:
         if lacking := without("vedette track --out: figures", "matplotlib"):
             note(lacking)
@@ -120,17 +99,52 @@ def track(
             with interruptible(f"wrote {out}, but not all of its figures"):
                 _draw(record, scenario, out)
         say(f"Wrote {out}: {', '.join(_contents(out, written))}")
-    document = run_document(record, scenario)
-    publish(
-        {
-            **document,
-            "assumptions": assumed,
-            "skipped": recording.skipped,
-            "warnings": [*cautions, *warned],
-            "folder": out,
-            "written": written,
-        }
-    )
+    origin = {"assumptions": assumed, "skipped": recording.skipped, "warnings": [*cautions, *warned]}
+    publish({**run_document(record, scenario), **origin, "folder": out, "written": written})
+
+
+def _check_formats(formats: Sequence[str], out: Path | None) -> None:
+    from vedette.evaluation.track_table import check_format
+
+    for name in formats:
+        if name not in FORMATS:
+            raise usage_error(f"expected one of {', '.join(FORMATS)}; got {name}", "--format")
+        check_format(Path(f"tracks.{name}"))
+    if formats and out is None:
+        raise usage_error("expected with --out, which names the folder", "--format")
+
+
+def _tracked(scenario: Scenario, num_scans: int) -> RunRecord:
+    """Run the tracker over all scans; a run that stops ends the program."""
+    from vedette.evaluation.runs import run_scenario
+    from vedette.simulation.loop import RunInterrupted, RunStopped
+
+    compile_if_cold(scenario)
+    try:
+        with compiling(), bar("scans", num_scans) as watch:
+            return run_scenario(scenario, "still", seed=0, watch=watch)
+    except (RunStopped, RunInterrupted) as error:
+        end_stopped(error, "nothing was written")
+
+
+def _save(
+    record: RunRecord, scenario: Scenario, out: Path, formats: Sequence[str] | None, *, overwrite: bool
+) -> list[Path]:
+    """Write the results folder and the tracks; returns the files of tracks."""
+    from vedette.evaluation.track_table import table_of_run, write_tracks
+    from vedette.scenarios.dumping import dump_kept
+    from vedette.simulation.storage import save_run
+
+    if lacking := without("vedette track --out: a folder of results", "pyarrow"):
+        note(f"{lacking}; the tracks are written without it")
+    else:
+        save_run(record, out, scenario_text=dump_kept(scenario), overwrite=overwrite)
+    usual = ("csv", "geojson") if scenario.model.origin is not None else ("csv",)
+    written = [out / "tracks" / f"tracks.{name}" for name in dict.fromkeys(formats or usual)]
+    table = table_of_run(record, scenario)
+    for path in written:
+        write_tracks(path, table)
+    return written
 
 
 def read_recording(
