@@ -10,7 +10,7 @@ from vedette.cli.output import console, note, say
 if TYPE_CHECKING:
     from vedette.calibration import Calibration, Found, Window
 
-NOT_CONVERGED = (
+_NOT_CONVERGED = (
     "the optimiser stopped before it converged. The estimates may be inaccurate and have no intervals. "
     "Check units, north and --speed, or use a longer recording."
 )
@@ -57,7 +57,7 @@ def print_windows(windows: list[Window], names: tuple[str, ...], *, position: bo
         calibration = window.calibration
         part = f"From {window.begin:.0f} s on: " if len(windows) > 1 else ""
         if not calibration.converged:
-            note(f"{part}Warning: {NOT_CONVERGED}")
+            note(f"Warning: {part[:1].lower()}{part[1:]}{_NOT_CONVERGED}")
         if any(each.why for each in calibration.found):
             say(f"{part}The recording determines {calibration.rank} of {len(calibration.found)} parameter directions.")
         values = (
