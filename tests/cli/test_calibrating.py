@@ -39,7 +39,7 @@ def test_what_is_found_is_printed_and_its_file_is_tracked_with(place: Path) -> N
     for sensors in ("radars.yaml", "new/found.yaml"):
         tracked = call("track", "scans.csv", "--sensors", sensors, "--truth", "truth.csv")
         assert tracked.exit_code == 0, tracked.output
-        scores.append(float(tracked.stdout.split("mean OSPA ")[1].split(" ")[0]))
+        scores.append(float(tracked.stdout.split("mean OSPA")[1].split()[0]))
     assert scores[1] < scores[0]
 
 

@@ -131,11 +131,11 @@ def test_a_format_of_places_on_the_earth_without_an_origin_leaves_no_folder(plac
 
 
 def test_numbers_that_an_option_cannot_have_are_told_as_they_came(place: Path) -> None:
-    words = ("scans.csv", "--sensors", "radars.yaml", "--speed")
+    words = ("scans.csv", "--sensors", "radars.yaml", "--max-target-speed")
     low, none = call(*words, "-3"), call(*words, "fast")
     assert (low.exit_code, none.exit_code) == (2, 2)
-    assert "'--speed': expected greater than or equal to 0.001; got '-3'" in " ".join(low.stderr.split())
-    assert "'--speed': expected a valid number" in " ".join(none.stderr.split())
+    assert "'--max-target-speed': expected greater than or equal to 0.001; got '-3'" in " ".join(low.stderr.split())
+    assert "'--max-target-speed': expected a valid number" in " ".join(none.stderr.split())
     assert "got 'fast'" in none.stderr
 
 

@@ -103,7 +103,7 @@ def test_measurements_of_fast_targets_that_no_track_explains_are_told_of(tmp_pat
     assert high == pytest.approx(speed, rel=0.03)
     where = r"\(from 1 to \d+ s, the first 118\d\d m away\)"  # at 0 s a new track is estimated where it was measured
     assert re.match(rf"R: \d+ measurements that no track explains {where}", line)
-    assert "new tracks are expected at about 10 m/s: give `--speed 250`" in line
+    assert "new tracks are expected at about 10 m/s: give `--max-target-speed 250`" in line
     fast = scenario_of_recording(tmp_path / "radar.yaml", tmp_path / "scans.csv", speed=300.0)
     assert unexplained(run_scenario(fast.scenario, "still", seed=0), fast.scenario) == ()
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 _NOT_CONVERGED = (
     "the optimiser stopped before it converged. The estimates may be inaccurate and have no intervals. "
-    "Check units, north and --speed, or use a longer recording."
+    "Check units, north and --max-target-speed, or use a longer recording."
 )
 
 

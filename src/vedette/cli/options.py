@@ -38,7 +38,7 @@ SensorsFile = Annotated[
 Speed = Annotated[
     float,
     typer.Option(
-        "--speed",
+        "--max-target-speed",
         metavar="M/S",
         min=0.001,
         help="Largest expected target speed; used for motion and birth if the sensors file gives neither.",

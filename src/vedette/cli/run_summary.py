@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from vedette.scenarios import Scenario
     from vedette.simulation.records import RunRecord
 
+_SHOWN_SECONDS = 0.005  # of a stage
 _FEW_DECISIONS = 5  # printed without --verbose
 _LONGEST_ACTIONS = 36  # letters, beyond which --verbose alone prints actions
 
@@ -86,8 +87,8 @@ def _print_facts(console: Console, record: RunRecord, scenario: Scenario | None)
         window = f"mean over t = {times[0]:g} to {times[-1]:g} s"
         console.print(f"mean OSPA   {amount(f'{total:.2f}', unit)} ({parts}; {window})", soft_wrap=True)
     spent = {stage: float(seconds.sum()) for stage, seconds in record.timings.items()}
-    stages = ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in spent.items())
-    console.print(f"run time    {sum(spent.values()):.2f} s ({stages})", soft_wrap=True)
+    stages = ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in spent.items() if seconds >= _SHOWN_SECONDS)
+    console.print(f"run time    {sum(spent.values()):.2f} s{f' ({stages})' if stages else ''}", soft_wrap=True)
 
 
 def _print_diagnostics(console: Console, record: RunRecord, scenario: Scenario | None) -> None:

@@ -72,7 +72,7 @@ def _told(found: list[_Course], name: str, place: Floats, assumed: float) -> str
     number = counted(sum(each.number for each in found), "measurement")
     fast = f"{min(speeds):.0f} to {max(speeds):.0f} m/s"
     step = 10.0 ** math.floor(math.log10(max(speeds)))
-    advice = f"`--speed {0.5 * step * math.ceil(2.2 * max(speeds) / step):g}`, or `birth` and `motion`"
+    advice = f"`--max-target-speed {0.5 * step * math.ceil(2.2 * max(speeds) / step):g}`, or `birth` and `motion`"
     what = f"{number} that no track explains ({where}) lie on straight courses at {fast}"
     return f"{name}: {what}, and new tracks are expected at about {assumed:g} m/s: give {advice} for such targets"
 
