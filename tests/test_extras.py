@@ -138,7 +138,7 @@ def test_filters_fusion_control_and_scenarios_need_no_extra(tmp_path: Path) -> N
 
 
 def test_a_tracking_loop_with_a_plan_needs_no_extra(tmp_path: Path) -> None:
-    (block,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text("utf-8"), re.DOTALL)
+    (block,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs/loop.md").read_text("utf-8"), re.DOTALL)
     ran = without(REFUSED, block, tmp_path)
     assert ran.returncode == 0, ran.stderr
     assert "go to" in ran.stdout

@@ -18,7 +18,7 @@ from vedette.evaluation.figures.scene import (
     draw_zones,
     field_handles,
     label_axes,
-    name_offsets,
+    place_names,
     zone_handles,
 )
 from vedette.evaluation.figures.style import (
@@ -51,7 +51,7 @@ def scenario_figure(scenario: Scenario, truth: Truth) -> Figure:
     draw_zones(axes, zones(scenario), scale)
     _draw_births(axes, scenario, scale)
     _draw_tracks(axes, truth, scale)
-    _draw_sensors(axes, scenario, scale)
+    _draw_sensors(axes, scenario, truth, np.array([low, high]), scale)
     axes.set_xlim(low[0] * scale, high[0] * scale)
     axes.set_ylim(low[1] * scale, high[1] * scale)
     for axis in (axes.xaxis, axes.yaxis):
@@ -95,12 +95,11 @@ def _draw_tracks(axes: Axes, truth: Truth, scale: float) -> None:
         axes.plot(*path[-1], marker="^", markersize=5, **style)
 
 
-def _draw_sensors(axes: Axes, scenario: Scenario, scale: float) -> None:
+def _draw_sensors(axes: Axes, scenario: Scenario, truth: Truth, bounds: Floats, scale: float) -> None:
     model = scenario.model
-    region = scenario.model.region
-    extent = max(region.x_max - region.x_min, region.y_max - region.y_min)
-    offsets = name_offsets(np.array([sensor.position for sensor in model.sensors]), extent)
-    for name, sensor, offset in zip(model.sensor_names, model.sensors, offsets, strict=True):
+    places = np.array([sensor.position for sensor in model.sensors])
+    stands = place_names(model.sensor_names, places, bounds, truth.states[:, :2])
+    for name, sensor, stand in zip(model.sensor_names, model.sensors, stands, strict=True):
         place = (sensor.position[0] * scale, sensor.position[1] * scale)
         if sensor.platform.top_speed > 0.0:
             _draw_heading(axes, place, np.radians(sensor.heading_deg))
@@ -110,7 +109,7 @@ def _draw_sensors(axes: Axes, scenario: Scenario, scale: float) -> None:
         axes.plot(*place, marker="s", markersize=6, color=INK, zorder=5)
         paper = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
         style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7, "zorder": 4.5, "bbox": paper}
-        axes.annotate(drawn_text(name), place, **offset, **style)
+        axes.annotate(drawn_text(name), place, **stand.arguments, **style)
 
 
 def _draw_heading(axes: Axes, place: tuple[float, float], heading: float) -> None:

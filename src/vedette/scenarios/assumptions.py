@@ -51,7 +51,8 @@ def assumed_motion(given: Mapping[str, Any], speed: float, words: dict[str, str]
         # Held over the times between scans of several sensors, it would be the less the more often some of them scans.
         found["motion"] = {"kind": "constant_velocity", "sigma_v": speed / 20.0, "acceleration": "continuous"}
         words["motion"] = (
-            f"constant velocity, process noise {speed / 20.0:g} m/s^1.5 (for speeds up to {speed:g} m/s; --max-target-speed)"
+            f"constant velocity, process noise {speed / 20.0:g} m/s^1.5 (for speeds up to {speed:g} m/s; "
+            "--max-target-speed)"
         )
     if "survival" not in given:
         found["survival"] = {"kind": "constant", "probability": 1.0 - _LOST_PER_SECOND, "period": 1.0}

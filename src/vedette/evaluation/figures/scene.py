@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -25,7 +25,18 @@ from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.views import COAST, HOLE, INSIDE, NO_GO, REGION, Zone, zones
 from vedette.text import elided
 
-_NEAR = 0.1  # of the extent of a figure
+_POINTS_ACROSS, _LETTER = 200.0, 4.2  # points of a column's axes, and of a letter of a name
+# Where a name may stand, the preferred side first: offset in points, and alignment.
+_SIDES: tuple[tuple[tuple[float, float], dict[str, str]], ...] = (
+    ((0.0, 7.0), {"ha": "center", "va": "bottom"}),
+    ((0.0, -7.0), {"ha": "center", "va": "top"}),
+    ((8.0, 0.0), {"ha": "left", "va": "center"}),
+    ((-8.0, 0.0), {"ha": "right", "va": "center"}),
+    ((7.0, 5.0), {"ha": "left", "va": "bottom"}),
+    ((-7.0, 5.0), {"ha": "right", "va": "bottom"}),
+    ((7.0, -5.0), {"ha": "left", "va": "top"}),
+    ((-7.0, -5.0), {"ha": "right", "va": "top"}),
+)
 _ZONES: dict[str, dict[str, Any]] = {
     REGION: {"edgecolor": GREY, "linewidth": 0.8, "linestyle": "--"},
     INSIDE: {"edgecolor": INK, "linewidth": 0.8, "linestyle": "-."},
@@ -87,17 +98,47 @@ def scene_of(scenario: Scenario, planner: str) -> Scene:
     return Scene(model.sensor_names, words, zones(scenario), model.sensors, origin)
 
 
-def name_offsets(places: Floats, extent: float) -> list[dict[str, Any]]:
-    """Where the names of sensors stand, given (num, 2) places: above, or below where one near by is above."""
-    above: list[Floats] = []
-    offsets: list[dict[str, Any]] = []
-    for place in places:
-        if any(np.hypot(*(place - other)) < _NEAR * extent for other in above):
-            offsets.append({"xytext": (0, -7), "va": "top", "ha": "center"})
-        else:
-            above.append(place)
-            offsets.append({"xytext": (0, 7), "ha": "center"})
-    return offsets
+class NamePlace(NamedTuple):
+    """Where a name stands: arguments of `Axes.annotate`, and whether it covers another name there."""
+
+    arguments: dict[str, Any]
+    covers_name: bool
+
+
+def place_names(names: Sequence[str], places: Floats, bounds: Floats, marks: Floats) -> list[NamePlace]:
+    """Return where names stand: at the side of their place that is within the axes and covers no name and few marks.
+
+    Args:
+        names: the more important ones first.
+        places: (num, 2) what is named, m.
+        bounds: (2, 2) lower left and upper right corner of the axes, m.
+        marks: (n, 2) what names should not cover, such as targets and paths, m.
+    """
+    point = float((bounds[1] - bounds[0]).max()) / _POINTS_ACROSS
+    corners = np.array([[x, y] for x in np.linspace(-1.0, 1.0, 9) for y in (-1.0, 0.0, 1.0)])
+    obstacles, taken = np.concatenate([marks, places]), np.empty((0, 2))
+    found = []
+    for name, place in zip(names, places, strict=True):
+        half = np.array([0.5 * _LETTER * len(name) + 2.0, 5.0]) * point
+        centres = [place + point * np.array(away) + half * np.sign(away) for away, _ in _SIDES]
+        covered = [
+            (
+                _inside(taken, centre, half),
+                bool((centre - half < bounds[0]).any() or (centre + half > bounds[1]).any()),
+                _inside(obstacles, centre, half),
+            )
+            for centre in centres
+        ]
+        side = min(range(len(_SIDES)), key=lambda each: covered[each])
+        away, alignment = _SIDES[side]
+        found.append(NamePlace({"xytext": away, **alignment}, covered[side][0] > 0))
+        taken = np.concatenate([taken, centres[side] + half * corners])
+    return found
+
+
+def _inside(points: Floats, centre: Floats, half: Floats) -> int:
+    """Return the number of points in a box."""
+    return int((np.abs(points - centre) < half).all(axis=1).sum())
 
 
 def draw_zones(axes: Axes, drawn: Sequence[Zone], scale: float) -> None:

@@ -24,7 +24,7 @@ from vedette.evaluation.figures.scene import (
     draw_zones,
     field_handles,
     label_axes,
-    name_offsets,
+    place_names,
     zone_handles,
 )
 from vedette.evaluation.figures.style import (
@@ -144,22 +144,31 @@ def draw_tracks(axes: Axes, record: RunRecord, scale: float, scene: Scene, shade
     draw_zones(axes, scene.zones, scale)
     _draw_truth(axes, record, scale)
     _draw_estimates(axes, record, scale, shade)
+    marks = np.concatenate([_positions(record), *(decision.poses[:, :2] for decision in record.decisions)])
+    names = [scene.name(sensor) for sensor in range(record.num_sensors)]
+    stands = place_names(names, record.poses[0, :, :2], bounds_of([record], scene), marks)
     for sensor in range(record.num_sensors):
-        _draw_sensor(axes, record, sensor, scale, scene)
+        _draw_sensor(axes, record, sensor, scale, scene, stands[sensor].arguments)
     axes.set_aspect("equal")
 
 
 def frame_tracks(axes: Axes, records: Sequence[RunRecord], scale: float, scene: Scene) -> None:
-    """Limits, shared by all panels, of a square around everything but a stray estimate; a label on the y axis."""
-    points = np.concatenate([scene.corners, *(_positions(record) for record in records)]) * scale
-    low, high = points.min(axis=0), points.max(axis=0)
-    reach = 0.55 * max(float((high - low).max()), np.finfo(float).eps)
-    middle = (low + high) / 2.0
-    axes.set_xlim(middle[0] - reach, middle[0] + reach)
-    axes.set_ylim(middle[1] - reach, middle[1] + reach)
+    """Limits of `bounds_of`, shared by all panels; a label on the y axis."""
+    low, high = bounds_of(records, scene) * scale
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
     label_axes(axes, scale, scene.origin if len(records) == 1 else None)
+
+
+def bounds_of(records: Sequence[RunRecord], scene: Scene) -> Floats:
+    """Return the corners of a square around everything except stray estimates, (2, 2), m."""
+    points = np.concatenate([scene.corners, *(_positions(record) for record in records)])
+    low, high = points.min(axis=0), points.max(axis=0)
+    reach = 0.55 * max(float((high - low).max()), np.finfo(float).eps)
+    middle = (low + high) / 2.0
+    return np.array([middle - reach, middle + reach])
 
 
 def reach_of(records: Sequence[RunRecord]) -> float:
@@ -203,7 +212,9 @@ def recur(labels: Ints) -> bool:
     return len(np.unique(labels, axis=0)) < len(labels)
 
 
-def _draw_sensor(axes: Axes, record: RunRecord, sensor: int, scale: float, scene: Scene) -> None:
+def _draw_sensor(
+    axes: Axes, record: RunRecord, sensor: int, scale: float, scene: Scene, name_place: dict[str, Any]
+) -> None:
     path = record.poses[:, sensor, :2] * scale
     field = scene.field(sensor, record.poses[0, sensor])
     if field is not None:
@@ -216,8 +227,7 @@ def _draw_sensor(axes: Axes, record: RunRecord, sensor: int, scale: float, scene
     axes.plot(*path[0], marker=marker, color=INK, markerfacecolor=GREY, markersize=9, zorder=6)
     paper = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
     style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7, "zorder": 9, "bbox": paper}
-    offset = name_offsets(record.poses[0, :, :2], reach_of([record]))[sensor]
-    axes.annotate(scene.name(sensor), _point(path[0]), **offset, **style)
+    axes.annotate(scene.name(sensor), _point(path[0]), **name_place, **style)
     if len(record.decisions) > _MOST_DECISIONS:
         return
     for number, decision in enumerate(record.decisions, start=1):

@@ -19,9 +19,17 @@ from numpy.typing import NDArray
 
 from vedette.errors import InputError, VedetteError
 from vedette.evaluation.figures.labels import drawn_text, short_label
-from vedette.evaluation.figures.scene import draw_field, draw_zones, name_offsets, scene_of
+from vedette.evaluation.figures.scene import draw_field, draw_zones, place_names, scene_of
 from vedette.evaluation.figures.style import COLUMN_WIDTH, GREY, INK, colour, new_figure, styled
-from vedette.evaluation.figures.tracks import LARGE, SENSOR_MARKERS, add_legend, frame_tracks, reach_of, recur
+from vedette.evaluation.figures.tracks import (
+    LARGE,
+    SENSOR_MARKERS,
+    add_legend,
+    bounds_of,
+    frame_tracks,
+    reach_of,
+    recur,
+)
 from vedette.evaluation.scans import LIE, Scans, code_of_sensors, in_plane, scans_of_record
 from vedette.evaluation.told import told_by
 from vedette.evaluation.track_formats import utc_text
@@ -172,6 +180,7 @@ class _Drawing:
         self._draw_sensors(step)
         self._draw_truth(step)
         self._draw_estimates(step)
+        self._draw_names(step)
 
     def _add(self, artist: Artist) -> None:
         self._shown.append(artist)
@@ -185,13 +194,6 @@ class _Drawing:
         ids, states = truth.at(step)
         style: dict[str, Any] = {"marker": "o", "color": INK, "markerfacecolor": "white", "markersize": 5}
         self._add(self._axes.plot(*(states[:, :2].T * self._scale), linestyle="", zorder=4, **style)[0])
-        names = self._told.names if len(ids) <= _MOST_NAMED else ()
-        for target, state in zip(ids.tolist(), states, strict=True):
-            if target >= len(names):
-                continue
-            place = (float(state[0]) * self._scale, float(state[1]) * self._scale)
-            text: dict[str, Any] = {"textcoords": "offset points", "fontsize": 6, "ha": "center", "zorder": 7}
-            self._add(self._axes.annotate(drawn_text(elided(names[target], 20)), place, xytext=(0, 6), **text))
 
     def _draw_estimates(self, step: int) -> None:
         past = self._record.estimates[: step + 1]
@@ -210,16 +212,39 @@ class _Drawing:
             ellipse = Ellipse(place, width, height, angle=angle, color=shade, fill=False, linewidth=0.8, zorder=5)
             self._add(self._axes.add_patch(ellipse))
             self._add(self._axes.plot(*place, marker=".", color=shade, markersize=5, zorder=6)[0])
-            if self._places and len(now.labels) <= _MOST_NAMED:
-                style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 6, "color": shade, "zorder": 7}
-                self._add(self._axes.annotate(".".join(map(str, label)), place, xytext=(4, -8), **style))
+
+    def _draw_names(self, step: int) -> None:
+        """Names of sensors, targets and estimates, in this order; a name that would cover another is left out."""
+        record, now = self._record, self._record.estimates[step]
+        ids, states = record.truth.at(step)
+        names = [(self._scene.name(s), pose[:2], INK) for s, pose in enumerate(record.poses[step])]
+        if record.num_sensors > _MOST_NAMED:
+            names = []
+        if len(ids) <= _MOST_NAMED:
+            known = zip(ids.tolist(), states, strict=True)
+            names += [
+                (drawn_text(elided(self._told.names[target], 20)), state[:2], INK)
+                for target, state in known
+                if target < len(self._told.names)
+            ]
+        if self._places and len(now.labels) <= _MOST_NAMED:
+            of_estimates = zip(now.labels.tolist(), now.means, strict=True)
+            names += [(".".join(map(str, label)), mean[:2], self._shade(label)) for label, mean in of_estimates]
+        if not names:
+            return
+        marks = np.concatenate([states[:, :2], now.means[:, :2], record.poses[step, :, :2]])
+        places = np.array([place for _, place, _ in names])
+        stands = place_names([name for name, *_ in names], places, bounds_of([record], self._scene), marks)
+        for (name, _, shade), place, (arguments, covers_name) in zip(names, places * self._scale, stands, strict=True):
+            style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 6, "color": shade, "zorder": 9}
+            if not covers_name:
+                self._add(self._axes.annotate(name, (float(place[0]), float(place[1])), **arguments, **style))
 
     def _shade(self, label: list[int]) -> str:
         return colour(self._places.get(tuple(label), 0))
 
     def _draw_sensors(self, step: int) -> None:
         record, model = self._record, self._scenario.model
-        offsets = name_offsets(record.poses[step, :, :2], reach_of([record]))
         for s, (section, pose) in enumerate(zip(model.sensors, record.poses[step], strict=True)):
             place = (float(pose[0]) * self._scale, float(pose[1]) * self._scale)
             field = self._scene.field(s, pose)
@@ -230,9 +255,6 @@ class _Drawing:
             marker = SENSOR_MARKERS[s % len(SENSOR_MARKERS)]
             style: dict[str, Any] = {"marker": marker, "color": INK, "markerfacecolor": GREY, "markersize": 6}
             self._add(self._axes.plot(*place, zorder=8, **style)[0])
-            if record.num_sensors <= _MOST_NAMED:
-                text: dict[str, Any] = {"textcoords": "offset points", "fontsize": 6, "zorder": 9}
-                self._add(self._axes.annotate(self._scene.name(s), place, **offsets[s], **text))
             scan = self._scans[step][s] if self._scans else None
             if scan is not None and section.measurement.kind in LIE:
                 self._draw_scan(scan, section.measurement.kind, pose)
