@@ -20,7 +20,7 @@ from vedette.models.arguments import count, reject
 from vedette.plausible import told_elsewhere
 from vedette.scenarios import Scenario, load_scenario
 from vedette.scenarios.build import build_experiment, build_parts, build_sensors
-from vedette.scenarios.sections.planners import Strategy
+from vedette.scenarios.sections.strategies import Strategy
 from vedette.simulation import Experiment, Moment, RunRecord, Truth, World
 from vedette.simulation.health import Health
 from vedette.simulation.journal import Journal

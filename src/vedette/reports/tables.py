@@ -22,6 +22,7 @@ from vedette.reports.groups import Group, Strategy
 from vedette.text import elided_apart, with_error, with_minus
 
 _BY_CHANCE = 1e-3  # chance below which a largest value says that the filter is not consistent
+_DIFFERENCES = range(4, 7)  # columns of `strategy_rows` that compare with the first strategy
 _LONGEST_NAME = 32  # letters, beyond which the page gives the full name as a title
 
 # (num_runs,) of an ensemble over the counted scans, NaN where a run has no value.
@@ -131,7 +132,7 @@ def error_table(group: Group) -> Table | None:
     caption = (
         f"Mean over {group.comparison.num_runs} paired runs and {over}, ± one standard error."
         if several
-        else f"1 paired run, mean {over}."
+        else f"1 {'paired ' if len(rows) > 1 else ''}run, mean {over}."
     )
     if len(rows) > 1:
         won = f", run by run, so above 0 where {first} is better; runs won: by {first}." if several else "."
@@ -139,7 +140,11 @@ def error_table(group: Group) -> Table | None:
     if several:
         caption += " A target is lost at the end where it has no estimate within the cutoff at the last of these scans."
     more = tail_header(group.comparison.unit) if several else ()
-    return Table(caption, (*header(group.comparison), *more), rows)
+    names = (*header(group.comparison), *more)
+    if len(rows) == 1:  # without differences
+        places = [place for place in range(len(names)) if not _DIFFERENCES.start <= place < _DIFFERENCES.stop]
+        names, rows = tuple(names[place] for place in places), (tuple(rows[0][place] for place in places),)
+    return Table(caption, names, rows)
 
 
 def measure_table(group: Group) -> Table | None:

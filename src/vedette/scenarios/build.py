@@ -30,10 +30,11 @@ from vedette.scenarios.sections.courses import in_courses
 from vedette.scenarios.sections.custom import Custom, NotGiven
 from vedette.scenarios.sections.deciding import Lookahead
 from vedette.scenarios.sections.fusion import IN_FULL, OF_SCANS, ONE_BELIEF, CustomFusion
-from vedette.scenarios.sections.planners import STRATEGIES, Named, NamedIndependent, Parts, Strategy, strategy_of
+from vedette.scenarios.sections.planners import STRATEGIES, Named, NamedIndependent, strategy_of
 from vedette.scenarios.sections.platforms import CustomPlatform
 from vedette.scenarios.sections.scenario import ScenarioModel
 from vedette.scenarios.sections.sensors import Sensor
+from vedette.scenarios.sections.strategies import Parts, Strategy
 from vedette.scenarios.sections.tracking import CustomFilter
 from vedette.scenarios.sections.tracking import Filter as FilterSection
 from vedette.scenarios.sections.undetected import undetected_anywhere
