@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,16 +11,18 @@ import typer
 from vedette.cli.errors import check_ending, named_options
 from vedette.cli.options import ScenarioName, Trust
 from vedette.cli.output import console as new_console
-from vedette.cli.output import note, publish, say
+from vedette.cli.output import is_verbose, note, publish, say
 from vedette.cli.running import Approval
 from vedette.extras import need
 
 if TYPE_CHECKING:
     from rich.table import Table
+    from rich.text import Text
 
     from vedette.scenarios import Scenario
     from vedette.simulation import Truth
 
+_MOST_ROWS, _FIRST_ROWS = 8, 3  # of a table; of a longer one without --verbose
 PICTURE_FORMATS = ("png", "pdf", "svg")
 
 
@@ -102,13 +104,25 @@ def _sensors(scenario: Scenario) -> Table:
     starts = [] if moves_from(model) else ["moves from"]
     direction = "course\n(deg)" if model.by_compass else "heading\n(deg)"
     table = _numbers_table("sensors", "name", "x\n(m)", "y\n(m)", direction, "platform", *starts)
+    rows: list[tuple[str | Text, ...]] = []
     for name, sensor in zip(model.sensor_names, model.sensors, strict=True):
         heading = sensor.heading_deg
         if model.by_compass:
             heading = start_course(heading, model.north(), sensor.position)
         place = (f"{sensor.position[0]:g}", f"{sensor.position[1]:g}")
         start = "-" if sensor.platform.kind == "still" else sensor.moves_from.replace("_", " ")
-        table.add_row(Text(name), *place, f"{heading:g}", sensor.platform.kind, *[start for _ in starts])
+        rows.append((Text(name), *place, f"{heading:g}", sensor.platform.kind, *[start for _ in starts]))
+    return _filled(table, rows)
+
+
+def _filled(table: Table, rows: Sequence[tuple[str | Text, ...]]) -> Table:
+    """The table with its rows; of many rows the first ones, unless details are asked for."""
+    few = is_verbose() or len(rows) <= _MOST_ROWS
+    for row in rows if few else rows[:_FIRST_ROWS]:
+        table.add_row(*row)
+    if not few:
+        table.caption = f"{len(rows) - _FIRST_ROWS} more: --verbose lists all"
+        table.caption_justify = "left"
     return table
 
 
@@ -130,13 +144,14 @@ def _targets(scenario: Scenario) -> Table:
     truth = truth_of(scenario)
     table = _numbers_table("targets", "id", "from\n(s)", "to\n(s)", "x\n(m)", "y\n(m)", "vx\n(m/s)", "vy\n(m/s)")
     scans = truth.scans
+    found: list[tuple[str | Text, ...]] = []
     for target in np.unique(truth.ids):
         rows = np.flatnonzero(truth.ids == target)
         first, last = truth.times[scans[rows[0]]], truth.times[scans[rows[-1]]]
         x, y, *velocity = truth.states[rows[0]]
         speeds = [f"{value:.1f}" for value in velocity[:2]] + ["-"] * (2 - len(velocity))
-        table.add_row(str(target + 1), f"{first:g}", f"{last:g}", f"{x:.0f}", f"{y:.0f}", *speeds)
-    return table
+        found.append((str(target + 1), f"{first:g}", f"{last:g}", f"{x:.0f}", f"{y:.0f}", *speeds))
+    return _filled(table, found)
 
 
 def truth_of(scenario: Scenario) -> Truth:
