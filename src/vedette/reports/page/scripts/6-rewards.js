@@ -1,7 +1,6 @@
 // Beside the plane: the rewards of the last decision, and what lies under the pointer there.
-function drawRewards(canvas, run, step) {
+function drawRewards(canvas, decision, run) {
   const { context, width, height } = prepared(canvas);
-  const decision = decisionAt(run, step);
   if (width < 150) return; // not laid out yet
   if (!decision?.curves.length) return;
   const names = run.sensors.map(({ name }) => clipped(name, 16));

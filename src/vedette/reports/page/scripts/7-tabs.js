@@ -17,7 +17,8 @@ function tabsOf(holder, list, choose) {
     const known = run.mean !== null && run.mean !== undefined;
     Object.assign(bar.style, { background: swatch.style.background, width: `${known && most > 0 ? (100 * run.mean) / most : 0}%` });
     const error = known ? `${fixed(run.mean, 1)}${run.ospa_unit && ` ${run.ospa_unit}`}` : "";
-    const what = [run.words, several ? run.group : "", `run ${run.run}${run.typical ? ", typical" : ""}`].filter(Boolean).join("; ");
+    const what = [several ? run.group : "", run.words, `run ${run.run}${run.typical ? ", typical" : ""}`].filter(Boolean).join("; ");
+    button.title = what;
     button.append(swatch, element("span", "name", run.strategy), element("span", "mean", error), bar, element("span", "about", what));
     button.addEventListener("click", () => choose(place));
     return button;

@@ -24,12 +24,16 @@ function startReplay(root) {
     panels.draw(run().times[state.step], shown(), camera.camera);
     part("caption").textContent = captionOf(run(), state.step);
     part("caption").style.borderColor = `var(--${strategyShade(run())})`;
-    drawRewards(part("rewards"), run(), state.step);
+    const decision = decisionAt(run(), state.step);
+    part("reward-block").hidden = !decision?.curves.length;
+    part("gains").hidden = !decision?.why;
+    drawRewards(part("rewards"), decision, run());
     drawTimeline(part("errors"), run(), state.step, paired(), state.ghost ?? runs[part("beside").value || -1]);
     tell();
   }
 
   function tell() {
+    const decision = decisionAt(run(), state.step);
     const { times, truth, estimates, ospa, ospa_unit } = run();
     const time = clock(run(), times[state.step]);
     const words = [`${estimates[state.step].length} estimates`];
@@ -41,9 +45,9 @@ function startReplay(root) {
     const lead = run().utc === null && times[state.step] !== null ? "t = " : "";
     part("summary").textContent = `${lead}${time}: ${words.join(", ")}`;
     part("decision").textContent = decisionText();
-    part("decision-notes").textContent = (decisionAt(run(), state.step)?.notes ?? []).map((note) => `Note: ${note}.`).join(" ");
+    part("decision-notes").textContent = (decision?.notes ?? []).map((note) => `Note: ${note}.`).join(" ");
     part("reward-title").textContent = run().reward ? `Reward (${run().reward})` : "Reward";
-    tellWhy(part, run(), decisionAt(run(), state.step));
+    tellWhy(part, run(), decision);
     part("scene").setAttribute("aria-label", `${run().strategy}, run ${run().run}, ${part("summary").textContent}`);
     part("scrubber").value = state.step;
     part("scrubber").setAttribute("aria-valuetext", `step ${state.step + 1} of ${last() + 1}, ${time}`);
@@ -157,7 +161,6 @@ function startReplay(root) {
   // What the run has is shown.
   function reveal() {
     part("scrubber").max = last();
-    part("rewards").hidden = !run().decisions.some((decision) => decision.curves.length);
     part("nothing").hidden = run().scans.length > 0;
     const searches = run().decisions.some((decision) => decision.undetected);
     for (const name of ["undetected", "undetected-key"]) part(name).hidden = !searches;
