@@ -50,7 +50,7 @@ def test_a_failed_run_says_where_it_stopped_until_it_is_done(broken: pytest.Monk
     assert results.failures() == (Failure("still", 1, 1, message),)
     assert results.missing("still") == (1,)
     told = CliRunner().invoke(app, ["results", str(folder)])
-    assert f"failed: 1 run, which the same command tries again:\n  cell still, run 1: {message}" in told.stdout
+    assert f"failed: 1 run; the same command tries again:\n  cell still, run 1: {message}" in told.stdout
     write_report(results, tmp_path / "report.html")
     page = (tmp_path / "report.html").read_text("utf-8")
     assert "1 run failed." in page

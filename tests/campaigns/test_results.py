@@ -272,12 +272,13 @@ def test_the_command_prints_the_comparisons_and_what_is_missing(whole):
         "sensors.*.clutter.rate 5.0:",
         "sensors.*.clutter.rate 10.0:",
         "OSPA (m)",
-        "jdm at 10 s",
+        "jdm     joint decisions, CS divergence",
         "trial, seed 7: 10 of 12 runs are finished",
-        "missing of random-rate-5.0: 1",
+        "missing: 1 run of random-rate-5.0",
     ):
         assert part in result.output
-    assert "missing of jdm" not in result.output
+    assert "jdm at 10 s" in call("results", whole, "--verbose").output
+    assert "run of jdm" not in result.output
     assert "scenario paper-a" not in result.output
 
 

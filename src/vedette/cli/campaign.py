@@ -157,7 +157,7 @@ def report_failures(failed: tuple[Failed, ...]) -> None:
     """Name runs that could not be finished, and end with status 1 if there are any."""
     if not failed:
         return
-    complain(f"failed: {counted(len(failed), 'run')}, which the same command tries again:")
+    complain(f"failed: {counted(len(failed), 'run')}; the same command tries again:")
     print_failures(failed, complain)
     raise typer.Exit(1)
 

@@ -19,11 +19,11 @@ from vedette.densities.tracks import gaussian_tracks
 from vedette.errors import InputError, ModelError, VedetteError
 from vedette.kernels.base.types import Bools, Floats, Ints, Lmb
 from vedette.kernels.gaussian.scans import examined_scan
+from vedette.kernels.labelled import births as kernels
 from vedette.models import BirthModel, SensorModel
 from vedette.models.arguments import as_array, reject, step_number
 from vedette.models.measurement import MeasurementModel, wrap_angular
 from vedette.plausible import implausible
-from vedette.probabilities import log_expit
 
 _MOST_STDS = 10.0  # of noise below the least that a measurement is without it
 _NO_ROWS = np.empty(0, np.int64)
@@ -130,15 +130,21 @@ def no_time(dt: Any) -> bool:
 
 
 @cache
+@cache
+def no_births(state_dim: int) -> LMB:
+    """Return an LMB without targets; made once for each dimension."""
+    return LMB.empty(state_dim)
+
+
 def nobody(state_dim: int) -> Lmb:
     """No births, as kernels take them."""
-    return LMB.empty(state_dim).to_kernel()
+    return no_births(state_dim).to_kernel()
 
 
 def births_at(birth: BirthModel, step: int) -> LMB:
     """The LMB of the targets that may be born at `step`, or within the model's period, labelled (step, site)."""
     if not birth.is_active(step):
-        return LMB.empty(birth.state_dim)
+        return no_births(birth.state_dim)
     return born_at(births_of(birth), step)
 
 
@@ -150,16 +156,16 @@ def born_at(born: LMB, step: int) -> LMB:
     return unchecked(LMB, unchecked(TrackTable, labels, *same, None), born.existence_logit)
 
 
-def births_within(born: LMB, period: float | None, dt: float) -> LMB:
-    """Who may be born within `dt` seconds, of those who may within `period`; None: at a step of any length.
+def births_within(born: LMB, period: float | None, dt: float, others: LMB | None = None) -> LMB:
+    """Return the births within `dt` seconds, of the births within `period` (None: at a step of any length).
 
-    1 - r(dt) = (1 - r)^(dt / period).
+    1 - r(dt) = (1 - r)^(dt / period). others: more births, whose labels follow.
     """
-    if period is None:
+    if period is None and others is None:
         return born
-    log_none = dt / period * log_expit(-born.existence_logit)
-    with np.errstate(divide="ignore"):  # certain births, or none
-        return unchecked(LMB, born.tracks, np.log(-np.expm1(log_none)) - log_none)
+    more = nobody(born.state_dim) if others is None else others.to_kernel()
+    within = kernels.births_within(born.to_kernel(), more, 1.0 if period is None else dt / period)
+    return unchecked(LMB, TrackTable.from_kernel(within.tracks), within.existence_logit)
 
 
 @lru_cache(maxsize=1000)

@@ -14,13 +14,14 @@ import numpy as np
 from vedette.densities import LMB, Labelled, TrackTable, as_lmb
 from vedette.densities.containers import unchecked
 from vedette.densities.labelled import LABELLED
-from vedette.densities.tracks import gaussian_tracks, take_tracks
+from vedette.densities.tracks import take_tracks
 from vedette.errors import InputError
 from vedette.filters import Limits
-from vedette.filters.inputs import births_at, births_within, model_errors, nobody
+from vedette.filters.inputs import births_at, births_within, model_errors, no_births, nobody
 from vedette.fusion.matching import OWN_LABELS
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.types import Floats, Ints, Lmb, ScanInput
+from vedette.kernels.labelled.births import births_of_measurements
 from vedette.kernels.labelled.stacking import stack_tracks
 from vedette.kernels.steps.explained import prob_explained
 from vedette.models import BirthModel, MeasurementBirth, SensorModel
@@ -70,11 +71,7 @@ def births_due(birth: BirthModel, step: int, dt: float, measured: LMB | None) ->
     """
     if birth.from_measurements is None:
         return None
-    due = births_at(birth, step)
-    if measured is not None:
-        tracks = TrackTable.from_kernel(stack_tracks([due.tracks.to_kernel(), measured.tracks.to_kernel()]))
-        due = unchecked(LMB, tracks, np.concatenate([due.existence_logit, measured.existence_logit]))
-    return births_within(due, birth.period, dt)
+    return births_within(births_at(birth, step), birth.period, dt, measured)
 
 
 def births_from_scans(
@@ -228,14 +225,8 @@ class _Cells:
 
 
 def _born(found: Unexplained, model: MeasurementBirth, step: int, first_index: int) -> LMB:
-    num, dim = len(found.probabilities), len(model.std)
-    if num == 0:
-        return LMB.empty(dim)
-    labels = np.column_stack([np.full(num, step), first_index + np.arange(num)])
-    means = np.zeros((num, dim))
-    means[:, :2] = found.positions
-    shares = model.expected * found.probabilities / found.probabilities.sum()
-    existence = np.minimum(model.max_existence, shares)
-    tracks = gaussian_tracks(labels, means, np.tile(model.cov, (num, 1, 1)))
-    with np.errstate(divide="ignore"):  # a share may be too small for a number
-        return unchecked(LMB, tracks, np.log(existence) - np.log1p(-existence))
+    if len(found.probabilities) == 0:
+        return no_births(len(model.std))
+    shared = (model.std, float(model.expected), float(model.max_existence), step, first_index)
+    born = births_of_measurements(found.positions, found.probabilities, *shared)
+    return unchecked(LMB, TrackTable.from_kernel(born.tracks), born.existence_logit)
