@@ -141,7 +141,8 @@ def carry_out(
     from vedette.campaigns import Progress, run_campaign
 
     with interruptible(f"{folder} keeps every run that is finished; the same command goes on from there"):
-        compile_if_cold(campaign.cells[0].scenario)
+        first = campaign.cells[0].scenario
+        compile_if_cold(first, [cell.planner for cell in campaign.cells if cell.scenario is first])
         with Progress(campaign, console(stderr=True)) as progress:
             return run_campaign(
                 campaign,

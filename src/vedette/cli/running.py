@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
@@ -27,15 +27,15 @@ if TYPE_CHECKING:
     from vedette.simulation.records import RunRecord
 
 
-def compile_if_cold(scenario: Scenario) -> None:
-    """The first start of all compiles for a minute or two; it is shared between two processes."""
+def compile_if_cold(scenario: Scenario, planners: Sequence[str] = ("jdm",)) -> None:
+    """Compile the kernels of a scenario and its planners in two processes, if no kernel is compiled yet."""
     from vedette.kernels.base.places import is_cold
 
     if is_cold():
         from vedette.evaluation.precompile import precompile
 
         with compiling():
-            precompile(scenario)
+            precompile(scenario, planners)
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from multiprocessing import get_context
 from typing import Any
@@ -14,6 +15,7 @@ from vedette.fusion import shares_prediction
 from vedette.processes import as_children, end_with_parent
 from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_experiment, build_planner
+from vedette.scenarios.sections.planners import Named
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.loop import run_stream
 from vedette.tracking import State
@@ -22,25 +24,40 @@ from vedette.tracking import State
 _QUICK: dict[str, Any] = {"num_samples": 2, "horizon_steps": 1, "num_threads": 1, "confidence": None}
 
 
-def precompile(scenario: Scenario) -> None:
-    """Compile the tracker of the scenario here; its fusion and joint planning in another process meanwhile.
+def precompile(scenario: Scenario, planners: Sequence[str] = ("jdm",)) -> None:
+    """Compile the tracker of a scenario and its joint planners, in this process and another one at the same time.
 
-    Each finds in the cache what the other has already compiled. Whatever the other process does not get done (it may be
+    The other process compiles the fusion and the last of the joint planners, this one the tracker and the others. Each
+    finds in the cache what the other has already compiled. Whatever the other process does not get done (it may be
     forbidden, or fail) is compiled where it is first used; no result depends on it.
+
+    Args:
+        scenario: with birth sites, where targets are placed for the example; without, the tracker alone is compiled.
+        planners: names of strategies; those that are no joint decisions are left out.
     """
     experiment = build_experiment(scenario)
     labelled = isinstance(experiment.tracker.initial().fused, Labelled)
     if not (labelled and experiment.tracker.targets.birth.num_sites):
         _compile_tracker(experiment)  # no fusion nor planning without labels; no example without birth sites
         return
-    other = get_context("spawn").Process(target=_compile_planning, args=(scenario,), daemon=True)
+    *here, there = [name for name in planners if _joint_planner(scenario, name)] or ["jdm"]
+    other = get_context("spawn").Process(target=_compile_elsewhere, args=(scenario, there), daemon=True)
     try:
         with as_children():
             other.start()
     except OSError:
         return
     _compile_tracker(experiment)
+    for name in here:
+        _compile_planning(scenario, name)
     other.join()
+
+
+def _joint_planner(scenario: Scenario, name: str) -> JointPlanner | None:
+    """The planner of that name; None where it is not a joint one."""
+    planner = build_planner(scenario, name)
+    planner = planner.planner if isinstance(planner, Named) else planner
+    return planner if isinstance(planner, JointPlanner) else None
 
 
 def _compile_tracker(experiment: Experiment) -> None:
@@ -49,12 +66,16 @@ def _compile_tracker(experiment: Experiment) -> None:
     tracker.step(tracker.initial(), scans, experiment.poses, 1.0, rngs=[run_stream(0, 0)] * num_sensors)
 
 
-def _compile_planning(scenario: Scenario) -> None:
-    """Fuse, estimate and plan as if every birth site held a target, one of which a single sensor knows."""
+def _compile_elsewhere(scenario: Scenario, name: str) -> None:
     end_with_parent()
+    _compile_planning(scenario, name)
+
+
+def _compile_planning(scenario: Scenario, name: str) -> None:
+    """Fuse, estimate and plan as if every birth site held a target, one of which a single sensor knows."""
     experiment = build_experiment(scenario)
-    planner = build_planner(scenario, "jdm")
-    assert isinstance(planner, JointPlanner)
+    planner = _joint_planner(scenario, name)
+    assert planner is not None
     num_sites, num_others = experiment.tracker.targets.birth.num_sites, experiment.num_sensors - 1
     beliefs = (_belief(experiment, num_sites), *(_belief(experiment, max(num_sites - 1, 1)),) * num_others)
     fused = beliefs[0] if shares_prediction(planner.fusion) else planner.fusion.fuse(beliefs)[0]
