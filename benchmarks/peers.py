@@ -29,6 +29,7 @@ from crowd import CUTOFF, FROM_STEP, NAMES, prepared, tracked
 from eight_sensors import RULES, SIDE, box_run, box_scene
 
 from vedette.evaluation import ospa
+from vedette.evaluation.figures.style import COLOURS, line_style
 from vedette.scenarios import GeneratedCrowd
 
 # Steps that take longer end a peer's run; and sizes beyond are not tried.
@@ -173,21 +174,26 @@ def draw(rows: Sequence[Row], path: Path) -> None:
     matplotlib.use("Agg")
     from matplotlib import pyplot as plt
 
-    figure, axes = plt.subplots(1, 3, figsize=(12.0, 4.0), layout="constrained")
+    figure, (time, error) = plt.subplots(1, 2, figsize=(9.0, 4.0), layout="constrained")
     crowd = [row for row in rows if row.scene == "crowd"]
     for number, name in enumerate(dict.fromkeys(row.filter for row in crowd)):
         own = [row for row in crowd if row.filter == name]
-        numbers, style = [row.num_targets for row in own], {"marker": "osD^vP"[number % 6], "label": name}
-        axes[0].plot(numbers, [row.milliseconds for row in own], **style)
-        axes[1].plot(numbers, [row.ospa for row in own], **style)
-        axes[2].plot([row.milliseconds for row in own], [row.ospa for row in own], **style)
-    highest = 1.5 * max(row.ospa for row in crowd)
-    axes[0].set(xscale="log", yscale="log", xlabel="targets", ylabel="CPU time of a scan, ms")
-    axes[1].set(xscale="log", xlabel="targets", ylabel="OSPA (c = 25 m, p = 1), m", ylim=(0.0, highest))
-    axes[2].set(xscale="log", xlabel="CPU time of a scan, ms", ylabel="OSPA (c = 25 m, p = 1), m", ylim=(0.0, highest))
-    for each in axes:
+        numbers = [row.num_targets for row in own]
+        look = {
+            "marker": "osD^vP"[number % 6],
+            "color": COLOURS[number % 6],
+            "linestyle": line_style(number),
+            "label": name,
+        }
+        time.plot(numbers, [row.milliseconds for row in own], **look)
+        error.plot(numbers, [row.ospa for row in own], **look)
+    time.set(xscale="log", yscale="log", xlabel="targets", ylabel="CPU time per scan (ms)")
+    error.set(
+        xscale="log", xlabel="targets", ylabel="OSPA (m), cutoff 25 m", ylim=(0.0, 1.2 * max(row.ospa for row in crowd))
+    )
+    for each in (time, error):
         each.grid(True, which="major", alpha=0.4)
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=4, frameon=False)
+    figure.legend(*time.get_legend_handles_labels(), loc="outside upper center", ncols=2, frameon=False)
     figure.savefig(path, dpi=110)
     print(f"wrote {path}")
 
