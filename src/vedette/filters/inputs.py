@@ -136,8 +136,9 @@ def no_births(state_dim: int) -> LMB:
     return LMB.empty(state_dim)
 
 
+@cache
 def nobody(state_dim: int) -> Lmb:
-    """No births, as kernels take them."""
+    """No births, as kernels take them; made once for each dimension."""
     return no_births(state_dim).to_kernel()
 
 
