@@ -117,6 +117,7 @@ def write_report(
         folder=shlex.quote(campaign.default_folder),
         compared=axis_label(campaign.compare),
         claims=claims,
+        remark="" if yardstick is None else yardstick.remark,
         sections=sections,
         sweeps=sweeps,
         finished=sum(len(results.finished(cell.name)) for cell in campaign.cells),
