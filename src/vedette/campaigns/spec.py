@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import os
 import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -165,6 +166,6 @@ def load_spec(name_or_path: Path | str) -> CampaignSpec:
     """
     builtin = builtin_specs()
     path = builtin.get(str(name_or_path), Path(name_or_path))
-    if not path.exists():
+    if not os.path.exists(path):  # False, too, for what can be no path
         raise InputError(f"{path}: no such file; expected a campaign file or one of {', '.join(builtin)}")
     return parse_spec(read_text(path, "campaign file", _MOST_BYTES), str(path))

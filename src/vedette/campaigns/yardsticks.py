@@ -15,6 +15,7 @@ from vedette.campaigns.scores import StrategyScore, score_markdown, score_strate
 from vedette.campaigns.spec import CampaignSpec, load_spec
 from vedette.evaluation import Comparison
 from vedette.evaluation.actions import choice_words
+from vedette.evaluation.health import percent
 from vedette.evaluation.statistics import CONFIDENCE
 from vedette.evaluation.tails import tails
 from vedette.text import amount, with_minus
@@ -120,9 +121,9 @@ def _checked_decisions(yardstick: Yardstick, comparison: Comparison) -> Iterator
         shares = comparison.decision_shares(planner, times.index(time))
         words = {choice_words(choice): share for choice, share in shares.items()}
         first = next(iter(words))
-        evidence = f"chosen in {words.get(actions, 0.0):.0%} of the runs".replace("%", " %")
+        evidence = f"chosen in {percent(words.get(actions, 0.0))} of the runs"
         if first != actions:
-            evidence += f", ({first}) in {words[first]:.0%}".replace("%", " %")
+            evidence += f", ({first}) in {percent(words[first])}"
         claim = f"{planner} chooses ({actions}) at {time:g} s"
         yield CheckedClaim(claim, "reproduced" if first == actions else "not reproduced", evidence)
 

@@ -116,7 +116,7 @@ def _sensors(scenario: Scenario) -> Table:
 
 
 def _filled(table: Table, rows: Sequence[tuple[str | Text, ...]]) -> Table:
-    """The table with its rows; of many rows the first ones, unless details are asked for."""
+    """Return the table with its rows; of a long table the first rows, without `--verbose`."""
     few = is_verbose() or len(rows) <= _MOST_ROWS
     for row in rows if few else rows[:_FIRST_ROWS]:
         table.add_row(*row)

@@ -51,11 +51,8 @@ def diagnostics(health: HealthSummary) -> tuple[Diagnostic, ...]:
 
 
 def _level(value: float, much: float = 0.0) -> Level:
+    """`check` above `much`, `note` above 0; with `much` infinite never `check`."""
     return "check" if value > much else "note" if value > 0.0 else "ok"
-
-
-def _noted(value: float) -> Level:
-    return "note" if value > 0.0 else "ok"
 
 
 def _scans(share: float) -> str:
@@ -97,13 +94,13 @@ def _of_fusion(health: HealthSummary) -> Iterator[Diagnostic]:
         "Label sets missing at a sensor",
         "Share of the fused label sets (CLMB: labels) that a sensor lacks, for the sensor that lacks most.",
         _worst(health.missing_sets, health.sensors),
-        _noted(float(health.missing_sets.max())),
+        _level(float(health.missing_sets.max()), math.inf),
     )
     yield Diagnostic(
         "Labels unknown to a sensor",
         "Share of the scans at which a sensor lacks a label that another sensor has.",
         _worst(health.unknown_labels, health.sensors),
-        _noted(float(health.unknown_labels.max())),
+        _level(float(health.unknown_labels.max()), math.inf),
     )
 
 
@@ -111,8 +108,7 @@ def _of_filters(health: HealthSummary) -> Iterator[Diagnostic]:
     yield Diagnostic(
         "Posterior truncated",
         "The filter reached its limits, or left out improbable hypotheses. The weight is an upper bound, and "
-        "not the error: "
-        "a campaign with ten times as many hypotheses measures what the limits cost.",
+        "not the error: a campaign with ten times as many hypotheses measures what the limits cost.",
         _truncation(health),
         _truncation_level(health),
     )
@@ -134,7 +130,7 @@ def _of_filters(health: HealthSummary) -> Iterator[Diagnostic]:
         "Independence error",
         "Upper bound on the share of the weight that a filter moves when it treats labels as independent, per scan.",
         (f"{_bound(worst)} (mean {_bound(mean)})" if worst else "none") if known else "not known",
-        ("check" if mean > 5.0 * _MUCH else _noted(worst)) if known else "note",
+        ("check" if mean > 5.0 * _MUCH else _level(worst, math.inf)) if known else "note",
     )
     yield Diagnostic(
         "Targets dropped",
@@ -171,5 +167,5 @@ def _of_measurements(health: HealthSummary) -> Iterator[Diagnostic]:
         "Clutter raised",
         "Measurements at places where the clutter intensity was raised to its floor.",
         str(health.clutter_raised),
-        _noted(health.clutter_raised),
+        _level(health.clutter_raised, math.inf),
     )

@@ -159,7 +159,7 @@ def _means(comparison: Comparison, strategy: str, part: str, *names: str) -> lis
 
 
 def caption(comparison: Comparison) -> str:
-    """Return what the numbers of the table are, as a paragraph."""
+    """Return the caption of the table: heading and legend in one paragraph."""
     return f"{heading(comparison)}. {legend(comparison)}".rstrip()
 
 

@@ -142,7 +142,7 @@ def error_table(group: Group) -> Table | None:
     more = tail_header(group.comparison.unit) if several else ()
     names = (*header(group.comparison), *more)
     if len(rows) == 1:  # without differences
-        places = [place for place in range(len(names)) if not _DIFFERENCES.start <= place < _DIFFERENCES.stop]
+        places = [place for place in range(len(names)) if place not in _DIFFERENCES]
         names, rows = tuple(names[place] for place in places), (tuple(rows[0][place] for place in places),)
     return Table(caption, names, rows)
 

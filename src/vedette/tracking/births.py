@@ -22,7 +22,6 @@ from vedette.fusion.matching import OWN_LABELS
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.types import Floats, Ints, Lmb, ScanInput
 from vedette.kernels.labelled.births import births_of_measurements
-from vedette.kernels.labelled.stacking import stack_tracks
 from vedette.kernels.steps.explained import prob_explained
 from vedette.models import BirthModel, MeasurementBirth, SensorModel
 from vedette.models.arguments import pose_vector, reject
@@ -115,9 +114,8 @@ def births_waiting(birth: BirthModel, before: LMB | None, found: LMB | None) -> 
     places, new = before.tracks.means[:, :2], found.tracks.means[:, :2]
     apart = ((new[:, np.newaxis] - places) / model.std[:2]) ** 2
     far = np.flatnonzero((apart.sum(axis=-1) > _SAME_TARGET).all(axis=1))
-    kept = take_tracks(found.tracks, far)
-    tracks = TrackTable.from_kernel(stack_tracks([before.tracks.to_kernel(), kept.to_kernel()]))
-    return unchecked(LMB, tracks, np.concatenate([before.existence_logit, found.existence_logit[far]]))
+    kept = unchecked(LMB, take_tracks(found.tracks, far), found.existence_logit[far])
+    return births_within(before, None, 0.0, kept)
 
 
 def unexplained(

@@ -147,26 +147,19 @@ def lacks(found: Any, wanted: type, spared: Sequence[str] = ()) -> str:
     """What an object lacks of a class or protocol but for what is spared, in words; empty where it lacks nothing."""
     if not getattr(wanted, "_is_protocol", False):
         return "" if isinstance(found, wanted) else f"a {type(found).__name__}"
+    from vedette.models.arguments import protocol_members
+
     what = f"a {type(found).__name__}"
-    for name, member in _members(wanted).items():
+    for name in protocol_members(wanted):
         if name in spared:
             continue
+        member = inspect.getattr_static(wanted, name, None)  # an attribute without a default has none
         if not hasattr(found, name):
             return f"{what} without {_shown(name, member)}"
         own = found if name == "__call__" else getattr(found, name)
         if inspect.isfunction(member) and not _takes(own, member):
             return f"{what} that cannot be called as {_shown(name, member)}"
     return ""
-
-
-def _members(wanted: type) -> dict[str, Any]:
-    members = {name: member for parent in reversed(wanted.__mro__) for name, member in vars(parent).items()}
-    return {
-        name: member
-        for name, member in members.items()
-        if (inspect.isfunction(member) or isinstance(member, property))
-        and (name == "__call__" or not name.startswith("_"))
-    }
 
 
 def _parameters(member: Any) -> list[inspect.Parameter]:

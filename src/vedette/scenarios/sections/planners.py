@@ -234,7 +234,7 @@ def strategy_of(model: ScenarioModel, name: str) -> Strategy:
 
 
 def strategy_words(model: ScenarioModel, name: str) -> str:
-    """Return the description of a strategy; empty for a name that a scenario does not have, such as of a recording."""
+    """Return the description of a strategy; empty for an unknown name, such as `recorded`."""
     known = name in model.planners or name in STRATEGIES
     return strategy_of(model, name).words(model) if known else ""
 

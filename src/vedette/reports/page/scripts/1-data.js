@@ -45,5 +45,8 @@ function placeOfLabel(run, label) {
   return places.get(label);
 }
 
+// The numbers of the targets that have an estimate at a scan.
+const trackedAt = (run, step) => new Set(run.estimates[step].map((estimate) => estimate[7]));
+
 // The last decision at or before a scan, or undefined.
 const decisionAt = (run, step) => run.decisions.filter((decision) => decision.scan <= step).at(-1);

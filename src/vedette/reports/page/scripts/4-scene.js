@@ -17,7 +17,7 @@ function drawScene(canvas, run, step, show, camera, ghost) {
   if (show.trails) drawTrails(context, run, view, step, show);
   if (ghost) drawGhost(context, ghost, view, Math.min(step, ghost.times.length - 1));
   run.sensors.forEach((_, s) => drawSensor(context, run, view, step, s));
-  const tracked = new Set(run.estimates[step].map((estimate) => estimate[7]));
+  const tracked = trackedAt(run, step);
   run.truth[step].forEach((target) => drawTarget(context, view, target, tracked.has(target[0])));
   run.estimates[step].forEach((estimate) => drawEstimate(context, run, view, estimate, show));
   drawScale(context, view);

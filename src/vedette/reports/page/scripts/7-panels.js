@@ -43,7 +43,7 @@ function panelsOf(holder, attach) {
 
 function captionOf(run, step) {
   if (!run.known) return `${run.strategy}: ${run.estimates[step].length} estimates`;
-  const tracked = new Set(run.estimates[step].map((estimate) => estimate[7]));
+  const tracked = trackedAt(run, step);
   const number = run.truth[step].filter(([target]) => tracked.has(target)).length;
   const error = `OSPA ${run.ospa[step][0].toFixed(1)}${run.ospa_unit && ` ${run.ospa_unit}`}`;
   return `${run.strategy}: ${number} of ${run.truth[step].length} targets tracked, ${error}`;

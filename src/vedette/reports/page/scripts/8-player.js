@@ -81,13 +81,13 @@ function startReplay(root) {
 
   function tellPointer() {
     const found = underPointer();
-    const [hover, { width }] = [part("hover"), root.getBoundingClientRect()];
+    const hover = part("hover");
     hover.textContent = found.join("\n");
     hover.hidden = !found.length;
     if (found.length) {
       const box = root.getBoundingClientRect();
-      hover.style.left = `${Math.min(state.pointer.pageX - box.left + 14, width - Math.min(340, width))}px`;
-      hover.style.top = `${state.pointer.pageY - box.top + 16}px`;
+      hover.style.left = `${Math.min(state.pointer.clientX - box.left + 14, box.width - Math.min(340, box.width))}px`;
+      hover.style.top = `${state.pointer.clientY - box.top + 16}px`;
     }
     root.dataset.hover = found.length;
     tellPlace();
@@ -259,8 +259,8 @@ function startReplay(root) {
   function point(canvas, panel, name = "scene") {
     const follow = (event) => {
       const box = canvas.getBoundingClientRect();
-      const at = { pageX: event.clientX, pageY: event.clientY };
-      state.pointer = { part: name, panel, x: event.clientX - box.left, y: event.clientY - box.top, ...at };
+      const { clientX, clientY } = event;
+      state.pointer = { part: name, panel, x: clientX - box.left, y: clientY - box.top, clientX, clientY };
       if (name === "errors" && canvas.hasPointerCapture(event.pointerId)) {
         state.playing = false;
         go(stepAt(run(), timeAt(canvas, run(), state.pointer.x)));
