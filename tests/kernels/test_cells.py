@@ -73,12 +73,12 @@ def test_cells_in_view_are_those_of_plain_numpy(detection: Any, reach: float, le
 
 @pytest.mark.parametrize("max_range", [12.0, 55.0])
 def test_what_a_scan_leaves_is_that_of_plain_numpy(max_range: float) -> None:
-    detection, expected = models.limited_range(0.9, max_range), np.linspace(0.0, 2.0, 35)
+    detection, expected = models.limited_range(0.9, max_range), np.linspace(0.0, 2.0, 70).reshape(2, 35)
     for pose in some_courses()[:, 0]:
         left = take_out_detected(sensor(detection).to_kernel(), pose, STATES, WEIGHTS, expected)
         missed = [1.0 - WEIGHTS @ detection.prob(states, pose) for states in STATES]
         np.testing.assert_allclose(left, expected * missed, rtol=1e-13)
-    np.testing.assert_array_equal(expected, np.linspace(0.0, 2.0, 35))
+    np.testing.assert_array_equal(expected, np.linspace(0.0, 2.0, 70).reshape(2, 35))
 
 
 @model_function("prob_survival")

@@ -18,7 +18,7 @@ from vedette.densities.telling import Targets
 from vedette.kernels.base.types import Floats
 from vedette.speaking import Speaking, Tabled
 
-_Container = TypeVar("_Container", bound="Container")
+_Made = TypeVar("_Made", bound=Speaking)
 
 
 class Container(Speaking):
@@ -87,8 +87,8 @@ class MultiTarget(Container, Tabled):
         """Probabilities of 0, 1, ..., n targets; see `vedette.densities.cardinality_distribution`."""
 
 
-def unchecked(container: type[_Container], *fields: Any) -> _Container:
-    """A container of the library's own making, of which the checks would cost more than some steps.
+def unchecked(container: type[_Made], *fields: Any) -> _Made:
+    """A container (or what holds some) of the library's own making, whose checks would cost more than some steps.
 
     It takes arrays as they are: those that no caller of the library holds.
     """

@@ -18,25 +18,26 @@ from vedette.densities import (
     track_moments,
 )
 from vedette.densities.checks import distinct_labels
+from vedette.densities.containers import for_kernel
 from vedette.densities.label_sets import are_among
-from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.base.types import Floats, Ints, Mixture
 from vedette.kernels.steps.lmb import Reduction
-from vedette.kernels.steps.undetected import survival_probabilities, take_out_detected
-from vedette.models import BirthModel, SensorModel, SurvivalModel, TargetModel, UndetectedModel, kernel_motion
+from vedette.kernels.steps.undetected import Arrivals, Cells, Left, survival_probabilities
+from vedette.models import BirthModel, SurvivalModel, TargetModel, UndetectedModel, kernel_motion
 from vedette.models.arguments import reject
 
 # Shape of the gamma prior of a learnt birth rate: half a target has been seen.
 _SHAPE = 0.5
 # Nodes along each side of a cell by which P_D is averaged: of 16 x 16 cells, and of cells that a user has chosen.
 _NODES, _NODES_OF_CHOSEN = 2, 3
+_STAY, _NOBODY = np.ones(1), np.zeros(2)
 
 
 class Appearing(NamedTuple):
     """Targets that appear anywhere in a region, by cells."""
 
     model: UndetectedModel
-    states: Floats  # (num_cells, num_nodes, state_dim) nodes of the cells
-    node_weights: Floats  # (num_nodes,)
+    cells: Cells
 
 
 @lru_cache(maxsize=100)
@@ -47,39 +48,78 @@ def appearing(birth: BirthModel) -> Appearing | None:
         model, nodes = None if measured is None else measured.uniform(), _NODES
     if model is None:
         return None
-    return Appearing(model, model.grid.states(birth.state_dim, nodes), model.grid.node_weights(nodes))
+    grid, dim = model.grid, birth.state_dim
+    corner, size = np.array([grid.region.x_min, grid.region.y_min]), np.array(grid.cell_size)
+    middles, states = grid.states(dim, 1)[:, 0].copy(), grid.states(dim, nodes)
+    return Appearing(
+        model, Cells(grid.columns, corner, size, middles, states, grid.node_weights(nodes), model.entering)
+    )
 
 
-def predicted_cells(
-    before: UndetectedTargets, targets: TargetModel, dt: float, *, appear: bool
-) -> tuple[UndetectedIntensity | None, LearntRate | None]:
-    """The targets that appeared anywhere, and what is known of a learnt birth rate, `dt` seconds later.
+@lru_cache(maxsize=100)
+def no_cells(state_dim: int) -> Cells:
+    """Those of no region."""
+    none = np.empty((0, state_dim))
+    return Cells(1, np.zeros(2), np.ones(2), none, none[:, np.newaxis], np.empty(0), np.empty(0))
 
-    The first prediction makes the cells: with the targets that are there at first, or those born since the start.
-    appear: whether targets have been born since then; else nobody has.
-    Raises `InputError` for a belief of other cells.
+
+def tables_of(undetected: UndetectedTargets) -> Floats:
+    """(num_tables, num_cells) expected numbers in the cells; of a learnt birth rate those per unit of it, too."""
+    if undetected.cells is None:
+        return np.empty((0, 0))
+    expected, learnt = for_kernel(undetected.cells.expected), undetected.birth_rate
+    return expected[np.newaxis] if learnt is None else np.stack([expected, learnt.unit])
+
+
+def with_cells(before: UndetectedTargets, birth: BirthModel, dt: float, *, appear: bool) -> UndetectedTargets:
+    """With those that appear anywhere: at the first prediction who is there at first, or was born since the start.
+
+    appear: whether targets have been born since; else nobody has. Raises `InputError` for a belief of other cells.
     """
-    birth, places = targets.birth, appearing(targets.birth)
-    if places is None or not (appear or before.cells is not None):
-        return before.cells, before.birth_rate
-    model, learnt, measured = places.model, before.birth_rate, birth.from_measurements
-    rate = model.first_rate if learnt is None else learnt.rate
-    in_scans = birth.anywhere is None and measured is not None and not isinstance(measured.expected, str)
-    if in_scans:
-        rate = measured.expected / (dt if birth.period is None else birth.period)  # type: ignore[union-attr, operator]
+    places, cells = appearing(birth), before.cells
+    if cells is not None and (
+        places is None or (cells.grid is not places.model.grid and cells.grid != places.model.grid)
+    ):
+        expected = "none" if places is None else f"those of the filter's births, {places.model.grid}"
+        raise reject("belief.undetected.cells", expected, cells.grid)
+    if places is None or cells is not None or not appear:
+        return before
+    model, learnt, rate = places.model, before.birth_rate, _rate_of(before, birth, places, dt)
     if model.is_learnt and learnt is None:
         no_labels = np.empty((0, 2), np.int64), np.empty(0)
         learnt = LearntRate(rate, 0.0, np.zeros(model.grid.num_cells), 0.0, *no_labels)
-    if before.cells is None:
-        first = model.initial() + (model.births(dt, rate) if in_scans else 0.0)
-        return UndetectedIntensity(model.grid, first), learnt
-    if before.cells.grid != model.grid:
-        raise reject("belief.undetected.cells", f"those of the filter's births, {model.grid}", before.cells.grid)
-    survival = survival_in_cells(model, targets, dt)
-    cells = UndetectedIntensity(model.grid, model.predict(before.cells.expected, dt, survival, rate * appear))
-    if learnt is not None:
-        learnt = replace(learnt, unit=model.predict(learnt.unit, dt, survival, float(appear)))
-    return cells, learnt
+    first = model.initial() + (model.births(dt, rate) if _in_scans(birth) else 0.0)
+    return replace(before, cells=UndetectedIntensity(model.grid, first), birth_rate=learnt)
+
+
+def _in_scans(birth: BirthModel) -> bool:
+    """Whether the number of births is one between scans, or within the births' period."""
+    measured = birth.from_measurements
+    return birth.anywhere is None and measured is not None and not measured.is_learnt
+
+
+def _rate_of(before: UndetectedTargets, birth: BirthModel, places: Appearing, dt: float) -> float:
+    """Births in the region, 1/s."""
+    if _in_scans(birth):
+        return birth.from_measurements.expected / (dt if birth.period is None else birth.period)  # type: ignore[union-attr, operator]
+    return places.model.first_rate if before.birth_rate is None else before.birth_rate.rate
+
+
+def arrivals_of(
+    before: UndetectedTargets, targets: TargetModel, born: Mixture, dt: float, most: int, *, appear: bool
+) -> Arrivals:
+    """What changes the undetected targets within `dt` seconds, as kernels take it.
+
+    born: intensity of those that have appeared at sites; most: components of the intensity; appear: whether targets
+    have appeared anywhere since. Targets in cells that a first prediction has made are not moved: see `with_cells`.
+    """
+    birth, places = targets.birth, appearing(targets.birth)
+    if places is None or before.cells is None:
+        return Arrivals(born, most, 1.0, _STAY, _STAY, _NOBODY)
+    model = places.model
+    rates = [_rate_of(before, birth, places, dt)] + [1.0] * (before.birth_rate is not None)
+    survival = -1.0 if model.survival is None else float(model.survival**dt)
+    return Arrivals(born, most, survival, *model.shares(dt), np.array(rates) * appear * dt)
 
 
 def survival_in_cells(model: UndetectedModel, targets: TargetModel, dt: float) -> Floats | float:
@@ -90,56 +130,17 @@ def survival_in_cells(model: UndetectedModel, targets: TargetModel, dt: float) -
     return survival_probabilities(motion, dt, model.grid.states(targets.state_dim, 1)[:, 0].copy())
 
 
-def cells_after(
-    before: UndetectedTargets, birth: BirthModel, sensor: SensorModel, scan: Floats, pose: Floats
-) -> tuple[UndetectedIntensity | None, LearntRate | None]:
-    """The targets that appeared anywhere and that a scan did not detect, and what is then known of the birth rate."""
-    cells, learnt, places = before.cells, before.birth_rate, appearing(birth)
-    if cells is None or places is None:
-        return cells, learnt
-    look = sensor.to_kernel(), pose, places.states, places.node_weights
-    left = UndetectedIntensity(cells.grid, take_out_detected(*look, cells.expected))
-    if learnt is None:
-        return left, None
-    unit = take_out_detected(*look, learnt.unit)
-    exposure = learnt.exposure + float(learnt.unit.sum() - unit.sum())
-    step, index = before.next_label
-    labels = np.column_stack([np.full(len(scan), step), index + np.arange(len(scan))])
-    return left, replace(
+def rate_after(learnt: LearntRate, left: Left, label: tuple[int, int]) -> LearntRate:
+    """What is known of a learnt birth rate after a scan. left: of the tables; label: of the first measurement."""
+    num = len(left.born_shares)
+    labels = np.column_stack([np.full(num, label[0]), label[1] + np.arange(num)])
+    return replace(
         learnt,
-        unit=unit,
-        exposure=exposure,
+        unit=left.tables[1],
+        exposure=learnt.exposure - float(left.changes[1]),
         labels=np.concatenate([learnt.labels, labels]),
-        shares=np.concatenate([learnt.shares, _shares(before, learnt, birth, sensor, scan, pose)]),
+        shares=np.concatenate([learnt.shares, left.born_shares]),
     )
-
-
-def _shares(
-    before: UndetectedTargets, learnt: LearntRate, birth: BirthModel, sensor: SensorModel, scan: Floats, pose: Floats
-) -> Floats:
-    """(num_measurements,) of the intensity at each measurement, the share of targets born after the first scan.
-
-    Others were there at first, come from birth sites, or had a label before. Noise is taken as half of the standard
-    deviation of a birth.
-    """
-    measured, cells = birth.from_measurements, before.cells
-    if measured is None or cells is None or not len(scan):
-        return np.zeros(len(scan))
-    positions = sensor.measurement.positions(scan, pose)
-    spread = before.intensity.covs[:, :2, :2] + np.diag((0.5 * measured.std[:2]) ** 2)
-    apart = positions[:, np.newaxis] - before.intensity.means[:, :2]
-    squares = np.einsum("mci,cij,mcj->mc", apart, np.linalg.inv(spread), apart)
-    peaks = np.exp(before.intensity.log_weights) / (2.0 * np.pi * np.sqrt(np.linalg.det(spread)))
-    elsewhere = np.exp(-0.5 * squares) @ peaks
-    born = learnt.rate * density_at(cells.grid.cells_at(positions), learnt.unit, cells)
-    total = density_at(cells.grid.cells_at(positions), cells.expected, cells) + elsewhere
-    return np.asarray(np.divide(born, total, out=np.zeros(len(scan)), where=born > 0.0))
-
-
-def density_at(at: Ints, expected: Floats, cells: UndetectedIntensity) -> Floats:
-    """(num,) targets per square metre in the cells `at`; 0 outside of the region (-1)."""
-    width, height = cells.grid.cell_size
-    return np.where(at >= 0, expected[at], 0.0) / (width * height)
 
 
 def with_deaths(

@@ -13,7 +13,14 @@ from vedette.densities import LMB, FactoredGLMB, Labelled, UndetectedTargets
 from vedette.densities.checks import offsets_of
 from vedette.densities.label_sets import take_factors
 from vedette.errors import InputError, NumericalError
-from vedette.filters.appearing import appearing, with_deaths, with_faint_candidates, with_learnt_rate
+from vedette.filters.appearing import (
+    appearing,
+    arrivals_of,
+    with_cells,
+    with_deaths,
+    with_faint_candidates,
+    with_learnt_rate,
+)
 from vedette.filters.base import LabelledFilter, OfKind, SensorStep, blind_sensor
 from vedette.filters.inputs import born_at, check_new, nobody
 from vedette.filters.limits import Limits
@@ -21,19 +28,21 @@ from vedette.filters.multi_sensor import InTurn, MultiSensorFilter
 from vedette.filters.protocols import FilterInfo
 from vedette.filters.undetected import (
     SplitBirths,
+    after_scan,
+    before_scan,
+    most_components,
     named_at,
+    no_arrivals,
     no_births,
     no_undetected,
-    predicted_undetected,
-    seen_by,
     split_births,
-    undetected_after,
     with_dropped,
 )
 from vedette.kernels.base.types import Bools, FactoredGlmb, Ints, Lmb
 from vedette.kernels.steps.factor_updates import Factoring
 from vedette.kernels.steps.factored import FactoredReport, step_factored
 from vedette.kernels.steps.in_view import in_view
+from vedette.kernels.steps.undetected import Arrivals
 from vedette.models.arguments import dimension, non_negative, one_of, step_number
 from vedette.models.fields import Count, L1Error
 
@@ -53,6 +62,7 @@ class _Before(NamedTuple):
 
     density: FactoredGlmb
     undetected: UndetectedTargets | None  # None where births are labelled
+    arrivals: Arrivals  # since the scan before
     error: float = 0.0  # L1, of taking births at sites as Poisson
 
 
@@ -94,34 +104,36 @@ class _OfFactors(OfKind[FactoredGLMB]):
         return split_births(birth, dt) if birth.is_active(step) else no_births(birth.state_dim)
 
     def _before_scan(self, prior: FactoredGLMB, dt: float, step: Any, births: LMB | None) -> _Before:
+        density, arrivals, error = prior.to_kernel(), no_arrivals(self.targets.state_dim), 0.0
         if self.births == "labelled":
-            return _Before(prior.to_kernel(), None)
-        undetected, error = self._none() if prior.undetected is None else prior.undetected, 0.0
+            return _Before(density, None, arrivals)
+        undetected = self._none() if prior.undetected is None else prior.undetected
         if dt > 0.0:
             # Births that a caller gives are instead of the model's, anywhere as at sites.
-            born = self._born(dt, step) if births is None else no_births(self.targets.state_dim)
-            undetected, error = with_deaths(undetected, prior, self.targets.survival, dt), born.error
-            undetected = predicted_undetected(
-                undetected, self.targets, born.undetected, dt, self.limits, appear=births is None
-            )
+            targets, appear = self.targets, births is None
+            born = self._born(dt, step) if appear else no_births(targets.state_dim)
+            most, error = most_components(self.limits, targets.birth), born.error
+            arrivals = arrivals_of(undetected, targets, born.undetected, dt, most, appear=appear)
+            undetected = with_cells(undetected, targets.birth, dt, appear=appear)
+            undetected = with_deaths(undetected, prior, targets.survival, dt)
         if step is not None:
             undetected = named_at(undetected, step, self.targets.birth.num_sites)
-        return _Before(prior.to_kernel(), undetected, error)
+        return _Before(density, undetected, arrivals, error)
 
     def _stepped(self, prior: _Before, step: SensorStep) -> tuple[_Before, FactoredReport]:
-        scan, reduction = step.inputs[0], step.limits.reduction()
+        scan, reduction, birth = step.inputs[0], step.limits.reduction(), self.targets.birth
         max_merging = 0.0 if self.births == "labelled" else _MAX_MERGING
         factoring = _factoring(self.max_split_error, self.max_factor_labels, step.num_scans, max_merging)
-        birth, at = self.targets.birth, (scan.measurements, scan.pose)
-        seen = no_undetected(self.targets.state_dim)
-        if prior.undetected is not None:
-            seen = seen_by(prior.undetected, prior.error, birth, step.sensor, *at)
-            reduction = with_faint_candidates(reduction, prior.undetected, birth)
-        density, missed, report = step_factored(prior.density, seen, *step.inputs, reduction, factoring)
-        if prior.undetected is None:
-            return prior._replace(density=density), report
-        undetected, log_missed = undetected_after(prior.undetected, missed, birth, step.sensor, *at)
-        return _Before(density, undetected, prior.error), report._replace(log_total=report.log_total + log_missed)
+        before, undetected = no_undetected(self.targets.state_dim), prior.undetected
+        if undetected is not None:
+            before = before_scan(undetected, prior.error, birth, step.sensor, scan.measurements, scan.pose)
+            reduction = with_faint_candidates(reduction, undetected, birth)
+        density, missed, left, report = step_factored(
+            prior.density, before, prior.arrivals, *step.inputs, reduction, factoring
+        )
+        if undetected is not None:
+            undetected = after_scan(undetected, missed, left, len(scan.measurements))
+        return prior._replace(density=density, undetected=undetected), report
 
     def _check(self, posterior: Any, report: FactoredReport, place: str) -> float:
         if report.log_total > -math.inf:

@@ -8,15 +8,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vedette.densities import LMB, FactoredGLMB, Poisson, UndetectedTargets, as_lmb
+from vedette.densities import LMB, FactoredGLMB, Poisson, UndetectedIntensity, UndetectedTargets, as_lmb
+from vedette.densities.containers import unchecked
 from vedette.densities.label_sets import without_labels
-from vedette.filters.appearing import cells_after, density_at, predicted_cells
+from vedette.filters.appearing import appearing, no_cells, rate_after, tables_of
 from vedette.filters.inputs import births_of, births_within
 from vedette.filters.limits import Limits
-from vedette.kernels.association.first_detections import Undetected
 from vedette.kernels.base.types import Floats, Lmb, Mixture
-from vedette.kernels.gaussian.intensities import predicted_intensity, stacked_mixtures
-from vedette.models import BirthModel, SensorModel, TargetModel, kernel_motion
+from vedette.kernels.gaussian.intensities import stacked_mixtures
+from vedette.kernels.steps.undetected import Arrivals, Left, Undetected
+from vedette.models import BirthModel, SensorModel
 from vedette.models.arguments import reject, step_number
 from vedette.probabilities import expit
 
@@ -24,15 +25,24 @@ from vedette.probabilities import expit
 FROM_THE_START = 0.15
 # Components of the intensity that a birth site may have, where these are more than `Limits.max_intensity_components`.
 _COMPONENTS_A_SITE = 3
-# Standard deviations of a birth's position that stand for "anywhere" about a measurement: wide beside the noise.
-_WIDE = 3.0
 
 
 @cache
 def no_undetected(state_dim: int) -> Undetected:
     """No undetected targets, as kernels take them."""
-    none = no_births(state_dim).undetected
-    return Undetected(none, none, 0, 0, 0.0)
+    none, cells = no_births(state_dim).undetected, no_cells(state_dim)
+    return Undetected(none, np.empty((0, 0)), cells, np.empty((0, 2)), np.zeros(state_dim), 0, 0, 0.0, 0.0)
+
+
+@cache
+def no_arrivals(state_dim: int) -> Arrivals:
+    """Nobody appears, as kernels take it."""
+    return Arrivals(no_births(state_dim).undetected, 1, 1.0, np.ones(1), np.ones(1), np.zeros(2))
+
+
+def most_components(limits: Limits, birth: BirthModel) -> int:
+    """Components that the intensity of undetected targets may have."""
+    return max(limits.max_intensity_components, _COMPONENTS_A_SITE * birth.num_sites)
 
 
 class SplitBirths(NamedTuple):
@@ -57,26 +67,6 @@ def split_births(birth: BirthModel, dt: float) -> SplitBirths:
 def no_births(state_dim: int) -> SplitBirths:
     """Return no births, of either kind."""
     return SplitBirths(LMB.empty(state_dim), Poisson.empty(state_dim).to_kernel(), 0.0)
-
-
-def predicted_undetected(
-    before: UndetectedTargets, targets: TargetModel, born: Mixture, dt: float, limits: Limits, *, appear: bool
-) -> UndetectedTargets:
-    """The undetected targets `dt` seconds later.
-
-    Args:
-        before: at the time of the last scan.
-        targets: how they move, live on, and appear anywhere.
-        born: intensity of those that have appeared at sites since.
-        dt: s, above 0.
-        limits: of which `max_intensity_components` counts.
-        appear: whether targets have appeared anywhere since.
-    """
-    motion = kernel_motion(targets.motion, targets.survival)
-    most = max(limits.max_intensity_components, _COMPONENTS_A_SITE * targets.birth.num_sites)
-    intensity = predicted_intensity(before.intensity.to_kernel(), motion, dt, born, most)
-    cells = predicted_cells(before, targets, dt, appear=appear)
-    return UndetectedTargets(Poisson.from_kernel(intensity), before.next_label, *cells)
 
 
 def with_dropped(undetected: UndetectedTargets, before: FactoredGLMB, kept: FactoredGLMB) -> UndetectedTargets:
@@ -107,33 +97,31 @@ def named_at(undetected: UndetectedTargets, step: Any, num_sites: int) -> Undete
     return undetected if number == last else replace(undetected, next_label=(number, num_sites))
 
 
-def seen_by(
+def before_scan(
     undetected: UndetectedTargets, error: float, birth: BirthModel, sensor: SensorModel, scan: Floats, pose: Floats
 ) -> Undetected:
-    """Return the undetected targets in the form that `step_factored` needs. error: see `SplitBirths`."""
-    intensity = undetected.intensity.to_kernel()
-    local, measured = no_births(birth.state_dim).undetected, birth.from_measurements
-    if undetected.cells is not None and measured is not None and len(scan):
-        places, std = sensor.measurement.positions(scan, pose), measured.std.copy()
-        std[:2] *= _WIDE
-        means = np.zeros((len(scan), len(std)))
-        means[:, :2] = places
-        cells = undetected.cells
-        with np.errstate(divide="ignore"):
-            density = density_at(cells.grid.cells_at(places), cells.expected, cells)
-            log_weights = np.log(density) + np.log(2.0 * np.pi * std[0] * std[1])
-        local = Mixture(log_weights, means, np.tile(np.diag(std**2), (len(scan), 1, 1)))
-    return Undetected(intensity, local, *undetected.next_label, error)
+    """The undetected targets and a scan's places, in the form that `step_factored` needs. error: see `SplitBirths`."""
+    intensity, label = undetected.intensity.to_kernel(), undetected.next_label
+    found, measured, learnt = appearing(birth), birth.from_measurements, undetected.birth_rate
+    none = no_undetected(birth.state_dim)
+    if found is None or undetected.cells is None:
+        return Undetected(intensity, none.tables, none.cells, none.places, none.std, *label, error, 0.0)
+    rate, tables = 0.0 if learnt is None else learnt.rate, tables_of(undetected)
+    if measured is None or not len(scan):
+        return Undetected(intensity, tables, found.cells, none.places, none.std, *label, error, rate)
+    places = sensor.measurement.positions(scan, pose)
+    return Undetected(intensity, tables, found.cells, places, measured.std, *label, error, rate)
 
 
-def undetected_after(
-    before: UndetectedTargets, missed: Mixture, birth: BirthModel, sensor: SensorModel, scan: Floats, pose: Floats
-) -> tuple[UndetectedTargets, float]:
-    """The undetected targets after a scan, and the log probability that it detected none of those anywhere.
+def after_scan(before: UndetectedTargets, missed: Mixture, left: Left, num_measurements: int) -> UndetectedTargets:
+    """The undetected targets after a scan.
 
-    missed: the intensity that the scan's kernel has left.
+    missed, left: intensity and cells, as the scan's kernel has left them.
     """
-    step, index = before.next_label
-    cells, learnt = cells_after(before, birth, sensor, scan, pose)
-    log_missed = 0.0 if cells is None or before.cells is None else cells.total - before.cells.total
-    return UndetectedTargets(Poisson.from_kernel(missed), (step, index + len(scan)), cells, learnt), log_missed
+    label, cells, learnt = before.next_label, before.cells, before.birth_rate
+    if cells is not None:
+        cells = unchecked(UndetectedIntensity, cells.grid, left.tables[0].copy())
+    if learnt is not None:
+        learnt = rate_after(learnt, left, label)
+    intensity, label = Poisson.from_kernel(missed), (label[0], label[1] + num_measurements)
+    return unchecked(UndetectedTargets, intensity, label, cells, learnt)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vedette.kernels.base.types import Floats
+from vedette.kernels.steps.undetected import moved_in_cells
 from vedette.models.arguments import float_array, non_negative, positive, probability, reject
 from vedette.models.fields import NonNegative, Positive, Probability
 from vedette.models.grid import CellGrid
@@ -81,14 +83,18 @@ class UndetectedModel:
         return isinstance(self.birth_rate, str) and self.birth_rate == LEARNT
 
     @property
+    def entering(self) -> Floats:
+        """(num_cells,) in what proportion targets that appear are shared out among the cells."""
+        return np.ones(self.grid.num_cells) if self.enters == "anywhere" else self.grid.border
+
+    @property
     def first_rate(self) -> float:
         """Birth rate before anything was measured, 1/s."""
         return self.prior_rate if isinstance(self.birth_rate, str) else self.birth_rate
 
     def births(self, dt: float, rate: float | None = None) -> Floats:
         """(num_cells,) mean number of targets that appear within `dt` seconds. rate: 1/s; None: `first_rate`."""
-        shares = np.ones(self.grid.num_cells) if self.enters == "anywhere" else self.grid.border
-        number = (self.first_rate if rate is None else rate) * non_negative("dt", dt)
+        number, shares = (self.first_rate if rate is None else rate) * non_negative("dt", dt), self.entering
         return np.asarray(number * shares / shares.sum())
 
     def predict(self, expected: Floats, dt: float, survival: Floats | float, rate: float | None = None) -> Floats:
@@ -103,12 +109,17 @@ class UndetectedModel:
             survival: probability of living through `dt`: one number, or (num_cells,).
             rate: of births, 1/s; None: `first_rate`.
         """
-        step, sizes = self.speed * non_negative("dt", dt), self.grid.cell_size
         living = (expected * survival).reshape(self.grid.rows, self.grid.columns)
-        along = _moved(living.T, cell_shares(step, sizes[0], self.grid.columns)).T
-        return _moved(along, cell_shares(step, sizes[1], self.grid.rows)).ravel() + self.births(dt, rate)
+        return moved_in_cells(living, *self.shares(dt)).ravel() + self.births(dt, rate)
+
+    def shares(self, dt: float) -> tuple[Floats, Floats]:
+        """Shares of a cell's targets that go 0, 1, 2, ... columns, and rows, to one side within `dt` seconds."""
+        step, grid = self.speed * non_negative("dt", dt), self.grid
+        width, height = grid.cell_size
+        return cell_shares(step, width, grid.columns), cell_shares(step, height, grid.rows)
 
 
+@lru_cache(maxsize=1000)
 def cell_shares(step: float, size: float, num: int) -> Floats:
     """(num or less,) probability that a point anywhere in a cell alike lands 0, 1, 2, ... cells to one side.
 
@@ -135,12 +146,3 @@ def _integral_below(x: NDArray[np.floating]) -> Floats:
 
     density = np.exp(-0.5 * x * x) / math.sqrt(2.0 * math.pi)
     return np.asarray(density * (1.0 - x * math.sqrt(0.5 * math.pi) * erfcx(x * math.sqrt(0.5))))
-
-
-def _moved(table: Floats, shares: Floats) -> Floats:
-    """Each row's content shared out among the rows on both sides of it; what leaves the table is lost."""
-    out = table * float(shares[0])
-    for offset, share in enumerate(shares[1:].tolist(), start=1):
-        out[offset:] += share * table[:-offset]
-        out[:-offset] += share * table[offset:]
-    return out

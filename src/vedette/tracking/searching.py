@@ -72,7 +72,8 @@ class Searching(AroundTracker):
             at = float_array("poses", poses, (len(self.sensors), None))
             looks = [own[:2] for own in zip(self.sensors, at, scans, strict=True) if own[2] is not None]
             for sensor, pose in looks:
-                expected = take_out_detected(sensor.to_kernel(), pose, self._nodes, self._node_weights, expected)
+                look = sensor.to_kernel(), pose, self._nodes, self._node_weights
+                expected = take_out_detected(*look, expected[np.newaxis])[0]
             expected = expected + self._lost(state, after, looks, float(time)) + self._new(after, scans, at)
         seconds = {**info.seconds, **stages.seconds}
         left = UndetectedIntensity(self.model.grid, expected)

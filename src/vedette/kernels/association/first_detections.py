@@ -37,20 +37,6 @@ _LEAST_SHARE = math.log(1e-5)  # of a candidate's density, below which a compone
 _LOG_CLAIMED, _LOG_WORTH = math.log(0.05), math.log(10.0)
 
 
-class Undetected(NamedTuple):
-    """The intensity of undetected targets at the time of a scan, and the name of the first of those that it detects.
-
-    Where targets may appear anywhere, `local` has the intensity about each measurement as one Gaussian, wide beside the
-    noise; it serves that measurement alone.
-    """
-
-    intensity: Mixture
-    local: Mixture  # (num_measurements,) components, or none
-    step: int  # of the labels
-    first_index: int  # of the label of the scan's first measurement
-    error: float  # L1 error of taking births at sites as Poisson
-
-
 class Candidates(NamedTuple):
     """The labels that a scan may begin."""
 
@@ -156,18 +142,20 @@ def _chosen(pairs: _Pairs, unclaimed: Floats, least_logit: float) -> tuple[_Chos
 @kernel
 def candidates_of(
     seen: Rows,
+    num_local: int,
     scan: ScanInput,
     sensor: Sensor,
     log_clutter: Floats,
     unclaimed: Floats,
     gate: float,
     least_logit: float,
-    label: Undetected,
+    label: tuple[int, int],
 ) -> Candidates:
     """The candidate labels of a scan, in the order of its measurements.
 
     Args:
         seen: the intensity and what there is about each measurement, as of `seen_intensity`.
+        num_local: components, the last ones, of which each is about one measurement and serves that alone.
         scan: whose measurements are asked about.
         sensor: that took it.
         log_clutter: (num_measurements,) log clutter intensity at each measurement.
@@ -175,10 +163,10 @@ def candidates_of(
             odds are rho / kappa times it, exactly if one track alone claims the measurement.
         gate: squared Mahalanobis distance beyond which a component does not explain a measurement.
         least_logit: log of the least odds of a candidate.
-        label: by which candidates are named.
+        label: birth step and index of the candidate of the first measurement.
     """
     sight = Sight(sensor, scan.pose, make_pair_work(seen.means.shape[1], len(sensor.angular)))
-    pairs = _gated_pairs(seen, len(label.local.log_weights), scan.measurements, log_clutter, sight, gate)
+    pairs = _gated_pairs(seen, num_local, scan.measurements, log_clutter, sight, gate)
     chosen, log_left_out, left_out = _chosen(pairs, unclaimed, least_logit)
     num, meas_dim = len(chosen.measurements), len(sensor.angular)
     rows = make_rows(num, chosen.num_pairs, seen.means.shape[1], meas_dim)
@@ -186,7 +174,7 @@ def candidates_of(
     options = make_room(num, 2 * num, chosen.num_pairs, len(scan.measurements), meas_dim, updated)
     for row in range(num):
         j = chosen.measurements[row]
-        rows.labels[row, 0], rows.labels[row, 1] = label.step, label.first_index + j
+        rows.labels[row, 0], rows.labels[row, 1] = label[0], label[1] + j
         rows.log_absent[row] = 0.0
         _write_candidate(row, j, seen, pairs, chosen, rows, options)
     return Candidates(rows, options, log_left_out, left_out)

@@ -15,7 +15,6 @@ import numpy as np
 from vedette.kernels.association.alternatives import alternatives_of, log_unclaimed
 from vedette.kernels.association.contention import leave_to_others
 from vedette.kernels.association.first_detections import (
-    Undetected,
     candidates_of,
     missed_intensity,
     seen_intensity,
@@ -57,6 +56,14 @@ from vedette.kernels.steps.factor_updates import (
     update_group,
 )
 from vedette.kernels.steps.lmb import Reduction
+from vedette.kernels.steps.undetected import (
+    Arrivals,
+    Left,
+    Undetected,
+    intensity_at_places,
+    left_in_cells,
+    predicted_undetected,
+)
 
 
 class FactoredReport(NamedTuple):
@@ -80,27 +87,32 @@ class FactoredReport(NamedTuple):
 def step_factored(
     prior: FactoredGlmb,
     undetected: Undetected,
+    arrivals: Arrivals,
     scan: ScanInput,
     motion: Motion | None,
     sensor: Sensor,
     truncation: Truncation,
     reduction: Reduction,
     factoring: Factoring,
-) -> tuple[FactoredGlmb, Mixture, FactoredReport]:
-    """One scan: weigh, link, update and split; and the intensity of the targets that stay undetected.
+) -> tuple[FactoredGlmb, Mixture, Left, FactoredReport]:
+    """One scan: weigh, link, update and split; and the intensity of who stays undetected, and the cells.
 
-    undetected: at the time of the scan. motion: None of a scan of the prior's own time, which has no births.
+    undetected, arrivals: before the scan, and since then. motion: None of a scan of the prior's own time, which has no
+    births.
     """
+    if motion is not None:
+        undetected = predicted_undetected(undetected, motion, scan.dt, arrivals)
     rows = rows_of_scan(prior.tracks, scan, motion, sensor)
     weigh_singles(prior, rows)
     log_levels = np.empty(len(scan.measurements))
     options, log_clutter, num_raised = weighed_options_at(rows, scan, sensor, truncation, log_levels)
-    seen = seen_intensity(stacked_mixtures(undetected.intensity, undetected.local), scan, sensor)
+    local = intensity_at_places(undetected)
+    seen = seen_intensity(stacked_mixtures(undetected.intensity, local), scan, sensor)
     presence = presence_of_rows(prior, len(rows.log_absent) + len(scan.measurements))
     alone = alternatives_of(options, rows.labels, presence[: len(rows.log_absent)])
     unclaimed = log_unclaimed(options, alone) if len(seen.log_absent) > 0 else np.zeros(len(scan.measurements))
-    least = reduction.min_existence_logit
-    new = candidates_of(seen, scan, sensor, log_levels, unclaimed, truncation.gate, least, undetected)
+    gate, least, label = truncation.gate, reduction.min_existence_logit, (undetected.step, undetected.first_index)
+    new = candidates_of(seen, len(local.log_weights), scan, sensor, log_levels, unclaimed, gate, least, label)
     if len(new.rows.log_absent) > 0:
         rows, options = joined_rows(rows, options, new.rows, new.options)
         alone = alternatives_of(options, rows.labels, presence[: len(rows.log_absent)])
@@ -130,9 +142,12 @@ def step_factored(
     sums, density = work.sums, stored(store)
     require_gaussians(density.tracks.means, density.tracks.covs)
     missed, log_missed = missed_intensity(seen, scan, sensor, len(undetected.intensity.log_weights))
+    left = left_in_cells(undetected, sensor, scan.pose)
+    log_missed += left.changes[0] if len(left.changes) > 0 else 0.0
     return (
         density,
         stacked_mixtures(missed, found_faint(work)),
+        left,
         FactoredReport(
             sums[TOTAL] + log_twice + log_missed + new.log_left_out,
             sums[KEPT],

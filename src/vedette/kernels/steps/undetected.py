@@ -1,12 +1,63 @@
-"""One scan of the intensity of targets not yet found: who lives on, and whom a sensor misses, cell by cell."""
+"""Targets not yet found between scans and in one: who lives on, moves and appears, and whom a sensor misses.
+
+They are a Poisson intensity of Gaussians, and tables of expected numbers in the cells of a grid.
+"""
 
 from __future__ import annotations
+
+import math
+from typing import NamedTuple
 
 import numpy as np
 
 from vedette.errors import ModelError
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import Floats, Motion, Sensor
+from vedette.kernels.base.types import Floats, Mixture, Motion, Sensor
+from vedette.kernels.gaussian.intensities import predicted_intensity
+from vedette.kernels.gaussian.mixtures import make_components
+
+# Standard deviations of a birth's position that stand for "anywhere" about a measurement: wide beside the noise.
+_WIDE = 3.0
+
+
+class Cells(NamedTuple):
+    """The cells of a grid, row after row."""
+
+    num_columns: int
+    corner: Floats  # (2,) least coordinates of the region
+    size: Floats  # (2,) width and height of a cell
+    middles: Floats  # (num_cells, state_dim) targets at rest in the middle of each
+    states: Floats  # (num_cells, num_nodes, state_dim) the same at the nodes of each
+    node_weights: Floats  # (num_nodes,) that sum to 1
+    entering: Floats  # (num_cells,) of targets that appear, how they are shared out; of any sum
+
+
+class Arrivals(NamedTuple):
+    """What changes the undetected targets between two scans, beside motion and survival of the states."""
+
+    born: Mixture  # intensity of those that appear at sites
+    max_components: int  # of the intensity
+    survival: float  # probability of living on in a cell; negative: as the motion says in its middle
+    across: Floats  # shares of a cell that end up 0, 1, ... columns to one side
+    along: Floats  # the same of rows
+    numbers: Floats  # (num_tables,) of targets that appear in the cells of each table
+
+
+class Undetected(NamedTuple):
+    """The undetected targets, and the name of the first of those that a scan detects.
+
+    Those in the cells are, about each measurement, one Gaussian that is wide beside the noise.
+    """
+
+    intensity: Mixture
+    tables: Floats  # (num_tables, num_cells) expected numbers; the first is of the targets, others move as they do
+    cells: Cells
+    places: Floats  # (num_measurements, 2) where each was taken; none: no first detections of those in cells
+    std: Floats  # (state_dim,) of a target that appears in a cell, about its place and at rest
+    step: int  # of the labels
+    first_index: int  # of the label of the scan's first measurement
+    error: float  # L1 error of taking births at sites as Poisson
+    birth_rate: float  # 1/s, where it is learnt and the second table is of it
 
 
 @inlined
@@ -22,21 +73,21 @@ def mean_detection(sensor: Sensor, pose: Floats, states: Floats, node_weights: F
 
 
 @borrowing
-def _write_missed(
-    sensor: Sensor, pose: Floats, states: Floats, node_weights: Floats, expected: Floats, out: Floats
-) -> None:
-    for c in range(len(expected)):
-        out[c] = expected[c] * (1.0 - mean_detection(sensor, pose, states[c], node_weights))
+def _take_out(sensor: Sensor, pose: Floats, states: Floats, node_weights: Floats, tables: Floats) -> None:
+    for c in range(tables.shape[1]):
+        missed = 1.0 - mean_detection(sensor, pose, states[c], node_weights)
+        for table in range(tables.shape[0]):
+            tables[table, c] *= missed
 
 
 @kernel
-def take_out_detected(sensor: Sensor, pose: Floats, states: Floats, node_weights: Floats, expected: Floats) -> Floats:
-    """(num_cells,) expected times the mean over the cell of 1 - P_D.
+def take_out_detected(sensor: Sensor, pose: Floats, states: Floats, node_weights: Floats, tables: Floats) -> Floats:
+    """(num_tables, num_cells) tables times the mean over each cell of 1 - P_D.
 
     states: (num_cells, num_nodes, state_dim) of targets at the nodes of each cell; node_weights: (num_nodes,), sum 1.
     """
-    out = np.empty_like(expected)
-    _write_missed(sensor, pose, states, node_weights, expected, out)
+    out = tables.copy()
+    _take_out(sensor, pose, states, node_weights, out)
     return out
 
 
@@ -49,3 +100,132 @@ def survival_probabilities(motion: Motion, dt: float, states: Floats) -> Floats:
         if not 0.0 <= out[i] <= 1.0:
             raise ModelError("survival model: probability is not in [0, 1]")
     return out
+
+
+@borrowing
+def _spread(row: Floats, shares: Floats, out: Floats) -> None:
+    """Share each number of a row out among those on both sides of it (-> out); what leaves the row is lost."""
+    for i in range(len(row)):
+        out[i] = row[i] * shares[0]
+        for offset in range(1, len(shares)):
+            if i >= offset:
+                out[i] += shares[offset] * row[i - offset]
+            if i + offset < len(row):
+                out[i] += shares[offset] * row[i + offset]
+
+
+@kernel
+def moved_in_cells(expected: Floats, across: Floats, along: Floats) -> Floats:
+    """(num_rows, num_columns) expected numbers after a step. across, along: shares as of `Arrivals`."""
+    num_rows, num_columns = expected.shape
+    between, moved = np.empty((num_rows, num_columns)), np.empty((num_rows, num_columns))
+    column, spread = np.empty(num_rows), np.empty(num_rows)
+    for r in range(num_rows):
+        _spread(expected[r], across, between[r])
+    for c in range(num_columns):
+        for r in range(num_rows):
+            column[r] = between[r, c]
+        _spread(column, along, spread)
+        for r in range(num_rows):
+            moved[r, c] = spread[r]
+    return moved
+
+
+@kernel
+def _predicted_tables(tables: Floats, cells: Cells, motion: Motion, dt: float, arrivals: Arrivals) -> Floats:
+    out, total = np.empty_like(tables), cells.entering.sum()
+    if len(tables) == 0:
+        return out
+    survival = np.full(tables.shape[1], arrivals.survival)
+    if arrivals.survival < 0.0:
+        survival = survival_probabilities(motion, dt, cells.middles)
+    for table in range(len(tables)):
+        living = (tables[table] * survival).reshape((-1, cells.num_columns))
+        moved = moved_in_cells(living, arrivals.across, arrivals.along)
+        out[table] = moved.reshape(-1) + arrivals.numbers[table] * cells.entering / total
+    return out
+
+
+@kernel
+def predicted_undetected(before: Undetected, motion: Motion, dt: float, arrivals: Arrivals) -> Undetected:
+    """The undetected targets `dt` seconds later."""
+    most = arrivals.max_components
+    return Undetected(
+        predicted_intensity(before.intensity, motion, dt, arrivals.born, most),
+        _predicted_tables(before.tables, before.cells, motion, dt, arrivals),
+        before.cells,
+        before.places,
+        before.std,
+        before.step,
+        before.first_index,
+        before.error,
+        before.birth_rate,
+    )
+
+
+@borrowing
+def _density_at(place: Floats, cells: Cells, table: Floats) -> float:
+    """Targets per square metre; 0 outside of the region."""
+    column = np.floor((place[0] - cells.corner[0]) / cells.size[0])
+    row = np.floor((place[1] - cells.corner[1]) / cells.size[1])
+    if not (0 <= column < cells.num_columns and 0 <= row < len(table) // cells.num_columns):
+        return 0.0
+    return float(table[int(row) * cells.num_columns + int(column)] / (cells.size[0] * cells.size[1]))
+
+
+@kernel
+def intensity_at_places(undetected: Undetected) -> Mixture:
+    """(num_measurements,) Gaussians of the targets in the cells about each measurement; none without tables."""
+    num, dim = len(undetected.places) if len(undetected.tables) > 0 else 0, len(undetected.std)
+    out, std = make_components(num, dim), undetected.std.copy()
+    std[:2] *= _WIDE
+    for j in range(num):
+        density = _density_at(undetected.places[j], undetected.cells, undetected.tables[0])
+        log_area = math.log(2.0 * math.pi * std[0] * std[1])
+        out.log_weights[j] = math.log(density) + log_area if density > 0.0 else -math.inf
+        out.means[j], out.covs[j] = 0.0, 0.0
+        out.means[j, :2] = undetected.places[j]
+        for d in range(dim):
+            out.covs[j, d, d] = std[d] ** 2
+    return out
+
+
+class Left(NamedTuple):
+    """What a scan leaves of the targets in the cells."""
+
+    tables: Floats  # (num_tables, num_cells)
+    changes: Floats  # (num_tables,) of their sums; the first is the log probability that it detected none of them
+    born_shares: Floats  # (num_measurements,) where a second table is of a birth rate: see `_share_born`
+
+
+@kernel
+def left_in_cells(undetected: Undetected, sensor: Sensor, pose: Floats) -> Left:
+    """The tables after a scan. undetected: at its time."""
+    tables, cells = undetected.tables, undetected.cells
+    shares = np.empty(len(undetected.places) if len(tables) > 1 else 0)
+    for j in range(len(shares)):
+        shares[j] = _share_born(undetected, undetected.places[j])
+    if len(tables) == 0:
+        return Left(tables, np.empty(0), shares)
+    left = take_out_detected(sensor, pose, cells.states, cells.node_weights, tables)
+    return Left(left, left.sum(axis=1) - tables.sum(axis=1), shares)
+
+
+@borrowing
+def _share_born(undetected: Undetected, place: Floats) -> float:
+    """Of the intensity at a measurement, the share of targets born after the first scan.
+
+    Others were there at first, come from birth sites, or had a label before. Noise is taken as half of the standard
+    deviation of a birth.
+    """
+    intensity, std, elsewhere = undetected.intensity, undetected.std, 0.0
+    for c in range(len(intensity.log_weights)):
+        cov = intensity.covs[c]
+        x, y = place[0] - intensity.means[c, 0], place[1] - intensity.means[c, 1]
+        xx, yy, xy = cov[0, 0] + (0.5 * std[0]) ** 2, cov[1, 1] + (0.5 * std[1]) ** 2, cov[0, 1]
+        det = xx * yy - xy * xy
+        squared = (x * x * yy - 2.0 * x * y * xy + y * y * xx) / det
+        elsewhere += math.exp(intensity.log_weights[c] - 0.5 * squared) / (2.0 * math.pi * math.sqrt(det))
+    born = undetected.birth_rate * _density_at(place, undetected.cells, undetected.tables[1])
+    total = elsewhere + _density_at(place, undetected.cells, undetected.tables[0])
+    return float(born / total) if born > 0.0 else 0.0
