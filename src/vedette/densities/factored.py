@@ -69,12 +69,8 @@ class FactoredGLMB(Hypotheses):
 
     @property
     def is_bernoulli(self) -> Bools:
-        """(num_factors,) which factors are of one label and laid out as by `from_lmb`: absent, then there."""
-        hyps, first = np.diff(self.factor_offsets), self.factor_offsets[:-1]
-        found = (np.diff(self.track_offsets) == 1) & (hyps == 2)
-        sizes = np.diff(self.hyp_offsets)
-        found[found] = (sizes[first[found]] == 0) & (sizes[first[found] + 1] == 1)
-        return np.asarray(found)
+        """(num_factors,) which factors are of one label; see `bernoulli_factors`."""
+        return bernoulli_factors(self.to_kernel())
 
     @property
     def factor_of(self) -> Ints:
@@ -251,3 +247,12 @@ def sets_of_factors(hypotheses: kt.Glmb, factor_of: Ints) -> tuple[Ints, Ints]:
     _, first, place = np.unique(numbers, return_index=True, return_inverse=True)
     order = np.argsort(first)
     return np.argsort(order)[place], first[order]
+
+
+def bernoulli_factors(density: kt.FactoredGlmb) -> Bools:
+    """(num_factors,) which factors are of one label and laid out as by `from_lmb`: absent, then there."""
+    tracks, factors, hyps = density.track_offsets, density.factor_offsets, density.hyp_offsets
+    alone = np.flatnonzero((tracks[1:] - tracks[:-1] == 1) & (factors[1:] - factors[:-1] == 2))
+    first, found = factors[alone], np.zeros(len(factors) - 1, np.bool_)
+    found[alone] = (hyps[first + 1] == hyps[first]) & (hyps[first + 2] - hyps[first + 1] == 1)
+    return found

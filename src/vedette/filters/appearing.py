@@ -77,12 +77,9 @@ def with_cells(before: UndetectedTargets, birth: BirthModel, dt: float, *, appea
     appear: whether targets have been born since; else nobody has. Raises `InputError` for a belief of other cells.
     """
     places, cells = appearing(birth), before.cells
-    if cells is not None and (
-        places is None or (cells.grid is not places.model.grid and cells.grid != places.model.grid)
-    ):
-        expected = "none" if places is None else f"those of the filter's births, {places.model.grid}"
-        raise reject("belief.undetected.cells", expected, cells.grid)
-    if places is None or cells is not None or not appear:
+    if cells is not None:
+        return _on_grid(before, cells, places)
+    if places is None or not appear:
         return before
     model, learnt, rate = places.model, before.birth_rate, _rate_of(before, birth, places, dt)
     if model.is_learnt and learnt is None:
@@ -90,6 +87,15 @@ def with_cells(before: UndetectedTargets, birth: BirthModel, dt: float, *, appea
         learnt = LearntRate(rate, 0.0, np.zeros(model.grid.num_cells), 0.0, *no_labels)
     first = model.initial() + (model.births(dt, rate) if _in_scans(birth) else 0.0)
     return replace(before, cells=UndetectedIntensity(model.grid, first), birth_rate=learnt)
+
+
+def _on_grid(before: UndetectedTargets, cells: UndetectedIntensity, places: Appearing | None) -> UndetectedTargets:
+    """The same, with the very grid of the model."""
+    if places is None or cells.grid != places.model.grid:
+        expected = "none" if places is None else f"those of the filter's births, {places.model.grid}"
+        raise reject("belief.undetected.cells", expected, cells.grid)
+    own = places.model.grid
+    return before if cells.grid is own else replace(before, cells=UndetectedIntensity(own, cells.expected))
 
 
 def _in_scans(birth: BirthModel) -> bool:

@@ -11,7 +11,8 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from vedette.densities import FactoredGLMB, Labelled, UndetectedIntensity
+from vedette.densities import Labelled, UndetectedIntensity
+from vedette.densities.factored import bernoulli_factors
 from vedette.errors import InputError
 from vedette.filters import FilterInfo
 from vedette.kernels.base.types import Floats
@@ -209,5 +210,5 @@ def bytes_of_belief(belief: Any) -> int:
     own = belief.to_factors()
     hyps = len(own.hyp_log_weights) + len(own.hyp_tracks)
     # Of those of one label an existence says all.
-    singles = int(np.count_nonzero(FactoredGLMB.of(belief).is_bernoulli)) if belief.is_product else 0
+    singles = int(np.count_nonzero(bernoulli_factors(own))) if belief.is_product else 0
     return NUMBER * (numbers + hyps - 2 * singles)

@@ -6,23 +6,23 @@ import math
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from vedette.densities import LMB, Labelled, TrackTable, as_lmb
+from vedette.densities import LMB, Labelled, as_lmb
 from vedette.densities.containers import unchecked
 from vedette.densities.labelled import LABELLED
 from vedette.densities.tracks import take_tracks
 from vedette.errors import InputError
 from vedette.filters import Limits
-from vedette.filters.inputs import births_at, births_within, model_errors, no_births, nobody
+from vedette.filters.inputs import births_at, births_within, blame_model, model_errors, nobody
 from vedette.fusion.matching import OWN_LABELS
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.types import Floats, Ints, Lmb, ScanInput
-from vedette.kernels.labelled.births import births_of_measurements
-from vedette.kernels.steps.explained import prob_explained
+from vedette.kernels.labelled.births import BirthsOfMeasurements, births_of_measurements
+from vedette.kernels.steps.explained import births_unexplained, prob_explained
 from vedette.models import BirthModel, MeasurementBirth, SensorModel
 from vedette.models.arguments import pose_vector, reject
 
@@ -55,11 +55,17 @@ def births_of_tracker(birth: BirthModel, local: Any) -> BirthModel:
     Raises `InputError` where a tracker must start tracks, and the number of births is to be learnt.
     """
     if getattr(local, "starts_tracks", False):
-        return replace(birth, from_measurements=None)
+        return _at_sites(birth)
     if birth.from_measurements is not None and birth.from_measurements.is_learnt:
         wanted = f"a number, as the beliefs of {type(local).__name__} have no intensity of undetected targets"
         raise reject("MeasurementBirth.expected", wanted, birth.from_measurements.expected)
     return birth
+
+
+@lru_cache(maxsize=100)
+def _at_sites(birth: BirthModel) -> BirthModel:
+    """Those of the sites alone; made once a model, as what filters lay out of it is kept."""
+    return replace(birth, from_measurements=None)
 
 
 def births_due(birth: BirthModel, step: int, dt: float, measured: LMB | None) -> LMB | None:
@@ -70,6 +76,8 @@ def births_due(birth: BirthModel, step: int, dt: float, measured: LMB | None) ->
     """
     if birth.from_measurements is None:
         return None
+    if birth.num_sites == 0 and birth.period is None and measured is not None:
+        return measured
     return births_within(births_at(birth, step), birth.period, dt, measured)
 
 
@@ -98,9 +106,12 @@ def births_from_scans(
     model = birth.from_measurements
     if model is None:
         return None
-    pooled = unexplained(model, belief, sensors, scans, poses)
     first = birth.num_sites if owner is None else OWN_LABELS * (owner + 1)
-    return _born(pooled, model, step, first)
+    begin = BirthsOfMeasurements(model.std, float(model.expected), float(model.max_existence), step, first)
+    scanned = [s for s, scan in enumerate(scans) if scan is not None]
+    if len(scanned) == 1:
+        return _born_of_one(belief, sensors[scanned[0]], scans[scanned[0]], poses[scanned[0]], begin)
+    return _born(unexplained(model, belief, sensors, scans, poses), begin)
 
 
 def births_waiting(birth: BirthModel, before: LMB | None, found: LMB | None) -> LMB | None:
@@ -122,9 +133,7 @@ def unexplained(
     model: MeasurementBirth, belief: Labelled, sensors: Sequence[SensorModel], scans: Sequence[Any], poses: Any
 ) -> Unexplained:
     """What no track explains surely, once for what several sensors measured of one target; see `births_from_scans`."""
-    if not isinstance(belief, Labelled):
-        raise InputError(f"belief: expected {LABELLED} for births from measurements; got {type(belief).__name__}")
-    lmb = as_lmb(belief).to_kernel()
+    lmb = _as_kernel(belief)
     found = [
         _unexplained(lmb, sensor, scans[s], poses[s], s) for s, sensor in enumerate(sensors) if scans[s] is not None
     ]
@@ -148,16 +157,39 @@ def births_heard(
     return births_from_scans(birth, belief, sensors, known, poses, step, owner=owner)
 
 
-def _unexplained(belief: Lmb, sensor: SensorModel, scan: Any, pose: Any, number: int) -> Unexplained:
-    # The filters have checked the scan.
+def _as_kernel(belief: Labelled) -> Lmb:
+    if not isinstance(belief, Labelled):
+        raise InputError(f"belief: expected {LABELLED} for births from measurements; got {type(belief).__name__}")
+    return as_lmb(belief).to_kernel()
+
+
+def _look(belief: Lmb, sensor: SensorModel, scan: Any, pose: Any) -> ScanInput:
+    """A scan that the filters have checked."""
     measurements = np.ascontiguousarray(scan, np.float64).reshape(-1, sensor.meas_dim)
-    at = pose_vector("pose", pose)
+    return ScanInput(nobody(belief.tracks.means.shape[1]), measurements, pose_vector("pose", pose), 0.0)
+
+
+def _unexplained(belief: Lmb, sensor: SensorModel, scan: Any, pose: Any, number: int) -> Unexplained:
+    given = _look(belief, sensor, scan, pose)
     with model_errors():
-        given = ScanInput(nobody(belief.tracks.means.shape[1]), measurements, at, 0.0)
         explained = prob_explained(belief, given, sensor.to_kernel(), _truncation(sensor.meas_dim))
     free = np.flatnonzero(explained < 1.0 - LEAST_UNEXPLAINED)
-    positions = sensor.measurement.positions(measurements[free], at)
+    positions = sensor.measurement.positions(given.measurements[free], given.pose)
     return Unexplained(positions, 1.0 - explained[free], np.full(len(free), number))
+
+
+def _born_of_one(belief: Labelled, sensor: SensorModel, scan: Any, pose: Any, begin: BirthsOfMeasurements) -> LMB:
+    """Who may be born where one sensor alone has scanned."""
+    lmb = _as_kernel(belief)
+    given = _look(lmb, sensor, scan, pose)
+    places = sensor.measurement.positions(given.measurements, given.pose)
+    models = sensor.to_kernel(), _truncation(sensor.meas_dim)
+    try:
+        born = births_unexplained(lmb, given, places, *models, LEAST_UNEXPLAINED, begin)
+    except Exception as error:
+        blame_model(error)
+        raise
+    return LMB.from_kernel(born)
 
 
 @cache
@@ -222,9 +254,5 @@ class _Cells:
         return x, y
 
 
-def _born(found: Unexplained, model: MeasurementBirth, step: int, first_index: int) -> LMB:
-    if len(found.probabilities) == 0:
-        return no_births(len(model.std))
-    shared = (model.std, float(model.expected), float(model.max_existence), step, first_index)
-    born = births_of_measurements(found.positions, found.probabilities, *shared)
-    return unchecked(LMB, TrackTable.from_kernel(born.tracks), born.existence_logit)
+def _born(found: Unexplained, begin: BirthsOfMeasurements) -> LMB:
+    return LMB.from_kernel(births_of_measurements(found.positions, found.probabilities, begin))

@@ -91,9 +91,9 @@ class Distributed(LocalFilters):
             sent.append(bytes_of_belief(belief))
             # Without feedback a sensor still knows what it saw at earlier scans.
             scanned.append(scans[s] is not None or not self.feedback)
-        fused, report, measured = local[0], None, None
-        if self.fusion is not None:
-            views, rule = Views(self.sensors, at, tuple(scanned), prediction), self.fusion
+        fused, report, measured, rule = local[0], None, None, self.fusion
+        if rule is not None:
+            views = Views(self.sensors, at, tuple(scanned), prediction)
             with stages.timing("fusion"):
                 if birth.from_measurements is not None and not self.feedback and self.min_detection > 0.0:
                     local, infos = self._without_forgotten(birth.from_measurements, local, infos, views)

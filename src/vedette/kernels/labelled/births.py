@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,30 +11,36 @@ from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Lmb, Tracks
 
 
+class BirthsOfMeasurements(NamedTuple):
+    """How targets may begin at measurements."""
+
+    std: Floats  # (state_dim,) standard deviations of each target
+    expected: float  # number of targets in all
+    max_existence: float  # largest existence probability
+    step: int  # with `first`, the label of the first target; the second number of the others goes on from there
+    first: int
+
+
 @kernel
-def births_of_measurements(
-    positions: Floats, unexplained: Floats, std: Floats, expected: float, max_existence: float, step: int, first: int
-) -> Lmb:
+def births_of_measurements(positions: Floats, unexplained: Floats, begin: BirthsOfMeasurements) -> Lmb:
     """One target at rest for each measured position, in their order.
 
     Args:
         positions: (num, 2) m.
-        unexplained: (num,) probabilities that no track explains the measurement.
-        std: (state_dim,) standard deviations of each target.
-        expected: number of targets in all, shared in proportion to `unexplained`.
-        max_existence: largest existence probability.
-        step, first: label of the first target; the second number of the others goes on from there.
+        unexplained: (num,) probabilities that no track explains the measurement, in proportion to which the expected
+            number is shared.
+        begin: the rest.
     """
-    num, dim = len(unexplained), len(std)
+    num, dim = len(unexplained), len(begin.std)
     total = unexplained.sum()
     labels, offsets = np.empty((num, 2), np.int64), np.arange(num + 1)
     means, covs, logits = np.zeros((num, dim)), np.zeros((num, dim, dim)), np.empty(num)
     for i in range(num):
-        labels[i, 0], labels[i, 1] = step, first + i
+        labels[i, 0], labels[i, 1] = begin.step, begin.first + i
         means[i, :2] = positions[i]
         for d in range(dim):
-            covs[i, d, d] = std[d] ** 2
-        existence = min(max_existence, expected * unexplained[i] / total)
+            covs[i, d, d] = begin.std[d] ** 2
+        existence = min(begin.max_existence, begin.expected * unexplained[i] / total)
         # A share may be too small for a number.
         logits[i] = math.log(existence) - math.log1p(-existence) if existence > 0.0 else -math.inf
     return Lmb(Tracks(labels, offsets, np.zeros(num), means, covs), logits)

@@ -11,7 +11,9 @@ from vedette.kernels.association.predicted import expect_rows, standing_rows
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Lmb, ScanInput, Sensor
+from vedette.kernels.gaussian.mixtures import descending_order
 from vedette.kernels.gaussian.scratch import make_scratch
+from vedette.kernels.labelled.births import BirthsOfMeasurements, births_of_measurements
 from vedette.kernels.steps.in_view import in_view, marked
 from vedette.kernels.steps.lmb import weigh_by_existence
 
@@ -34,3 +36,23 @@ def prob_explained(belief: Lmb, scan: ScanInput, sensor: Sensor, truncation: Tru
     for j in range(len(odds)):
         odds[j] = odds[j] / (1.0 + odds[j]) if odds[j] < math.inf else 1.0
     return odds
+
+
+@kernel
+def births_unexplained(
+    belief: Lmb,
+    scan: ScanInput,
+    places: Floats,
+    sensor: Sensor,
+    truncation: Truncation,
+    least_unexplained: float,
+    begin: BirthsOfMeasurements,
+) -> Lmb:
+    """Who may be born where one sensor measured what no track explains surely, from the least explained on.
+
+    places: (num_measurements, 2) where each was taken, m.
+    """
+    unexplained = 1.0 - prob_explained(belief, scan, sensor, truncation)
+    order = descending_order(unexplained)
+    free = order[unexplained[order] > least_unexplained]
+    return births_of_measurements(places[free], unexplained[free], begin)
