@@ -125,7 +125,7 @@ def test_relabelling_changes_nothing(glmb, random):
     labels = np.array([renamed[label_of(glmb.tracks, t)] for t in range(glmb.tracks.num_tracks)], np.int64).reshape(
         -1, 2
     )
-    tracks = TrackTable(labels, *glmb.tracks.to_kernel()[1:])
+    tracks = TrackTable(labels, glmb.tracks.offsets, *glmb.tracks.to_kernel().components)
     hypotheses = [glmb.hyp_tracks[a:b] for a, b in zip(glmb.hyp_offsets, glmb.hyp_offsets[1:], strict=False)]
     other = GLMB.from_hypotheses(tracks, hypotheses, np.exp(glmb.hyp_log_weights))
     _close(cardinality_distribution(other), cardinality_distribution(glmb))
@@ -238,10 +238,12 @@ def test_densities_of_no_target():
 @pytest.mark.parametrize("limits", [{}, EXACT, {"max_components": 2}])
 def test_conversions_leave_their_input_alone(limits):
     glmb = random_glmb(np.random.default_rng(1), 4, 12, 3)
-    before = [array.copy() for array in (*glmb.tracks.to_kernel(), *glmb.to_kernel()[1:])]
+    tracks, *hypotheses = glmb.to_kernel()
+    arrays = tracks.labels, tracks.offsets, *tracks.components, *hypotheses
+    before = [array.copy() for array in arrays]
     marginalise(glmb, **limits)
     as_glmb(as_lmb(glmb, **limits), max_hypotheses=5)
-    for array, copy in zip((*glmb.tracks.to_kernel(), *glmb.to_kernel()[1:]), before, strict=True):
+    for array, copy in zip(arrays, before, strict=True):
         assert np.array_equal(array, copy)
 
 

@@ -105,7 +105,7 @@ def test_indices_changed_after_construction_do_not_reach_a_kernel() -> None:
 def test_arrays_of_any_layout_are_taken(layout: Any) -> None:
     made = replace(TRACKS, covs=layout(TRACKS.covs))
     np.testing.assert_array_equal(made.covs, layout(TRACKS.covs))
-    assert made.to_kernel().covs.flags.c_contiguous
+    assert made.to_kernel().components.covs.flags.c_contiguous
 
 
 def test_parts_of_a_density_are_arrays_of_their_own() -> None:

@@ -10,7 +10,7 @@ import pytest
 from vedette import models
 from vedette.densities import FactoredGLMB, existence_probabilities
 from vedette.filters import FactoredGlmbFilter
-from vedette.kernels.base.types import FactoredGlmb, Glmb, Tracks
+from vedette.kernels.base.types import FactoredGlmb, Glmb, Mixture, Tracks
 from vedette.kernels.labelled.renaming import with_known_names
 from vedette.kernels.labelled.splitting import choices_of
 
@@ -19,7 +19,8 @@ LABELS = np.array([[1, 0], [2, 0], [2, 1]])
 
 def glmb(hypotheses: dict[tuple[int, ...], float]) -> Glmb:
     """Of three labels with one track each. hypotheses: weights of sets of tracks."""
-    tracks = Tracks(LABELS, np.arange(4), np.zeros(3), np.arange(12.0).reshape(3, 4), np.tile(np.eye(4), (3, 1, 1)))
+    components = Mixture(np.zeros(3), np.arange(12.0).reshape(3, 4), np.tile(np.eye(4), (3, 1, 1)))
+    tracks = Tracks(LABELS, np.arange(4), components)
     sizes = [len(held) for held in hypotheses]
     members = np.array([track for held in hypotheses for track in held], np.int64)
     return Glmb(tracks, np.cumsum([0, *sizes]), members, np.log(list(hypotheses.values())))
@@ -30,7 +31,7 @@ def listed(density: Glmb) -> dict[tuple[tuple[float, ...], ...], float]:
     found: dict[tuple[tuple[float, ...], ...], float] = {}
     for h, log_weight in enumerate(density.hyp_log_weights):
         held = density.hyp_tracks[density.hyp_offsets[h] : density.hyp_offsets[h + 1]]
-        key = tuple((*map(float, density.tracks.labels[t]), float(density.tracks.means[t, 0])) for t in held)
+        key = tuple((*map(float, density.tracks.labels[t]), float(density.tracks.components.means[t, 0])) for t in held)
         found[key] = math.exp(log_weight)
     return found
 
@@ -69,7 +70,8 @@ def test_hypotheses_that_hold_both_names_are_left_out() -> None:
 def test_a_prediction_keeps_improbable_names() -> None:
     """A parallel update needs the same labels, one Gaussian each, in the prediction and in what sensors made of it."""
     pair = glmb({(0,): 0.992, (1,): 0.004, (): 0.004})
-    tracks = Tracks(LABELS[:2], np.arange(3), np.zeros(2), pair.tracks.means[:2], pair.tracks.covs[:2])
+    own = pair.tracks.components
+    tracks = Tracks(LABELS[:2], np.arange(3), Mixture(np.zeros(2), own.means[:2], own.covs[:2]))
     factor = np.array([0, 2]), pair.hyp_offsets, pair.hyp_tracks, pair.hyp_log_weights, np.array([0, 3])
     belief = FactoredGLMB.from_kernel(FactoredGlmb(tracks, *factor))
     targets = models.TargetModel(

@@ -100,5 +100,5 @@ def test_a_track_out_of_view_is_one_that_the_scan_leaves_as_it_was(off: float, m
         assert changed > 1e-16
     else:
         assert changed < 1e-15
-        np.testing.assert_allclose(after.tracks.means, prior.tracks.means, rtol=1e-15)
+        np.testing.assert_allclose(after.tracks.components.means, prior.tracks.components.means, rtol=1e-15)
     assert in_view(prior.tracks, *rest)[0] == (off <= 300.0 or (measured and off <= 900.0))

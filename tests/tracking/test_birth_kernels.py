@@ -23,8 +23,8 @@ def test_births_of_measurements_share_the_expected_number() -> None:
     std = np.array([10.0, 20.0, 3.0, 4.0])
     born = births_of_measurements(positions, unexplained, BirthsOfMeasurements(std, 0.65, 0.4, 7, 2))
     assert born.tracks.labels.tolist() == [[7, 2], [7, 3], [7, 4]]
-    assert born.tracks.means.tolist() == [[3.0, 4.0, 0.0, 0.0], [1.0, 2.0, 0.0, 0.0], [5.0, 6.0, 0.0, 0.0]]
-    np.testing.assert_array_equal(born.tracks.covs, np.tile(np.diag(std**2), (3, 1, 1)))
+    assert born.tracks.components.means.tolist() == [[3.0, 4.0, 0.0, 0.0], [1.0, 2.0, 0.0, 0.0], [5.0, 6.0, 0.0, 0.0]]
+    np.testing.assert_array_equal(born.tracks.components.covs, np.tile(np.diag(std**2), (3, 1, 1)))
     existence = 1.0 / (1.0 + np.exp(-born.existence_logit))
     np.testing.assert_allclose(existence, [0.4, 0.1, 0.1], rtol=1e-12)
     LMB(TrackTable.from_kernel(born.tracks), born.existence_logit)  # it is a valid one

@@ -116,8 +116,8 @@ def _run_lmb(
 
     with model_errors():
         if settings.association == "known":
-            horizon, tracks = decision.horizon, prior.tracks
-            paths = predict_paths(decision.motion, horizon.dt, settings.horizon_steps, tracks.means, tracks.covs)
+            dt, gaussians = decision.horizon.dt, prior.tracks.components
+            paths = predict_paths(decision.motion, dt, settings.horizon_steps, gaussians.means, gaussians.covs)
             own = KnownBelief(prior, paths, targets, label_radii(paths, targets, decision.futures.states))
             num_courses = len(decision.horizon.poses)
             run_chunks(

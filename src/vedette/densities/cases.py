@@ -76,11 +76,12 @@ class LabelledCases:
     def of(cls, density: Labelled) -> LabelledCases:
         """One LMB or marginalised GLMB as the only case; a mixture is replaced by one Gaussian of its moments."""
         tracks = single_gaussians(density.tracks).to_kernel()
+        gaussians = tracks.components
         if isinstance(density, LMB):
             labels = [tuple(label) for label in tracks.labels.tolist()]
-            return cls.of_lmbs(labels, density.existence_logit[None], tracks.means[None], tracks.covs[None])
+            return cls.of_lmbs(labels, density.existence_logit[None], gaussians.means[None], gaussians.covs[None])
         assert isinstance(density, GLMB)
-        means, covs = tracks.means[density.hyp_tracks], tracks.covs[density.hyp_tracks]
+        means, covs = gaussians.means[density.hyp_tracks], gaussians.covs[density.hyp_tracks]
         log_weights = for_kernel(density.hyp_log_weights)
         return cls.of_glmbs(label_sets(density).sets, log_weights[None], means[None], covs[None])
 

@@ -20,7 +20,7 @@ from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import no_gaussians
 from vedette.probabilities import expit
 
-_ARRAYS = kernel_arrays("existence_logit", "offsets", "log_weights", "means", "covs")
+_ARRAYS = kernel_arrays("existence_logit", "offsets", *kt.Mixture._fields)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -79,13 +79,13 @@ class MultiBernoulli(Unlabelled):
     def to_kernel(self) -> kt.Lmb:
         """The same arrays as the bundle that kernels take, every label (-1, -1)."""
         labels = np.full((self.num_bernoullis, 2), -1, np.int64)
-        existence_logit, *mixtures = _ARRAYS(self)
-        return kt.Lmb(kt.Tracks(labels, *mixtures), existence_logit)
+        existence_logit, offsets, *columns = _ARRAYS(self)
+        return kt.Lmb(kt.Tracks(labels, offsets, kt.Mixture(*columns)), existence_logit)
 
     @classmethod
     def from_kernel(cls, lmb: kt.Lmb) -> MultiBernoulli:
         """The Bernoullis of a bundle, whatever their labels; a kernel's own need no check."""
-        return unchecked(cls, lmb.existence_logit, *lmb.tracks[1:])
+        return unchecked(cls, lmb.existence_logit, lmb.tracks.offsets, *lmb.tracks.components)
 
     @classmethod
     def empty(cls, state_dim: int) -> MultiBernoulli:

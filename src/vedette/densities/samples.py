@@ -15,6 +15,7 @@ from vedette.densities.multi_bernoulli import MultiBernoulli
 from vedette.densities.unlabelled import IidCluster, Poisson
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base.types import Floats, Ints, Lmb, Tracks
+from vedette.kernels.gaussian.components import components_of
 from vedette.models.arguments import generator
 from vedette.speaking import Speaking
 
@@ -119,16 +120,16 @@ def _independent(density: Lmb, existence: Floats, num_samples: int, rng: np.rand
 def _alike(density: Poisson | IidCluster, numbers: Ints, rng: np.random.Generator) -> MultiTargetSamples:
     """Samples of these numbers of targets, all drawn from the density's one mixture."""
     offsets, whole = checks.offsets_of(numbers), np.array([0, len(density.log_weights)])
-    mixture = Tracks(np.full((1, 2), -1), whole, density.log_weights, density.means, density.covs)
+    mixture = Tracks(np.full((1, 2), -1), whole, components_of(density.log_weights, density.means, density.covs))
     return _drawn(offsets, mixture, np.zeros(int(offsets[-1]), np.int64), rng)
 
 
 def _drawn(offsets: Ints, tracks: Tracks, chosen: Ints, rng: np.random.Generator) -> MultiTargetSamples:
     """Samples of the `chosen` tracks (num_targets,), cut by offsets: one state of each."""
-    states = np.empty((0, tracks.means.shape[1]))
+    states = np.empty((0, tracks.components.means.shape[1]))
     if len(chosen):
-        components = _choose(tracks.log_weights, tracks.offsets, chosen, rng)
-        states = _draw_gaussians(tracks.means, tracks.covs, components, rng)
+        components = _choose(tracks.components.log_weights, tracks.offsets, chosen, rng)
+        states = _draw_gaussians(tracks.components.means, tracks.components.covs, components, rng)
     return MultiTargetSamples(offsets, tracks.labels[chosen], states)
 
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from vedette.densities.containers import Container, for_kernel, kernel_arrays, u
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.gaussian.components import components_of, taken_components
 from vedette.kernels.gaussian.mixtures import heaviest_of_runs
 from vedette.kernels.gaussian.pooling import pooled_tracks
 from vedette.kernels.gaussian.reduction import MixtureCaps
@@ -22,7 +24,8 @@ from vedette.models.arguments import no_gaussians
 from vedette.text import counted
 
 UNSCANNED = -2  # in the place of a measurement
-_ARRAYS = kernel_arrays("labels", "offsets", "log_weights", "means", "covs")
+_ARRAYS = kernel_arrays("labels", "offsets", *kt.Mixture._fields)
+_MIXTURES = attrgetter("offsets", *kt.Mixture._fields)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -77,18 +80,19 @@ class TrackTable(Container):
 
     def to_kernel(self) -> kt.Tracks:
         """The same arrays as the bundle that kernels take."""
-        return kt.Tracks(*_ARRAYS(self))
+        labels, offsets, *columns = _ARRAYS(self)
+        return kt.Tracks(labels, offsets, kt.Mixture(*columns))
 
     @classmethod
     def from_kernel(cls, tracks: kt.Tracks, sources: Ints | None = None) -> TrackTable:
         """The arrays of a bundle as they are; a kernel's own need no check."""
-        return unchecked(cls, *tracks, sources)
+        return unchecked(cls, tracks.labels, tracks.offsets, *tracks.components, sources)
 
     @classmethod
     def empty(cls, state_dim: int) -> TrackTable:
         """A table without tracks. Raises `InputError` for what is no dimension of a state."""
         labels, offsets = np.empty((0, 2), np.int64), np.zeros(1, np.int64)
-        return cls.from_kernel(kt.Tracks(labels, offsets, np.empty(0), *no_gaussians(state_dim)))
+        return cls.from_kernel(kt.Tracks(labels, offsets, components_of(np.empty(0), *no_gaussians(state_dim))))
 
     @classmethod
     def from_gaussians(cls, labels: Any, means: Any, covs: Any) -> TrackTable:
@@ -145,15 +149,14 @@ def log_weights(field: str, weights: Any) -> Floats:
 def take_tracks(tracks: TrackTable, places: Ints) -> TrackTable:
     """The tracks at `places`, in that order."""
     offsets, components = checks.take_runs(tracks.offsets, places)
-    return unchecked(
-        TrackTable,
-        tracks.labels[places],
-        offsets,
-        tracks.log_weights[components],
-        tracks.means[components],
-        tracks.covs[components],
-        None if tracks.sources is None else tracks.sources[places],
-    )
+    taken = taken_components(tracks.to_kernel().components, components)
+    sources = None if tracks.sources is None else tracks.sources[places]
+    return TrackTable.from_kernel(kt.Tracks(tracks.labels[places], offsets, taken), sources)
+
+
+def relabelled_tracks(tracks: TrackTable, labels: Ints) -> TrackTable:
+    """The same mixtures with other labels."""
+    return unchecked(TrackTable, labels, *_MIXTURES(tracks), None)
 
 
 def places_of(labels: Ints, table: Ints) -> Ints:
@@ -165,7 +168,7 @@ def places_of(labels: Ints, table: Ints) -> Ints:
 def gaussian_tracks(labels: Ints, means: Floats, covs: Floats) -> TrackTable:
     """As `TrackTable.from_gaussians`, of arrays of the library's own."""
     num = len(labels)
-    return TrackTable.from_kernel(kt.Tracks(labels, np.arange(num + 1), np.zeros(num), means, covs))
+    return TrackTable.from_kernel(kt.Tracks(labels, np.arange(num + 1), components_of(np.zeros(num), means, covs)))
 
 
 def place_labels(tables: Sequence[Ints]) -> tuple[Ints, Ints]:
@@ -190,7 +193,7 @@ def single_gaussians(tracks: TrackTable) -> TrackTable:
 def reduced_tracks(tracks: kt.Tracks, caps: MixtureCaps) -> kt.Tracks:
     """The tracks with their mixtures reduced by the caps."""
     num = len(tracks.labels)
-    if len(tracks.log_weights) == num:
+    if len(tracks.components.log_weights) == num:
         return tracks
     each = np.arange(num + 1)
     return pooled_tracks(tracks, tracks.labels, each, each[:-1].copy(), np.ones(num), caps)

@@ -19,8 +19,8 @@ from vedette.kernels.base.types import Floats
 from vedette.models.arguments import no_gaussians
 from vedette.text import counted
 
-_POISSON = kernel_arrays("log_weights", "means", "covs")
-_CLUSTER = kernel_arrays("log_cardinality", "log_weights", "means", "covs")
+_POISSON = kernel_arrays(*kt.Mixture._fields)
+_CLUSTER = kernel_arrays("log_cardinality", *kt.Mixture._fields)
 
 
 class Unlabelled(MultiTarget):

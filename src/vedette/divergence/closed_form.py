@@ -13,6 +13,7 @@ from vedette.densities.label_sets import in_label_order, join_factors, label_set
 from vedette.densities.labelled import LABELLED
 from vedette.errors import InputError, NumericalError
 from vedette.kernels.base.types import Glmb, Tracks
+from vedette.kernels.gaussian.components import joined_components
 from vedette.kernels.labelled.inner_products import log_glmbs, log_lmbs, log_tracks
 from vedette.kernels.labelled.stacking import stack_glmbs, stack_tracks
 from vedette.models.arguments import positive
@@ -183,13 +184,8 @@ def _lmbs(a: LMB, b: LMB, log_unit_volume: float, common: bool) -> tuple[float, 
 def _intensities(a: Poisson, b: Poisson) -> Tracks:
     """The two intensities as tracks 0 and 1."""
     sizes = [len(a.log_weights), len(b.log_weights)]
-    return Tracks(
-        np.zeros((2, 2), np.int64),
-        np.cumsum([0, *sizes]),
-        np.concatenate([a.log_weights, b.log_weights]),
-        np.concatenate([a.means, b.means]),
-        np.concatenate([a.covs, b.covs]),
-    )
+    components = joined_components([a.to_kernel(), b.to_kernel()])
+    return Tracks(np.zeros((2, 2), np.int64), np.cumsum([0, *sizes]), components)
 
 
 def _poisson(a: Poisson, b: Poisson, log_unit_volume: float) -> float:

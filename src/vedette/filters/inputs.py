@@ -15,7 +15,7 @@ import numpy as np
 
 from vedette.densities import GLMB, LMB, FactoredGLMB, IidCluster, Labelled, MultiBernoulli, Poisson, TrackTable
 from vedette.densities.containers import unchecked
-from vedette.densities.tracks import gaussian_tracks
+from vedette.densities.tracks import gaussian_tracks, relabelled_tracks
 from vedette.errors import InputError, ModelError, VedetteError
 from vedette.kernels.base.types import Bools, Floats, Ints, Lmb
 from vedette.kernels.gaussian.scans import examined_scan
@@ -153,8 +153,7 @@ def born_at(born: LMB, step: int) -> LMB:
     """The same targets with the labels of a step."""
     tracks, labels = born.tracks, born.tracks.labels.copy()
     labels[:, 0] = step
-    same = (tracks.offsets, tracks.log_weights, tracks.means, tracks.covs)
-    return unchecked(LMB, unchecked(TrackTable, labels, *same, None), born.existence_logit)
+    return unchecked(LMB, relabelled_tracks(tracks, labels), born.existence_logit)
 
 
 def births_within(born: LMB, period: float | None, dt: float, others: LMB | None = None) -> LMB:

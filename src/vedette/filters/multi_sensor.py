@@ -35,7 +35,7 @@ class SensorScans(NamedTuple):
 
     def inputs_in_turn(self, born: Lmb, dt: float) -> list[ScanInput]:
         """As `inputs`, with births and a period for the first alone."""
-        none = nobody(born.tracks.means.shape[1])
+        none = nobody(born.tracks.components.means.shape[1])
         first, *others = self.inputs(born, dt)
         return [first, *(own._replace(birth=none, dt=0.0) for own in others)]
 

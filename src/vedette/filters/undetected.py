@@ -15,7 +15,7 @@ from vedette.filters.appearing import appearing, no_cells, rate_after, tables_of
 from vedette.filters.inputs import births_of, births_within
 from vedette.filters.limits import Limits
 from vedette.kernels.base.types import Floats, Lmb, Mixture
-from vedette.kernels.gaussian.intensities import stacked_mixtures
+from vedette.kernels.gaussian.components import components_of, stacked_mixtures
 from vedette.kernels.steps.undetected import Arrivals, Left, Undetected
 from vedette.models import BirthModel, SensorModel
 from vedette.models.arguments import reject, step_number
@@ -84,9 +84,8 @@ def with_dropped(undetected: UndetectedTargets, before: FactoredGLMB, kept: Fact
 def _intensity_of(labels: Lmb) -> Mixture:
     """The tracks of labels, weighed by their existence."""
     existence, tracks = expit(labels.existence_logit), labels.tracks
-    return Mixture(
-        tracks.log_weights + np.repeat(np.log(existence), np.diff(tracks.offsets)), tracks.means, tracks.covs
-    )
+    weighed = tracks.components.log_weights + np.repeat(np.log(existence), np.diff(tracks.offsets))
+    return tracks.components._replace(log_weights=weighed)
 
 
 def named_at(undetected: UndetectedTargets, step: Any, num_sites: int) -> UndetectedTargets:

@@ -30,6 +30,7 @@ from vedette.fusion.parallel_sets import (
 from vedette.fusion.powers import ONE, FusionLimits, check_limits
 from vedette.fusion.views import Views
 from vedette.kernels.base.types import Floats, Ints, Tracks
+from vedette.kernels.gaussian.components import components_of
 from vedette.kernels.labelled.parallel import update_in_parallel
 from vedette.kernels.labelled.stacking import stack_tracks
 from vedette.models.arguments import chance, non_negative, sequence
@@ -132,10 +133,12 @@ class ParallelUpdate:
     def _fused_lmbs(self, prediction: LMB, beliefs: Sequence[LMB], weights: Floats) -> tuple[LMB, FusionInfo]:
         """Label by label; of a prediction of single Gaussians."""
         prior, given = prediction.tracks.to_kernel(), posteriors_of(prediction, beliefs, self.missing_existence)
-        means, covs, log_overlaps = self._updated_tracks(prior.means, prior.covs, given.chosen, weights, given.tracks)
+        before = prior.components
+        means, covs, log_overlaps = self._updated_tracks(before.means, before.covs, given.chosen, weights, given.tracks)
         logits = updated_logs(prediction.existence_logit, given.logits, weights) + log_overlaps
         check_evidence(prediction.tracks.labels, logits)
-        tracks = TrackTable.from_kernel(Tracks(prior.labels, prior.offsets, prior.log_weights, means, covs))
+        after = components_of(before.log_weights, means, covs)
+        tracks = TrackTable.from_kernel(Tracks(prior.labels, prior.offsets, after))
         present, absent = (
             updated_logs(log_expit(sign * prediction.existence_logit), log_expit(sign * given.logits), weights)
             for sign in (1.0, -1.0)

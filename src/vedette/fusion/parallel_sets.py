@@ -19,6 +19,7 @@ from vedette.fusion.base import count_lost
 from vedette.fusion.powers import ONE
 from vedette.fusion.views import sum_over_sensors
 from vedette.kernels.base.types import Bools, Floats, Ints, Tracks
+from vedette.kernels.gaussian.components import components_of
 from vedette.kernels.gaussian.pooling import pooled_tracks
 from vedette.kernels.labelled.groups import group_log_sums
 from vedette.kernels.labelled.stacking import stack_tracks
@@ -215,7 +216,8 @@ def _group(labels: Ints, places: Ints, log_weights: Floats, means: Floats, covs:
     set_of, label_of = np.nonzero(columns)
     order = np.argsort(label_of, kind="stable")
     pool, shares = places[:, held][columns][order], np.exp(log_weights)[set_of[order]]
-    table = Tracks(np.zeros((len(means), 2), np.int64), np.arange(len(means) + 1), np.zeros(len(means)), means, covs)
+    components = components_of(np.zeros(len(means)), means, covs)
+    table = Tracks(np.zeros((len(means), 2), np.int64), np.arange(len(means) + 1), components)
     offsets = offsets_of(np.bincount(label_of, minlength=num))
     tracks = pooled_tracks(table, labels[held], offsets, pool, shares, ONE)
     hyp_offsets = offsets_of(columns.sum(axis=1))

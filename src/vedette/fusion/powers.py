@@ -106,7 +106,7 @@ def fused_tracks(
     mixtures are reduced by the rule's caps. Raises `NumericalError` where a product of powers is no density.
     """
     try:
-        offsets, log_weights, means, covs, log_overlaps = fuse_tracks(
+        offsets, components, log_overlaps = fuse_tracks(
             chosen,
             np.array(np.broadcast_to(weights, chosen.shape)),
             tracks,
@@ -118,7 +118,7 @@ def fused_tracks(
     if len(rule.points) > 0:
         # Hoelder: the integral is at most 1, which cubature may overshoot.
         log_overlaps = np.minimum(log_overlaps, 0.0)
-    fused = Tracks(labels, offsets, log_weights, means, covs)
+    fused = Tracks(labels, offsets, components)
     return TrackTable.from_kernel(reduced_tracks(fused, rule.caps)), log_overlaps
 
 

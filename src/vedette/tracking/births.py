@@ -166,7 +166,7 @@ def _as_kernel(belief: Labelled) -> Lmb:
 def _look(belief: Lmb, sensor: SensorModel, scan: Any, pose: Any) -> ScanInput:
     """A scan that the filters have checked."""
     measurements = np.ascontiguousarray(scan, np.float64).reshape(-1, sensor.meas_dim)
-    return ScanInput(nobody(belief.tracks.means.shape[1]), measurements, pose_vector("pose", pose), 0.0)
+    return ScanInput(nobody(belief.tracks.components.means.shape[1]), measurements, pose_vector("pose", pose), 0.0)
 
 
 def _unexplained(belief: Lmb, sensor: SensorModel, scan: Any, pose: Any, number: int) -> Unexplained:

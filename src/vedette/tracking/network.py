@@ -153,7 +153,7 @@ def parts_of_belief(belief: Any) -> dict[bytes, int]:
     for (low, high), size, other in zip(pairwise(firsts.tolist()), sizes.tolist(), others, strict=True):
         start, end = tracks.offsets[low], tracks.offsets[high]
         of_tracks = tracks.labels[low:high], tracks.offsets[low:high] - start
-        of_components = (array[start:end] for array in (tracks.log_weights, tracks.means, tracks.covs))
+        of_components = (array[start:end] for array in tracks.to_kernel().components)
         content = b"".join([other, *(array.tobytes() for array in (*of_tracks, *of_components))])
         parts[blake2b(content, digest_size=NUMBER).digest()] = size
     return parts

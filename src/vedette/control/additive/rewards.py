@@ -182,7 +182,7 @@ def valuation_of(reward: PowerReward | LabelReward | ExpectedLossReward, predict
 
     prior: (num_labels, bernoulli_size) rows of the prediction.
     """
-    moments, num = prediction.tracks.to_kernel()[3:], len(prior)
+    gaussians, num = prediction.tracks.to_kernel().components, len(prior)
     loss = Valuation(
         EXPECTED_LOSS,
         1,
@@ -192,7 +192,8 @@ def valuation_of(reward: PowerReward | LabelReward | ExpectedLossReward, predict
         0.0,
         np.empty(0),
         cardinality_variance_of_label,  # not asked but by FUNCTION
-        *moments,
+        gaussians.means,
+        gaussians.covs,
     )
     if isinstance(reward, ExpectedLossReward):
         covs = prediction.tracks.covs

@@ -94,8 +94,8 @@ def starts_of(
     """
     samples = Samples.draw(state.fused, sensors, settings, rng=rng) if sampled else Samples.none(state.fused, settings)
     given = prediction.to_kernel()
-    references = given.tracks.means
-    prior = rows_without_scans(references, given.tracks.covs, given.existence_logit, references)
+    references, covs = given.tracks.components.means, given.tracks.components.covs
+    prior = rows_without_scans(references, covs, given.existence_logit, references)
     courses, scans = [own.courses for own in options], scans_within(sensors, options, state.time, settings)
     shared, groups = IDEAL_MODES[settings.ideal_measurements] == IDEAL or not sampled, []
     for members in _alike(sensors, state.local, shared=shared):
@@ -139,8 +139,8 @@ def _group(
     futures = samples.futures(sensor.filter.sensor.meas_dim, settings, rng=rng)
     together, when = (np.concatenate([own[s] for s in members]) for own in (courses, scans))
     decision = decision_of(sensor, together, futures, settings, when, None if sampled else "mean")
-    labels, tracks, horizon = places[own], prior.tracks, decision.horizon
-    paths = predict_paths(decision.motion, horizon.dt, horizon.poses.shape[1], tracks.means, tracks.covs)
+    labels, gaussians, horizon = places[own], prior.tracks.components, decision.horizon
+    paths = predict_paths(decision.motion, horizon.dt, horizon.poses.shape[1], gaussians.means, gaussians.covs)
     ends = np.ascontiguousarray(paths.means[:, -1]), np.ascontiguousarray(paths.covs[:, -1])
     rows = rows_without_scans(*ends, prior.existence_logit, prediction.tracks.means[labels])
     targets = np.ascontiguousarray(samples.targets[labels])

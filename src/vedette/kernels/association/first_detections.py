@@ -24,10 +24,10 @@ from vedette.kernels.association.predicted import Rows, expect_rows, log_or_minu
 from vedette.kernels.base.arrays import group_members
 from vedette.kernels.base.compile import borrowing, kernel
 from vedette.kernels.base.types import Floats, Ints, Mixture, ScanInput, Sensor
+from vedette.kernels.gaussian.components import copy_component, copy_components, make_components
 from vedette.kernels.gaussian.detection import moments_if_missed
 from vedette.kernels.gaussian.innovation import copy_innovation
 from vedette.kernels.gaussian.linalg import log_add
-from vedette.kernels.gaussian.mixtures import copy_component, make_components
 from vedette.kernels.gaussian.relinearisation import make_pair_work
 from vedette.kernels.gaussian.scratch import make_scratch
 
@@ -62,8 +62,8 @@ def seen_intensity(intensity: Mixture, scan: ScanInput, sensor: Sensor) -> Rows:
     rows = make_rows(num, num, state_dim, meas_dim)
     for c in range(num):
         rows.labels[c, 0], rows.labels[c, 1] = 0, 0
-        rows.offsets[c + 1], rows.log_absent[c], rows.log_weights[c] = c + 1, -math.inf, intensity.log_weights[c]
-        copy_component(intensity.means, intensity.covs, c, rows.means, rows.covs, c)
+        rows.offsets[c + 1], rows.log_absent[c] = c + 1, -math.inf
+    copy_components(intensity, 0, num, rows.components, 0)
     expect_rows(sensor, scan.pose, rows, make_scratch(state_dim, meas_dim))
     return rows
 
@@ -75,16 +75,17 @@ def missed_intensity(seen: Rows, scan: ScanInput, sensor: Sensor, num: int) -> t
     num: components that are of the intensity. The log probability is minus the integral of P_D D, as the number of
     detections is Poisson.
     """
-    state_dim = seen.means.shape[1]
+    components = seen.components
+    state_dim = components.means.shape[1]
     out, expected, state = make_components(num, state_dim), 0.0, np.empty(state_dim)
     for c in range(num):
         detected = seen.innovation.prob_detection[c]
-        expected += math.exp(seen.log_weights[c]) * detected
-        out.log_weights[c] = seen.log_weights[c] + log_or_minus_inf(1.0 - detected)
+        expected += math.exp(components.log_weights[c]) * detected
+        copy_component(components, c, out, c)
+        out.log_weights[c] += log_or_minus_inf(1.0 - detected)
         if seen.innovation.at_edge[c]:
-            moments_if_missed(sensor, scan.pose, seen.means[c], seen.covs[c], state, out.means[c], out.covs[c])
-        else:
-            copy_component(seen.means, seen.covs, c, out.means, out.covs, c)
+            mean, cov = components.means[c], components.covs[c]
+            moments_if_missed(sensor, scan.pose, mean, cov, state, out.means[c], out.covs[c])
     return out, -expected
 
 
@@ -165,11 +166,11 @@ def candidates_of(
         least_logit: log of the least odds of a candidate.
         label: birth step and index of the candidate of the first measurement.
     """
-    sight = Sight(sensor, scan.pose, make_pair_work(seen.means.shape[1], len(sensor.angular)))
+    sight = Sight(sensor, scan.pose, make_pair_work(seen.components.means.shape[1], len(sensor.angular)))
     pairs = _gated_pairs(seen, num_local, scan.measurements, log_clutter, sight, gate)
     chosen, log_left_out, left_out = _chosen(pairs, unclaimed, least_logit)
     num, meas_dim = len(chosen.measurements), len(sensor.angular)
-    rows = make_rows(num, chosen.num_pairs, seen.means.shape[1], meas_dim)
+    rows = make_rows(num, chosen.num_pairs, seen.components.means.shape[1], meas_dim)
     updated = room_for_updated(seen, chosen.num_pairs)
     options = make_room(num, 2 * num, chosen.num_pairs, len(scan.measurements), meas_dim, updated)
     for row in range(num):
@@ -194,8 +195,7 @@ def _write_candidate(
         c, own = pairs.components[pair], pairs.log_odds[pair]
         if own - chosen.log_odds[j] < _LEAST_SHARE:
             continue
-        rows.log_weights[filled] = seen.log_weights[c]
-        copy_component(seen.means, seen.covs, c, rows.means, rows.covs, filled)
+        copy_component(seen.components, c, rows.components, filled)
         copy_innovation(seen.innovation, c, rows.innovation, filled)
         copy_entry(pairs.options, pair, options, filled)
         options.component_log_weights[filled] = own

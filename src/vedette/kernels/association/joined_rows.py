@@ -9,8 +9,8 @@ from vedette.kernels.association.options import room_for_updated
 from vedette.kernels.association.predicted import Rows, make_rows
 from vedette.kernels.base.arrays import grown_floats, grown_ints
 from vedette.kernels.base.compile import inlined, kernel
+from vedette.kernels.gaussian.components import copy_components
 from vedette.kernels.gaussian.innovation import copy_innovation
-from vedette.kernels.gaussian.mixtures import copy_component
 
 
 @kernel
@@ -74,7 +74,7 @@ def _copy_rows(source: Rows, out: Rows, first: int, start: int) -> None:
         out.labels[first + row, 0], out.labels[first + row, 1] = source.labels[row, 0], source.labels[row, 1]
         out.log_absent[first + row] = source.log_absent[row]
         out.offsets[first + row + 1] = start + source.offsets[row + 1]
-    for c in range(source.offsets[len(source.log_absent)]):
-        out.log_weights[start + c] = source.log_weights[c]
-        copy_component(source.means, source.covs, c, out.means, out.covs, start + c)
+    num = source.offsets[len(source.log_absent)]
+    copy_components(source.components, 0, num, out.components, start)
+    for c in range(num):
         copy_innovation(source.innovation, c, out.innovation, start + c)

@@ -68,7 +68,7 @@ def _room_for(rows: Rows, near: Near, num_measurements: int, meas_dim: int) -> O
 @kernel
 def room_for_updated(rows: Rows, num_entries: int) -> Floats:
     """(num_entries, state_dim + 1, state_dim), or (0, ...) where no component bends or is at the edge of the view."""
-    dim, kinds = rows.means.shape[1], rows.innovation
+    dim, kinds = rows.components.means.shape[1], rows.innovation
     return np.empty((num_entries if kinds.bends.any() or kinds.at_edge.any() else 0, dim + 1, dim))
 
 
@@ -140,13 +140,13 @@ def weigh_detection(
     log_norm = innovation.log_norm[c]
     if innovation.bends[c] and distance <= gate:
         copy_innovation(innovation, c, sight.work.innovation, 0)
-        pair = Pair(sight.pose, rows.means[c], rows.covs[c], measurement)
+        pair = Pair(sight.pose, rows.components.means[c], rows.components.covs[c], measurement)
         distance = update_pair(sight.sensor, pair, sight.work, out.updated[entry])
         log_norm = sight.work.innovation.log_norm[0]
     if not distance <= gate:
         return -math.inf
     # The predicted component times p_D g(z | x) / kappa(z), integrated over x.
-    weight = rows.log_weights[c] + log_norm - 0.5 * distance - log_clutter
+    weight = rows.components.log_weights[c] + log_norm - 0.5 * distance - log_clutter
     detected = innovation.prob_detection[c]
     if innovation.at_edge[c]:
         detected = _detected_there(rows, c, sight, out.whitened[entry], out.updated[entry])
@@ -157,7 +157,7 @@ def weigh_detection(
 def _detected_there(rows: Rows, c: int, sight: Sight, whitened: Floats, updated: Floats) -> float:
     """Mean P_D of a component after a measurement. Its Gaussian is in `updated` if it bends, else written there."""
     if not rows.innovation.bends[c]:
-        write_posterior(rows.innovation, c, whitened, rows.means[c], updated)
+        write_posterior(rows.innovation, c, whitened, rows.components.means[c], updated)
     return detection_probability(sight.sensor, sight.pose, updated[0], updated[1:], sight.work.scratch.points[0])
 
 
@@ -192,6 +192,7 @@ def _fill_options(
     """Options of every row, heaviest first; options of weight zero are left out."""
     filled, entry, every = 0, 0, len(near.offsets) == 0
     out.offsets[0] = 0
+    components = rows.components
     for row in range(len(rows.log_absent)):
         start = filled
         first = rows.offsets[row]
@@ -202,9 +203,9 @@ def _fill_options(
         peak = -math.inf
         for i in range(count):
             missed = log_or_minus_inf(1.0 - rows.innovation.prob_detection[first + i])
-            out.component_log_weights[entry + i] = rows.log_weights[first + i] + missed
+            out.component_log_weights[entry + i] = components.log_weights[first + i] + missed
             if rows.innovation.at_edge[first + i]:
-                mean, cov, updated = rows.means[first + i], rows.covs[first + i], out.updated[entry + i]
+                mean, cov, updated = components.means[first + i], components.covs[first + i], out.updated[entry + i]
                 state = sight.work.scratch.points[0]
                 moments_if_missed(sight.sensor, sight.pose, mean, cov, state, updated[0], updated[1:])
             peak = max(peak, out.component_log_weights[entry + i])
@@ -262,6 +263,6 @@ def weighed_options_at(
     """As `weighed_options`; log_clutter: (num_measurements,) written as of `weigh_options`."""
     num, near = len(scan.measurements), near_measurements(rows, scan.measurements, sensor.angular, caps.gate)
     options = _room_for(rows, near, num, len(sensor.angular))
-    work = make_pair_work(rows.means.shape[1], len(sensor.angular))
+    work = make_pair_work(rows.components.means.shape[1], len(sensor.angular))
     log_total, num_raised = weigh_options(rows, near, scan, sensor, caps, log_clutter, work, options)
     return options, log_total, num_raised

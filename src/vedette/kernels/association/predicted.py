@@ -13,10 +13,10 @@ import numpy as np
 
 from vedette.errors import ModelError
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import Floats, Ints, Lmb, Motion, ScanInput, Sensor, Tracks
+from vedette.kernels.base.types import Floats, Ints, Lmb, Mixture, Motion, ScanInput, Sensor, Tracks
+from vedette.kernels.gaussian.components import borrowed_components, copy_component, copy_components, make_components
 from vedette.kernels.gaussian.innovation import Innovation, copy_innovation, expect, make_innovation
 from vedette.kernels.gaussian.linalg import log_add
-from vedette.kernels.gaussian.mixtures import copy_component
 from vedette.kernels.gaussian.prediction import predict
 from vedette.kernels.gaussian.scratch import Scratch, make_scratch
 
@@ -27,9 +27,7 @@ class Rows(NamedTuple):
     labels: Ints  # (num_rows, 2)
     offsets: Ints  # (num_rows + 1,) into the components
     log_absent: Floats  # (num_rows,) log probability of not being there
-    log_weights: Floats  # (num_components,) log of mixture weight times probability of being there
-    means: Floats  # (num_components, state_dim) predicted
-    covs: Floats  # (num_components, state_dim, state_dim) predicted
+    components: Mixture  # predicted; log weights of the mixture times the probability of being there
     innovation: Innovation
 
 
@@ -44,9 +42,7 @@ def make_rows(num_rows: int, num_components: int, state_dim: int, meas_dim: int)
         np.empty((num_rows, 2), np.int64),
         np.zeros(num_rows + 1, np.int64),
         np.empty(num_rows),
-        np.empty(num_components),
-        np.empty((num_components, state_dim)),
-        np.empty((num_components, state_dim, state_dim)),
+        make_components(num_components, state_dim),
         make_innovation(num_components, state_dim, meas_dim),
     )
 
@@ -59,9 +55,7 @@ def view_rows(rows: Rows, num: int) -> Rows:
         rows.labels[:num],
         rows.offsets[: num + 1],
         rows.log_absent[:num],
-        rows.log_weights[:num],
-        rows.means[:num],
-        rows.covs[:num],
+        borrowed_components(rows.components, 0, num),
         Innovation(
             innovation.predicted[:num],
             innovation.factor[:num],
@@ -78,18 +72,20 @@ def view_rows(rows: Rows, num: int) -> Rows:
 @borrowing
 def fill_survivors(tracks: Tracks, motion: Motion, dt: float, rows: Rows, scratch: Scratch) -> None:
     """Predict every track into the first rows."""
+    components, out = tracks.components, rows.components
     rows.offsets[0] = 0
     for i in range(len(tracks.labels)):
         absent = 0.0
         for c in range(tracks.offsets[i], tracks.offsets[i + 1]):
-            mean = tracks.means[c]
+            mean = components.means[c]
             survival = motion.prob_survival(mean, dt, motion.survival_params)
             if not 0.0 <= survival <= 1.0:
                 raise ModelError("survival model: probability is not in [0, 1]")
             # 1 - <p, P_S>: who is in this mixture has died. What survives keeps its weight in the mixture.
-            absent += math.exp(tracks.log_weights[c]) * (1.0 - survival)
-            rows.log_weights[c] = tracks.log_weights[c] + log_or_minus_inf(survival)
-            predict(motion, dt, mean, tracks.covs[c], rows.means[c], rows.covs[c], scratch)
+            absent += math.exp(components.log_weights[c]) * (1.0 - survival)
+            copy_component(components, c, out, c)
+            out.log_weights[c] += log_or_minus_inf(survival)
+            predict(motion, dt, mean, components.covs[c], out.means[c], out.covs[c], scratch)
         rows.log_absent[i] = log_or_minus_inf(absent)
         rows.labels[i, 0], rows.labels[i, 1] = tracks.labels[i, 0], tracks.labels[i, 1]
         rows.offsets[i + 1] = tracks.offsets[i + 1]
@@ -108,15 +104,16 @@ def fill_births(birth: Lmb, first_row: int, rows: Rows) -> None:
         log_existence = -log_add(0.0, -birth.existence_logit[i])
         rows.offsets[row + 1] = shift + sites.offsets[i + 1]
         for c in range(sites.offsets[i], sites.offsets[i + 1]):
-            rows.log_weights[shift + c] = sites.log_weights[c] + log_existence
-            copy_component(sites.means, sites.covs, c, rows.means, rows.covs, shift + c)
+            copy_component(sites.components, c, rows.components, shift + c)
+            rows.components.log_weights[shift + c] += log_existence
 
 
 @borrowing
 def expect_rows(sensor: Sensor, pose: Floats, rows: Rows, scratch: Scratch) -> None:
     """Write what every component of the rows expects of a scan taken from `pose`."""
-    for c in range(len(rows.log_weights)):
-        expect(sensor, pose, rows.means[c], rows.covs[c], c, rows.innovation, scratch)
+    components = rows.components
+    for c in range(len(components.log_weights)):
+        expect(sensor, pose, components.means[c], components.covs[c], c, rows.innovation, scratch)
 
 
 @inlined
@@ -137,14 +134,16 @@ def leave_unseen(rows: Rows) -> None:
 @kernel
 def rows_of_scan(tracks: Tracks, scan: ScanInput, motion: Motion | None, sensor: Sensor) -> Rows:
     """As `predict_rows`, into arrays made for it. motion: None where the tracks are of the scan's own time."""
-    sites, state_dim, meas_dim = scan.birth.tracks, tracks.means.shape[1], len(sensor.angular)
+    sites, state_dim, meas_dim = scan.birth.tracks, tracks.components.means.shape[1], len(sensor.angular)
     if motion is None:
         standing = standing_rows(tracks, meas_dim)
         expect_rows(sensor, scan.pose, standing, make_scratch(state_dim, meas_dim))
         return standing
     # Every component has its innovation here once, whatever number of hypotheses hold its track.
     num_rows = len(tracks.labels) + len(sites.labels)
-    rows = make_rows(num_rows, len(tracks.log_weights) + len(sites.log_weights), state_dim, meas_dim)
+    rows = make_rows(
+        num_rows, len(tracks.components.log_weights) + len(sites.components.log_weights), state_dim, meas_dim
+    )
     predict_rows(tracks, scan, motion, sensor, rows, make_scratch(state_dim, meas_dim))
     return rows
 
@@ -152,13 +151,12 @@ def rows_of_scan(tracks: Tracks, scan: ScanInput, motion: Motion | None, sensor:
 @kernel
 def standing_rows(tracks: Tracks, meas_dim: int) -> Rows:
     """The tracks as they are, without births, deaths or motion; each is surely there. `expect_rows` is left to do."""
-    rows = make_rows(len(tracks.labels), len(tracks.log_weights), tracks.means.shape[1], meas_dim)
+    num, state_dim = tracks.components.means.shape
+    rows = make_rows(len(tracks.labels), num, state_dim, meas_dim)
     for i in range(len(tracks.labels)):
         rows.labels[i, 0], rows.labels[i, 1] = tracks.labels[i, 0], tracks.labels[i, 1]
         rows.log_absent[i], rows.offsets[i + 1] = -math.inf, tracks.offsets[i + 1]
-    for c in range(len(tracks.log_weights)):
-        rows.log_weights[c] = tracks.log_weights[c]
-        copy_component(tracks.means, tracks.covs, c, rows.means, rows.covs, c)
+    copy_components(tracks.components, 0, num, rows.components, 0)
     return rows
 
 
@@ -170,13 +168,13 @@ def taken_rows(rows: Rows, members: Ints) -> Rows:
         num_components += rows.offsets[row + 1] - rows.offsets[row]
     meas_dim, state_dim = rows.innovation.whitened_cross.shape[1:]
     out, end = make_rows(len(members), num_components, state_dim, meas_dim), 0
+    components, taken = rows.components, out.components
     for i in range(len(members)):
         row = members[i]
         out.labels[i, 0], out.labels[i, 1] = rows.labels[row, 0], rows.labels[row, 1]
         out.log_absent[i] = rows.log_absent[row]
         for c in range(rows.offsets[row], rows.offsets[row + 1]):
-            out.log_weights[end] = rows.log_weights[c]
-            copy_component(rows.means, rows.covs, c, out.means, out.covs, end)
+            copy_component(components, c, taken, end)
             copy_innovation(rows.innovation, c, out.innovation, end)
             end += 1
         out.offsets[i + 1] = end

@@ -15,22 +15,24 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 
+class Mixture(NamedTuple):
+    """Gaussian components: one mixture of any total weight, or several that offsets tell apart.
+
+    All that makes, copies, takes, joins or merges components is in `vedette.kernels.gaussian.mixtures`, so that a
+    column is added here and there.
+    """
+
+    log_weights: Floats  # (num,)
+    means: Floats  # (num, state_dim)
+    covs: Floats  # (num, state_dim, state_dim)
+
+
 class Tracks(NamedTuple):
     """Labelled Gaussian-mixture track densities."""
 
     labels: Ints  # (num_tracks, 2) birth step, birth index
     offsets: Ints  # (num_tracks + 1,) into the components
-    log_weights: Floats  # (num_components,) normalised within each track
-    means: Floats  # (num_components, state_dim)
-    covs: Floats  # (num_components, state_dim, state_dim)
-
-
-class Mixture(NamedTuple):
-    """One Gaussian mixture of any total weight."""
-
-    log_weights: Floats  # (num,)
-    means: Floats  # (num, state_dim)
-    covs: Floats  # (num, state_dim, state_dim)
+    components: Mixture  # weights are normalised within each track
 
 
 class Glmb(NamedTuple):

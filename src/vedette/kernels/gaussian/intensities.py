@@ -9,8 +9,15 @@ import numpy as np
 from vedette.errors import ModelError
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, Mixture, Motion
+from vedette.kernels.gaussian.components import (
+    copy_component,
+    make_components,
+    merge_components,
+    own_components,
+    stacked_mixtures,
+)
 from vedette.kernels.gaussian.linalg import cholesky, inverse_from_factor, log_det_from_factor
-from vedette.kernels.gaussian.mixtures import copy_component, descending_order, make_components, match_components
+from vedette.kernels.gaussian.mixtures import descending_order
 from vedette.kernels.gaussian.prediction import predict
 from vedette.kernels.gaussian.scratch import make_scratch
 
@@ -18,20 +25,6 @@ from vedette.kernels.gaussian.scratch import make_scratch
 # this grows until few enough are left.
 _REACH, _GROWTH = 0.1, 3.0
 _LIGHTEST = 1e-9  # expected number of targets below which a component is merged with whatever is near, or dropped
-
-
-@kernel
-def stacked_mixtures(first: Mixture, second: Mixture) -> Mixture:
-    """The components of both, in their order."""
-    num = len(first.log_weights)
-    out = make_components(num + len(second.log_weights), first.means.shape[1])
-    for c in range(num):
-        out.log_weights[c] = first.log_weights[c]
-        copy_component(first.means, first.covs, c, out.means, out.covs, c)
-    for c in range(len(second.log_weights)):
-        out.log_weights[num + c] = second.log_weights[c]
-        copy_component(second.means, second.covs, c, out.means, out.covs, num + c)
-    return out
 
 
 @kernel
@@ -49,7 +42,8 @@ def _moved(intensity: Mixture, motion: Motion, dt: float) -> Mixture:
         survival = motion.prob_survival(intensity.means[c], dt, motion.survival_params)
         if not 0.0 <= survival <= 1.0:
             raise ModelError("survival model: probability is not in [0, 1]")
-        out.log_weights[c] = intensity.log_weights[c] + (math.log(survival) if survival > 0.0 else -math.inf)
+        copy_component(intensity, c, out, c)
+        out.log_weights[c] += math.log(survival) if survival > 0.0 else -math.inf
         predict(motion, dt, intensity.means[c], intensity.covs[c], out.means[c], out.covs[c], scratch)
     return out
 
@@ -115,10 +109,10 @@ def _merged(mixture: Mixture, reach: float) -> Mixture:
             total += weights[k]
         if total == 0.0:
             continue
+        merge_components(mixture, near, weights, count, out, filled)
         out.log_weights[filled] = math.log(total)
-        match_components(near, weights, count, mixture.means, mixture.covs, out.means[filled], out.covs[filled])
         filled += 1
-    return Mixture(out.log_weights[:filled].copy(), out.means[:filled].copy(), out.covs[:filled].copy())
+    return own_components(out, filled)
 
 
 @kernel
@@ -137,7 +131,6 @@ def condensed(intensity: Mixture, max_components: int) -> Mixture:
         if found.log_weights[c] < lightest:
             continue
         if kept < c:
-            found.log_weights[kept] = found.log_weights[c]
-            copy_component(found.means, found.covs, c, found.means, found.covs, kept)
+            copy_component(found, c, found, kept)
         kept += 1
-    return Mixture(found.log_weights[:kept].copy(), found.means[:kept].copy(), found.covs[:kept].copy())
+    return own_components(found, kept)

@@ -8,15 +8,9 @@ import numpy as np
 
 from vedette.errors import NumericalError
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import Floats, Ints, Mixture
+from vedette.kernels.base.types import Floats, Ints
 
 _RUN = 16  # values that are sorted by insertion before runs are merged
-
-
-@kernel
-def make_components(num: int, state_dim: int) -> Mixture:
-    """Room for so many components."""
-    return Mixture(np.empty(num), np.empty((num, state_dim)), np.empty((num, state_dim, state_dim)))
 
 
 @inlined
@@ -98,16 +92,6 @@ def _merge_runs(values: Floats, source: Ints, low: int, middle: int, high: int, 
         else:
             out[k] = source[j]
             j += 1
-
-
-@inlined
-def copy_component(means: Floats, covs: Floats, source: int, out_means: Floats, out_covs: Floats, target: int) -> None:
-    """Copy component `source` to place `target`. (Written out: array assignment takes seconds to compile.)"""
-    n = means.shape[1]
-    for i in range(n):
-        out_means[target, i] = means[source, i]
-        for j in range(n):
-            out_covs[target, i, j] = covs[source, i, j]
 
 
 @borrowing

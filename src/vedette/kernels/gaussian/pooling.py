@@ -9,13 +9,8 @@ import numpy as np
 
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, Mixture, Tracks
-from vedette.kernels.gaussian.mixtures import (
-    copy_component,
-    make_components,
-    match_components,
-    moment_match,
-    require_gaussians,
-)
+from vedette.kernels.gaussian.components import copy_component, make_components, merge_components, own_components
+from vedette.kernels.gaussian.mixtures import moment_match, require_gaussians
 from vedette.kernels.gaussian.reduction import MixtureCaps, make_reduction_work, reduce_into
 
 
@@ -29,14 +24,15 @@ class Moments(NamedTuple):
 @kernel
 def moments_of(tracks: Tracks, first: int, last: int) -> Moments:
     """Of the tracks `first` to `last`."""
-    dim = tracks.means.shape[1]
+    components = tracks.components
+    dim = components.means.shape[1]
     out = Moments(np.empty((last - first, dim)), np.empty((last - first, dim, dim)))
     for i in range(last - first):
         start, end = tracks.offsets[first + i], tracks.offsets[first + i + 1]
         moment_match(
-            tracks.log_weights[start:end],
-            tracks.means[start:end],
-            tracks.covs[start:end],
+            components.log_weights[start:end],
+            components.means[start:end],
+            components.covs[start:end],
             out.means[i],
             out.covs[i],
         )
@@ -61,11 +57,11 @@ def _gather(
     tracks: Tracks, pool: Ints, weights: Floats, low: int, high: int, components: Ints, component_weights: Floats
 ) -> int:
     """Components of the pool `low:high` and their linear weights, into the last two arguments; their number."""
-    count = 0
+    count, log_weights = 0, tracks.components.log_weights
     for p in range(low, high):
         for source in range(tracks.offsets[pool[p]], tracks.offsets[pool[p] + 1]):
             components[count] = source
-            log_weight = tracks.log_weights[source]
+            log_weight = log_weights[source]
             # A single Gaussian has log weight 0: the usual case needs no exponential.
             component_weights[count] = weights[p] if log_weight == 0.0 else weights[p] * math.exp(log_weight)
             count += 1
@@ -73,15 +69,15 @@ def _gather(
 
 
 @borrowing
-def _write_normalised(tracks: Tracks, components: Ints, weights: Floats, num: int, wide: Mixture) -> None:
+def _write_normalised(mixture: Mixture, components: Ints, weights: Floats, num: int, wide: Mixture) -> None:
     """Write (-> wide) the mixture of the first `num` of `components` under linear weights, normalised."""
     total = 0.0
     for c in range(num):
         total += weights[c]
     for c in range(num):
         share = weights[c] / total if total > 0.0 else 1.0 / num
+        copy_component(mixture, components[c], wide, c)
         wide.log_weights[c] = math.log(share) if share > 0.0 else -math.inf
-        copy_component(tracks.means, tracks.covs, components[c], wide.means, wide.covs, c)
 
 
 @kernel
@@ -89,7 +85,7 @@ def pooled_tracks(
     tracks: Tracks, labels: Ints, pool_offsets: Ints, pool: Ints, weights: Floats, caps: MixtureCaps
 ) -> Tracks:
     """One track for each pool of tracks: the mixture of the pool under its linear weights, reduced."""
-    num, n, used, largest, room = len(labels), tracks.means.shape[1], 0, 0, 0
+    num, n, used, largest, room = len(labels), tracks.components.means.shape[1], 0, 0, 0
     for i in range(num):
         size = 0
         for p in range(pool_offsets[i], pool_offsets[i + 1]):
@@ -98,23 +94,18 @@ def pooled_tracks(
         room += min(size, caps.max_components)
     components, component_weights = np.empty(largest, np.int64), np.empty(largest)
     wide, work = make_components(largest, n), make_reduction_work(largest, n)
-    offsets, log_weights, means, covs = (
-        np.zeros(num + 1, np.int64),
-        np.zeros(room),
-        np.empty((room, n)),
-        np.empty((room, n, n)),
-    )
-    out = Mixture(log_weights, means, covs)
+    offsets, out, given = np.zeros(num + 1, np.int64), make_components(room, n), tracks.components
     for i in range(num):
         count = _gather(tracks, pool, weights, pool_offsets[i], pool_offsets[i + 1], components, component_weights)
         if caps.max_components == 1 or count == 1:
-            match_components(components, component_weights, count, tracks.means, tracks.covs, means[used], covs[used])
+            merge_components(given, components, component_weights, count, out, used)
+            out.log_weights[used] = 0.0
             used += 1
         else:
-            _write_normalised(tracks, components, component_weights, count, wide)
+            _write_normalised(given, components, component_weights, count, wide)
             used = reduce_into(wide, count, caps, work, out, used)
         offsets[i + 1] = used
     if used < room:
-        log_weights, means, covs = log_weights[:used].copy(), means[:used].copy(), covs[:used].copy()
-    require_gaussians(means, covs)
-    return Tracks(labels, offsets, log_weights, means, covs)
+        out = own_components(out, used)
+    require_gaussians(out.means, out.covs)
+    return Tracks(labels, offsets, out)

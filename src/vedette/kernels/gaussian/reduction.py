@@ -9,14 +9,15 @@ import numpy as np
 
 from vedette.kernels.base.compile import borrowing, kernel
 from vedette.kernels.base.types import Floats, Ints, Mixture
-from vedette.kernels.gaussian.linalg import cholesky, log_sum
-from vedette.kernels.gaussian.mixtures import (
+from vedette.kernels.gaussian.components import (
+    components_between,
     copy_component,
     make_components,
-    match_all,
-    match_components,
-    sort_descending,
+    merge_all,
+    merge_components,
 )
+from vedette.kernels.gaussian.linalg import cholesky, log_sum
+from vedette.kernels.gaussian.mixtures import sort_descending
 
 
 class MixtureCaps(NamedTuple):
@@ -103,8 +104,8 @@ def _merge(wide: Mixture, width: int, log_floor: float, merge_distance: float, w
             total += work.weights[k]
             left[work.near[k]] = -math.inf
         out = work.merged
+        merge_components(wide, work.near, work.weights, count, out, merged)
         out.log_weights[merged] = log_weights[heaviest] + math.log(total)
-        match_components(work.near, work.weights, count, wide.means, wide.covs, out.means[merged], out.covs[merged])
         merged += 1
     return merged
 
@@ -120,17 +121,13 @@ def reduce_into(wide: Mixture, width: int, caps: MixtureCaps, work: ReductionWor
     if caps.max_components == 1 or width <= 1 or total == -math.inf:
         if width == 0:
             return filled
-        out.log_weights[filled] = total
-        match_all(
-            wide.log_weights, wide.means, wide.covs, width, work.near, work.weights, out.means[filled], out.covs[filled]
-        )
+        merge_all(wide, width, work.near, work.weights, total, out, filled)
         return filled + 1
     num_merged = _merge(wide, width, total + caps.log_min_weight, caps.merge_distance, work)
     sort_descending(work.merged.log_weights, num_merged, work.order, work.buffer)
     kept = min(num_merged, caps.max_components)
     for k in range(kept):
-        out.log_weights[filled + k] = work.merged.log_weights[work.order[k]]
-        copy_component(work.merged.means, work.merged.covs, work.order[k], out.means, out.covs, filled + k)
+        copy_component(work.merged, work.order[k], out, filled + k)
     # What was dropped is shared out, so that reducing does not lose a target.
     shift = total - log_sum(out.log_weights[filled : filled + kept])
     for k in range(kept):
@@ -139,12 +136,10 @@ def reduce_into(wide: Mixture, width: int, caps: MixtureCaps, work: ReductionWor
 
 
 @kernel
-def reduce_mixture(
-    log_weights: Floats, means: Floats, covs: Floats, caps: MixtureCaps
-) -> tuple[Floats, Floats, Floats]:
-    """`reduce_into` with new arrays: log weights, means and covariances of the reduced mixture."""
-    num, n = means.shape
+def reduce_mixture(mixture: Mixture, caps: MixtureCaps) -> Mixture:
+    """The reduced mixture, see `reduce_into`, in new arrays."""
+    num, n = mixture.means.shape
     most = min(num, max(1, caps.max_components))
     out = make_components(most, n)
-    last = reduce_into(Mixture(log_weights, means, covs), num, caps, make_reduction_work(num, n), out, 0)
-    return out.log_weights[:last], out.means[:last], out.covs[:last]
+    last = reduce_into(mixture, num, caps, make_reduction_work(num, n), out, 0)
+    return components_between(out, 0, last)

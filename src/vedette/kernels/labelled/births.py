@@ -9,6 +9,7 @@ import numpy as np
 
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Lmb, Tracks
+from vedette.kernels.gaussian.components import make_components, stacked_mixtures
 
 
 class BirthsOfMeasurements(NamedTuple):
@@ -34,16 +35,18 @@ def births_of_measurements(positions: Floats, unexplained: Floats, begin: Births
     num, dim = len(unexplained), len(begin.std)
     total = unexplained.sum()
     labels, offsets = np.empty((num, 2), np.int64), np.arange(num + 1)
-    means, covs, logits = np.zeros((num, dim)), np.zeros((num, dim, dim)), np.empty(num)
+    out, logits = make_components(num, dim), np.empty(num)
     for i in range(num):
         labels[i, 0], labels[i, 1] = begin.step, begin.first + i
-        means[i, :2] = positions[i]
+        out.log_weights[i] = 0.0
         for d in range(dim):
-            covs[i, d, d] = begin.std[d] ** 2
+            out.means[i, d] = positions[i, d] if d < 2 else 0.0
+            for e in range(dim):
+                out.covs[i, d, e] = begin.std[d] ** 2 if d == e else 0.0
         existence = min(begin.max_existence, begin.expected * unexplained[i] / total)
         # A share may be too small for a number.
         logits[i] = math.log(existence) - math.log1p(-existence) if existence > 0.0 else -math.inf
-    return Lmb(Tracks(labels, offsets, np.zeros(num), means, covs), logits)
+    return Lmb(Tracks(labels, offsets, out), logits)
 
 
 @kernel
@@ -59,7 +62,5 @@ def births_within(first: Lmb, second: Lmb, share: float) -> Lmb:
             log_none = share * (min(-logits[i], 0.0) - math.log1p(math.exp(-abs(logits[i]))))
             some = -math.expm1(log_none)
             logits[i] = (math.log(some) if some > 0.0 else -math.inf) - log_none
-    weights = np.concatenate((first.tracks.log_weights, second.tracks.log_weights))
-    means = np.concatenate((first.tracks.means, second.tracks.means))
-    covs = np.concatenate((first.tracks.covs, second.tracks.covs))
-    return Lmb(Tracks(labels, offsets, weights, means, covs), logits)
+    both = stacked_mixtures(first.tracks.components, second.tracks.components)
+    return Lmb(Tracks(labels, offsets, both), logits)

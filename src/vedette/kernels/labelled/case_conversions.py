@@ -9,7 +9,7 @@ import numpy as np
 
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Glmb, Ints, Tracks
-from vedette.kernels.gaussian.mixtures import copy_component
+from vedette.kernels.gaussian.components import copy_gaussian, make_components
 from vedette.kernels.gaussian.reduction import MixtureCaps
 from vedette.kernels.labelled.conversions import glmb_to_lmb
 from vedette.kernels.labelled.power_integrals import SensorCases
@@ -53,9 +53,12 @@ def glmb_cases_to_lmb(
     order; one that a case has lost with all its sets gets logit -inf there, and no Gaussian.
     """
     num = len(members)
-    offsets, no_weights, caps = np.arange(num + 1), np.zeros(num), MixtureCaps(-math.inf, 0.0, 1)
+    offsets, components = np.arange(num + 1), make_components(num, cases.means.shape[2])
+    tracks, caps = Tracks(members, offsets, components), MixtureCaps(-math.inf, 0.0, 1)
+    components.log_weights[:] = 0.0
     for case in range(first, last):
-        tracks = Tracks(members, offsets, no_weights, cases.means[case], cases.covs[case])
+        for m in range(num):
+            copy_gaussian(cases.means[case], cases.covs[case], m, components.means, components.covs, m)
         hyp_offsets, hyp_members, log_weights = _held_sets(set_offsets, cases, case)
         lmb, found = glmb_to_lmb(Glmb(tracks, hyp_offsets, hyp_members, log_weights), caps), 0
         known = lmb.tracks.labels
@@ -63,5 +66,6 @@ def glmb_cases_to_lmb(
             out.logits[case, i] = -math.inf
             if found < len(known) and known[found, 0] == labels[i, 0] and known[found, 1] == labels[i, 1]:
                 out.logits[case, i] = lmb.existence_logit[found]
-                copy_component(lmb.tracks.means, lmb.tracks.covs, found, out.means[case], out.covs[case], i)
+                found_means, found_covs = lmb.tracks.components.means, lmb.tracks.components.covs
+                copy_gaussian(found_means, found_covs, found, out.means[case], out.covs[case], i)
                 found += 1

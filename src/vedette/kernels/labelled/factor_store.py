@@ -9,8 +9,9 @@ import numpy as np
 from vedette.kernels.base.arrays import filled_ints, grown_floats, grown_ints
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import FactoredGlmb, Floats, Glmb, Ints, Mixture, Tracks
+from vedette.kernels.gaussian.components import copy_components, grown_components, make_components, own_components
 from vedette.kernels.gaussian.linalg import log_add, log_sum
-from vedette.kernels.gaussian.mixtures import copy_component, descending_order
+from vedette.kernels.gaussian.mixtures import descending_order
 from vedette.kernels.labelled.groups import group_log_sums
 from vedette.kernels.labelled.splitting import Choices, group_choices
 
@@ -39,29 +40,13 @@ def make_store(num_tracks: int, num_components: int, state_dim: int) -> FactorSt
         np.zeros(5, np.int64),
         np.empty(2 * num_tracks, np.int64),
         np.zeros(num_tracks + 1, np.int64),
-        Mixture(
-            np.empty(num_components),
-            np.empty((num_components, state_dim)),
-            np.empty((num_components, state_dim, state_dim)),
-        ),
+        make_components(num_components, state_dim),
         np.zeros(num_tracks + 1, np.int64),
         np.zeros(2 * num_tracks + 1, np.int64),
         np.empty(num_tracks, np.int64),
         np.empty(2 * num_tracks),
         np.zeros(num_tracks + 1, np.int64),
     )
-
-
-@kernel
-def _grown_mixture(mixture: Mixture, filled: int, needed: int) -> Mixture:
-    if needed <= len(mixture.log_weights):
-        return mixture
-    num, dim = max(needed, 2 * len(mixture.log_weights)), mixture.means.shape[1]
-    longer = Mixture(np.empty(num), np.empty((num, dim)), np.empty((num, dim, dim)))
-    for c in range(filled):
-        longer.log_weights[c] = mixture.log_weights[c]
-        copy_component(mixture.means, mixture.covs, c, longer.means, longer.covs, c)
-    return longer
 
 
 @kernel
@@ -72,7 +57,7 @@ def with_room(store: FactorStore, factors: int, tracks: int, components: int, hy
         filled,
         grown_ints(store.labels, 2 * (filled[_TRACKS] + tracks)),
         grown_ints(store.offsets, filled[_TRACKS] + tracks + 1),
-        _grown_mixture(store.components, filled[_COMPONENTS], filled[_COMPONENTS] + components),
+        grown_components(store.components, filled[_COMPONENTS], filled[_COMPONENTS] + components),
         grown_ints(store.track_offsets, filled[_FACTORS] + factors + 1),
         grown_ints(store.hyp_offsets, filled[_HYPS] + hyps + 1),
         grown_ints(store.hyp_tracks, filled[_ENTRIES] + entries),
@@ -159,25 +144,20 @@ def append_part(store: FactorStore, glmb: Glmb, choices: Choices, part_of: Ints,
 
 @borrowing
 def _append_track(store: FactorStore, tracks: Tracks, track: int) -> None:
-    end, out = next_component(store), store.components
-    for c in range(tracks.offsets[track], tracks.offsets[track + 1]):
-        out.log_weights[end] = tracks.log_weights[c]
-        copy_component(tracks.means, tracks.covs, c, out.means, out.covs, end)
-        end += 1
+    first, last = tracks.offsets[track], tracks.offsets[track + 1]
+    end = copy_components(tracks.components, first, last, store.components, next_component(store))
     _close_track(store, tracks.labels[track, 0], tracks.labels[track, 1], end)
 
 
 @kernel
 def stored(store: FactorStore) -> FactoredGlmb:
     """The factors as a density, without the room that is left."""
-    filled, out = store.filled, store.components
-    num, end = filled[_TRACKS], filled[_COMPONENTS]
+    filled = store.filled
+    num = filled[_TRACKS]
     tracks = Tracks(
         store.labels[: 2 * num].copy().reshape((num, 2)),
         store.offsets[: num + 1].copy(),
-        out.log_weights[:end].copy(),
-        out.means[:end].copy(),
-        out.covs[:end].copy(),
+        own_components(store.components, filled[_COMPONENTS]),
     )
     return FactoredGlmb(
         tracks,

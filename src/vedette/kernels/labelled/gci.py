@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.kernels.base.compile import kernel
-from vedette.kernels.base.types import Floats, Ints, Tracks
+from vedette.kernels.base.types import Floats, Ints, Mixture, Tracks
+from vedette.kernels.gaussian.components import make_components
 from vedette.kernels.gaussian.information import log_integral, log_value, row_size, to_information, to_moments
 from vedette.kernels.gaussian.linalg import cholesky, log_add, normalise_logs
 from vedette.kernels.gaussian.mixtures import require_gaussians
@@ -53,7 +54,7 @@ def _make_powers(num_sensors: int, most: int, dim: int) -> Powers:
 @kernel
 def _load(chosen: Ints, item: int, fusion_weights: Floats, tracks: Tracks, powers: Powers) -> None:
     """Raise the components of the sensors' tracks (-1: unknown there) to their powers."""
-    total, used = 0.0, 0
+    total, used, components = 0.0, 0, tracks.components
     for s in range(fusion_weights.shape[1]):
         if chosen[item, s] >= 0:
             total += fusion_weights[item, s]
@@ -68,18 +69,19 @@ def _load(chosen: Ints, item: int, fusion_weights: Floats, tracks: Tracks, power
         powers.weights[s] = weight
         for c in range(tracks.offsets[track], tracks.offsets[track + 1]):
             if used == 0:
-                for i in range(tracks.means.shape[1]):
-                    powers.reference[i] = tracks.means[c, i]
+                for i in range(components.means.shape[1]):
+                    powers.reference[i] = components.means[c, i]
             row, factor, matrix = powers.rows[used], powers.factor, powers.matrix
-            if not to_information(tracks.means[c], tracks.covs[c], powers.reference, weight, row, factor, matrix):
+            mean, cov = components.means[c], components.covs[c]
+            if not to_information(mean, cov, powers.reference, weight, row, factor, matrix):
                 raise FloatingPointError("covariance of a track is not positive definite")
-            powers.log_weights[used] = weight * tracks.log_weights[c]
+            powers.log_weights[used] = weight * components.log_weights[c]
             used += 1
         powers.starts[s + 1] = used
 
 
 @kernel
-def _multiply(powers: Powers, low: int, high: int, log_weights: Floats, means: Floats, covs: Floats) -> None:
+def _multiply(powers: Powers, low: int, high: int, out: Mixture) -> None:
     """One Gaussian for every combination of one component a sensor: its log mass and its moments."""
     dim, row = len(powers.reference), powers.row
     for combination in range(low, high):
@@ -96,9 +98,9 @@ def _multiply(powers: Powers, low: int, high: int, log_weights: Floats, means: F
             total += powers.log_weights[component]
             for k in range(len(row)):
                 row[k] += powers.rows[component, k]
-        positive = to_moments(row, powers.reference, means[combination], covs[combination], powers.factor)
-        log_weights[combination] = total + log_integral(row, dim)
-        if not positive or math.isnan(log_weights[combination]):
+        positive = to_moments(row, powers.reference, out.means[combination], out.covs[combination], powers.factor)
+        out.log_weights[combination] = total + log_integral(row, dim)
+        if not positive or math.isnan(out.log_weights[combination]):
             raise FloatingPointError("the product of the track densities of a label is not integrable")
 
 
@@ -168,7 +170,7 @@ def _count_combinations(chosen: Ints, tracks: Tracks) -> tuple[Ints, int]:
 @kernel
 def fuse_tracks(
     chosen: Ints, fusion_weights: Floats, tracks: Tracks, points: Floats, point_weights: Floats
-) -> tuple[Ints, Floats, Floats, Floats, Floats]:
+) -> tuple[Ints, Mixture, Floats]:
     """Fused density of each label, and the log of the integral of prod_i p_i^(w_i) (paper eqs. 11 and 12).
 
     chosen: (num, S) track of each sensor, -1 where it does not know the label: its factor is left out and the other
@@ -177,21 +179,20 @@ def fuse_tracks(
     fused mixture is the component-wise power. A fused mixture has a component for every combination of the sensors'
     components.
 
-    Returns offsets (num + 1,), log_weights, means and covs of the fused tracks, and log_overlaps (num,). Raises
-    FloatingPointError where a covariance is not positive definite, NumericalError where a fused one is not.
+    Returns offsets (num + 1,) and components of the fused tracks, and log_overlaps (num,). Raises FloatingPointError
+    where a covariance is not positive definite, NumericalError where a fused one is not.
     """
-    num, dim = len(chosen), tracks.means.shape[1]
+    num, dim = len(chosen), tracks.components.means.shape[1]
     offsets, most = _count_combinations(chosen, tracks)
     powers, log_overlaps = _make_powers(fusion_weights.shape[1], most, dim), np.empty(num)
-    log_weights = np.empty(offsets[num])
-    means, covs = np.empty((offsets[num], dim)), np.empty((offsets[num], dim, dim))
+    out = make_components(offsets[num], dim)
     for item in range(num):
         low, high = offsets[item], offsets[item + 1]
         _load(chosen, item, fusion_weights, tracks, powers)
-        _multiply(powers, low, high, log_weights, means, covs)
+        _multiply(powers, low, high, out)
         for c in range(low, high):
             if high - low > 1 and len(points) > 0:
-                log_weights[c] += _correct(powers, points, point_weights, means[c], covs[c])
-        log_overlaps[item] = normalise_logs(log_weights[low:high])
-    require_gaussians(means, covs)
-    return offsets, log_weights, means, covs, log_overlaps
+                out.log_weights[c] += _correct(powers, points, point_weights, out.means[c], out.covs[c])
+        log_overlaps[item] = normalise_logs(out.log_weights[low:high])
+    require_gaussians(out.means, out.covs)
+    return offsets, out, log_overlaps

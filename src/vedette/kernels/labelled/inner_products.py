@@ -21,11 +21,11 @@ from vedette.kernels.labelled.labels import group_by_label_set
 @kernel
 def _log_gaussians(tracks: Tracks, a: int, b: int, offset: Floats, factor: Floats) -> float:
     """log of the integral of the product of components `a` and `b`: N(m_a; m_b, P_a + P_b)."""
-    n = len(offset)
+    n, means, covs = len(offset), tracks.components.means, tracks.components.covs
     for i in range(n):
-        offset[i] = tracks.means[a, i] - tracks.means[b, i]
+        offset[i] = means[a, i] - means[b, i]
         for j in range(i + 1):
-            factor[i, j] = tracks.covs[a, i, j] + tracks.covs[b, i, j]
+            factor[i, j] = covs[a, i, j] + covs[b, i, j]
     if not cholesky(factor, factor):
         return math.nan
     solve_lower(factor, offset, offset)
@@ -38,11 +38,11 @@ def _log_gaussians(tracks: Tracks, a: int, b: int, offset: Floats, factor: Float
 @kernel
 def log_tracks(tracks: Tracks, a: int, b: int) -> float:
     """log <p, q> of the mixtures of tracks `a` and `b`; NaN where a covariance is not positive definite."""
-    n = tracks.means.shape[1]
+    n, log_weights = tracks.components.means.shape[1], tracks.components.log_weights
     offset, factor, total = np.empty(n), np.empty((n, n)), -math.inf
     for i in range(tracks.offsets[a], tracks.offsets[a + 1]):
         for j in range(tracks.offsets[b], tracks.offsets[b + 1]):
-            weight = tracks.log_weights[i] + tracks.log_weights[j]
+            weight = log_weights[i] + log_weights[j]
             if weight > -math.inf:
                 total = log_add(total, weight + _log_gaussians(tracks, i, j, offset, factor))
     return total

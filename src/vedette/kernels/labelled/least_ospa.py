@@ -128,10 +128,11 @@ def _worths(density: FactoredGlmb, chosen: Ints, existence: Floats) -> tuple[Flo
     if len(unsure) == 0 or len(others) == 0:
         return worth, own
     unsure = unsure[np.argsort(-own[unsure], kind="mergesort")]
-    table = density.tracks
-    here = heaviest_of_runs(table.log_weights, table.offsets, chosen[unsure])
-    peaks = heaviest_of_runs(table.log_weights, table.offsets, others)
-    near = near_pairs(table.means[here], table.covs[here], table.means[peaks], table.covs[peaks], _IN_PLACE)
+    offsets, components = density.tracks.offsets, density.tracks.components
+    here = heaviest_of_runs(components.log_weights, offsets, chosen[unsure])
+    peaks = heaviest_of_runs(components.log_weights, offsets, others)
+    means, covs = components.means, components.covs
+    near = near_pairs(means[here], covs[here], means[peaks], covs[peaks], _IN_PLACE)
     pair = 0
     for i in range(len(unsure)):
         begin, there = pair, 0.0

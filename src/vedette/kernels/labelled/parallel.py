@@ -204,7 +204,7 @@ def update_in_parallel(
     for track in range(len(own.labels)):
         largest = max(largest, own.offsets[track + 1] - own.offsets[track])
     out_means, out_covs, log_integrals = means.copy(), covs.copy(), np.zeros(num)
-    work, said = _make_work(dim), _make_said(largest, dim)
+    work, said, updated = _make_work(dim), _make_said(largest, dim), own.components
     choices, longer = _make_said(max_choices, dim), _make_said(max_choices * largest, dim)
     for item in range(num):
         if not cholesky(covs[item], work.root):
@@ -217,9 +217,9 @@ def update_in_parallel(
                 continue
             first, size = own.offsets[track], own.offsets[track + 1] - own.offsets[track]
             for j in range(size):
-                if not _say(j, own.means[first + j], own.covs[first + j], means[item], work, said):
+                if not _say(j, updated.means[first + j], updated.covs[first + j], means[item], work, said):
                     raise FloatingPointError("covariance of a track is not positive definite")
-                said.log_weights[j] += own.log_weights[first + j]
+                said.log_weights[j] += updated.log_weights[first + j]
             for c in range(count):
                 for j in range(size):
                     _multiply(choices, c, said, j, weights[s], longer if size > 1 else choices, c * size + j)

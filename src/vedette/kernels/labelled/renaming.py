@@ -77,7 +77,7 @@ def with_known_names(glmb: Glmb, choices: Choices, max_error: float) -> tuple[Gl
     if spent == 0.0:
         return glmb, choices, 0.0
     tracks = glmb.tracks
-    relabelled = Tracks(labels, tracks.offsets, tracks.log_weights, tracks.means, tracks.covs)
+    relabelled = Tracks(labels, tracks.offsets, tracks.components)
     renamed = _with_weight(relabelled, choices, glmb.hyp_log_weights)
     return renamed, choices_of(renamed), spent
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from vedette.kernels.base.types import Glmb, Ints, Tracks
+from vedette.kernels.gaussian.components import joined_components
 
 
 def join_offsets(offsets: Sequence[Ints]) -> Ints:
@@ -20,8 +21,8 @@ def join_offsets(offsets: Sequence[Ints]) -> Ints:
 
 def stack_tracks(tables: Sequence[Tracks]) -> Tracks:
     """One track table of all the tracks, in the order given."""
-    labels, offsets, *components = zip(*tables, strict=True)
-    return Tracks(np.concatenate(labels), join_offsets(offsets), *map(np.concatenate, components))
+    labels, offsets, components = zip(*tables, strict=True)
+    return Tracks(np.concatenate(labels), join_offsets(offsets), joined_components(components))
 
 
 def stack_glmbs(glmbs: Sequence[Glmb]) -> Glmb:

@@ -127,18 +127,19 @@ def _pooling_error(glmb: Glmb, merged: Tracks, leader: Ints, number: Ints, weigh
     A track for another, label by label, changes no more than the weight of the hypotheses that hold it times the
     distance of the two mixtures, and this no more than the mean distance of their components.
     """
-    tracks, dim, error = glmb.tracks, merged.means.shape[1], 0.0
+    tracks, error, own, pooled = glmb.tracks, 0.0, glmb.tracks.components, merged.components
+    dim = pooled.means.shape[1]
     factor, offset, sizes = np.empty((dim, dim)), np.empty(dim), np.zeros(len(leader), np.int64)
     for track in range(len(leader)):
         sizes[leader[track]] += 1
     for track in range(len(leader)):
         if sizes[leader[track]] == 1:
             continue
-        pooled = number[leader[track]]
+        place = number[leader[track]]
         for a in range(tracks.offsets[track], tracks.offsets[track + 1]):
-            for b in range(merged.offsets[pooled], merged.offsets[pooled + 1]):
-                share = weights[track] * math.exp(tracks.log_weights[a] + merged.log_weights[b])
-                apart = l1_bound(tracks.means[a], tracks.covs[a], merged.means[b], merged.covs[b], factor, offset)
+            for b in range(merged.offsets[place], merged.offsets[place + 1]):
+                share = weights[track] * math.exp(own.log_weights[a] + pooled.log_weights[b])
+                apart = l1_bound(own.means[a], own.covs[a], pooled.means[b], pooled.covs[b], factor, offset)
                 error += share * apart
     return error
 

@@ -19,6 +19,7 @@ from vedette.kernels.association.search import WIDEST, Search, grown_search, mak
 from vedette.kernels.base.arrays import counted_ints, filled_ints
 from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, Tracks
+from vedette.kernels.gaussian.components import borrowed_components, make_components
 from vedette.kernels.gaussian.relinearisation import PairWork, make_pair_work
 from vedette.kernels.steps.assembly import Naming, make_naming
 
@@ -63,13 +64,8 @@ def has_rows(work: GlmbWork, num: int) -> bool:
 
 @kernel
 def _make_belief(num_tracks: int, num_hyps: int, num_entries: int, dim: int) -> CaseBelief:
-    tracks = Tracks(
-        np.empty((num_tracks, 2), np.int64),
-        np.empty(num_tracks + 1, np.int64),
-        np.empty(num_tracks),
-        np.empty((num_tracks, dim)),
-        np.empty((num_tracks, dim, dim)),
-    )
+    room = make_components(num_tracks, dim)
+    tracks = Tracks(np.empty((num_tracks, 2), np.int64), np.empty(num_tracks + 1, np.int64), room)
     hyps = Parents(np.empty(num_hyps + 1, np.int64), np.empty(num_entries, np.int64), np.empty(num_hyps))
     return CaseBelief(tracks, hyps, np.empty(num_hyps, np.int64))
 
@@ -82,9 +78,7 @@ def view_belief(belief: CaseBelief, num_tracks: int, num_hyps: int, num_entries:
         Tracks(
             tracks.labels[:num_tracks],
             tracks.offsets[: num_tracks + 1],
-            tracks.log_weights[:num_tracks],
-            tracks.means[:num_tracks],
-            tracks.covs[:num_tracks],
+            borrowed_components(tracks.components, 0, num_tracks),
         ),
         Parents(hyps.offsets[: num_hyps + 1], hyps.rows[:num_entries], hyps.log_weights[:num_hyps]),
         belief.groups[:num_hyps],
@@ -94,7 +88,8 @@ def view_belief(belief: CaseBelief, num_tracks: int, num_hyps: int, num_entries:
 @kernel
 def grown_work(work: GlmbWork) -> GlmbWork:
     """Room for `needed` tracks, and for more children than there are."""
-    meas_dim, most_measurements, dim = work.measurements.shape[1], len(work.measurements), work.rows.means.shape[1]
+    most_measurements, meas_dim = work.measurements.shape
+    dim = work.rows.components.means.shape[1]
     rows, options, num = work.rows, work.options, work.needed[0]
     # Doubled, as a longer horizon will ask for more tracks yet.
     if not has_rows(work, num):

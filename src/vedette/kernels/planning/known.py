@@ -346,7 +346,7 @@ def fill_changes(
 def pseudo_update_known(belief: Belief, decision: Decision, first: int, last: int, results: LmbResults) -> None:
     """Densities of courses `first:last` of one sensor, for every sample: case `course * num_samples + sample`."""
     tracks, num_samples = belief.prior.tracks, belief.targets.shape[1]
-    dim, room = tracks.means.shape[1], min(num_samples, _MOST_LANES)
+    dim, room = tracks.components.means.shape[1], min(num_samples, _MOST_LANES)
     work, found = _make_work(dim, len(decision.sensor.angular), room), _make_followed(dim, room)
     for course in range(first, last):
         for label in range(len(tracks.labels)):

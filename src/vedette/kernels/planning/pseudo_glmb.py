@@ -115,6 +115,7 @@ def _write_marginal(belief: CaseBelief, results: GlmbResults, case: int, work: G
         following[h] = heads[groups[h]]
         heads[groups[h]] = h
         log_weights[groups[h]] = max(log_weights[groups[h]], hyps.log_weights[h])
+    own = belief.tracks.components
     for track in range(len(belief.tracks.labels)):
         slot_of[track] = -1
     for at in range(len(log_weights)):
@@ -132,7 +133,7 @@ def _write_marginal(belief: CaseBelief, results: GlmbResults, case: int, work: G
                 track = hyps.rows[hyps.offsets[h] + m - set_offsets[at]]
                 end = add_to_pool(track, relative[h], slot_of, pool, weights, end)
                 h = following[h]
-            match_components(pool, weights, end, belief.tracks.means, belief.tracks.covs, means[m], covs[m])
+            match_components(pool, weights, end, own.means, own.covs, means[m], covs[m])
             for p in range(end):
                 slot_of[pool[p]] = -1
 
@@ -146,7 +147,7 @@ def pseudo_update_glmb(
     prior: of one Gaussian a track. groups: label set of each of its hypotheses.
     """
     belief = CaseBelief(prior.tracks, Parents(prior.hyp_offsets, prior.hyp_tracks, prior.hyp_log_weights), groups)
-    num_tracks, dim = prior.tracks.means.shape
+    num_tracks, dim = prior.tracks.components.means.shape
     num_sets, most = len(results.set_offsets) - 1, most_targets(decision.futures)
     work = make_work(num_tracks, num_sets, dim, len(decision.sensor.angular), most)
     while first < last:

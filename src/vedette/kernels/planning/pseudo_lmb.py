@@ -22,7 +22,7 @@ from vedette.kernels.association.predicted import Rows, leave_unseen, make_rows,
 from vedette.kernels.base.arrays import counted_ints
 from vedette.kernels.base.compile import borrowing, kernel
 from vedette.kernels.base.types import Floats, Ints, Lmb, ScanInput, Tracks
-from vedette.kernels.gaussian.mixtures import copy_component
+from vedette.kernels.gaussian.components import copy_gaussian, make_components
 from vedette.kernels.gaussian.relinearisation import PairWork, make_pair_work
 from vedette.kernels.planning.ideal import Decision, ideal_scan, most_targets
 from vedette.kernels.steps.lmb import fill_existence, weigh_by_existence
@@ -56,10 +56,12 @@ class LmbWork(NamedTuple):
 
 @kernel
 def _make_work(prior: Lmb, meas_dim: int, most_measurements: int) -> LmbWork:
-    num, dim = prior.tracks.means.shape
+    num, dim = prior.tracks.components.means.shape
     options = make_options(num, num, most_measurements, dim, meas_dim)
-    means, covs = np.empty((num, dim)), np.empty((num, dim, dim))
-    tracks = Tracks(prior.tracks.labels, prior.tracks.offsets, prior.tracks.log_weights, means, covs)
+    room = make_components(num, dim)
+    for c in range(num):
+        room.log_weights[c] = prior.tracks.components.log_weights[c]
+    tracks = Tracks(prior.tracks.labels, prior.tracks.offsets, room)
     return LmbWork(
         make_pair_work(dim, meas_dim),
         np.empty((most_measurements, meas_dim)),
@@ -106,7 +108,7 @@ def _update_cases(
 ) -> int:
     """Cases `first:last`; returns `last`, or the case before which `work` must be grown."""
     sensor, horizon, caps, belief = decision.sensor, decision.horizon, decision.truncation, work.belief
-    num_samples, prepared = len(decision.futures.offsets) - 1, -1
+    num_samples, prepared, updated = len(decision.futures.offsets) - 1, -1, belief.tracks.components
     for case in range(first, last):
         action, sample = case // num_samples, case % num_samples
         for step in range(horizon.poses.shape[1]):
@@ -130,12 +132,10 @@ def _update_cases(
                     "pseudo-update: no association has positive weight; do the models forbid the ideal scan?"
                 )
             fill_existence(options, work.marginals, belief.existence_logit)
-            match_rows(
-                work.all_rows, rows, options, work.marginals, work.mixture, belief.tracks.means, belief.tracks.covs
-            )
+            match_rows(work.all_rows, rows, options, work.marginals, work.mixture, updated.means, updated.covs)
         for i in range(len(belief.existence_logit)):
             results.logits[case, i] = belief.existence_logit[i]
-            copy_component(belief.tracks.means, belief.tracks.covs, i, results.means[case], results.covs[case], i)
+            copy_gaussian(updated.means, updated.covs, i, results.means[case], results.covs[case], i)
     return last
 
 

@@ -105,7 +105,7 @@ def fill_reach(
     Judged by the samples and by the prediction, at every step; with a `least` of 0 by distance alone. reach: m, beyond
     which the sensor detects nothing.
     """
-    state = np.empty(belief.prior.tracks.means.shape[1])
+    state = np.empty(belief.prior.tracks.components.means.shape[1])
     for course in range(first, last):
         for label in range(out.shape[1]):
             out[course, label] = 0

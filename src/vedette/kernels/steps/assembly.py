@@ -12,9 +12,9 @@ from vedette.kernels.association.children import Children, Parents
 from vedette.kernels.association.predicted import Rows
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Glmb, Ints, Mixture, Tracks
+from vedette.kernels.gaussian.components import components_between, copy_component, copy_gaussian, make_components
 from vedette.kernels.gaussian.innovation import update_mean
 from vedette.kernels.gaussian.linalg import normalise_logs
-from vedette.kernels.gaussian.mixtures import copy_component
 from vedette.kernels.gaussian.relinearisation import copy_updated
 
 
@@ -38,21 +38,19 @@ def write_updated(row: int, option: int, rows: Rows, options: Options, start: in
     Their log weights sum to the option's own; components outside the gate are left out.
     """
     first, entry = rows.offsets[row], options.entries[option]
-    detected = options.columns[option] != MISSED
+    detected, predicted = options.columns[option] != MISSED, rows.components
     for i in range(rows.offsets[row + 1] - first):
-        weight = options.component_log_weights[entry + i]
+        c, weight = first + i, options.component_log_weights[entry + i]
         # A component outside the gate cannot have made this measurement.
         if weight == -math.inf:
             continue
+        copy_component(predicted, c, out, start)
         out.log_weights[start] = weight
-        if rows.innovation.bends[first + i] if detected else rows.innovation.at_edge[first + i]:
+        if rows.innovation.bends[c] if detected else rows.innovation.at_edge[c]:
             copy_updated(options.updated[entry + i], out.means[start], out.covs[start])
         elif detected:
-            c, whitened = first + i, options.whitened[entry + i]
-            copy_component(rows.means, rows.innovation.covs, c, out.means, out.covs, start)
-            update_mean(rows.innovation, c, whitened, rows.means[c], out.means[start])
-        else:
-            copy_component(rows.means, rows.covs, first + i, out.means, out.covs, start)
+            copy_gaussian(predicted.means, rows.innovation.covs, c, out.means, out.covs, start)
+            update_mean(rows.innovation, c, options.whitened[entry + i], predicted.means[c], out.means[start])
         start += 1
     return start
 
@@ -91,16 +89,16 @@ def name_tracks(
 @borrowing
 def update_tracks(naming: Naming, num_tracks: int, rows: Rows, options: Options, out: Tracks) -> int:
     """Write the tracks that have been named, their mixtures normalised; returns the number of components."""
-    filled, components = 0, Mixture(out.log_weights, out.means, out.covs)
+    filled, components = 0, out.components
     out.offsets[0] = 0
     for i in range(num_tracks):
         row, option = naming.rows[i], naming.options[i]
         out.labels[i, 0], out.labels[i, 1] = rows.labels[row, 0], rows.labels[row, 1]
         end = write_updated(row, option, rows, options, filled, components)
         if end == filled + 1:
-            out.log_weights[filled] = 0.0
+            components.log_weights[filled] = 0.0
         else:
-            normalise_logs(out.log_weights[filled:end])
+            normalise_logs(components.log_weights[filled:end])
         filled = end
         out.offsets[i + 1] = filled
     return filled
@@ -117,14 +115,8 @@ def assemble(
     most = 0
     for i in range(num):
         most += rows.offsets[naming.rows[i] + 1] - rows.offsets[naming.rows[i]]
-    dim = rows.means.shape[1]
-    tracks = Tracks(
-        np.empty((num, 2), np.int64),
-        np.empty(num + 1, np.int64),
-        np.empty(most),
-        np.empty((most, dim)),
-        np.empty((most, dim, dim)),
-    )
+    room = make_components(most, rows.components.means.shape[1])
+    tracks = Tracks(np.empty((num, 2), np.int64), np.empty(num + 1, np.int64), room)
     last = update_tracks(naming, num, rows, options, tracks)
-    trimmed = Tracks(tracks.labels, tracks.offsets, tracks.log_weights[:last], tracks.means[:last], tracks.covs[:last])
+    trimmed = Tracks(tracks.labels, tracks.offsets, components_between(room, 0, last))
     return Glmb(trimmed, hyps.offsets, hyps.rows[:filled].copy(), hyps.log_weights), log_total, naming

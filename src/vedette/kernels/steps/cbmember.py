@@ -17,8 +17,9 @@ from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.arrays import group_members
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Ints, Lmb, Motion, ScanInput, Sensor, Tracks
+from vedette.kernels.gaussian.components import components_between, make_components
 from vedette.kernels.gaussian.linalg import log_add
-from vedette.kernels.gaussian.mixtures import make_components, require_gaussians
+from vedette.kernels.gaussian.mixtures import require_gaussians
 from vedette.kernels.gaussian.reduction import MixtureCaps, make_reduction_work
 from vedette.kernels.steps.assembly import write_updated
 from vedette.kernels.steps.lmb import Reduction, append_reduced, labels_to_keep, weigh_by_existence
@@ -116,7 +117,7 @@ def posterior_mixtures(sources: Ints, rows: Rows, options: Options, choices: Cho
     """The reduced mixture of each kept Bernoulli: of the missed row, or of all rows that explain its
     measurement, weighed by the odds of their existence.
     """
-    num_rows, dim = len(rows.log_absent), rows.means.shape[1]
+    num_rows, dim = len(rows.log_absent), rows.components.means.shape[1]
     widest, total = _most_components(sources, rows, choices)
     offsets, labels = np.zeros(len(sources) + 1, np.int64), np.full((len(sources), 2), -1, np.int64)
     out, wide, work = make_components(total, dim), make_components(widest, dim), make_reduction_work(widest, dim)
@@ -137,7 +138,7 @@ def posterior_mixtures(sources: Ints, rows: Rows, options: Options, choices: Cho
                 width = end
         filled = append_reduced(wide, width, caps, work, out, filled)
         offsets[k + 1] = filled
-    return Tracks(labels, offsets, out.log_weights[:filled], out.means[:filled], out.covs[:filled])
+    return Tracks(labels, offsets, components_between(out, 0, filled))
 
 
 @kernel
@@ -177,5 +178,5 @@ def step_cb_member(
     for i in range(len(kept)):
         sources[i], kept_logits[i] = possible[kept[i]], possible_logits[kept[i]]
     tracks = posterior_mixtures(sources, rows, options, choices, reduction.mixture)
-    require_gaussians(tracks.means, tracks.covs)
+    require_gaussians(tracks.components.means, tracks.components.covs)
     return Lmb(tracks, kept_logits), CbMemberReport(num_raised, dropped + lost)

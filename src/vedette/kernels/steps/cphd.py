@@ -16,6 +16,7 @@ from vedette.kernels.association.options import weighed_options
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, Lmb, Mixture, Motion, ScanInput, Sensor
+from vedette.kernels.gaussian.components import components_between
 from vedette.kernels.gaussian.linalg import log_add, log_sum, normalise_logs
 from vedette.kernels.gaussian.reduction import MixtureCaps
 from vedette.kernels.steps.phd import IntensityReport, corrected_intensity, predict_intensity
@@ -182,7 +183,7 @@ def _predict(log_cardinality: Floats, prior: Mixture, birth: Lmb, rows_log_weigh
 def _normalised(mixture: Mixture) -> Mixture:
     """The mixture with weights that sum to one; none where there is no weight."""
     if normalise_logs(mixture.log_weights) == -math.inf:
-        return Mixture(mixture.log_weights[:0], mixture.means[:0], mixture.covs[:0])
+        return components_between(mixture, 0, 0)
     return mixture
 
 
@@ -213,7 +214,7 @@ def step_cphd(
     log total of the report is -inf and the prior comes back.
     """
     rows, log_died = predict_intensity(prior, scan, motion, sensor)
-    predicted = _predict(log_cardinality, prior, scan.birth, rows.log_weights, log_died)
+    predicted = _predict(log_cardinality, prior, scan.birth, rows.components.log_weights, log_died)
     options, log_clutter, num_raised = weighed_options(rows, scan, sensor, truncation)
     num_options = options.offsets[1]
     detections = _detections(options.columns[:num_options])

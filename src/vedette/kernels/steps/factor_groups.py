@@ -85,7 +85,7 @@ def weigh_singles(prior: FactoredGlmb, rows: Rows) -> None:
         # Absent: never there, or there and died.
         rows.log_absent[row] = log_add(log_absent, log_present + rows.log_absent[row])
         for c in range(rows.offsets[row], rows.offsets[row + 1]):
-            rows.log_weights[c] += log_present
+            rows.components.log_weights[c] += log_present
 
 
 @kernel

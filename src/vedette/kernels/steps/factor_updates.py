@@ -17,9 +17,9 @@ from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.arrays import filled_ints
 from vedette.kernels.base.compile import borrowing, kernel
 from vedette.kernels.base.types import Floats, Glmb, Ints, Mixture
+from vedette.kernels.gaussian.components import components_between, copy_component, make_components
 from vedette.kernels.gaussian.distances import reduction_bound
 from vedette.kernels.gaussian.linalg import log_add, log_sum
-from vedette.kernels.gaussian.mixtures import copy_component, make_components
 from vedette.kernels.gaussian.reduction import MixtureCaps, ReductionWork, make_reduction_work, reduce_into
 from vedette.kernels.labelled.factor_store import FactorStore, append_part, append_single, next_component, with_room
 from vedette.kernels.labelled.renaming import with_known_names
@@ -74,13 +74,13 @@ class Work(NamedTuple):
 
 @kernel
 def make_work(rows: Rows, options: Options) -> Work:
-    widest, dim = 0, rows.means.shape[1]
+    widest, dim = 0, rows.components.means.shape[1]
     for row in range(len(rows.log_absent)):
         num_options = options.offsets[row + 1] - options.offsets[row]
         widest = max(widest, (rows.offsets[row + 1] - rows.offsets[row]) * max(1, num_options))
     return Work(
         np.empty(options.offsets[-1]),
-        Mixture(np.empty(widest), np.empty((widest, dim)), np.empty((widest, dim, dim))),
+        make_components(widest, dim),
         np.empty(len(rows.log_absent), np.int64),
         filled_ints(options.num_measurements, -1),
         np.zeros(options.num_measurements),
@@ -94,8 +94,7 @@ def make_work(rows: Rows, options: Options) -> Work:
 @kernel
 def found_faint(work: Work) -> Mixture:
     """The labels that were dropped, as an intensity."""
-    faint, num = work.faint, work.num_faint[0]
-    return Mixture(faint.log_weights[:num], faint.means[:num], faint.covs[:num])
+    return components_between(work.faint, 0, work.num_faint[0])
 
 
 @borrowing
@@ -214,14 +213,15 @@ def _append_label(
             absent = log_add(absent, glmb.hyp_log_weights[h])
         else:
             log_versions[track] = log_add(log_versions[track], glmb.hyp_log_weights[h])
-    num, dim = len(tracks.log_weights), tracks.means.shape[1]
+    components = tracks.components
+    num, dim = components.means.shape
     wide, width, reducing = make_components(num, dim), 0, make_reduction_work(num, dim)
     for track in range(len(log_versions)):
         if log_versions[track] == -math.inf:
             continue
         for c in range(tracks.offsets[track], tracks.offsets[track + 1]):
-            wide.log_weights[width] = log_versions[track] + tracks.log_weights[c]
-            copy_component(tracks.means, tracks.covs, c, wide.means, wide.covs, width)
+            copy_component(components, c, wide, width)
+            wide.log_weights[width] += log_versions[track]
             width += 1
     logit = log_sum(log_versions) - absent
     _append_mixture(store, choices.labels[label], wide, width, logit, reduction, reducing, work)
@@ -266,7 +266,9 @@ def append_parts(
     work.sums[REDUCED] += merging_error
     num, num_labels, tracks = len(choices.weights), len(part_of), glmb.tracks
     entries = (num + 1) * num_labels
-    store = with_room(store, num_labels, len(tracks.labels), len(tracks.log_weights), entries + num_labels, entries)
+    store = with_room(
+        store, num_labels, len(tracks.labels), len(tracks.components.log_weights), entries + num_labels, entries
+    )
     for part in range(num_labels):
         size = 0
         for k in range(len(part_of)):

@@ -27,7 +27,7 @@ from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.arrays import group_members
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import FactoredGlmb, Mixture, Motion, ScanInput, Sensor
-from vedette.kernels.gaussian.intensities import stacked_mixtures
+from vedette.kernels.gaussian.components import stacked_mixtures
 from vedette.kernels.gaussian.mixtures import require_gaussians
 from vedette.kernels.labelled.factor_store import has_room_for_single, make_store, stored, with_room
 from vedette.kernels.steps.factor_groups import (
@@ -123,7 +123,7 @@ def step_factored(
     offsets, members = group_members(leaders, len(leaders))
     work, ranking, most_labels = make_work(rows, options), make_ranking(), 0
     widest = len(work.wide.log_weights)
-    store = make_store(len(rows.log_absent), 2 * len(rows.log_weights), rows.means.shape[1])
+    store = make_store(len(rows.log_absent), 2 * len(rows.components.log_weights), rows.components.means.shape[1])
     for leader in range(len(leaders)):
         together = members[offsets[leader] : offsets[leader + 1]]
         if len(together) == 0 or factors.num_labels[leader] == 0:
@@ -140,7 +140,7 @@ def step_factored(
         if len(posterior.hyp_log_weights) > 0:
             store = append_parts(store, posterior, factoring, reduction, most, work)
     sums, density = work.sums, stored(store)
-    require_gaussians(density.tracks.means, density.tracks.covs)
+    require_gaussians(density.tracks.components.means, density.tracks.components.covs)
     missed, log_missed = missed_intensity(seen, scan, sensor, len(undetected.intensity.log_weights))
     left = left_in_cells(undetected, sensor, scan.pose)
     log_missed += left.changes[0] if len(left.changes) > 0 else 0.0

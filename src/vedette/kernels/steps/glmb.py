@@ -145,7 +145,7 @@ def _conclude(
     log_bound = log_weight_bound(found.options, found.parents, children, log_totals, log_next, log_bound)
     children, kept = kept_children(found, children, truncation, is_covered)
     posterior, log_total, naming = assemble(children, kept, found.parents, found.rows, found.options)
-    require_gaussians(posterior.tracks.means, posterior.tracks.covs)
+    require_gaussians(posterior.tracks.components.means, posterior.tracks.components.covs)
     log_kept = log_total - log_bound if log_bound - log_total > ROUNDING else 0.0
     full = len(kept) >= truncation.search.max_hypotheses
     sources = _sources(naming, len(posterior.tracks.labels), num_prior, found.options.columns)

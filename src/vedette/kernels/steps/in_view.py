@@ -14,9 +14,9 @@ from vedette.kernels.association.options import log_clutter_at
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import Bools, Ints, Lmb, ScanInput, Sensor, Tracks
+from vedette.kernels.gaussian.components import components_between, copy_components, make_components
 from vedette.kernels.gaussian.detection import detection_probability
 from vedette.kernels.gaussian.linalg import LOG_2PI, cholesky, log_det_from_factor, normalise_logs
-from vedette.kernels.gaussian.mixtures import copy_component, make_components
 from vedette.kernels.gaussian.reduction import MixtureCaps, reduce_mixture
 from vedette.kernels.gaussian.scratch import Scratch, make_scratch
 
@@ -37,8 +37,8 @@ def _says_something(
     tracks: Tracks, c: int, scan: ScanInput, sensor: Sensor, least_log_clutter: float, scratch: Scratch
 ) -> bool:
     """Whether the scan may change a component: no measurement is likelier of it than at the peak of the noise alone."""
-    mean, noise = tracks.means[c], scratch.measurement_noise
-    chance = detection_probability(sensor, scan.pose, mean, tracks.covs[c], scratch.points[0])
+    mean, noise = tracks.components.means[c], scratch.measurement_noise
+    chance = detection_probability(sensor, scan.pose, mean, tracks.components.covs[c], scratch.points[0])
     if chance == 0.0 or chance > _NOTHING:
         return chance > 0.0
     if least_log_clutter == math.inf:
@@ -53,7 +53,8 @@ def _says_something(
 @kernel
 def in_view(tracks: Tracks, scan: ScanInput, sensor: Sensor, truncation: Truncation) -> Bools:
     """(num_tracks,) whether the scan may say anything of each track."""
-    marks, scratch = np.zeros(len(tracks.labels), np.bool_), make_scratch(tracks.means.shape[1], len(sensor.angular))
+    marks = np.zeros(len(tracks.labels), np.bool_)
+    scratch = make_scratch(tracks.components.means.shape[1], len(sensor.angular))
     least_log_clutter = _least_log_clutter(scan, sensor, truncation.log_clutter_floor)
     for i in range(len(marks)):
         for c in range(tracks.offsets[i], tracks.offsets[i + 1]):
@@ -71,8 +72,8 @@ def marked(lmb: Lmb, marks: Bools) -> Lmb:
         if marks[i]:
             num += 1
             num_components += lmb.tracks.offsets[i + 1] - lmb.tracks.offsets[i]
-    room, logits, filled = make_components(num_components, lmb.tracks.means.shape[1]), np.empty(num), 0
-    out = Tracks(np.empty((num, 2), np.int64), np.zeros(num + 1, np.int64), room.log_weights, room.means, room.covs)
+    room, logits, filled = make_components(num_components, lmb.tracks.components.means.shape[1]), np.empty(num), 0
+    out = Tracks(np.empty((num, 2), np.int64), np.zeros(num + 1, np.int64), room)
     for i in range(len(marks)):
         if marks[i]:
             _copy(lmb.tracks, i, out, filled)
@@ -84,13 +85,9 @@ def marked(lmb: Lmb, marks: Bools) -> Lmb:
 @kernel
 def _copy(source: Tracks, i: int, out: Tracks, num: int) -> None:
     """Write track `i` of `source` as number `num`."""
-    end = out.offsets[num]
-    for c in range(source.offsets[i], source.offsets[i + 1]):
-        out.log_weights[end] = source.log_weights[c]
-        copy_component(source.means, source.covs, c, out.means, out.covs, end)
-        end += 1
+    first, last = source.offsets[i], source.offsets[i + 1]
     out.labels[num, 0], out.labels[num, 1] = source.labels[i, 0], source.labels[i, 1]
-    out.offsets[num + 1] = end
+    out.offsets[num + 1] = copy_components(source.components, first, last, out.components, out.offsets[num])
 
 
 @kernel
@@ -100,15 +97,11 @@ def _copy_reduced(source: Tracks, i: int, caps: MixtureCaps, out: Tracks, num: i
     first, end = out.offsets[num], out.offsets[num + 1]
     if end - first == 1:
         return True
-    log_weights, means, covs = reduce_mixture(
-        out.log_weights[first:end], out.means[first:end], out.covs[first:end], caps
-    )
-    normalise_logs(log_weights)
-    out.offsets[num + 1] = first + len(log_weights)
-    for c in range(len(log_weights)):
-        out.log_weights[first + c] = log_weights[c]
-        copy_component(means, covs, c, out.means, out.covs, first + c)
-    return bool(len(log_weights) == end - first)
+    reduced = reduce_mixture(components_between(out.components, first, end), caps)
+    normalise_logs(reduced.log_weights)
+    last = copy_components(reduced, 0, len(reduced.log_weights), out.components, first)
+    out.offsets[num + 1] = last
+    return bool(last == end)
 
 
 @kernel
@@ -118,10 +111,10 @@ def put_back(prior: Lmb, marks: Bools, updated: Lmb, caps: MixtureCaps, settled:
     Mixtures of the others are reduced as by an update that changes nothing, which may merge what the last one made,
     but for the `settled` ones, of which it is known that it does not. Also returns which are settled now.
     """
-    most, dim = len(marks), prior.tracks.means.shape[1]
-    room = make_components(len(prior.tracks.log_weights) + len(updated.tracks.log_weights), dim)
+    most, dim = len(marks), prior.tracks.components.means.shape[1]
+    room = make_components(len(prior.tracks.components.log_weights) + len(updated.tracks.components.log_weights), dim)
     logits, still, num, own = np.empty(most), np.zeros(most, np.bool_), 0, 0
-    out = Tracks(np.empty((most, 2), np.int64), np.zeros(most + 1, np.int64), room.log_weights, room.means, room.covs)
+    out = Tracks(np.empty((most, 2), np.int64), np.zeros(most + 1, np.int64), room)
     for i in range(most):
         if not marks[i]:
             if settled[i]:
@@ -133,8 +126,7 @@ def put_back(prior: Lmb, marks: Bools, updated: Lmb, caps: MixtureCaps, settled:
             _copy(updated.tracks, own, out, num)
             logits[num] = updated.existence_logit[own]
             num, own = num + 1, own + 1
-    end = out.offsets[num]
-    tracks = Tracks(out.labels[:num], out.offsets[: num + 1], out.log_weights[:end], out.means[:end], out.covs[:end])
+    tracks = Tracks(out.labels[:num], out.offsets[: num + 1], components_between(room, 0, out.offsets[num]))
     return Lmb(tracks, logits[:num]), still[:num]
 
 

@@ -22,8 +22,9 @@ from vedette.kernels.association.predicted import Rows, rows_of_scan
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, Lmb, Mixture, Motion, ScanInput, Sensor, Tracks
+from vedette.kernels.gaussian.components import components_between, copy_component, make_components
 from vedette.kernels.gaussian.linalg import log_add, normalise_logs
-from vedette.kernels.gaussian.mixtures import copy_component, descending_order, make_components, require_gaussians
+from vedette.kernels.gaussian.mixtures import descending_order, require_gaussians
 from vedette.kernels.gaussian.reduction import MixtureCaps, ReductionWork, make_reduction_work, reduce_into
 from vedette.kernels.steps.assembly import write_updated
 from vedette.kernels.steps.matching import make_mixture, match_rows
@@ -66,7 +67,7 @@ def weigh_by_existence(existence_logit: Floats, rows: Rows) -> None:
         # Absent: never there, or there and died.
         rows.log_absent[i] = log_add(log_absence, log_existence + rows.log_absent[i])
         for c in range(rows.offsets[i], rows.offsets[i + 1]):
-            rows.log_weights[c] += log_existence
+            rows.components.log_weights[c] += log_existence
 
 
 @borrowing
@@ -117,15 +118,16 @@ def _most_components(kept: Ints, rows: Rows, options: Options) -> tuple[int, int
 @kernel
 def _matched_tracks(kept: Ints, rows: Rows, options: Options, marginals: Floats) -> Tracks:
     """One Gaussian for each kept row."""
-    num, dim = len(kept), rows.means.shape[1]
+    num, dim = len(kept), rows.components.means.shape[1]
     widest, _ = _most_components(kept, rows, options)
     labels, offsets = np.empty((num, 2), np.int64), np.zeros(num + 1, np.int64)
-    log_weights, means, covs = np.zeros(num), np.empty((num, dim)), np.empty((num, dim, dim))
+    out = make_components(num, dim)
     for i in range(num):
+        out.log_weights[i] = 0.0
         labels[i, 0], labels[i, 1] = rows.labels[kept[i], 0], rows.labels[kept[i], 1]
         offsets[i + 1] = i + 1
-    match_rows(kept, rows, options, marginals, make_mixture(widest, dim), means, covs)
-    return Tracks(labels, offsets, log_weights, means, covs)
+    match_rows(kept, rows, options, marginals, make_mixture(widest, dim), out.means, out.covs)
+    return Tracks(labels, offsets, out)
 
 
 @borrowing
@@ -142,7 +144,7 @@ def write_mixture(row: int, rows: Rows, options: Options, marginals: Floats, wid
     if width == 0:
         # Existence 0: any density will do, as long as it is one.
         for c in range(rows.offsets[row], rows.offsets[row + 1]):
-            copy_component(rows.means, rows.covs, c, wide.means, wide.covs, width)
+            copy_component(rows.components, c, wide, width)
             wide.log_weights[width] = 0.0
             width += 1
     return width
@@ -151,7 +153,7 @@ def write_mixture(row: int, rows: Rows, options: Options, marginals: Floats, wid
 @kernel
 def _reduced_tracks(kept: Ints, rows: Rows, options: Options, marginals: Floats, caps: MixtureCaps) -> Tracks:
     """Each kept row's mixture over its options, reduced."""
-    dim = rows.means.shape[1]
+    dim = rows.components.means.shape[1]
     widest, total = _most_components(kept, rows, options)
     labels, offsets = np.empty((len(kept), 2), np.int64), np.zeros(len(kept) + 1, np.int64)
     out, wide, work = make_components(total, dim), make_components(widest, dim), make_reduction_work(widest, dim)
@@ -162,7 +164,7 @@ def _reduced_tracks(kept: Ints, rows: Rows, options: Options, marginals: Floats,
         width = write_mixture(row, rows, options, marginals, wide)
         filled = append_reduced(wide, width, caps, work, out, filled)
         offsets[i + 1] = filled
-    return Tracks(labels, offsets, out.log_weights[:filled], out.means[:filled], out.covs[:filled])
+    return Tracks(labels, offsets, components_between(out, 0, filled))
 
 
 @borrowing
@@ -170,8 +172,8 @@ def append_reduced(wide: Mixture, width: int, caps: MixtureCaps, work: Reduction
     """Append the first `width` components, reduced and their weights normalised to one; returns the new end."""
     if width == 1 and wide.log_weights[0] > -math.inf:
         # Of one there is nothing to reduce: most births, which nothing was measured of.
+        copy_component(wide, 0, out, filled)
         out.log_weights[filled] = 0.0
-        copy_component(wide.means, wide.covs, 0, out.means, out.covs, filled)
         return filled + 1
     end = reduce_into(wide, width, caps, work, out, filled)
     normalise_logs(out.log_weights[filled:end])
@@ -203,7 +205,7 @@ def step_lmb(
         tracks = _matched_tracks(kept, rows, options, marginals)
     else:
         tracks = _reduced_tracks(kept, rows, options, marginals, reduction.mixture)
-    require_gaussians(tracks.means, tracks.covs)
+    require_gaussians(tracks.components.means, tracks.components.covs)
     kept_logits = np.empty(len(kept))
     for i in range(len(kept)):
         kept_logits[i] = logits[kept[i]]

@@ -58,11 +58,11 @@ def _gather(row: int, rows: Rows, options: Options, marginals: Floats, out: Mixt
                     out.means[count, i] = options.updated[at, 0, i]
             elif detected:
                 out.sources[count] = 3 * c + UPDATED
-                update_mean(rows.innovation, c, options.whitened[at], rows.means[c], out.means[count])
+                update_mean(rows.innovation, c, options.whitened[at], rows.components.means[c], out.means[count])
             else:
                 out.sources[count] = 3 * c + PREDICTED
                 for i in range(out.means.shape[1]):
-                    out.means[count, i] = rows.means[c, i]
+                    out.means[count, i] = rows.components.means[c, i]
             count += 1
     return count
 
@@ -74,7 +74,7 @@ def _gather_predicted(row: int, rows: Rows, out: Mixture) -> int:
     for c in range(first, last):
         out.weights[c - first], out.sources[c - first] = 1.0, 3 * c + PREDICTED
         for i in range(out.means.shape[1]):
-            out.means[c - first, i] = rows.means[c, i]
+            out.means[c - first, i] = rows.components.means[c, i]
     return last - first
 
 
@@ -110,7 +110,7 @@ def _moments(
         else:
             for i in range(n):
                 for j in range(i + 1):
-                    out_cov[i, j] += share * (rows.covs[c, i, j] + means[k, i] * means[k, j])
+                    out_cov[i, j] += share * (rows.components.covs[c, i, j] + means[k, i] * means[k, j])
     for i in range(n):
         for j in range(i):
             out_cov[j, i] = out_cov[i, j]

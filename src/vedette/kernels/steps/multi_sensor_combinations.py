@@ -25,7 +25,8 @@ from vedette.kernels.association.predicted import (
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.arrays import filled_ints
 from vedette.kernels.base.compile import kernel
-from vedette.kernels.base.types import Floats, Ints, Lmb, Mixture, Motion, ScanInput, Sensor
+from vedette.kernels.base.types import Floats, Ints, Lmb, Motion, ScanInput, Sensor
+from vedette.kernels.gaussian.components import components_between
 from vedette.kernels.gaussian.innovation import make_innovation
 from vedette.kernels.gaussian.linalg import log_sum
 from vedette.kernels.gaussian.mixtures import descending_order
@@ -75,8 +76,8 @@ def predict_combinations(prior: Lmb, scan: ScanInput, num_sensors: int, motion: 
     """One combination a predicted track or birth site, before the first sensor; measurements are not looked at."""
     birth = scan.birth
     num_tracks, num_births = len(prior.tracks.labels), len(birth.tracks.labels)
-    num, dim = num_tracks + num_births, prior.tracks.means.shape[1]
-    rows = make_rows(num, len(prior.tracks.log_weights) + len(birth.tracks.log_weights), dim, 0)
+    num, dim = num_tracks + num_births, prior.tracks.components.means.shape[1]
+    rows = make_rows(num, len(prior.tracks.components.log_weights) + len(birth.tracks.components.log_weights), dim, 0)
     fill_survivors(prior.tracks, motion, scan.dt, rows, make_scratch(dim, 0))
     fill_births(birth, num_tracks, rows)
     return _one_each(prior, rows, num_sensors)
@@ -119,8 +120,8 @@ def _taken(combinations: Combinations, rows: Rows, options: Options, kept: Ints,
             num += kept[option]
             num_components += kept[option] * (rows.offsets[i + 1] - rows.offsets[i])
     columns, tracks = np.empty((num, combinations.columns.shape[1]), np.int64), np.empty(num, np.int64)
-    grown = make_rows(num, num_components, rows.means.shape[1], 0)
-    updated, filled, end = Mixture(grown.log_weights, grown.means, grown.covs), 0, 0
+    grown = make_rows(num, num_components, rows.components.means.shape[1], 0)
+    updated, filled, end = grown.components, 0, 0
     for i in range(len(combinations.tracks)):
         for option in range(options.offsets[i], options.offsets[i + 1]):
             if kept[option] == 0:
@@ -139,9 +140,7 @@ def _taken(combinations: Combinations, rows: Rows, options: Options, kept: Ints,
         grown.labels,
         grown.offsets,
         grown.log_absent,
-        grown.log_weights[:end],
-        grown.means[:end],
-        grown.covs[:end],
+        components_between(updated, 0, end),
         grown.innovation,
     )
     return Combinations(trimmed, tracks, columns, combinations.log_absent)
@@ -157,12 +156,10 @@ def extend_combinations(
         given.labels,
         given.offsets,
         given.log_absent,
-        given.log_weights,
-        given.means,
-        given.covs,
-        make_innovation(len(given.log_weights), given.means.shape[1], meas_dim),
+        given.components,
+        make_innovation(len(given.components.log_weights), given.components.means.shape[1], meas_dim),
     )
-    expect_rows(sensor, scan.pose, rows, make_scratch(given.means.shape[1], meas_dim))
+    expect_rows(sensor, scan.pose, rows, make_scratch(given.components.means.shape[1], meas_dim))
     options, log_clutter, num_raised = weighed_options(rows, scan, sensor, truncation)
     kept, log_kept = _options_to_keep(combinations, options, truncation.search.max_hypotheses)
     return _taken(combinations, rows, options, kept, at, shift), SensorReport(log_clutter, num_raised, log_kept)

@@ -11,8 +11,9 @@ from vedette.kernels.association.predicted import Rows
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Ints, Lmb, ScanInput, Sensor, Tracks
+from vedette.kernels.gaussian.components import components_between, copy_component, make_components
 from vedette.kernels.gaussian.linalg import log_add, log_sum
-from vedette.kernels.gaussian.mixtures import copy_component, make_components, require_gaussians
+from vedette.kernels.gaussian.mixtures import require_gaussians
 from vedette.kernels.gaussian.reduction import MixtureCaps, make_reduction_work
 from vedette.kernels.steps.lmb import LmbReport, Reduction, append_reduced, labels_to_keep
 from vedette.kernels.steps.multi_sensor_choices import Choices
@@ -33,7 +34,7 @@ def _likely_choices(combinations: Combinations, log_least_odds: float) -> tuple[
     rows, num_tracks, num = combinations.rows, len(combinations.log_absent), len(combinations.tracks)
     log_weights, log_free, log_kept = np.empty(num), combinations.log_absent.copy(), 0.0
     for i in range(num):
-        log_weights[i] = log_sum(rows.log_weights[rows.offsets[i] : rows.offsets[i + 1]])
+        log_weights[i] = log_sum(rows.components.log_weights[rows.offsets[i] : rows.offsets[i + 1]])
         if combinations.columns[i].max() < 0:
             log_free[combinations.tracks[i]] = log_add(log_free[combinations.tracks[i]], log_weights[i])
     offsets, kept, count = np.zeros(num_tracks + 1, np.int64), np.empty(num, np.int64), 0
@@ -82,7 +83,8 @@ def _reduced_tracks(
     chosen: Ints, rows: Rows, choices: Choices, sources: Ints, marginals: Floats, caps: MixtureCaps
 ) -> Tracks:
     """Each chosen track's mixture over its combinations, reduced."""
-    dim = rows.means.shape[1]
+    components = rows.components
+    dim = components.means.shape[1]
     widest, total = _widths(chosen, rows, choices, sources)
     labels, offsets = np.empty((len(chosen), 2), np.int64), np.zeros(len(chosen) + 1, np.int64)
     out, wide, work = make_components(total, dim), make_components(widest, dim), make_reduction_work(widest, dim)
@@ -93,14 +95,14 @@ def _reduced_tracks(
             source = sources[choice]
             labels[i, 0], labels[i, 1] = rows.labels[source, 0], rows.labels[source, 1]
             for c in range(rows.offsets[source], rows.offsets[source + 1]):
-                weight = rows.log_weights[c] + marginals[choice] - choices.log_weights[choice]
+                weight = components.log_weights[c] + marginals[choice] - choices.log_weights[choice]
                 if weight > -math.inf:
-                    copy_component(rows.means, rows.covs, c, wide.means, wide.covs, width)
+                    copy_component(components, c, wide, width)
                     wide.log_weights[width] = weight
                     width += 1
         filled = append_reduced(wide, width, caps, work, out, filled)
         offsets[i + 1] = filled
-    return Tracks(labels, offsets, out.log_weights[:filled], out.means[:filled], out.covs[:filled])
+    return Tracks(labels, offsets, components_between(out, 0, filled))
 
 
 @kernel
@@ -119,7 +121,7 @@ def lmb_of_combinations(
     logits = _logits(choices, marginals, absent)
     chosen, dropped = labels_to_keep(logits, reduction)
     tracks = _reduced_tracks(chosen, combinations.rows, choices, sources, marginals, reduction.mixture)
-    require_gaussians(tracks.means, tracks.covs)
+    require_gaussians(tracks.components.means, tracks.components.covs)
     chosen_logits = np.empty(len(chosen))
     for i in range(len(chosen)):
         chosen_logits[i] = logits[chosen[i]]

@@ -17,8 +17,9 @@ from vedette.kernels.association.predicted import Rows, rows_of_scan
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Mixture, Motion, ScanInput, Sensor, Tracks
+from vedette.kernels.gaussian.components import make_components
 from vedette.kernels.gaussian.linalg import log_add
-from vedette.kernels.gaussian.mixtures import make_components, require_gaussians
+from vedette.kernels.gaussian.mixtures import require_gaussians
 from vedette.kernels.gaussian.reduction import MixtureCaps, reduce_mixture
 from vedette.kernels.steps.assembly import write_updated
 
@@ -41,15 +42,13 @@ def predict_intensity(prior: Mixture, scan: ScanInput, motion: Motion | None, se
     num = len(prior.log_weights)
     offsets = np.zeros(2, np.int64)
     offsets[1] = num
-    one_track = Tracks(np.zeros((1, 2), np.int64), offsets, prior.log_weights, prior.means, prior.covs)
+    one_track = Tracks(np.zeros((1, 2), np.int64), offsets, prior)
     rows = rows_of_scan(one_track, scan, motion, sensor)
     log_died = rows.log_absent[0]
     all_components = np.zeros(2, np.int64)
-    all_components[1] = len(rows.log_weights)
+    all_components[1] = len(rows.components.log_weights)
     never_absent = np.full(1, -math.inf)
-    one_row = Rows(
-        rows.labels[:1], all_components, never_absent, rows.log_weights, rows.means, rows.covs, rows.innovation
-    )
+    one_row = Rows(rows.labels[:1], all_components, never_absent, rows.components, rows.innovation)
     return one_row, log_died
 
 
@@ -60,7 +59,7 @@ def corrected_intensity(rows: Rows, options: Options, log_factors: Floats, caps:
     log_factors: (>= num_options,) log of the factor of each option.
     """
     num_options = options.offsets[1]
-    num_components, dim = rows.means.shape
+    num_components, dim = rows.components.means.shape
     filled = 0
     for option in range(num_options):
         entry = options.entries[option]
@@ -73,9 +72,9 @@ def corrected_intensity(rows: Rows, options: Options, log_factors: Floats, caps:
         for c in range(start, end):
             wide.log_weights[c] += log_factors[option]
         start = end
-    few_weights, few_means, few_covs = reduce_mixture(wide.log_weights, wide.means, wide.covs, caps)
-    require_gaussians(few_means, few_covs)
-    return Mixture(few_weights, few_means, few_covs)
+    few = reduce_mixture(wide, caps)
+    require_gaussians(few.means, few.covs)
+    return few
 
 
 @kernel
@@ -93,7 +92,8 @@ def step_phd(
             # Vo and Ma 2006: each detection's weight over kappa(z) + all weights, here relative to kappa.
             log_factors[option] = -log_add(0.0, options.log_weights[option])
             log_total -= log_factors[option]
-    for c in range(len(rows.log_weights)):
-        log_total -= math.exp(rows.log_weights[c]) * rows.innovation.prob_detection[c]
+    predicted = rows.components.log_weights
+    for c in range(len(predicted)):
+        log_total -= math.exp(predicted[c]) * rows.innovation.prob_detection[c]
     posterior = corrected_intensity(rows, options, log_factors, caps)
     return posterior, IntensityReport(log_total, log_clutter, num_raised, 0.0)
