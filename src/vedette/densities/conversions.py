@@ -14,10 +14,11 @@ from vedette.densities.factored import FactoredGLMB, sets_of_factors
 from vedette.densities.glmb import GLMB
 from vedette.densities.label_sets import take_factors
 from vedette.densities.labelled import LMB, Labelled
-from vedette.densities.tracks import TrackTable, reduced_tracks, single_gaussians, take_tracks
+from vedette.densities.tracks import TrackTable, single_gaussians, take_tracks
 from vedette.errors import InputError
 from vedette.kernels.association.names import settled_names
 from vedette.kernels.base.types import Lmb
+from vedette.kernels.gaussian.pooling import reduced_tracks
 from vedette.kernels.gaussian.reduction import MixtureCaps
 from vedette.kernels.labelled import conversions as kernels
 from vedette.probabilities import log_expit

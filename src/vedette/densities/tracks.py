@@ -18,8 +18,6 @@ from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.components import components_of, taken_components
 from vedette.kernels.gaussian.mixtures import heaviest_of_runs
-from vedette.kernels.gaussian.pooling import pooled_tracks
-from vedette.kernels.gaussian.reduction import MixtureCaps
 from vedette.models.arguments import no_gaussians
 from vedette.text import counted
 
@@ -188,15 +186,6 @@ def single_gaussians(tracks: TrackTable) -> TrackTable:
     if len(tracks.log_weights) == tracks.num_tracks:
         return tracks
     return gaussian_tracks(tracks.labels, *track_moments(tracks))
-
-
-def reduced_tracks(tracks: kt.Tracks, caps: MixtureCaps) -> kt.Tracks:
-    """The tracks with their mixtures reduced by the caps."""
-    num = len(tracks.labels)
-    if len(tracks.components.log_weights) == num:
-        return tracks
-    each = np.arange(num + 1)
-    return pooled_tracks(tracks, tracks.labels, each, each[:-1].copy(), np.ones(num), caps)
 
 
 def mixture_moments(log_weights: Floats, means: Floats, covs: Floats) -> tuple[Floats, Floats]:

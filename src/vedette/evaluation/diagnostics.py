@@ -9,8 +9,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from vedette.evaluation.health import HealthSummary, health_sums, percent, summarise_health
-from vedette.fusion.base import LOST, SURE
 from vedette.kernels.base.types import Floats
+from vedette.kernels.labelled.set_fusion import LOST, SURE
 from vedette.simulation.health import Health
 from vedette.text import counted
 

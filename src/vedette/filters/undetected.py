@@ -15,7 +15,7 @@ from vedette.filters.appearing import appearing, no_cells, rate_after, tables_of
 from vedette.filters.inputs import births_of, births_within
 from vedette.filters.limits import Limits
 from vedette.kernels.base.types import Floats, Lmb, Mixture
-from vedette.kernels.gaussian.components import components_of, stacked_mixtures
+from vedette.kernels.gaussian.components import stacked_mixtures
 from vedette.kernels.steps.undetected import Arrivals, Left, Undetected
 from vedette.models import BirthModel, SensorModel
 from vedette.models.arguments import reject, step_number

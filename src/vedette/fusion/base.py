@@ -14,12 +14,10 @@ from vedette.densities.checks import labels_increase, offsets_of
 from vedette.errors import InputError
 from vedette.fusion.views import Views
 from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.kernels.labelled.set_fusion import LOST, SURE
 from vedette.kernels.labelled.stacking import stack_tracks
 from vedette.models.arguments import real, reject, sequence
 from vedette.text import either
-
-# Existence from which a sensor is sure of a label, and below which the fusion has lost it.
-SURE, LOST = 0.9, 0.5
 
 # Type and number of dimensions of the arrays of an LMB: labels, offsets, log weights, means, covariances, logits.
 _INT, _FLOAT = np.dtype(np.int64), np.dtype(np.float64)

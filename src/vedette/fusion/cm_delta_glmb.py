@@ -4,38 +4,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 import numpy as np
 
-from vedette.densities import GLMB, FactoredGLMB, Labelled, TrackTable
+from vedette.densities import GLMB, FactoredGLMB, Labelled
 from vedette.densities.cases import LabelledCases
-from vedette.densities.checks import offsets_of, take_runs
-from vedette.densities.containers import unchecked
 from vedette.densities.conversions import marginalised_factors
-from vedette.densities.label_sets import possible
 from vedette.densities.products import PowerProducts, Share
-from vedette.densities.tracks import take_tracks
-from vedette.errors import NumericalError
-from vedette.fusion.alignment import Aligned, align, side_by_side, tidied
-from vedette.fusion.base import (
-    FusionInfo,
-    by_sensor,
-    check_beliefs,
-    check_kinds,
-    check_weights,
-    count_lost,
-    taking_part,
-)
+from vedette.fusion.alignment import side_by_side, tidied
+from vedette.fusion.base import FusionInfo, by_sensor, check_beliefs, check_kinds, check_weights, taking_part
 from vedette.fusion.laid_out import lay_out_glmbs
-from vedette.fusion.powers import FusionLimits, MixturePower, PowerRule, check_power, fused_tracks, power_rule
+from vedette.fusion.powers import FusionLimits, MixturePower, check_power, power_rule, told_of_tracks
 from vedette.fusion.views import Views
-from vedette.kernels.base.types import Floats
-from vedette.kernels.labelled.conversions import marginalise
-from vedette.kernels.labelled.groups import group_log_sums
+from vedette.kernels.base.types import Floats, Glmb, Ints
+from vedette.kernels.labelled.set_alignment import Sets
+from vedette.kernels.labelled.set_fusion import SetReport, SetRule, fuse_glmbs, fuse_sets
+from vedette.kernels.labelled.stacking import stack_glmbs
 from vedette.models.arguments import real, reject
-from vedette.probabilities import expit
 
 _Glmb = TypeVar("_Glmb", GLMB, FactoredGLMB)
 
@@ -92,49 +79,37 @@ class CmDeltaGlmb:
         a density that is not valid, and `NumericalError` where a product of track densities cannot be integrated.
         """
         check_beliefs(beliefs, (GLMB, FactoredGLMB), len(self.weights))
-        rule = power_rule(self.mixture_power, self.limits, beliefs[0].state_dim, len(self.weights))
         active, weights = taking_part(self.weights)
+        power = power_rule(self.mixture_power, self.limits, beliefs[0].state_dim, len(self.weights))
+        rule = SetRule(weights, self.missing_log_weight, power, self.limits.max_hypotheses)
+        own, log_kept = [beliefs[i] for i in active], 0.0
         fused: Any
         if not any(belief.is_product for belief in beliefs):
-            marginal = [GLMB.from_kernel(marginalise(beliefs[i].as_hypotheses(), rule.caps)) for i in active]
-            sensors = [FactoredGLMB.of(possible(own)) for own in marginal]
-            whole, info = self._fused(sensors, np.zeros(1), weights, rule)
-            fused = whole.factor(0)
+            hyps, sensor_of = _stacked(own)
+            with told_of_tracks():
+                glmb, report = fuse_glmbs(hyps, sensor_of, rule)
+            fused = GLMB.from_kernel(glmb)
         else:
-            factored = [marginalised_factors(FactoredGLMB.of(beliefs[i]), rule.caps) for i in active]
-            sensors, log_kept = side_by_side(factored, self.limits.max_hypotheses)
-            whole, info = self._fused(sensors, log_kept, weights, rule)
-            fused = tidied(whole)
-        missing_sets = by_sensor(np.array(info.missing_sets), active, len(beliefs))
-        missing_labels = by_sensor(np.array(info.missing_labels), active, len(beliefs))
-        return fused, replace(info, missing_sets=missing_sets, missing_labels=missing_labels)
+            factored = [marginalised_factors(FactoredGLMB.of(belief), power.caps) for belief in own]
+            sensors, log_shares = side_by_side(factored, self.limits.max_hypotheses)
+            hyps, sensor_of = _stacked(sensors)
+            sets = Sets(hyps, sensor_of, np.concatenate([sensor.factor_of for sensor in sensors]))
+            with told_of_tracks():
+                product, report = fuse_sets(sets, len(log_shares), rule)
+            fused, log_kept = tidied(FactoredGLMB.from_kernel(product)), float(log_shares.sum())
+        return fused, self._info(report, active, log_kept)
 
-    def _fused(
-        self, sensors: Sequence[FactoredGLMB], log_kept: Floats, weights: Floats, rule: PowerRule
-    ) -> tuple[FactoredGLMB, FusionInfo]:
-        """The fusion of marginalised GLMBs, factor g with factor g, and the report of these sensors alone.
-
-        log_kept: (num_groups,) log of the weight that was left of the sensors' factors.
-        """
-        aligned = align(sensors, self.missing_log_weight, rule)
-        tracks, log_overlaps = fused_tracks(aligned.labels, aligned.chosen, weights, aligned.tracks, rule)
-        log_weights = aligned.log_weights @ weights
-        log_weights = log_weights + np.bincount(aligned.set_of_member, log_overlaps, len(log_weights))
-        fused, discarded = _heaviest(aligned, tracks, log_weights, self.limits.max_hypotheses)
-        log_normalisers = group_log_sums(log_weights, aligned.groups, aligned.num_groups)
-        of_sensors = np.where(aligned.held, aligned.log_weights, -math.inf)
-        existence = aligned.existence(np.column_stack([of_sensors, log_weights - log_normalisers[aligned.groups]]))
-        in_common = np.bincount(aligned.groups[aligned.held.all(axis=1)], minlength=aligned.num_groups)
-        with np.errstate(divide="ignore"):
-            left = float((np.log1p(-discarded) + log_kept).sum())
-        return fused, FusionInfo(
-            missing_sets=tuple(np.count_nonzero(~aligned.held, axis=0).tolist()),
-            missing_labels=tuple(aligned.num_missing_labels.tolist()),
-            num_sets=len(aligned.held),
-            num_lost_labels=count_lost(existence[:, :-1], existence[:, -1]),
-            empty_intersection=not bool(in_common.all()),
-            log_normaliser=float(log_normalisers.sum()),
-            discarded_weight=-math.expm1(left) + 0.0,  # no -0
+    def _info(self, report: SetReport, active: Sequence[int], log_kept: float) -> FusionInfo:
+        """log_kept: of the weight that was left of the sensors' factors."""
+        num = len(self.weights)
+        return FusionInfo(
+            missing_sets=by_sensor(report.missing_sets, active, num),
+            missing_labels=by_sensor(report.missing_labels, active, num),
+            num_sets=report.num_sets,
+            num_lost_labels=report.num_lost_labels,
+            empty_intersection=bool(report.empty_intersection),
+            log_normaliser=report.log_normaliser,
+            discarded_weight=-math.expm1(report.log_kept + log_kept) + 0.0,  # no -0
         )
 
     def lay_out(self, cases: Sequence[LabelledCases], prediction: Labelled) -> PowerProducts | None:
@@ -164,32 +139,8 @@ class CmDeltaGlmb:
         return Share(own, weight, held, least[:, None])
 
 
-def _heaviest(
-    aligned: Aligned, tracks: TrackTable, log_weights: Floats, max_hypotheses: int
-) -> tuple[FactoredGLMB, Floats]:
-    """Normalised GLMBs of the `max_hypotheses` heaviest label sets of each group, and the weights of the others."""
-    groups, num = aligned.groups, aligned.num_groups
-    order = np.lexsort((-log_weights, groups))
-    starts = offsets_of(np.bincount(groups, minlength=num))
-    rank = np.arange(len(order)) - starts[groups[order]]
-    kept, cut = order[rank < max_hypotheses], order[rank >= max_hypotheses]
-    peaks = log_weights[order[starts[:-1]]]
-    if (peaks == -math.inf).any():
-        raise NumericalError("fusion: expected a label set of positive weight; the sensors' densities share no place")
-    # From the heaviest on: logs of -1e12 keep their differences.
-    relative = log_weights[kept] - peaks[groups[kept]]
-    log_kept = group_log_sums(relative, groups[kept], num)
-    hyp_offsets, members = take_runs(aligned.set_offsets, kept)
-    factor_offsets = offsets_of(np.bincount(groups[kept], minlength=num))
-    fused = unchecked(
-        FactoredGLMB,
-        take_tracks(tracks, members),
-        hyp_offsets[factor_offsets],
-        hyp_offsets,
-        np.arange(len(members)),
-        relative - log_kept[groups[kept]],
-        factor_offsets,
-        None,
-    )
-    log_cut = group_log_sums(log_weights[cut] - peaks[groups[cut]], groups[cut], num)
-    return fused, np.asarray(expit(log_cut - log_kept))
+def _stacked(beliefs: Sequence[Labelled]) -> tuple[Glmb, Ints]:
+    """The hypotheses of all beliefs, and (num_hyps,) whose each is."""
+    hyps = [belief.as_hypotheses() for belief in beliefs]
+    sensor_of = np.repeat(np.arange(len(hyps)), [len(own.hyp_log_weights) for own in hyps])
+    return stack_glmbs(hyps), sensor_of

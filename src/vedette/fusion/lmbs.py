@@ -14,7 +14,6 @@ from vedette.densities.checks import offsets_of
 from vedette.densities.containers import unchecked
 from vedette.densities.conversions import reduced_lmb
 from vedette.densities.products import PowerProducts, Share, lay_out_products
-from vedette.densities.tracks import reduced_tracks
 from vedette.fusion.base import (
     FusionInfo,
     LinearRule,
@@ -28,13 +27,14 @@ from vedette.fusion.powers import (
     FusionLimits,
     MixturePower,
     check_power,
-    fused_tracks,
     power_rule,
+    told_of_tracks,
 )
 from vedette.fusion.views import AlignedLmbs, Views, align_lmbs, require_views, sum_over_sensors, weights_by_view
 from vedette.kernels.base.types import Bools, Floats, Ints, Lmb
-from vedette.kernels.gaussian.pooling import pooled_tracks
+from vedette.kernels.gaussian.pooling import pooled_tracks, reduced_tracks
 from vedette.kernels.gaussian.reduction import MixtureCaps
+from vedette.kernels.labelled.gci import fused_tracks
 from vedette.models.arguments import chance, flag
 from vedette.probabilities import expit, log_expit, logit
 
@@ -96,14 +96,16 @@ class Clmb:
         active, weights = taking_part(self.weights)
         aligned = align_lmbs([_reduced(beliefs[i], rule.caps) for i in active], self.missing_existence)
         powers = _Powers.plain(aligned, weights) if seen is None else _Powers.by_view(aligned, weights, seen, active)
-        tracks, log_overlaps = fused_tracks(aligned.labels, powers.chosen, powers.of_tracks, aligned.tracks, rule)
+        of_tracks = np.array(np.broadcast_to(powers.of_tracks, powers.chosen.shape))
+        with told_of_tracks():
+            tracks, log_overlaps = fused_tracks(aligned.labels, powers.chosen, of_tracks, aligned.tracks, rule)
         log_present = powers.mean(log_expit(aligned.logits)) + log_overlaps
         log_absent = powers.mean(log_expit(-aligned.logits))
         logits, lacking = powers.mean(aligned.logits) + log_overlaps, powers.taking_part & ~aligned.held
         log_normaliser = float(np.logaddexp(log_present, log_absent).sum())
         existence = expit(aligned.logits), expit(logits)
         info = info_of_labels(lacking, active, len(beliefs), *existence, log_normaliser)
-        return unchecked(LMB, tracks, logits), info
+        return unchecked(LMB, TrackTable.from_kernel(tracks), logits), info
 
     def linear_rule(self, num_sensors: int) -> LinearRule | None:
         """The weights; None by views."""

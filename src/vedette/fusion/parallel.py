@@ -14,7 +14,7 @@ from vedette.densities.checks import offsets_of
 from vedette.densities.containers import unchecked
 from vedette.densities.conversions import marginalised_factors
 from vedette.densities.label_sets import WHOLE, in_label_order, join_factors
-from vedette.densities.tracks import places_of, reduced_tracks
+from vedette.densities.tracks import places_of
 from vedette.errors import InputError, NumericalError
 from vedette.fusion.base import FusionInfo, LinearRule, ValidBeliefs, check_beliefs, info_of_labels
 from vedette.fusion.parallel_sets import (
@@ -31,6 +31,7 @@ from vedette.fusion.powers import ONE, FusionLimits, check_limits
 from vedette.fusion.views import Views
 from vedette.kernels.base.types import Floats, Ints, Tracks
 from vedette.kernels.gaussian.components import components_of
+from vedette.kernels.gaussian.pooling import reduced_tracks
 from vedette.kernels.labelled.parallel import update_in_parallel
 from vedette.kernels.labelled.stacking import stack_tracks
 from vedette.models.arguments import chance, non_negative, sequence

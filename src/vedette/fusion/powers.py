@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from vedette.densities import TrackTable
-from vedette.densities.tracks import reduced_tracks
 from vedette.errors import InputError, NumericalError
-from vedette.kernels.base.types import Floats, Ints, Tracks
+from vedette.kernels.base.types import Floats
 from vedette.kernels.gaussian.reduction import MixtureCaps
-from vedette.kernels.labelled.gci import fuse_tracks
+from vedette.kernels.labelled.gci import PowerRule
 from vedette.models.arguments import instance, one_of, real
 from vedette.models.fields import Count, NonNegative, check_fields
 
@@ -46,14 +46,6 @@ class FusionLimits(NamedTuple):
     max_components: Count = 4
     max_combinations: Count = 4096
     max_hypotheses: Count = 1000
-
-
-class PowerRule(NamedTuple):
-    """How powers of mixtures of one state dimension are taken."""
-
-    caps: MixtureCaps
-    points: Floats  # (num_points, state_dim) of a cubature rule for the standard normal, empty without quadrature
-    point_weights: Floats  # (num_points,)
 
 
 def check_power(mixture_power: str, limits: FusionLimits, num_sensors: int) -> None:
@@ -96,30 +88,13 @@ def power_rule(mixture_power: str, limits: FusionLimits, state_dim: int, num_sen
     return PowerRule(caps, points, point_weights)
 
 
-def fused_tracks(
-    labels: Ints, chosen: Ints, weights: Floats, tracks: Tracks, rule: PowerRule
-) -> tuple[TrackTable, Floats]:
-    """Fused track of each label and log of the integral of the product of the powers (paper eqs. 11 and 12).
-
-    labels: (num, 2). chosen: (num, S) each sensor's track in `tracks`, -1 where it does not know the label; of
-    mixtures already reduced. weights: (S,) or (num, S) fusion weights, positive where a track is chosen. The fused
-    mixtures are reduced by the rule's caps. Raises `NumericalError` where a product of powers is no density.
-    """
+@contextmanager
+def told_of_tracks() -> Iterator[None]:
+    """Raise a `NumericalError` from what a kernel raises of a product of powers that is no density."""
     try:
-        offsets, components, log_overlaps = fuse_tracks(
-            chosen,
-            np.array(np.broadcast_to(weights, chosen.shape)),
-            tracks,
-            rule.points,
-            rule.point_weights,
-        )
+        yield
     except FloatingPointError as fault:
         raise NumericalError(f"fusion of tracks: {fault}") from None
-    if len(rule.points) > 0:
-        # Hoelder: the integral is at most 1, which cubature may overshoot.
-        log_overlaps = np.minimum(log_overlaps, 0.0)
-    fused = Tracks(labels, offsets, components)
-    return TrackTable.from_kernel(reduced_tracks(fused, rule.caps)), log_overlaps
 
 
 def _simplex(dim: int) -> Floats:

@@ -109,3 +109,13 @@ def pooled_tracks(
         out = own_components(out, used)
     require_gaussians(out.means, out.covs)
     return Tracks(labels, offsets, out)
+
+
+@kernel
+def reduced_tracks(tracks: Tracks, caps: MixtureCaps) -> Tracks:
+    """The tracks with their mixtures reduced by the caps; the same bundle where each is one Gaussian."""
+    num = len(tracks.labels)
+    if len(tracks.components.log_weights) == num:
+        return tracks
+    each = np.arange(num + 1)
+    return pooled_tracks(tracks, tracks.labels, each, each[:-1].copy(), np.ones(num), caps)

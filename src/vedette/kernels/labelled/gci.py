@@ -19,6 +19,8 @@ from vedette.kernels.gaussian.components import make_components
 from vedette.kernels.gaussian.information import log_integral, log_value, row_size, to_information, to_moments
 from vedette.kernels.gaussian.linalg import cholesky, log_add, normalise_logs
 from vedette.kernels.gaussian.mixtures import require_gaussians
+from vedette.kernels.gaussian.pooling import reduced_tracks
+from vedette.kernels.gaussian.reduction import MixtureCaps
 
 
 class Powers(NamedTuple):
@@ -196,3 +198,21 @@ def fuse_tracks(
         log_overlaps[item] = normalise_logs(out.log_weights[low:high])
     require_gaussians(out.means, out.covs)
     return offsets, out, log_overlaps
+
+
+class PowerRule(NamedTuple):
+    """How a power of a mixture is taken."""
+
+    caps: MixtureCaps  # of the mixtures that are fused, and of those that come of it
+    points: Floats  # (num_points, state_dim) cubature points of a standard normal; none: the stand-in itself
+    point_weights: Floats  # (num_points,)
+
+
+@kernel
+def fused_tracks(labels: Ints, chosen: Ints, weights: Floats, tracks: Tracks, rule: PowerRule) -> tuple[Tracks, Floats]:
+    """As `fuse_tracks`: the fused tracks with their mixtures reduced, and log_overlaps. labels: (num, 2)."""
+    offsets, components, log_overlaps = fuse_tracks(chosen, weights, tracks, rule.points, rule.point_weights)
+    if len(rule.points) > 0:
+        for item in range(len(log_overlaps)):  # Hoelder: the integral is at most 1, which cubature may overshoot
+            log_overlaps[item] = min(log_overlaps[item], 0.0)
+    return reduced_tracks(Tracks(labels, offsets, components), rule.caps), log_overlaps

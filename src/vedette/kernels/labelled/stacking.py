@@ -1,4 +1,4 @@
-"""Several bundles as one, so that one kernel call sees them all. Plain NumPy."""
+"""Several bundles as one, so that one kernel call sees them all, and tracks taken out of one."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Glmb, Ints, Tracks
-from vedette.kernels.gaussian.components import joined_components
+from vedette.kernels.gaussian.components import copy_components, joined_components, make_components, stacked_mixtures
 
 
 def join_offsets(offsets: Sequence[Ints]) -> Ints:
@@ -31,3 +32,25 @@ def stack_glmbs(glmbs: Sequence[Glmb]) -> Glmb:
     starts = np.cumsum([0, *(len(table.labels) for table in tracks[:-1])])
     shifted = np.concatenate(members) + np.repeat(starts, [*map(len, members)])
     return Glmb(stack_tracks(tracks), join_offsets(offsets), shifted, np.concatenate(log_weights))
+
+
+@kernel
+def joined_tracks(first: Tracks, second: Tracks) -> Tracks:
+    """The tracks of both, in their order."""
+    offsets = np.concatenate((first.offsets, second.offsets[1:] + first.offsets[-1]))
+    labels = np.concatenate((first.labels, second.labels))
+    return Tracks(labels, offsets, stacked_mixtures(first.components, second.components))
+
+
+@kernel
+def taken_tracks(tracks: Tracks, places: Ints) -> Tracks:
+    """The tracks at `places`, in that order."""
+    num, given = len(places), tracks.components
+    labels, offsets = np.empty((num, 2), np.int64), np.zeros(num + 1, np.int64)
+    for i in range(num):
+        labels[i, 0], labels[i, 1] = tracks.labels[places[i], 0], tracks.labels[places[i], 1]
+        offsets[i + 1] = offsets[i] + tracks.offsets[places[i] + 1] - tracks.offsets[places[i]]
+    components = make_components(offsets[num], given.means.shape[1])
+    for i in range(num):
+        copy_components(given, tracks.offsets[places[i]], tracks.offsets[places[i] + 1], components, offsets[i])
+    return Tracks(labels, offsets, components)

@@ -13,8 +13,8 @@ import numpy as np
 from vedette.errors import ModelError
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Mixture, Motion, Sensor
-from vedette.kernels.gaussian.intensities import predicted_intensity
 from vedette.kernels.gaussian.components import make_components
+from vedette.kernels.gaussian.intensities import predicted_intensity
 
 # Standard deviations of a birth's position that stand for "anywhere" about a measurement: wide beside the noise.
 _WIDE = 3.0
