@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, ClassVar, Generic, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
@@ -99,32 +99,33 @@ class SingleSensorFilter(WithBirths):
             if not isinstance(value, kind):
                 raise InputError(f"{name}: expected a {kind.__name__}; got {type(value).__name__}")
 
-    def _inputs(
-        self, scan: Floats, pose: Any, dt: Any, step: Any, prior: Labelled | None = None, births: LMB | None = None
-    ) -> tuple[ScanInput, Motion, Sensor, Truncation]:
-        """Scan, models and truncation as the kernels take them, in their order.
+    def _inputs_after(
+        self, dt: Any, scan: Floats, pose: Any, step: Any, prior: Labelled | None = None, births: LMB | None = None
+    ) -> StepInputs:
+        """Scan, models and truncation as the kernels take them, in their order; of no time those of an update.
 
         prior: whose labels those of the births must not repeat; None where there are none. births: instead of those of
         the targets' model.
         """
-        targets, sensor, period = self.targets, self.sensor, positive("dt", dt)
-        given = ScanInput(self._births(period, step, prior, births), scan, pose_vector("pose", pose), period)
-        motion = kernel_motion(targets.motion, targets.survival)
-        return given, motion, sensor.to_kernel(), self.limits.truncation(sensor.meas_dim)
-
-    def _inputs_after(
-        self, dt: Any, scan: Floats, pose: Any, step: Any, prior: Labelled | None = None, births: LMB | None = None
-    ) -> StepInputs:
-        """As `_inputs`; at the prior's own time those of an update."""
         if no_time(dt):
             step_number(step)
             return self._update_inputs(scan, pose)
-        return self._inputs(scan, pose, dt, step, prior, births)
+        (motion, sensor, truncation), period = _models(self.targets, self.sensor, self.limits), positive("dt", dt)
+        born = self._births(period, step, prior, births)
+        return ScanInput(born, scan, pose_vector("pose", pose), period), motion, sensor, truncation
 
-    def _update_inputs(self, scan: Floats, pose: Any) -> tuple[ScanInput, None, Sensor, Truncation]:
-        """As `_inputs`, of a scan of the prior's own time."""
+    def _update_inputs(self, scan: Floats, pose: Any) -> StepInputs:
+        """As `_inputs_after`, of a scan of the prior's own time."""
+        _, sensor, truncation = _models(self.targets, self.sensor, self.limits)
         given = ScanInput(nobody(self.targets.state_dim), scan, pose_vector("pose", pose), 0.0)
-        return given, None, self.sensor.to_kernel(), self.limits.truncation(self.sensor.meas_dim)
+        return given, None, sensor, truncation
+
+
+@lru_cache(maxsize=1000)
+def _models(targets: TargetModel, sensor: SensorModel, limits: Limits) -> tuple[Motion, Sensor, Truncation]:
+    """As kernels take them; laid out once."""
+    motion = kernel_motion(targets.motion, targets.survival)
+    return motion, sensor.to_kernel(), limits.truncation(sensor.meas_dim)
 
 
 class OfKind(WithBirths, ABC, Generic[BeliefT]):
