@@ -10,7 +10,7 @@ import pytest
 
 from control.examples import KNOWN, Situation, decided, situation
 from vedette.control import ExpectedLossReward, HorizonPlanner, IndependentPlanner, JointPlanner, KullbackLeiblerReward
-from vedette.control.priors import predicted
+from vedette.control.prediction import predicted
 from vedette.densities import LMB, at_peaks
 from vedette.probabilities import expit
 

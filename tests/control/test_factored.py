@@ -17,7 +17,7 @@ from vedette.control import (
     VoidProbability,
     void_probability,
 )
-from vedette.control.priors import predicted
+from vedette.control.prediction import predicted
 from vedette.densities import FactoredGLMB, as_glmb, as_lmb
 from vedette.errors import InputError
 from vedette.filters import DeltaGlmbFilter

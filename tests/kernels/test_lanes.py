@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from vedette import models
-from vedette.control.priors import forms_of
+from vedette.control.known_models import forms_of
 from vedette.kernels.gaussian.innovation import expect, make_innovation
 from vedette.kernels.gaussian.prediction import predict
 from vedette.kernels.gaussian.relinearisation import Pair, make_pair_work, relinearise

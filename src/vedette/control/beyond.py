@@ -77,12 +77,11 @@ class Beyond:
         at least one more horizon: otherwise nothing would depend on where it goes meanwhile.
         """
         horizon = settings.horizon_steps * settings.horizon_period
-        speeds = np.array([_speed(own, horizon) for own in self.options])
-        turns = np.array([turn_rate(own, horizon) for own in self.options])
+        speeds, turns = self._rates(horizon)
         if not ((speeds > 0.0) | (turns > 0.0)).all():
             return ()
         beyond = _STAY * max(self._seconds_to_targets(speeds, turns), self._seconds_to_search(turns))
-        if len(self.places) and not all(own.scans.any(axis=1).all() for own in self.options):
+        if len(self.places) and not all([own.scans.any(axis=1).all() for own in self.options]):
             beyond = max(beyond, horizon)
         if beyond == 0.0:
             return ()
@@ -116,17 +115,29 @@ class Beyond:
         rows = zip(self.paths, self.options, strict=True)
         return np.concatenate([paths.distances(own.pose[np.newaxis, :2]) for paths, own in rows])
 
+    def _rates(self, horizon: float) -> tuple[Floats, Floats]:
+        """(num_sensors,) m/s of each sensor's course that goes farthest, and rad/s of the one that turns most."""
+        speeds, turns = np.empty(len(self.options)), np.zeros(len(self.options))
+        for s, own in enumerate(self.options):
+            offsets = own.courses[:, -1, :2] - own.pose[:2]
+            speeds[s] = np.hypot(offsets[:, 0], offsets[:, 1]).max() / horizon
+            turns[s] = turn_rate(own, horizon)
+        return speeds, turns
+
     def _seconds_to_targets(self, speeds: Floats, turns: Floats) -> float:
         """s until each sensor may have come to a target, and each target may be reached by one of them."""
         if len(self.places) == 0:
             return 0.0
-        gaps = np.stack([self._gaps(s) for s in range(len(self.options))]) - self.reaches[:, np.newaxis]
-        moving = np.full(gaps.shape, np.inf)
-        np.divide(gaps, speeds[:, np.newaxis], out=moving, where=speeds[:, np.newaxis] > 0.0)
-        moving[gaps <= 0.0] = 0.0
-        turning = [seconds_to_turn(own, rate, self.places) for own, rate in zip(self.options, turns, strict=True)]
-        seconds = np.maximum(moving, turning)
-        return max(_longest(seconds.min(axis=0)), _longest(seconds.min(axis=1)))
+        seconds = np.full((len(self.options), len(self.places)), np.inf)
+        for s, (own, speed, rate) in enumerate(zip(self.options, speeds.tolist(), turns.tolist(), strict=True)):
+            gaps = self._gaps(s) - self.reaches[s]
+            if speed > 0.0:
+                seconds[s] = gaps / speed
+            seconds[s, gaps <= 0.0] = 0.0
+            if rate > 0.0:
+                seconds[s] = np.maximum(seconds[s], seconds_to_turn(own, rate, self.places))
+        longest = np.concatenate([seconds.min(axis=0), seconds.min(axis=1)])
+        return float(np.where(np.isfinite(longest), longest, 0.0).max())
 
     def _seconds_to_search(self, turns: Floats) -> float:
         """s until cameras have looked where undetected targets are; 0 where none turns, or nothing is known of them."""
@@ -221,14 +232,3 @@ def sight(sensor: MobileSensor, pose: Floats) -> float:
     states[:, :2] = pose[:2] + (_DISTANCES[:, np.newaxis, np.newaxis] * around).reshape(-1, 2)
     chances = numbers_at(model.function, states, pose, model.params).reshape(-1, _DIRECTIONS).max(axis=1)
     return float(_DISTANCES[np.flatnonzero(chances >= 0.5 * chances.max())[-1]])
-
-
-def _longest(seconds: Floats) -> float:
-    """The largest of those that are finite; 0 where none is."""
-    return float(np.where(np.isfinite(seconds), seconds, 0.0).max())
-
-
-def _speed(own: Options, horizon: float) -> float:
-    """m/s of the course that goes farthest."""
-    offsets = own.courses[:, -1, :2] - own.pose[:2]
-    return float(np.hypot(offsets[:, 0], offsets[:, 1]).max()) / horizon

@@ -50,6 +50,7 @@ class Evidence:
     _evaluations: list[int] = field(default_factory=list)
     _best: list[float] = field(default_factory=list)
     most_by_target: list[tuple[float, int]] = field(default_factory=list)
+    _is_complete: bool = False
 
     def __post_init__(self) -> None:
         shape = self.evaluator.joint_shape()
@@ -116,10 +117,12 @@ class Evidence:
 
     def is_complete(self) -> bool:
         """Whether every joint action was evaluated."""
-        num, noted = math.prod(self.shape), [actions for actions, _, _ in self._noted]
-        if sum(map(len, noted)) < num:
-            return False
-        return len(np.unique(np.ravel_multi_index(tuple(np.concatenate(noted).T), self.shape))) == num
+        if not self._is_complete:
+            num, noted = math.prod(self.shape), [noted[0] for noted in self._noted]
+            if sum(map(len, noted)) >= num:
+                places = np.ravel_multi_index(tuple(np.concatenate(noted).T), self.shape)
+                self._is_complete = bool(np.bincount(places, minlength=num).all())
+        return self._is_complete
 
     def mean_of(self, choice: Sequence[int]) -> float:
         """Mean reward of a joint action that was evaluated."""

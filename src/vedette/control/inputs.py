@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from vedette.control.constraints import Active, Constraint, Mask, Situation, mask_of
-from vedette.control.priors import predicted
+from vedette.control.prediction import predicted
 from vedette.control.rewards.base import LabelReward, PowerReward
 from vedette.control.rewards.power import ExpectedLossReward
 from vedette.control.settings import MobileSensor, PlanningSettings
@@ -18,6 +18,7 @@ from vedette.filters import shared_targets
 from vedette.fusion import Fusion
 from vedette.kernels.base.types import Floats
 from vedette.kernels.planning.ascent import Allowed
+from vedette.kernels.planning.validity import is_valid_glmb, is_valid_lmb
 from vedette.models import TargetModel
 from vedette.models.arguments import float_array, instance, reject, sequence, tell_degrees
 from vedette.platforms import Options, options_at
@@ -57,8 +58,8 @@ def check_poses(poses: Any, num_sensors: int) -> Floats:
     checked = float_array("poses", poses, (num_sensors, None))
     if checked.shape[1] < 3:
         raise reject("poses", f"an array of shape ({num_sensors}, 3 or more)", f"shape {checked.shape}")
-    for s, heading in enumerate(checked[:, 2].tolist()):
-        tell_degrees(f"poses[{s}]", heading)
+    for s in np.flatnonzero(np.abs(checked[:, 2]) >= 10.0).tolist():
+        tell_degrees(f"poses[{s}]", float(checked[s, 2]))
     return checked
 
 
@@ -96,11 +97,14 @@ def _check_density(name: str, density: Any, kind: type[Any], state_dim: int, che
         raise InputError(f"{name}: expected states of dimension {state_dim}, as its filter; got {density.state_dim}")
     if id(density) in checked:
         return
+    checked.add(id(density))
+    # A quick yes; otherwise its own checks, which tell what is wrong.
+    if not density.is_product and (is_valid_lmb if density.is_lmb else is_valid_glmb)(density.to_kernel()):
+        return
     try:
         density.validate(error=InputError)
     except InputError as fault:
         raise InputError(f"{name}: {fault}") from None
-    checked.add(id(density))
 
 
 def check_choice(name: str, choice: Any, shape: tuple[int, ...]) -> tuple[int, ...]:

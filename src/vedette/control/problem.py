@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from vedette.densities.checks import offsets_of
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.planning.bernoulli_rows import Table
 from vedette.kernels.planning.bounds import Choices, best_of_labels, losses_at_least
+from vedette.kernels.planning.joint_values import label_values
 from vedette.kernels.planning.label_values import EXPECTED_LOSS
 from vedette.probabilities import expit
 from vedette.threads import run_chunks
@@ -48,10 +49,10 @@ def searched(
 def joint_problem(evidence: Evidence, mask: Mask | None) -> JointProblem:
     """The search problem of a joint decision; what it evaluates is kept in the evidence."""
     evaluator = evidence.evaluator
-    stay = staying(evaluator.options, mask)
+    stay = cache(lambda: staying(evaluator.options, mask))
 
     def partial(actions: Ints) -> Floats:
-        means = evidence.rewards(np.where(actions < 0, stay, actions)).mean(axis=1)
+        means = evidence.rewards(np.where(actions < 0, stay(), actions)).mean(axis=1)
         return np.where(np.isnan(means), -np.inf, means)
 
     plain = JointProblem(evidence.shape, evidence.evaluate, lambda: _independent(evidence, mask), mask, partial=partial)
@@ -84,6 +85,8 @@ def joint_problem(evidence: Evidence, mask: Mask | None) -> JointProblem:
 def note_lines(evidence: Evidence, choice: Sequence[int], mask: Mask | None) -> None:
     """Evaluate a joint action, and with sums over labels all allowed ones that differ in one sensor's action."""
     evaluator, chosen = evidence.evaluator, np.array(choice, np.int64)
+    if evidence.is_complete():
+        return
     if not evidence.holds(choice):
         evidence.evaluate(chosen[np.newaxis])
     if evaluator.additive is not None and not evidence.is_complete():
@@ -244,17 +247,12 @@ def beyond_cutoff(evaluator: Evaluator, choice: Sequence[int]) -> Iterator[str]:
 
 def _errors(additive: AdditiveRewards, choice: Sequence[int]) -> tuple[Floats, Floats]:
     """(num_labels,) probability that any scan detects each label, and its error then, m."""
-    covs = additive.valuation.covs
-    table, unseen = additive.table, covs[:, 0, 0] + covs[:, 1, 1]
-    courses = table.first_courses[:-1] + np.array(choice)
-    entries = np.concatenate([np.arange(*table.offsets[[course, course + 1]]) for course in courses])
-    labels, changes = table.labels[entries], np.ascontiguousarray(table.changes[entries])
-    offsets = offsets_of(np.diff(table.offsets)[courses])
-    taken = table._replace(first_courses=np.arange(len(courses) + 1), offsets=offsets, labels=labels, changes=changes)
-    uncut = additive.valuation._replace(own=unseen[:, np.newaxis], params=np.array([math.inf, 1.0, 1.0]))
-    # Each sensor has one course: the best of all is the loss -r (q tr P+ + (1 - q) tr P) itself.
-    losses = -best_values(replace(additive, table=taken, valuation=uncut), max_work=len(courses) + 1)
-    detected = -np.expm1(np.bincount(labels, changes[:, -1, 0], len(unseen)))
+    valuation, rows = additive.valuation, additive.with_scans(np.array(choice))
+    unseen = valuation.covs[:, 0, 0] + valuation.covs[:, 1, 1]
+    detected = -np.expm1(rows[:, -1, 0])
+    # Without a cutoff the loss of a label is r (q tr P+ + (1 - q) tr P).
+    uncut = valuation._replace(own=unseen[:, np.newaxis], params=np.array([math.inf, 1.0, 1.0]))
+    losses = -label_values(rows, uncut)[:, 0, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
-        squares = (losses / expit(additive.valuation.prior[:, -2]) - (1.0 - detected) * unseen) / detected
+        squares = (losses / expit(valuation.prior[:, -2]) - (1.0 - detected) * unseen) / detected
     return detected, np.sqrt(np.where(detected > 0.0, squares, unseen))

@@ -12,7 +12,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vedette.control.priors import decision_of, draw_paths, targets_of
+from vedette.control.known_models import decision_of
+from vedette.control.sampling import draw_paths, targets_of
 from vedette.control.settings import Belief, MobileSensor, PlanningSettings
 from vedette.densities import (
     GLMB,

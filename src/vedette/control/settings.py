@@ -173,5 +173,7 @@ def scans_within(
     sensors: Sequence[MobileSensor], options: Sequence[Options], now: float | None, settings: PlanningSettings
 ) -> tuple[Bools, ...]:
     """For each sensor (num_courses, horizon_steps) the pseudo-updates at which it scans on each of its courses."""
-    pairs = zip(sensors, options, strict=True)
-    return tuple(own.scans & sensor.scans(now, settings) for sensor, own in pairs)
+    found = []
+    for sensor, own in zip(sensors, options, strict=True):
+        found.append(own.scans & sensor.scans(now, settings))
+    return tuple(found)

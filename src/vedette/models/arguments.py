@@ -91,7 +91,10 @@ def flag(field: str, value: Any) -> bool:
 
 def provides(value: object, protocol: Any) -> TypeGuard[Any]:
     """Return what `isinstance` does of a protocol, in a tenth of its time before Python 3.12: for loops."""
-    return all(getattr(value, name, None) is not None for name in protocol_members(protocol))
+    for name in protocol_members(protocol):  # noqa: SIM110  # a generator is a call more a name
+        if getattr(value, name, None) is None:
+            return False
+    return True
 
 
 @cache

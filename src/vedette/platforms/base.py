@@ -183,7 +183,10 @@ def actions_at(field: str, platform: Platform, pose: Floats) -> Actions:
     values = float_array(f"{field}.actions", platform.actions(pose.copy()), (None, len(columns)))
     if len(values) == 0:
         raise reject(f"{field}.actions", "at least one action", "none")
-    return Actions(columns, values)
+    actions = object.__new__(Actions)  # of what was just checked, under the platform's name
+    object.__setattr__(actions, "columns", columns)
+    object.__setattr__(actions, "values", values)
+    return actions
 
 
 def course_of(field: str, platform: Platform, pose: Floats, action: Floats, times: Floats) -> Floats:

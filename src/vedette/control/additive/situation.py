@@ -3,23 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from vedette.control.priors import decision_of, draw_paths, targets_of
+from vedette.control.known_models import decision_of
+from vedette.control.prediction import Prediction
+from vedette.control.sampling import draw_paths, targets_of
 from vedette.control.settings import IDEAL_MODES, MobileSensor, PlanningSettings, scans_within
 from vedette.densities import LMB
 from vedette.densities.checks import offsets_of
 from vedette.densities.containers import unchecked
 from vedette.densities.tracks import places_of, single_gaussians, take_tracks
-from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.kernels.base.types import Bools, Floats, Ints, Lmb
 from vedette.kernels.planning.ideal import EXPECTED, IDEAL, Decision, Futures
 from vedette.kernels.planning.known import rows_without_scans
-from vedette.kernels.planning.reach import Belief, label_radii, predict_paths
+from vedette.kernels.planning.reach import Belief, Paths, label_radii, predict_paths
+from vedette.models import SensorModel
 from vedette.platforms import Options
 from vedette.probabilities import logit
 from vedette.tracking import State
+
+
+class Task(NamedTuple):
+    """What one horizon is laid out from."""
+
+    sensors: Sequence[MobileSensor]
+    options: Sequence[Options]  # of each sensor, with courses over the horizon
+    settings: PlanningSettings
+    state: State
+    prediction: Prediction
+    sampled: bool  # False for what needs no samples, and takes the mean P_D over the predicted Gaussian
 
 
 class Samples(NamedTuple):
@@ -75,82 +90,85 @@ class Start(NamedTuple):
     num_samples: int
 
 
-def starts_of(
-    prediction: LMB,
-    state: State,
-    sensors: Sequence[MobileSensor],
-    options: Sequence[Options],
-    settings: PlanningSettings,
-    *,
-    missing_existence: float,
-    sampled: bool,
-    rng: np.random.Generator,
-) -> Start:
-    """What the changes of the sensors' scans are added to.
-
-    prediction: the fused density at the end of the horizon, of one Gaussian a label. options: of each sensor, with
-    courses over the horizon. missing_existence: of a label that a sensor lacks. sampled: false for what needs no
-    samples, and takes the mean P_D over the predicted Gaussian.
-    """
-    samples = Samples.draw(state.fused, sensors, settings, rng=rng) if sampled else Samples.none(state.fused, settings)
-    given = prediction.to_kernel()
-    references, covs = given.tracks.components.means, given.tracks.components.covs
-    prior = rows_without_scans(references, covs, given.existence_logit, references)
-    courses, scans = [own.courses for own in options], scans_within(sensors, options, state.time, settings)
-    shared, groups = IDEAL_MODES[settings.ideal_measurements] == IDEAL or not sampled, []
-    for members in _alike(sensors, state.local, shared=shared):
-        group = _group(members, prediction, state.local, sensors, courses, scans, samples, settings, sampled, rng)
-        groups.append(group)
-    bases: list[Floats] = [prior] * len(sensors)
-    for group in groups:
+def starts_of(task: Task, missing_existence: float, *, rng: np.random.Generator) -> Start:
+    """What the changes of the sensors' scans are added to. missing_existence: of a label that a sensor lacks."""
+    settings, given = task.settings, task.prediction.end.to_kernel()
+    drawn = Samples.draw(task.state.fused, task.sensors, settings, rng=rng) if task.sampled else None
+    samples = drawn or Samples.none(task.state.fused, settings)
+    references = given.tracks.components.means
+    prior = rows_without_scans(references, given.tracks.components.covs, given.existence_logit, references)
+    shared = IDEAL_MODES[settings.ideal_measurements] == IDEAL or not task.sampled
+    scans = scans_within(task.sensors, task.options, task.state.time, settings)
+    groups, bases = list[SensorGroup](), [prior] * len(task.sensors)
+    for members in _alike(task, shared=shared):
+        group = _group(task, members, scans, samples, prior, rng)
         row = _spread(group, prior, missing_existence)
-        for s in group.members:
+        for s in members:
             bases[s] = row
+        groups.append(group)
     return Start(tuple(groups), references, prior, tuple(bases), samples.targets.shape[1])
 
 
-def _alike(sensors: Sequence[MobileSensor], beliefs: Sequence[Any], *, shared: bool) -> list[tuple[int, ...]]:
+def _alike(task: Task, *, shared: bool) -> list[tuple[int, ...]]:
     """Sensors with the same belief and equal models together; each by itself unless `shared`."""
+    if not shared:
+        return [(s,) for s in range(len(task.sensors))]
     found: dict[object, list[int]] = {}
-    for s, (sensor, belief) in enumerate(zip(sensors, beliefs, strict=True)):
-        key: list[object] = [id(belief)]
-        for part in sensor.filter.sensor.to_kernel():
-            key.append(part.tobytes() if isinstance(part, np.ndarray) else part)
-        found.setdefault(tuple(key) if shared else s, []).append(s)
+    for s, (sensor, belief) in enumerate(zip(task.sensors, task.state.local, strict=True)):
+        found.setdefault((id(belief), _model_key(sensor.filter.sensor)), []).append(s)
     return list(map(tuple, found.values()))
 
 
+@lru_cache(maxsize=1000)
+def _model_key(model: SensorModel) -> tuple[object, ...]:
+    """All that a model says, the same of equal ones; made once."""
+    return tuple(part.tobytes() if isinstance(part, np.ndarray) else part for part in model.to_kernel())
+
+
 def _group(
+    task: Task,
     members: tuple[int, ...],
-    prediction: LMB,
-    beliefs: Sequence[Any],
-    sensors: Sequence[MobileSensor],
-    courses: Sequence[Floats],
     scans: Sequence[Bools],
     samples: Samples,
-    settings: PlanningSettings,
-    sampled: bool,
+    prior: Floats,
     rng: np.random.Generator,
 ) -> SensorGroup:
-    sensor, belief = sensors[members[0]], beliefs[members[0]]
-    places = places_of(belief.tracks.labels, prediction.tracks.labels)
-    own = np.flatnonzero((places >= 0) & (belief.existence_logit > -np.inf))
-    prior = unchecked(LMB, single_gaussians(take_tracks(belief.tracks, own)), belief.existence_logit[own]).to_kernel()
+    """scans: as of `scans_within`. prior: rows of the prediction."""
+    sensor, settings = task.sensors[members[0]], task.settings
     futures = samples.futures(sensor.filter.sensor.meas_dim, settings, rng=rng)
-    together, when = (np.concatenate([own[s] for s in members]) for own in (courses, scans))
-    decision = decision_of(sensor, together, futures, settings, when, None if sampled else "mean")
-    labels, gaussians, horizon = places[own], prior.tracks.components, decision.horizon
-    paths = predict_paths(decision.motion, horizon.dt, horizon.poses.shape[1], gaussians.means, gaussians.covs)
-    ends = np.ascontiguousarray(paths.means[:, -1]), np.ascontiguousarray(paths.covs[:, -1])
-    rows = rows_without_scans(*ends, prior.existence_logit, prediction.tracks.means[labels])
+    courses = np.concatenate([task.options[s].courses for s in members])
+    when = np.concatenate([scans[s] for s in members])
+    decision = decision_of(sensor, courses, futures, settings, when, None if task.sampled else "mean")
+    labels, now, paths, rows = _without_scans(task.prediction, task.state.local[members[0]], decision, prior)
     targets = np.ascontiguousarray(samples.targets[labels])
-    offsets = offsets_of([len(courses[s]) for s in members])
-    known = Belief(prior, paths, targets, label_radii(paths, targets, samples.states))
+    offsets = offsets_of([len(task.options[s].courses) for s in members])
+    known = Belief(now, paths, targets, label_radii(paths, targets, samples.states))
     return SensorGroup(members, known, labels, decision, rows, offsets, sensor.filter.sensor.detection.reach)
+
+
+def _without_scans(
+    prediction: Prediction, belief: LMB, decision: Decision, prior: Floats
+) -> tuple[Ints, Lmb, Paths, Floats]:
+    """Labels of a belief that exist and that the prediction has, as places there; what they are and become, and rows.
+
+    Those of the fused belief are the prediction's own.
+    """
+    exists = belief.existence_logit > -np.inf
+    if belief is prediction.fused and exists.all():
+        return np.arange(len(prior)), prediction.now, prediction.paths, prior
+    places = places_of(belief.tracks.labels, prediction.end.tracks.labels)
+    own, horizon = np.flatnonzero((places >= 0) & exists), decision.horizon
+    now = unchecked(LMB, single_gaussians(take_tracks(belief.tracks, own)), belief.existence_logit[own]).to_kernel()
+    paths = predict_paths(decision.motion, horizon.dt, horizon.poses.shape[1], now.tracks.means, now.tracks.covs)
+    ends = np.ascontiguousarray(paths.means[:, -1]), np.ascontiguousarray(paths.covs[:, -1])
+    rows = rows_without_scans(*ends, now.existence_logit, prediction.end.tracks.means[places[own]])
+    return places[own], now, paths, rows
 
 
 def _spread(group: SensorGroup, prior: Floats, missing_existence: float) -> Floats:
     """The rows on all labels; of one that the sensor lacks, an existence that it would hardly have missed."""
+    if group.rows is prior:
+        return prior
     rows = np.zeros_like(prior)
     rows[:, -2] = min(logit(missing_existence), float(group.rows[:, -2].min(initial=np.inf)))
     rows[group.labels] = group.rows

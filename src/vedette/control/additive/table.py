@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 
 from vedette.control.additive.rewards import AdditiveRewards, valuation_of
-from vedette.control.additive.situation import SensorGroup, Start, starts_of
+from vedette.control.additive.situation import SensorGroup, Start, Task, starts_of
 from vedette.control.rewards.base import WithMissedCost
-from vedette.control.rewards.power import ExpectedLossReward
-from vedette.control.settings import MobileSensor, PlanningSettings
+from vedette.control.settings import PlanningSettings
 from vedette.densities import UndetectedIntensity
 from vedette.densities.checks import offsets_of
 from vedette.errors import InputError
@@ -24,9 +23,7 @@ from vedette.kernels.planning.cells import cells_in_view
 from vedette.kernels.planning.expected import fill_expected_changes
 from vedette.kernels.planning.known import Entries, fill_changes
 from vedette.kernels.planning.reach import fill_reach
-from vedette.platforms import Options
 from vedette.threads import run_chunks
-from vedette.tracking import State
 
 # A label that no sample and no prediction gives a higher probability of detection is out of reach.
 LEAST_DETECTION = 1e-6
@@ -34,39 +31,26 @@ LEAST_DETECTION = 1e-6
 # No cell is searched so well that nothing can be left in it.
 _LEAST_LOG_MISS = float(np.log(1e-12))
 
-# Courses that a thread works on before it looks at the clock.
-_QUICK = 16
+# Courses that a thread works on before it looks at the clock: followed by samples, or without.
+_SAMPLED, _UNSAMPLED = 16, 512
 
 # Bytes of changes beyond which a decision is refused rather than left to run out of memory.
 _MOST_BYTES = 8e9
 
 
-def lay_out(
-    sensors: Sequence[MobileSensor],
-    options: Sequence[Options],
-    rule: LinearRule,
-    settings: PlanningSettings,
-    reward: Any,
-    state: State,
-    prediction: Any,
-    *,
-    rng: np.random.Generator,
-) -> AdditiveRewards:
+def lay_out(task: Task, rule: LinearRule, reward: Any, *, rng: np.random.Generator) -> AdditiveRewards:
     """The rewards at the end of the horizon: each label followed over every course that reaches it."""
-    sampled = not isinstance(reward, ExpectedLossReward)
-    missing = rule.missing_existence
+    settings, undetected, prediction = task.settings, task.state.undetected, task.prediction.end
     num_threads = settings.threads()
     with model_errors():
-        start = starts_of(
-            prediction, state, sensors, options, settings, missing_existence=missing, sampled=sampled, rng=rng
-        )
-        table = lay_out_changes(start, rule, num_threads, sampled=sampled)
+        start = starts_of(task, rule.missing_existence, rng=rng)
+        table = lay_out_changes(start, rule, num_threads, sampled=task.sampled)
     valuation = valuation_of(reward, prediction, start.prior)
     cells = no_cells(len(table.offsets) - 1)
-    if state.undetected is not None and (worth := worth_of_finding(reward, settings)) > 0.0:
-        cells = cells_of(start, state.undetected, worth, table.first_courses, prediction.state_dim)
-    own = reward if sampled else None
-    prices = np.concatenate([each.prices for each in options])
+    if undetected is not None and (worth := worth_of_finding(reward, settings)) > 0.0:
+        cells = cells_of(start, undetected, worth, table.first_courses, prediction.state_dim)
+    prices = np.concatenate([each.prices for each in task.options])
+    own = reward if task.sampled else None
     return AdditiveRewards(table, valuation, start.bases, own, cells, prices, num_threads)
 
 
@@ -94,7 +78,8 @@ def lay_out_changes(start: Start, rule: LinearRule, num_threads: int, *, sampled
         found, counts = np.nonzero(reach)[1], reach.sum(axis=1)
         at = np.repeat(entries.first - offsets_of(counts)[:-1], counts) + np.arange(len(found))
         own[at], labels[at] = found, group.labels[found]
-        run_chunks(_filling(group, entries, start, changes, sampled), len(places), num_threads, first_piece=_QUICK)
+        work = _filling(group, entries, start, changes, sampled)
+        run_chunks(work, len(places), num_threads, first_piece=_SAMPLED if sampled else _UNSAMPLED)
     powers = np.array(rule.powers)
     joint = rule.prior_power * start.prior
     for s, power in enumerate(rule.powers):
@@ -119,7 +104,7 @@ def _reach(group: SensorGroup, num_threads: int, *, sampled: bool) -> Ints:
     def work(first: int, last: int) -> None:
         fill_reach(group.belief, group.decision, least, group.reach, first, last, out)
 
-    run_chunks(work, num_courses, num_threads, first_piece=_QUICK)
+    run_chunks(work, num_courses, num_threads, first_piece=_SAMPLED if sampled else _UNSAMPLED)
     return out
 
 

@@ -1,32 +1,22 @@
-"""Where a decision starts: the fused density predicted ahead, and what the pseudo-updates of a sensor depend on."""
+"""What the pseudo-updates of a sensor depend on besides its prior, with the forms of the models that kernels know."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import lru_cache
-from typing import TypeVar
 
 import numpy as np
 
-from vedette.control.settings import IDEAL_MODES, Belief, MobileSensor, PlanningSettings
-from vedette.densities import Labelled, MultiTargetSamples, track_moments
-from vedette.densities.conversions import collapsed
-from vedette.densities.label_sets import possible
-from vedette.densities.samples import sample_labelled
-from vedette.densities.tracks import gaussian_tracks, places_of
-from vedette.filters import shared_targets
-from vedette.filters.inputs import model_errors, nobody
-from vedette.kernels.base.types import Bools, Floats, Ints, Motion, Sensor
+from vedette.control.prediction import ALWAYS_SURVIVES
+from vedette.control.settings import IDEAL_MODES, MobileSensor, PlanningSettings
+from vedette.filters.inputs import nobody
+from vedette.kernels.base.types import Bools, Floats, Motion, Sensor
 from vedette.kernels.gaussian.sigma_points import LINEARISED
 from vedette.kernels.planning.forms import ANY, BEARING_RANGE, CONSTANT, GAUSSIAN, GROWING, POSITION, SAME, Forms
-from vedette.kernels.planning.ideal import Decision, Futures, Horizon, propagate_samples
-from vedette.kernels.planning.reach import predict_paths
+from vedette.kernels.planning.ideal import Decision, Futures, Horizon
 from vedette.models import (
-    MotionModel,
     bearing_range,
     constant_detection,
     constant_noise,
-    constant_survival,
     constant_velocity,
     gaussian_detection,
     kernel_motion,
@@ -50,37 +40,6 @@ _NOISES = {
 }
 
 _DETECTIONS = {gaussian_detection(1.0).function: GAUSSIAN, constant_detection(0.5).function: SAME}
-
-_Labelled = TypeVar("_Labelled", bound=Labelled)
-
-# Over the horizon nobody dies. One model for all decisions, by which what kernels take of a motion is found again.
-ALWAYS_SURVIVES = constant_survival(1.0)
-
-
-def predicted(fused: _Labelled, motion: MotionModel, num_steps: int, period: float) -> _Labelled:
-    """The fused density at the end of the horizon, without birth or death (paper, "pseudo-prediction").
-
-    Tracks are first collapsed to one Gaussian each (GLMBs are marginalised), as those of the pseudo-updates are. Label
-    sets of weight zero are left out of a GLMB.
-    """
-    single = possible(collapsed(fused))
-    means, covs = track_moments(single.tracks)
-    with model_errors():
-        paths = predict_paths(kernel_motion(motion, ALWAYS_SURVIVES), float(period), int(num_steps), means, covs)
-    ends = np.ascontiguousarray(paths.means[:, -1]), np.ascontiguousarray(paths.covs[:, -1])
-    return single.with_fields(tracks=gaussian_tracks(single.tracks.labels, *ends))
-
-
-def draw_paths(
-    fused: Belief, sensors: Sequence[MobileSensor], settings: PlanningSettings, *, rng: np.random.Generator
-) -> tuple[MultiTargetSamples, Floats]:
-    """Samples of the fused density, and (horizon_steps, num_targets, state_dim) where they go without noise."""
-    targets = shared_targets([sensor.filter for sensor in sensors])
-    samples = sample_labelled(fused, settings.num_samples, rng=rng)
-    with model_errors():
-        motion = kernel_motion(targets.motion, targets.survival)
-        states = propagate_samples(motion, samples.states, float(settings.horizon_period), int(settings.horizon_steps))
-    return samples, states
 
 
 def decision_of(
@@ -113,18 +72,6 @@ def decision_of(
         futures,
         settings.limits.truncation(own.meas_dim),
     )
-
-
-def targets_of(table: Ints, labels: Ints, offsets: Ints) -> Ints:
-    """(num_labels, num_samples) place of the target of each label of `table` in each sample, -1 where it is not there.
-
-    labels: of the sampled targets, which are `offsets[i]:offsets[i + 1]` of sample i.
-    """
-    rows = places_of(labels, table)
-    of_sample = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
-    targets, known = np.full((len(table), len(offsets) - 1), -1), rows >= 0
-    targets[rows[known], of_sample[known]] = np.flatnonzero(known)
-    return targets
 
 
 def forms_of(motion: Motion, sensor: Sensor, dt: float, state_dim: int) -> Forms:

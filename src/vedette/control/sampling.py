@@ -1,0 +1,41 @@
+"""Samples of the fused density, and where their targets go over the horizon."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from vedette.control.settings import Belief, MobileSensor, PlanningSettings
+from vedette.densities import MultiTargetSamples
+from vedette.densities.samples import sample_labelled
+from vedette.densities.tracks import places_of
+from vedette.filters import shared_targets
+from vedette.filters.inputs import model_errors
+from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.planning.ideal import propagate_samples
+from vedette.models import kernel_motion
+
+
+def draw_paths(
+    fused: Belief, sensors: Sequence[MobileSensor], settings: PlanningSettings, *, rng: np.random.Generator
+) -> tuple[MultiTargetSamples, Floats]:
+    """Samples of the fused density, and (horizon_steps, num_targets, state_dim) where they go without noise."""
+    targets = shared_targets([sensor.filter for sensor in sensors])
+    samples = sample_labelled(fused, settings.num_samples, rng=rng)
+    with model_errors():
+        motion = kernel_motion(targets.motion, targets.survival)
+        states = propagate_samples(motion, samples.states, float(settings.horizon_period), int(settings.horizon_steps))
+    return samples, states
+
+
+def targets_of(table: Ints, labels: Ints, offsets: Ints) -> Ints:
+    """(num_labels, num_samples) place of the target of each label of `table` in each sample, -1 where it is not there.
+
+    labels: of the sampled targets, which are `offsets[i]:offsets[i + 1]` of sample i.
+    """
+    rows = places_of(labels, table)
+    of_sample = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
+    targets, known = np.full((len(table), len(offsets) - 1), -1), rows >= 0
+    targets[rows[known], of_sample[known]] = np.flatnonzero(known)
+    return targets

@@ -1,0 +1,107 @@
+"""Whether a labelled density is one, in one call: a quick yes. What is wrong where it is no, its own checks tell.
+
+Tolerances are narrower than those of `vedette.densities.checks`: what passes here passes there, too.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from vedette.kernels.base.compile import kernel
+from vedette.kernels.base.types import Floats, Glmb, Ints, Lmb, Tracks
+from vedette.kernels.gaussian.linalg import cholesky, log_sum
+
+_TOLERANCE = 0.5e-9  # of the log of sums that are to be 1, and of symmetry, relative to the largest variance
+_LEAST_PIVOT = 1e-7  # of a Cholesky factor, relative to the standard deviation
+
+
+@kernel
+def _cuts(offsets: Ints, count: int, total: int, least: int) -> bool:
+    """Whether offsets cut `total` entries into `count` runs of at least `least`."""
+    if len(offsets) != count + 1 or offsets[0] != 0 or offsets[count] != total:
+        return False
+    shortest = total
+    for i in range(count):
+        shortest = min(shortest, offsets[i + 1] - offsets[i])
+    return bool(count == 0 or shortest >= least)
+
+
+@kernel
+def _sum_to_one(log_weights: Floats) -> bool:
+    for log_weight in log_weights:
+        if math.isnan(log_weight) or log_weight == math.inf:
+            return False
+    return abs(log_sum(log_weights)) <= _TOLERANCE
+
+
+@kernel
+def _increases(labels: Ints, before: int, after: int) -> bool:
+    step = labels[after, 0] - labels[before, 0]
+    return bool(step > 0 or (step == 0 and labels[after, 1] > labels[before, 1]))
+
+
+@kernel
+def _is_gaussian(mean: Floats, cov: Floats, factor: Floats) -> bool:
+    dim, scale = len(mean), 0.0
+    for i in range(dim):
+        scale = max(scale, abs(cov[i, i]))
+    for i in range(dim):
+        if not math.isfinite(mean[i]):
+            return False
+        for j in range(i + 1):
+            if not (math.isfinite(cov[i, j]) and abs(cov[i, j] - cov[j, i]) <= _TOLERANCE * scale):
+                return False
+    if not cholesky(cov, factor):
+        return False
+    is_far_from_singular = True
+    for i in range(dim):
+        is_far_from_singular &= factor[i, i] > _LEAST_PIVOT * math.sqrt(cov[i, i])
+    return is_far_from_singular
+
+
+@kernel
+def _are_mixtures(tracks: Tracks) -> bool:
+    """Whether every track is a density."""
+    num, (num_components, dim) = len(tracks.labels), tracks.means.shape
+    if tracks.labels.shape[1] != 2 or dim == 0 or len(tracks.log_weights) != num_components:
+        return False
+    if tracks.covs.shape != (num_components, dim, dim) or not _cuts(tracks.offsets, num, num_components, 1):
+        return False
+    factor = np.empty((dim, dim))
+    for i in range(num_components):
+        if not _is_gaussian(tracks.means[i], tracks.covs[i], factor):
+            return False
+    are_normalised = True
+    for track in range(num):
+        are_normalised &= _sum_to_one(tracks.log_weights[tracks.offsets[track] : tracks.offsets[track + 1]])
+    return are_normalised
+
+
+@kernel
+def is_valid_lmb(density: Lmb) -> bool:
+    """Whether tracks are densities of labels in order, and existence is a probability."""
+    labels, logits = density.tracks.labels, density.existence_logit
+    if not _are_mixtures(density.tracks) or len(logits) != len(labels):
+        return False
+    is_sound = True
+    for i in range(len(labels)):
+        is_sound &= not math.isnan(logits[i]) and (i == 0 or _increases(labels, i - 1, i))
+    return is_sound
+
+
+@kernel
+def is_valid_glmb(density: Glmb) -> bool:
+    """Whether tracks are densities, and hypotheses of weights that sum to 1 hold tracks of labels in order."""
+    offsets, members, num_hyps = density.hyp_offsets, density.hyp_tracks, len(density.hyp_log_weights)
+    if not _are_mixtures(density.tracks) or num_hyps == 0 or not _cuts(offsets, num_hyps, len(members), 0):
+        return False
+    for member in members:
+        if not 0 <= member < len(density.tracks.labels):
+            return False
+    for hyp in range(num_hyps):
+        for i in range(offsets[hyp] + 1, offsets[hyp + 1]):
+            if not _increases(density.tracks.labels, members[i - 1], members[i]):
+                return False
+    return _sum_to_one(density.hyp_log_weights)
