@@ -29,6 +29,7 @@ from vedette.densities.cases import LabelledCases
 from vedette.errors import NumericalError, SlowRewardWarning
 from vedette.fusion import Fusion, LaidOut, LaysOut, Views, lay_out_alone
 from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.models.arguments import provides
 from vedette.platforms import Options
 from vedette.tracking import State
 
@@ -157,12 +158,12 @@ def lay_out_rewards(
 
     fusion: None for a sensor alone.
     """
-    if not isinstance(reward, PowerReward) or not speaks_for(reward, "combine", "__call__"):
+    if not provides(reward, PowerReward) or not speaks_for(reward, "combine", "__call__"):
         return f"{_name(reward)} is a function of two densities"
     laid: LaidOut | None = None
     if fusion is None:
         laid = lay_out_alone(cases[0], prediction)
-    elif isinstance(fusion, LaysOut) and speaks_for(fusion, "lay_out", "fuse"):
+    elif provides(fusion, LaysOut) and speaks_for(fusion, "lay_out", "fuse"):
         laid = fusion.lay_out(cases, prediction)
     if laid is None:
         return f"{'a sensor alone' if fusion is None else _name(fusion)} cannot lay out these beliefs"

@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 
 from vedette.control.additive.rewards import AdditiveRewards
-from vedette.control.additive.situation import Task
 from vedette.control.additive.table import lay_out
 from vedette.control.beyond import Beyond, drawing
 from vedette.control.cases import CaseRewards, SampleRewards
 from vedette.control.constraints import VisibilityGraph
-from vedette.control.prediction import Prediction, predicted
+from vedette.control.prediction import predicted
 from vedette.control.rewards.base import LabelReward, PowerReward, Reward
 from vedette.control.rewards.power import ExpectedLossReward
 from vedette.control.settings import Belief, MobileSensor, PlanningSettings
@@ -90,29 +89,23 @@ class Evaluator:
         (`vedette.control.beyond.Beyond.horizons`). graph: of the zones that constraints forbid, for paths beyond the
         horizon; None: there are none. Raises as `JointPlanner.plan`.
         """
-        motion = sensors[0].filter.targets.motion
-        fused: Any = state.fused
-        prediction = Prediction.of(fused, motion, settings.horizon_steps, settings.horizon_period)
-        is_loss = isinstance(reward, ExpectedLossReward)
-        task = Task(sensors, options, settings, state, prediction, sampled=not is_loss)
-        found = [lay_out(task, rule, reward, rng=rng)]
-        due, beyond = is_loss if horizons is None else len(horizons) > 0, None
+        first, prediction = lay_out(sensors, options, rule, settings, reward, state, rng=rng)
+        due, beyond = isinstance(reward, ExpectedLossReward) if horizons is None else len(horizons) > 0, None
         if due:
-            beyond = Beyond.of(sensors, options, *drawing(prediction.end), graph, state.undetected)
+            beyond = Beyond.of(sensors, options, *drawing(prediction), graph, state.undetected)
         if horizons is None:
             horizons = () if beyond is None else beyond.horizons(settings)
+        found = [first]
         for own in horizons:
             assert beyond is not None
             later = beyond.continued(settings.horizon_times(), own.horizon_times())
-            ahead = Prediction.of(fused, motion, own.horizon_steps, own.horizon_period)
-            later_task = task._replace(options=later, settings=own, prediction=ahead)
-            found.append(lay_out(later_task, rule, reward, rng=rng))
+            found.append(lay_out(sensors, later, rule, own, reward, state, rng=rng)[0])
         counts = {"filter_steps": 0, "rewards": 0}
         for each, own in zip(found, (settings, *horizons), strict=True):
             counts["filter_steps"] += len(each.table.labels) * each.num_samples * own.horizon_steps
         source = at_all(found) if horizons else found[0]
         notes = dict.fromkeys(() if beyond is None else beyond.notes())
-        return cls(settings, tuple(options), prediction.end, source, source, counts, notes, horizons=horizons)
+        return cls(settings, tuple(options), prediction, source, source, counts, notes, horizons=horizons)
 
     def joint_shape(self) -> tuple[int, ...]:
         """Number of different courses of each sensor."""

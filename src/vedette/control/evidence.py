@@ -196,9 +196,12 @@ class Evidence:
 
     def _table(self, sensors: tuple[int, ...], actions: Ints, means: Floats, errors: Floats) -> RewardTable:
         """Rewards of joint actions (num, num of `sensors`), numbers of courses, spread over the actions."""
-        options = [self.evaluator.options[s] for s in sensors]
-        spread, filled = np.ix_(*[own.which for own in options]), []
-        shape = [len(own.courses) for own in options]
+        which, shape, filled = [], [], []
+        for s in sensors:
+            own = self.evaluator.options[s]
+            which.append(own.which)
+            shape.append(len(own.courses))
+        spread = np.ix_(*which)
         # The first evaluation holds: a later one, along a line, may differ from it in the last digit.
         places, first = np.unique(np.ravel_multi_index(tuple(actions.T), shape), return_index=True)
         for values in (means, errors):

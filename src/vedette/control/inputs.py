@@ -69,7 +69,7 @@ def options_of(sensors: Sequence[MobileSensor], poses: Any, settings: PlanningSe
     """
     at, times, found = check_poses(poses, len(sensors)), settings.horizon_times(), []
     for s, sensor in enumerate(sensors):
-        found.append(options_at(f"sensors[{s}].platform", sensor.platform, at[s], times))
+        found.append(options_at(f"sensors[{s}].platform", sensor.platform, at[s], times, sensor.abilities))
     return tuple(found)
 
 

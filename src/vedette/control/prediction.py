@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 from vedette.densities import LMB, Labelled, track_moments
 from vedette.densities.containers import for_kernel, unchecked
@@ -30,9 +30,10 @@ class Prediction(NamedTuple):
 
     @classmethod
     def of(cls, fused: LMB, motion: MotionModel, num_steps: int, period: float) -> Prediction:
-        """Carry it so many steps of `period` s. Raises as the motion model."""
+        """Carry it so many steps of `period` s; within `model_errors`."""
         tracks, logits = single_gaussians(fused.tracks).to_kernel(), fused.existence_logit
-        paths = _paths(motion, num_steps, period, tracks.means, tracks.covs)
+        own = kernel_motion(motion, ALWAYS_SURVIVES)
+        paths = predict_paths(own, float(period), int(num_steps), tracks.means, tracks.covs)
         end = unchecked(LMB, gaussian_tracks(tracks.labels, paths.means[:, -1], paths.covs[:, -1]), logits)
         return cls(fused, Lmb(tracks, for_kernel(logits)), paths, end)
 
@@ -44,12 +45,8 @@ def predicted(fused: _Labelled, motion: MotionModel, num_steps: int, period: flo
     sets of weight zero are left out of a GLMB.
     """
     single = possible(collapsed(fused))
-    paths = _paths(motion, num_steps, period, *track_moments(single.tracks))
+    means, covs = track_moments(single.tracks)
+    with model_errors():
+        paths = predict_paths(kernel_motion(motion, ALWAYS_SURVIVES), float(period), int(num_steps), means, covs)
     tracks = gaussian_tracks(single.tracks.labels, paths.means[:, -1], paths.covs[:, -1])
     return single.with_fields(tracks=tracks)
-
-
-def _paths(motion: MotionModel, num_steps: int, period: float, means: Any, covs: Any) -> Paths:
-    with model_errors():
-        found: Paths = predict_paths(kernel_motion(motion, ALWAYS_SURVIVES), float(period), int(num_steps), means, covs)
-    return found

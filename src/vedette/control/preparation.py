@@ -25,7 +25,7 @@ from vedette.densities import (
     settled_lmb,
 )
 from vedette.fusion import Clmb, CmDeltaGlmb, Fusion, Linear, LinearRule, ParallelUpdate, shares_prediction
-from vedette.models.arguments import reject
+from vedette.models.arguments import provides, reject
 from vedette.platforms import Options
 from vedette.tracking import State
 
@@ -33,6 +33,7 @@ AnyReward: TypeAlias = Reward | PowerReward | LabelReward | ExpectedLossReward
 
 
 _PARALLEL = ParallelUpdate()  # how the expected loss adds up
+_PLANNED_ON_LMBS = "planned on the LMBs of the GLMB beliefs: {}"
 
 
 class Planned(NamedTuple):
@@ -78,8 +79,11 @@ class Preparation:
         """Raises `InputError` for inputs that do not fit."""
         options = options_of(sensors, poses, settings)
         planned = planned_on(sensors, fusion, settings, reward, state)
-        mask = mask_of_decision(constraints, sensors, options, state.fused, np.asarray(poses), settings)
-        return cls(tuple(sensors), settings, reward, planned, options, mask, visibility_graph(constraints))
+        mask, graph = None, None
+        if constraints:
+            mask = mask_of_decision(constraints, sensors, options, state.fused, np.asarray(poses), settings)
+            graph = visibility_graph(constraints)
+        return cls(tuple(sensors), settings, reward, planned, options, mask, graph)
 
     @property
     def races(self) -> bool:
@@ -127,7 +131,7 @@ def notes_of_state(
         why = "the state has no intensity of them" if state.undetected is None else "rewards are no sums over labels"
         notes.append(f"targets not found yet are not looked for: {why}")
     for s, sensor in enumerate(sensors):
-        if not sensor.scans(state.time, settings).any():
+        if sensor.scan_times is not None and not sensor.scans(state.time, settings).any():
             notes.append(f"sensor {s + 1}: no scan within the horizon; all of its courses are worth the same")
     return tuple(notes)
 
@@ -162,12 +166,12 @@ def planned_on(
     Raises `InputError` for a state that does not fit.
     """
     check_state(sensors, state)
-    num_sensors = len(sensors)
-    beliefs = (*state.local, state.fused)
-    notes: tuple[str, ...] = ()
+    if isinstance(reward, ExpectedLossReward):
+        return _planned_on_loss(fusion, state, why or "the expected loss asks for no more")
+    num_sensors, beliefs, notes = len(sensors), (*state.local, state.fused), tuple[str, ...]()
     # What divides by the common prediction needs beliefs that have one.
-    from_one = isinstance(reward, ExpectedLossReward) or shares_prediction(fusion)
-    if _has_glmb(beliefs) and (why := why or _why_lmbs(num_sensors, fusion, settings, reward, beliefs)):
+    from_one = shares_prediction(fusion)
+    if _has_glmb(beliefs) and (why := why or _why_lmbs(num_sensors, fusion, settings, beliefs)):
         # Of one belief, open names are settled; of several, each would settle them in its own way.
         as_planned = settled_lmb if from_one or len(set(map(id, beliefs))) == 1 else as_lmb
         converted: dict[int, LMB] = {}
@@ -176,14 +180,22 @@ def planned_on(
                 converted[id(belief)] = as_planned(belief)
         local = state.local if from_one else tuple([converted[id(belief)] for belief in state.local])
         state = replace(state, local=local, fused=converted[id(state.fused)])
-        notes = (f"planned on the LMBs of the GLMB beliefs: {why}",)
+        notes = (_PLANNED_ON_LMBS.format(why),)
         fusion = _of_lmbs(fusion)
-    if isinstance(reward, ExpectedLossReward) and state.fused.is_lmb:
-        state = replace(state, fused=at_peaks(state.fused))
     if from_one:
         state = replace(state, local=(state.fused,) * num_sensors)
-    summed = isinstance(reward, ExpectedLossReward) or not _has_glmb((*state.local, state.fused))
+    summed = not _has_glmb((*state.local, state.fused))
     return Planned(state, fusion, _rule_of_lmbs(num_sensors, fusion, settings, reward) if summed else None, notes)
+
+
+def _planned_on_loss(fusion: Fusion, state: State, why: str) -> Planned:
+    """The fused belief as that of all sensors: an LMB, of each label its heaviest Gaussian. why: what a note says."""
+    fused, num_sensors, notes = state.fused, len(state.local), tuple[str, ...]()
+    if _has_glmb((*state.local, fused)):
+        fused, fusion, notes = settled_lmb(fused), _of_lmbs(fusion), (_PLANNED_ON_LMBS.format(why),)
+    fused = at_peaks(fused)
+    state = replace(state, local=(fused,) * num_sensors, fused=fused)
+    return Planned(state, fusion, _PARALLEL.linear_rule(num_sensors), notes)
 
 
 def _of_lmbs(fusion: Fusion) -> Fusion:
@@ -200,12 +212,8 @@ def _has_glmb(beliefs: Sequence[Labelled]) -> bool:
     return not all([belief.is_lmb for belief in beliefs])
 
 
-def _why_lmbs(
-    num_sensors: int, fusion: Fusion, settings: PlanningSettings, reward: AnyReward, beliefs: Sequence[Labelled]
-) -> str:
+def _why_lmbs(num_sensors: int, fusion: Fusion, settings: PlanningSettings, beliefs: Sequence[Labelled]) -> str:
     """Why GLMBs are planned on their LMBs; empty where they are not. beliefs: the fused one last."""
-    if isinstance(reward, ExpectedLossReward):
-        return "the expected loss asks for no more"
     if shares_prediction(fusion):
         return f"{type(fusion).__name__} fuses LMBs"
     if any(belief.is_product for belief in beliefs):
@@ -224,8 +232,11 @@ def _rule_of_lmbs(num_sensors: int, fusion: Fusion, settings: PlanningSettings, 
         return _PARALLEL.linear_rule(num_sensors)
     if settings.association != "known":
         return None
-    if not isinstance(reward, PowerReward | LabelReward) or not speaks_for(reward, "combine", "__call__"):
+    if not (provides(reward, PowerReward) or provides(reward, LabelReward)):
         return None
-    if not isinstance(fusion, Linear) or not speaks_for(fusion, "linear_rule", "fuse"):
+    if not speaks_for(reward, "combine", "__call__"):
         return None
-    return fusion.linear_rule(num_sensors)
+    if not provides(fusion, Linear) or not speaks_for(fusion, "linear_rule", "fuse"):
+        return None
+    rule: LinearRule = fusion.linear_rule(num_sensors)
+    return rule

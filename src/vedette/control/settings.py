@@ -27,7 +27,7 @@ from vedette.models.fields import (
     check_fields,
 )
 from vedette.platforms import Options, Platform
-from vedette.platforms.base import check_platform
+from vedette.platforms.base import Abilities, check_platform
 from vedette.threads import processors
 
 Belief: TypeAlias = GLMB | LMB  # that is planned on
@@ -137,6 +137,7 @@ class MobileSensor:
         scan_times: s, increasing, as `State.time`: when it scans; None: whenever a decision looks ahead to. A
             pseudo-update counts where it scans at least once in the period that ends with it.
         belief: the kind of labelled density that the filter believes in; None where it does not label its targets.
+        abilities: what the platform has more than it must.
 
     Raises:
         InputError: something else than a filter, a platform, or times in order.
@@ -146,11 +147,13 @@ class MobileSensor:
     platform: Platform
     scan_times: Floats | None = None
     belief: type[Labelled] | None = field(init=False)
+    abilities: Abilities = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         if not isinstance(self.filter, Filter):
             raise reject("filter", "a Filter, with targets, sensor, initial() and step()", self.filter)
         check_platform("platform", self.platform)
+        object.__setattr__(self, "abilities", Abilities.of(self.platform))
         initial = self.filter.initial()
         object.__setattr__(self, "belief", type(initial) if isinstance(initial, Labelled) else None)
         if self.scan_times is not None:
@@ -175,5 +178,5 @@ def scans_within(
     """For each sensor (num_courses, horizon_steps) the pseudo-updates at which it scans on each of its courses."""
     found = []
     for sensor, own in zip(sensors, options, strict=True):
-        found.append(own.scans & sensor.scans(now, settings))
+        found.append(own.scans if sensor.scan_times is None else own.scans & sensor.scans(now, settings))
     return tuple(found)

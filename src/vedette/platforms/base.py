@@ -52,15 +52,34 @@ class Options(NamedTuple):
         return int(np.flatnonzero(self.which == course)[0])
 
 
-def options_at(field: str, platform: Platform, pose: Floats, times: Floats) -> Options:
+class Abilities(NamedTuple):
+    """What a platform has more than a `Platform` must."""
+
+    takes_many_actions: bool
+    has_prices: bool
+    has_scans: bool
+
+    @classmethod
+    def of(cls, platform: Platform) -> Abilities:
+        """Find it out."""
+        return cls(*[provides(platform, more) for more in (TakesManyActions, WithPrices, WithScans)])
+
+
+def options_at(
+    field: str, platform: Platform, pose: Floats, times: Floats, abilities: Abilities | None = None
+) -> Options:
     """The options of a platform at a pose, distinguished by price, poses and scans at `times`, in seconds from now.
 
-    Raises `InputError`, with the name of the platform, for actions, courses, prices or scans that are none.
+    abilities: of the platform, where they are known. Raises `InputError`, with the name of the platform, for actions,
+    courses, prices or scans that are none.
     """
-    actions = actions_at(field, platform, pose)
-    courses = courses_of(field, platform, pose, actions.values, times)
-    prices = prices_of(field, platform, actions.values)
-    scans = scans_of(field, platform, pose, actions.values, times)
+    can, actions = abilities or Abilities.of(platform), actions_at(field, platform, pose)
+    num = len(actions.values)
+    courses = courses_of(field, platform, pose, actions.values, times, can)
+    prices = prices_of(field, platform, actions.values) if can.has_prices else np.zeros(num)
+    scans = np.ones((num, len(times)), np.bool_)
+    if can.has_scans:
+        scans = scans_of(field, platform, pose, actions.values, times)
     same = _same(courses) & (prices[:, np.newaxis] == prices) & (scans[:, np.newaxis] == scans).all(axis=2)
     own, which = np.unique(same.argmax(axis=1), return_inverse=True)  # itself, if none before it
     return Options(actions, courses[own], which, pose, prices[own], scans[own])
@@ -195,9 +214,11 @@ def course_of(field: str, platform: Platform, pose: Floats, action: Floats, time
     return _checked(f"{field}.course", course, (len(times),), pose)
 
 
-def courses_of(field: str, platform: Platform, pose: Floats, actions: Floats, times: Floats) -> Floats:
+def courses_of(
+    field: str, platform: Any, pose: Floats, actions: Floats, times: Floats, abilities: Abilities | None = None
+) -> Floats:
     """(num_actions, num_times, pose_dim) poses after each action; `InputError` as `course_of`."""
-    if provides(platform, TakesManyActions):
+    if (abilities or Abilities.of(platform)).takes_many_actions:
         courses = platform.courses(pose.copy(), actions.copy(), times.copy())
         return _checked(f"{field}.courses", courses, (len(actions), len(times)), pose)
     return np.stack([course_of(field, platform, pose, action, times) for action in actions])

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from vedette.control.rewards.base import LabelReward, LinearReward, PowerReward, combined, unit_volume_of
+from vedette.control.rewards.base import LinearReward, PowerReward, combined, unit_volume_of
 from vedette.control.rewards.labels import cardinality_variance_of_label
 from vedette.control.rewards.power import ExpectedLossReward
 from vedette.densities import LMB
@@ -18,6 +18,7 @@ from vedette.kernels.planning.ascent import Allowed, Cells, Trace, ascend
 from vedette.kernels.planning.bernoulli_rows import Table
 from vedette.kernels.planning.joint_values import alone_values, joint_values, line_values, start_totals
 from vedette.kernels.planning.label_values import EXPECTED_LOSS, FUNCTION, POWER_INTEGRALS, Valuation
+from vedette.models.arguments import provides
 from vedette.probabilities import log_expit
 from vedette.threads import run_chunks
 
@@ -62,7 +63,7 @@ class AdditiveRewards:
         """Of the sums, where the reward is linear in them; None where it is not known to be."""
         if self.reward is None:
             return np.ones(1)
-        found = self.reward.coefficients if isinstance(self.reward, LinearReward) else None
+        found = self.reward.coefficients if provides(self.reward, LinearReward) else None
         return None if found is None else np.asarray(found, np.float64)
 
     def joint(self) -> AdditiveRewards:
@@ -181,8 +182,8 @@ class AdditiveRewards:
         return float(-(cells.worth @ np.expm1(totals)))
 
 
-def valuation_of(reward: PowerReward | LabelReward | ExpectedLossReward, prediction: LMB, prior: Floats) -> Valuation:
-    """How a reward values the labels of a prediction, of one Gaussian each.
+def valuation_of(reward: Any, prediction: LMB, prior: Floats) -> Valuation:
+    """How a reward, by labels or by power integrals, values the labels of a prediction of one Gaussian each.
 
     prior: (num_labels, bernoulli_size) rows of the prediction.
     """
@@ -203,7 +204,7 @@ def valuation_of(reward: PowerReward | LabelReward | ExpectedLossReward, predict
         covs = prediction.tracks.covs
         unseen = np.minimum(covs[:, 0, 0] + covs[:, 1, 1], reward.cutoff**2)[:, np.newaxis] ** (0.5 * reward.order)
         return loss._replace(own=unseen, params=np.array([reward.cutoff**2, 0.5 * reward.order, 1.0]))
-    if isinstance(reward, PowerReward):
+    if provides(reward, PowerReward):
         log_volume = math.log(unit_volume_of(reward, prediction))
         exponents = np.array([[float(a), float(b)] for a, b in reward.exponents])
         own = _of_prediction(prediction, exponents, log_volume, prior[:, -2])

@@ -9,9 +9,11 @@ import numpy as np
 
 from vedette.control.additive.rewards import AdditiveRewards, valuation_of
 from vedette.control.additive.situation import SensorGroup, Start, Task, starts_of
+from vedette.control.prediction import Prediction
 from vedette.control.rewards.base import WithMissedCost
-from vedette.control.settings import PlanningSettings
-from vedette.densities import UndetectedIntensity
+from vedette.control.rewards.power import ExpectedLossReward
+from vedette.control.settings import MobileSensor, PlanningSettings
+from vedette.densities import LMB, UndetectedIntensity
 from vedette.densities.checks import offsets_of
 from vedette.errors import InputError
 from vedette.filters.inputs import model_errors
@@ -22,8 +24,11 @@ from vedette.kernels.planning.bernoulli_rows import Table
 from vedette.kernels.planning.cells import cells_in_view
 from vedette.kernels.planning.expected import fill_expected_changes
 from vedette.kernels.planning.known import Entries, fill_changes
-from vedette.kernels.planning.reach import fill_reach
+from vedette.kernels.planning.reach import fill_reach, fill_within
+from vedette.models.arguments import provides
+from vedette.platforms import Options
 from vedette.threads import run_chunks
+from vedette.tracking import State
 
 # A label that no sample and no prediction gives a higher probability of detection is out of reach.
 LEAST_DETECTION = 1e-6
@@ -38,20 +43,32 @@ _SAMPLED, _UNSAMPLED = 16, 512
 _MOST_BYTES = 8e9
 
 
-def lay_out(task: Task, rule: LinearRule, reward: Any, *, rng: np.random.Generator) -> AdditiveRewards:
-    """The rewards at the end of the horizon: each label followed over every course that reaches it."""
-    settings, undetected, prediction = task.settings, task.state.undetected, task.prediction.end
-    num_threads = settings.threads()
+def lay_out(
+    sensors: Sequence[MobileSensor],
+    options: Sequence[Options],
+    rule: LinearRule,
+    settings: PlanningSettings,
+    reward: Any,
+    state: State,
+    *,
+    rng: np.random.Generator,
+) -> tuple[AdditiveRewards, LMB]:
+    """The rewards at the end of the horizon, each label followed over every course that reaches it; the prediction."""
+    fused: Any = state.fused
+    num_threads, undetected, motion = settings.threads(), state.undetected, sensors[0].filter.targets.motion
     with model_errors():
+        ahead = Prediction.of(fused, motion, settings.horizon_steps, settings.horizon_period)
+        task = Task(sensors, options, settings, state, ahead, sampled=not isinstance(reward, ExpectedLossReward))
         start = starts_of(task, rule.missing_existence, rng=rng)
         table = lay_out_changes(start, rule, num_threads, sampled=task.sampled)
+    prediction = ahead.end
     valuation = valuation_of(reward, prediction, start.prior)
     cells = no_cells(len(table.offsets) - 1)
     if undetected is not None and (worth := worth_of_finding(reward, settings)) > 0.0:
         cells = cells_of(start, undetected, worth, table.first_courses, prediction.state_dim)
-    prices = np.concatenate([each.prices for each in task.options])
+    prices = np.concatenate([each.prices for each in options])
     own = reward if task.sampled else None
-    return AdditiveRewards(table, valuation, start.bases, own, cells, prices, num_threads)
+    return AdditiveRewards(table, valuation, start.bases, own, cells, prices, num_threads), prediction
 
 
 def lay_out_changes(start: Start, rule: LinearRule, num_threads: int, *, sampled: bool) -> Table:
@@ -98,13 +115,16 @@ def _seen(table: Table) -> Table:
 
 def _reach(group: SensorGroup, num_threads: int, *, sampled: bool) -> Ints:
     """(num_courses, num_own) 1 where a course reaches a label; without samples, where it might."""
-    num_courses, least = int(group.course_offsets[-1]), LEAST_DETECTION if sampled else 0.0
+    num_courses, belief, decision = int(group.course_offsets[-1]), group.belief, group.decision
     out = np.empty((num_courses, len(group.labels)), np.int64)
+    if not sampled:
+        fill_within(belief.paths, belief.radii, decision.horizon, group.reach, 0, num_courses, out)
+        return out
 
     def work(first: int, last: int) -> None:
-        fill_reach(group.belief, group.decision, least, group.reach, first, last, out)
+        fill_reach(belief, decision, LEAST_DETECTION, group.reach, first, last, out)
 
-    run_chunks(work, num_courses, num_threads, first_piece=_SAMPLED if sampled else _UNSAMPLED)
+    run_chunks(work, num_courses, num_threads, first_piece=_SAMPLED)
     return out
 
 
@@ -142,9 +162,10 @@ def _filling(
 
 def worth_of_finding(reward: Any, settings: PlanningSettings) -> float:
     """What finding an undetected target is worth, in units of the reward."""
-    if not isinstance(reward, WithMissedCost):
+    if not provides(reward, WithMissedCost):
         return settings.undetected_worth or 0.0
-    return reward.missed_cost * (1.0 if settings.undetected_worth is None else settings.undetected_worth)
+    cost: float = reward.missed_cost
+    return cost * (1.0 if settings.undetected_worth is None else settings.undetected_worth)
 
 
 def no_cells(num_courses: int) -> Cells:

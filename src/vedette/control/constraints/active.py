@@ -10,6 +10,7 @@ import numpy as np
 
 from vedette.control.constraints.protocol import Constraint, Situation, WithMostActive
 from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.models.arguments import provides
 from vedette.models.fields import Checked, Count, part
 from vedette.platforms.operated import LEFT
 
@@ -96,7 +97,7 @@ def active_of(constraints: Sequence[Constraint], courses: Sequence[Floats], scan
 
     courses: (num_courses, num_times, pose_dim) of each sensor. scans: (num_courses, num_times) whether they scan.
     """
-    numbers = [own.most_active for own in constraints if isinstance(own, WithMostActive)]
+    numbers = [own.most_active for own in constraints if provides(own, WithMostActive)]
     if not numbers or not scans:
         return None
     on = tuple(np.asarray(own.any(axis=1)) for own in scans)

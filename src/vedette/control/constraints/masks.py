@@ -13,6 +13,7 @@ from vedette.control.constraints.mask import Mask, opened
 from vedette.control.constraints.protocol import Constraint, Situation, WithViolations, reach_of
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Floats
+from vedette.models.arguments import provides
 
 # Violations that differ by no more, relative to the least of them or to 1, are equal.
 _SAME = 1e-9
@@ -91,7 +92,7 @@ def _answers(constraint: Constraint, situation: Situation) -> list[Bools]:
 
 def _violations(constraint: Constraint, situation: Situation, answers: Sequence[Bools]) -> Sequence[Floats]:
     """(num_courses,) how much each course violates a constraint; one that does not say it, by 1 what it forbids."""
-    if not isinstance(constraint, WithViolations):
+    if not provides(constraint, WithViolations):
         return [np.asarray(~own, np.float64) for own in answers]
     given = [np.asarray(own, np.float64) for own in constraint.violations(situation)]
     for s, own in enumerate(answers):

@@ -10,6 +10,7 @@ import numpy as np
 
 from vedette.densities import Labelled
 from vedette.kernels.base.types import Bools, Floats
+from vedette.models.arguments import provides
 
 _Values = TypeVar("_Values", Bools, Floats)
 
@@ -133,7 +134,7 @@ class WithMostActive(Protocol):
 
 def reach_of(constraint: Constraint) -> float:
     """m; what lies within it is asked of pairs of sensors, see `WithReach`."""
-    return constraint.reach if isinstance(constraint, WithReach) else math.inf
+    return constraint.reach if provides(constraint, WithReach) else math.inf
 
 
 class Alone:

@@ -99,7 +99,7 @@ def _is_seen(
     paths, seen = belief.paths, False
     for h in range(len(detections)):
         pose, state, detections[h] = decision.horizon.poses[course, h], work.scratch.points[0], 0.0
-        if not is_beyond(belief, decision, course, label, h, reach):
+        if not is_beyond(belief.paths, belief.radii, decision.horizon, course, label, h, reach):
             mean, cov = paths.means[label, h], paths.covs[label, h]
             detections[h] = detection_probability(decision.sensor, pose, mean, cov, state)
             seen |= detections[h] >= least

@@ -12,7 +12,7 @@ from vedette.kernels.base.types import Floats, Ints, Lmb, Motion
 from vedette.kernels.gaussian.detection import detection_probability
 from vedette.kernels.gaussian.prediction import predict
 from vedette.kernels.gaussian.scratch import make_scratch
-from vedette.kernels.planning.ideal import Decision
+from vedette.kernels.planning.ideal import Decision, Horizon
 
 
 class Paths(NamedTuple):
@@ -70,12 +70,12 @@ def label_radii(paths: Paths, targets: Ints, states: Floats) -> Floats:
 
 
 @inlined
-def is_beyond(belief: Belief, decision: Decision, course: int, label: int, step: int, reach: float) -> bool:
+def is_beyond(paths: Paths, radii: Floats, horizon: Horizon, course: int, label: int, step: int, reach: float) -> bool:
     """Whether a label is, at a step of a course, where a sensor of this reach detects nothing, or does not scan."""
-    if not decision.horizon.scans[course, step]:
+    if not horizon.scans[course, step]:
         return True
-    pose, mean = decision.horizon.poses[course, step], belief.paths.means[label, step]
-    return math.hypot(mean[0] - pose[0], mean[1] - pose[1]) > reach + belief.radii[label, step]
+    pose, mean = horizon.poses[course, step], paths.means[label, step]
+    return math.hypot(mean[0] - pose[0], mean[1] - pose[1]) > reach + radii[label, step]
 
 
 @borrowing
@@ -102,16 +102,27 @@ def fill_reach(
 ) -> None:
     """Set out[course, label] to 1 where a course may detect a label with probability `least` or more, else to 0.
 
-    Judged by the samples and by the prediction, at every step; with a `least` of 0 by distance alone. reach: m, beyond
-    which the sensor detects nothing.
+    Judged by the samples and by the prediction, at every step. reach: m, beyond which the sensor detects nothing.
     """
     state = np.empty(belief.prior.tracks.components.means.shape[1])
     for course in range(first, last):
         for label in range(out.shape[1]):
             out[course, label] = 0
             for h in range(decision.horizon.poses.shape[1]):
-                if not is_beyond(belief, decision, course, label, h, reach) and (
-                    least == 0.0 or _detects(belief, decision, course, label, h, least, state)
-                ):
+                if is_beyond(belief.paths, belief.radii, decision.horizon, course, label, h, reach):
+                    continue
+                if _detects(belief, decision, course, label, h, least, state):
+                    out[course, label] = 1
+                    break
+
+
+@kernel
+def fill_within(paths: Paths, radii: Floats, horizon: Horizon, reach: float, first: int, last: int, out: Ints) -> None:
+    """As `fill_reach`, by distance alone."""
+    for course in range(first, last):
+        for label in range(out.shape[1]):
+            out[course, label] = 0
+            for h in range(horizon.poses.shape[1]):
+                if not is_beyond(paths, radii, horizon, course, label, h, reach):
                     out[course, label] = 1
                     break
