@@ -1,6 +1,7 @@
-"""The road of a scan and of a decision: how many calls it takes, and that `docs/architecture.md` names its files."""
+"""Calls that a scan, a decision and a command take; `docs/architecture.md` names the files of the first two."""
 
 import re
+import subprocess
 import sys
 from collections import Counter
 from collections.abc import Callable
@@ -10,8 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import vedette
+from vedette.cli import app
 from vedette.kernels.base.compile import JIT_ENABLED
 from vedette.scenarios import load_scenario, with_fields
 from vedette.scenarios.build import build_experiment, build_planner
@@ -85,3 +88,39 @@ def test_the_list_of_a_decision_is_short() -> None:
 def test_a_decision_takes_few_files(walks: dict[str, Counter[str]]) -> None:
     assert sum(file.startswith(("control/", "kernels/planning/")) for file in walks["decision"]) <= 24
     assert len(walks["decision"]) <= 54
+
+
+def test_a_run_from_the_command_line_takes_few_calls(tmp_path: Path) -> None:
+    """The second one in a process, which writes its folder and figures; more than half are of tracking and planning."""
+    words = ["run", "paper-a", "--threads", "1", "--out", str(tmp_path / "run"), "--overwrite"]
+    assert CliRunner().invoke(app, words).exit_code == 0
+    calls = calls_of(lambda: CliRunner().invoke(app, words))
+    assert 10_000 < calls.total() <= 32_500, calls.most_common()
+
+
+READING = """
+import sys
+from collections import Counter
+from pathlib import Path
+import vedette
+
+source, found = str(Path(vedette.__file__).parent), Counter()
+
+def note(frame, event, argument):
+    if event == "call" and frame.f_code.co_filename.startswith(source):
+        found[frame.f_code.co_filename] += 1
+
+sys.setprofile(note)
+from vedette.scenarios import load_scenario
+load_scenario("paper-a")
+sys.setprofile(None)
+print(found.total(), len(found))
+"""
+
+
+def test_reading_a_scenario_takes_few_calls_and_no_filters() -> None:
+    """In a process of its own, imports included: what is only read needs nothing of what it describes."""
+    done = subprocess.run([sys.executable, "-c", READING], capture_output=True, text=True, check=True)
+    calls, files = map(int, done.stdout.split())
+    assert calls <= 5_200
+    assert files <= 55

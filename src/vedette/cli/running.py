@@ -162,6 +162,8 @@ def end_stopped(stop: RunStopped | RunInterrupted, left: str) -> NoReturn:
 
 def warn_of_recording(record: RunRecord, scenario: Scenario) -> tuple[str, ...]:
     """Warn of sensors of a recording that agree on no target, and of targets too fast for its tracks; returns these."""
+    if scenario.model.recording is None:
+        return ()
     from vedette.evaluation.agreement import disagreements
     from vedette.evaluation.unexplained import unexplained
 

@@ -33,7 +33,7 @@ class Prediction(NamedTuple):
         """Carry it so many steps of `period` s; within `model_errors`."""
         tracks, logits = single_gaussians(fused.tracks).to_kernel(), fused.existence_logit
         own = kernel_motion(motion, ALWAYS_SURVIVES)
-        paths = predict_paths(own, float(period), int(num_steps), tracks.means, tracks.covs)
+        paths = predict_paths(own, float(period), int(num_steps), tracks.components.means, tracks.components.covs)
         end = unchecked(LMB, gaussian_tracks(tracks.labels, paths.means[:, -1], paths.covs[:, -1]), logits)
         return cls(fused, Lmb(tracks, for_kernel(logits)), paths, end)
 

@@ -52,7 +52,7 @@ def action_axis(actions: Actions) -> ActionAxis:
     """
     actions = _without_speed(actions)
     rows = [rounded(actions.columns, row) for row in actions.values]
-    ticks = tuple(with_minus(", ".join(f"{value:g}" for _, value in row)) for row in rows)
+    ticks = tuple(with_minus(", ".join([f"{value:g}" for _, value in row])) for row in rows)
     labels = tuple(map(row_words, rows))
     names, units = [[_parts(column)[i] for column in actions.columns] for i in (0, 1)]
     if len(names) == 1:
@@ -75,14 +75,14 @@ def _without_speed(actions: Actions) -> Actions:
 
 def rounded(columns: Sequence[str], row: Floats) -> Row:
     """A row to whole degrees and four digits of all else."""
-    numbers = zip(columns, row.tolist(), strict=True)
-    return tuple((name, _rounded(name, x) + 0.0) for name, x in numbers)
-
-
-def _rounded(name: str, number: float) -> float:
-    if not name.endswith("_deg"):
-        return float(f"{number:.4g}")
-    return round(number) % 360 if name in _AZIMUTHS else round(number)
+    found = []
+    for name, number in zip(columns, row.tolist(), strict=True):
+        if not name.endswith("_deg"):
+            number = float(f"{number:.4g}")
+        else:
+            number = round(number) % 360 if name in _AZIMUTHS else round(number)
+        found.append((name, number + 0.0))
+    return tuple(found)
 
 
 def angle_of(row: Mapping[str, float], heading: str = "heading_deg", azimuth: str = "course_deg") -> float | None:
@@ -99,7 +99,7 @@ def row_words(row: Row) -> str:
     """`-30°` of a heading or course, `heading -30°, speed 5, off` of more columns, `still` of none."""
     if len(row) == 1 and row[0][0] in ("heading_deg", "course_deg"):
         return f"{row[0][1]:g}°"
-    return ", ".join(switch_words(column, x) or _number_words(column, x) for column, x in row) or "still"
+    return ", ".join([switch_words(column, x) or _number_words(column, x) for column, x in row]) or "still"
 
 
 def _number_words(column: str, number: float) -> str:
@@ -114,6 +114,6 @@ def choice_words(rows: Sequence[Row]) -> str:
 
 def _parts(column: str) -> tuple[str, str, str]:
     """Name in words, unit, and sign after a number: `heading_deg` is `heading`, `deg`, `°`."""
-    end = next((end for end in _UNITS if column.endswith(end)), "")
+    end = next(filter(column.endswith, _UNITS), "")
     name = column.removesuffix(end).replace("_", " ")
     return (name, *_UNITS[end]) if end else (name, "", "")

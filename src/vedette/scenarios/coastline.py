@@ -6,16 +6,18 @@ import os
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path as FilePath
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Floats
-from vedette.recorded import Origin
 from vedette.scenarios.faults import Finding, Path, describe
 from vedette.scenarios.geojson import geometries, listed
 from vedette.scenarios.sections import ScenarioModel
+
+if TYPE_CHECKING:  # with it come the filters, which a check does without
+    from vedette.recorded import Origin
 
 Line: TypeAlias = tuple[tuple[float, float], ...]
 _FINEST = 1e-4  # of the extent: points nearer than that are one

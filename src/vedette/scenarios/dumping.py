@@ -11,7 +11,6 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.scalarstring import DoubleQuotedScalarString
 
-from vedette.recorded.tables import sha256_of
 from vedette.scenarios.sections import ScenarioModel, Section
 from vedette.scenarios.sections.base import sections_in
 from vedette.scenarios.sections.custom import Custom
@@ -24,6 +23,7 @@ if TYPE_CHECKING:
     from vedette.scenarios.loading import Scenario
 
 _LONGEST_LINE = 100
+_NUMBERS = float | int | None
 # What stays without quotes: words of letters, digits, dots and dashes that YAML 1.2 takes for nothing else.
 _PLAIN = re.compile(r"[A-Za-z][\w.-]*( [A-Za-z0-9][\w.-]*)*")
 
@@ -43,6 +43,8 @@ def dump_kept(scenario: Scenario) -> str:
     data = _anchored(scenario.model.model_dump(mode="json"), scenario.folder.resolve())
     for section in (data["recording"], data["targets"]):
         if section is not None and "sha256" in section:
+            from vedette.recorded.tables import sha256_of  # with it come the filters
+
             section["sha256"] = sha256_of(section["path"])
     return dump_data(data)
 
@@ -71,13 +73,11 @@ def _files(section: Section, folder: Path) -> tuple[str, ...]:
     return section.files(folder) if isinstance(section, Custom | ProgramSection) else ()
 
 
-def _anchored(value: Any, folder: Path) -> Any:
+def _anchored(value: dict[str, Any] | list[Any], folder: Path) -> Any:
     """The data with the files of recorded targets, custom models, programs and coastlines as absolute paths."""
     if isinstance(value, list):
-        return [_anchored(item, folder) for item in value]
-    if not isinstance(value, dict):
-        return value
-    anchored = {key: _anchored(item, folder) for key, item in value.items()}
+        return [_anchored(item, folder) if isinstance(item, dict | list) else item for item in value]
+    anchored = {key: _anchored(item, folder) if isinstance(item, dict | list) else item for key, item in value.items()}
     if isinstance(value.get("coastline"), str):
         anchored["coastline"] = str((folder / value["coastline"]).resolve())
     if value.get("kind") == "recorded" or {"path", "bad_rows"} <= set(value):
@@ -94,13 +94,17 @@ def _laid_out(value: Any) -> Any:
     if isinstance(value, str):
         return value if _PLAIN.fullmatch(value) and plain_scalar(value) == value else DoubleQuotedScalarString(value)
     if isinstance(value, dict):
-        mapping = CommentedMap((_laid_out(key), _laid_out(item)) for key, item in value.items())
-        if value and len(repr(value)) <= _LONGEST_LINE and not any(isinstance(v, dict | list) for v in value.values()):
+        items = [
+            (_laid_out(key), item if isinstance(item, _NUMBERS) else _laid_out(item)) for key, item in value.items()
+        ]
+        mapping = CommentedMap(items)
+        inner = [item for item in value.values() if isinstance(item, dict | list)]
+        if value and not inner and len(repr(value)) <= _LONGEST_LINE:
             mapping.fa.set_flow_style()
         return mapping
     if isinstance(value, list):
-        items = CommentedSeq(_laid_out(item) for item in value)
-        if not any(isinstance(item, dict) for item in value):
-            items.fa.set_flow_style()
-        return items
+        row = CommentedSeq([item if isinstance(item, _NUMBERS) else _laid_out(item) for item in value])
+        if not [item for item in value if isinstance(item, dict)]:
+            row.fa.set_flow_style()
+        return row
     return value

@@ -5,13 +5,15 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path as FilePath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from vedette.errors import InputError
 from vedette.reading import parse_json, read_text
-from vedette.recorded import Origin
 from vedette.scenarios.faults import Path, Told, describe
 from vedette.scenarios.sections.places import OriginSection
+
+if TYPE_CHECKING:  # with it come the filters, which a check does without
+    from vedette.recorded import Origin
 
 _MOST_BYTES = 20_000_000
 _MOST_CORNERS = 50_000  # of all zones of a file: each is looked at for every course of every sensor

@@ -106,6 +106,8 @@ class _Reader:
         self.faults.append(Fault(place, Told(path, expected, got)))
 
     def node(self, event: Any, path: Path) -> Any:
+        if len(path) > _MAX_DEPTH:
+            raise _Unreadable(Fault(_place(event), Told((), f"at most {_MAX_DEPTH} levels of nesting", "more")))
         place = _place(event)
         self.record(path, place, is_key=False)
         if isinstance(event, AliasEvent):
@@ -139,7 +141,7 @@ class _Reader:
     def sequence(self, path: Path) -> list[Any]:
         items: list[Any] = []
         while not isinstance(event := next(self.events), SequenceEndEvent):
-            items.append(self.child(event, (*path, len(items))))
+            items.append(self.node(event, (*path, len(items))))
         return items
 
     def mapping(self, path: Path) -> dict[str, Any]:
@@ -152,7 +154,7 @@ class _Reader:
                 self.fault(_place(event), (*path, key), "each key once", f"it again, after line {first}")
             elif key is not None:
                 self.record(inner, _place(event), is_key=True)
-            value = self.child(next(self.events), inner)
+            value = self.node(next(self.events), inner)
             if inner[-1] == key:
                 entries[key] = value
         return entries
@@ -164,14 +166,9 @@ class _Reader:
                 return value
             got = describe(value)
         else:
-            got = describe(self.child(event, (*path, "?")))
+            got = describe(self.node(event, (*path, "?")))
         self.fault(_place(event), path, "a word as key", got)
         return None
-
-    def child(self, event: Any, path: Path) -> Any:
-        if len(path) > _MAX_DEPTH:
-            raise _Unreadable(Fault(_place(event), Told((), f"at most {_MAX_DEPTH} levels of nesting", "more")))
-        return self.node(event, path)
 
     def alias(self, event: Any, path: Path) -> Any:
         anchor = self.anchors.get(event.anchor)

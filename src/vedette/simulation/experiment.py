@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -73,6 +73,7 @@ class Experiment(Speaking):
     drop_out: tuple[float, ...] = ()
     explain: bool = True
     recording: Recording | None = None
+    _scanning: tuple[TrueSensor, ...] = field(init=False, default=())
 
     def __post_init__(self) -> None:
         if not isinstance(self.tracker, Tracker):
@@ -92,7 +93,7 @@ class Experiment(Speaking):
         bad = [step for step in self.decision_steps if not 1 <= step <= len(self.times)]
         if bad:
             raise InputError(f"decision_steps: expected scans from 1 to {len(self.times)}; got {bad[0]}")
-        true_sensors_of(self.true_sensors, self.tracker.sensors)
+        object.__setattr__(self, "_scanning", true_sensors_of(self.true_sensors, self.tracker.sensors))
         if self.drop_out and (len(self.drop_out) != num or not all(0.0 <= share < 1.0 for share in self.drop_out)):
             raise InputError(f"drop_out: expected {num} probabilities below 1, one a sensor; got {self.drop_out}")
         if self.scans_at is not None:
@@ -126,7 +127,7 @@ class Experiment(Speaking):
         scans_at: of a run, see `vedette.simulation.loop.scans_of_run`; None: without drop-outs.
         """
         times = self.scans_at if scans_at is None else scans_at
-        return scanning(true_sensors_of(self.true_sensors, self.tracker.sensors), times, step)
+        return scanning(self._scanning, times, step)
 
     def fleet(self, *, moving: bool = True) -> Fleet:
         """The platforms at the first scan; those that are not under way, or not `moving` at all, lie still."""

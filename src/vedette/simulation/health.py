@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -89,14 +90,14 @@ class Health(Speaking):
         Raises `InputError` for another number of reports, or what is none.
         """
         num = self.num_tracks.shape[1]
-        if len(infos) not in (1, num) or not all(isinstance(info, FilterInfo) for info in infos):
+        if len(infos) not in (1, num) or [info for info in infos if not isinstance(info, FilterInfo)]:
             kinds = [type(info).__name__ for info in infos]
             raise InputError(
                 f"TrackerInfo.filters: expected a FilterInfo of each of {num} sensors, or of all; got {kinds}"
             )
-        for name in _OF_FILTER:
+        for name, reported in zip(_OF_FILTER, zip(*map(_reported, infos), strict=True), strict=True):
             array = getattr(self, name)
-            array[scan] = [getattr(info, name) for info in infos]
+            array[scan] = reported
             if len(infos) == 1 and name in _OF_SCANS:
                 array[scan, 1:] = 0
 
@@ -131,6 +132,7 @@ _DTYPES = {field.name: np.dtype(np.float64 if field.type == "Floats" else np.int
 _KINDS = {name: Kind.NUMBER if dtype == np.float64 else Kind.INTEGER for name, dtype in _DTYPES.items()}
 _OF_SCANS = ("num_clutter_raised", "num_duplicates")  # which are added up over the sensors
 _OF_FILTER = tuple(field.name for field in fields(FilterInfo) if field.name in _DTYPES)
+_reported = attrgetter(*_OF_FILTER)
 
 # The columns of the tables of sensors and of scans.
 FUSION_COLUMNS = {name: kind for name, kind in _KINDS.items() if name.startswith(_FUSION)}

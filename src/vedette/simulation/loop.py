@@ -184,7 +184,7 @@ class World:
                 ids, states = self.truth.at(step - 1)
                 sensors = experiment.sensors_at(step, self._scans_at)
                 scans = kept_scans(simulate_scans(states, poses, sensors, ids=ids, rngs=self._scan_rngs), off)
-                measurements = tuple(None if scan is None else scan.measurements for scan in scans)
+                measurements = tuple([None if scan is None else scan.measurements for scan in scans])
             else:
                 measurements = tuple(recording.scans[step - 1])
         with clock.timing("filter"):

@@ -14,7 +14,7 @@ from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.gaussian.scans import add_noise, mixed_scan, seen_with
 from vedette.models import SensorModel
 from vedette.models.arguments import float_array, generator, pose_vector, reject
-from vedette.models.bias import LEAST_RANGE
+from vedette.models.bias import LEAST_RANGE, NO_BIAS
 from vedette.models.functions import numbers_at, write_rows
 from vedette.models.measurement import wrap_angular
 from vedette.simulation.true_sensors import TrueSensor
@@ -60,20 +60,32 @@ def simulate_scan(
         ModelError: a model function raised or gave no valid value at a target's state.
     """
     states, pose = float_array("truth_states", truth_states, (None, None)), pose_vector("pose", pose)
-    generator(rng)
-    true = sensor if isinstance(sensor, TrueSensor) else TrueSensor(sensor)
-    num, model = len(states), true.model
+    return _drawn(states, _named(ids, len(states)), pose, sensor, generator(rng))
+
+
+def _named(ids: ArrayLike | None, num: int) -> Ints:
+    """(num,) ids of the targets; None: their places."""
     names = np.arange(num) if ids is None else np.array(ids)
     if names.shape != (num,):
         raise reject("ids", f"{num} ids, one a target", names.tolist())
+    return names.astype(np.int64, copy=False)
+
+
+def _drawn(
+    states: Floats, names: Ints, pose: Floats, sensor: SensorModel | TrueSensor, rng: np.random.Generator
+) -> Scan:
+    """One scan of arguments that are checked."""
+    true = sensor if isinstance(sensor, TrueSensor) else TrueSensor(sensor)
+    num, model = len(states), true.model
     luck = rng.random(num)
-    states, at = _shown(true, states, pose)
+    states, at = (states, pose) if true.bias is NO_BIAS else _shown(true, states, pose)
     measured = _noisy_measurements(model, states, at, rng.standard_normal((num, model.meas_dim)))
     seen = _seen(model, _detected_at(true, states, at, measured), at, luck)
     clutter = model.clutter.sample(at, model.measurement, state_dim=states.shape[1], rng=rng)
     order = rng.random(num + len(clutter)).argsort()
-    said = _biased(true, measured), _biased(true, clutter)
-    return Scan(*mixed_scan(said[0], names.astype(np.int64, copy=False), seen, said[1], order))
+    if true.bias is not NO_BIAS:
+        measured, clutter = _biased(true, measured), _biased(true, clutter)
+    return Scan(*mixed_scan(measured, names, seen, clutter, order))
 
 
 @overload
@@ -112,10 +124,14 @@ def simulate_scans(
 
     None for a sensor that is None: it does not scan, and draws nothing.
     """
-    stages, scans = Stages(), []
+    states, stages, scans = float_array("truth_states", truth_states, (None, None)), Stages(), list[Scan | None]()
+    names = _named(ids, len(states))
     for s, (pose, sensor, rng) in enumerate(zip(poses, sensors, rngs, strict=True)):
         with stages.timing("scans", s):
-            scans.append(None if sensor is None else simulate_scan(truth_states, pose, sensor, ids=ids, rng=rng))
+            drawn = None
+            if sensor is not None:
+                drawn = _drawn(states, names, pose_vector("pose", pose), sensor, generator(rng))
+            scans.append(drawn)
     return tuple(scans)
 
 
@@ -124,7 +140,7 @@ def kept_scans(scans: Sequence[Scan | None], off: Bools) -> tuple[Scan | None, .
 
     All are drawn first, so that a sensor meets the same luck whether or not it was off before.
     """
-    return tuple(None if is_off else scan for scan, is_off in zip(scans, off.tolist(), strict=True))
+    return tuple([None if is_off else scan for scan, is_off in zip(scans, off.tolist(), strict=True)])
 
 
 def _shown(sensor: TrueSensor, states: Floats, pose: Floats) -> tuple[Floats, Floats]:

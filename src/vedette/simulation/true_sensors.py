@@ -85,7 +85,7 @@ def scanning(sensors: Sequence[TrueSensor], scans_at: Bools | None, step: int) -
         step: of the run, from 1.
     """
     if scans_at is None:
-        return tuple(sensor.at_first_scan() if step == 1 else sensor for sensor in sensors)
+        return tuple(sensors) if step > 1 else tuple([sensor.at_first_scan() for sensor in sensors])
     found: list[TrueSensor | None] = []
     for sensor, scans in zip(sensors, scans_at, strict=True):
         is_first = not scans[: step - 1].any()

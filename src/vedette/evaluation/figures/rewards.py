@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -59,16 +59,17 @@ def reward_figure(plan: Plan, *, pair: tuple[int, int] | None = None, scene: Sce
         raise InputError("plan: expected a sensor with a choice; got one action each")
     joint = [table for table in plan.tables if len(table.sensors) > 1]
     pair = pair or first_pair(plan.tables, plan.actions)
-    groups = alike(plan.actions, drawn)
+    along = {sensor: action_axis(plan.actions[sensor]) for sensor in {*drawn, *(pair or ())}}
+    groups = alike(along, drawn)
     if pair is None:
         joint = []
     heights = [1.55] * len(joint[:1]) + [1.0] * len(groups)
     figure = new_figure((COLUMN_WIDTH + 1.4 if joint else 2.3) + 1.9 * (len(groups) - 1))
     panels = figure.subplots(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
     if joint and pair is not None:
-        _draw_heat_map(figure, panels[0], plan, joint[0], pair, scene)
+        _draw_heat_map(figure, panels[0], plan, joint[0], pair, along, scene)
     for axes, sensors in zip(panels[-len(groups) :], groups, strict=True):
-        _draw_curves(axes, plan, sensors, scene, sensor_looks(drawn))
+        _draw_curves(axes, plan, {sensor: along[sensor] for sensor in sensors}, scene, sensor_looks(drawn))
     return figure
 
 
@@ -95,34 +96,36 @@ def first_pair(tables: Sequence[RewardTable], actions: Sequence[Actions]) -> tup
     return (with_choice[0], with_choice[1]) if len(with_choice) > 1 else None
 
 
-def alike(actions: Sequence[Actions], sensors: Sequence[int]) -> list[list[int]]:
-    """The sensors, gathered by what can be drawn along one axis."""
+def alike(along: Mapping[int, ActionAxis], sensors: Sequence[int]) -> list[list[int]]:
+    """The sensors, gathered by what can be drawn along one axis; along: that of each sensor's actions."""
     groups: dict[Any, list[int]] = {}
     for sensor in sensors:
-        axis = action_axis(actions[sensor])
+        axis = along[sensor]
         groups.setdefault(axis.title() if axis.is_numeric else axis.labels, []).append(sensor)
     return list(groups.values())
 
 
-def _draw_curves(axes: Axes, plan: Plan, sensors: Sequence[int], scene: Scene, looks: dict[int, Any]) -> None:
+def _draw_curves(
+    axes: Axes, plan: Plan, along: Mapping[int, ActionAxis], scene: Scene, looks: Mapping[int, Any]
+) -> None:
     for table in plan.tables:
         for axis, sensor in enumerate(table.sensors):
-            if sensor in sensors:
-                _draw_curve(axes, plan, sensor, *best_over_others(table, axis), scene.name(sensor), looks[sensor])
+            if sensor in along:
+                curve, chosen = best_over_others(table, axis), plan.chosen[sensor]
+                _draw_curve(axes, along[sensor], *curve, chosen, scene.name(sensor), looks[sensor])
     joint = any(len(table.sensors) > 1 for table in plan.tables)
-    mark_actions(axes, action_axis(plan.actions[sensors[0]]))
+    mark_actions(axes, next(iter(along.values())))
     axes.set_ylabel(scene.reward_title("Largest joint reward" if joint else "Reward").replace(" (", "\n("))
     # Above the panel: wherever a legend would lie inside, some curve passes.
     columns = legend_columns([str(each) for each in axes.get_legend_handles_labels()[1]], width=_PANEL_WIDTH)
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns, frameon=False, handlelength=1.8)
 
 
-def _draw_curve(axes: Axes, plan: Plan, sensor: int, mean: Floats, error: Floats, name: str, looks: Any) -> None:
+def _draw_curve(axes: Axes, axis: ActionAxis, mean: Floats, error: Floats, choice: int, name: str, looks: Any) -> None:
     # Changes of heading come in another order than the headings that they lead to.
-    axis = action_axis(plan.actions[sensor])
     order = np.argsort(axis.places, kind="stable")
     places, mean, error = axis.places[order], mean[order], error[order]
-    chosen = int(np.flatnonzero(order == plan.chosen[sensor])[0])
+    chosen = int(np.flatnonzero(order == choice)[0])
     shade, marker, dashes = looks
     if axis.is_numeric:
         axes.fill_between(places, mean - error, mean + error, color=shade, alpha=0.2, linewidth=0)
@@ -182,15 +185,20 @@ def best_over_pair(table: RewardTable, pair: tuple[int, int]) -> Floats:
 
 
 def _draw_heat_map(
-    figure: Figure, axes: Axes, plan: Plan, table: RewardTable, pair: tuple[int, int], scene: Scene
+    figure: Figure,
+    axes: Axes,
+    plan: Plan,
+    table: RewardTable,
+    pair: tuple[int, int],
+    along: Mapping[int, ActionAxis],
+    scene: Scene,
 ) -> None:
     reward = best_over_pair(table, pair)
     image = axes.imshow(reward.T, origin="lower", cmap=HEAT_MAP, aspect="auto", interpolation="nearest")
     axes.grid(False)
     for axis, sensor in zip((axes.xaxis, axes.yaxis), pair, strict=True):
-        along = action_axis(plan.actions[sensor])
-        map_ticks(axis, along, 7)
-        axis.set_label_text(along.title(scene.name(sensor)))
+        map_ticks(axis, along[sensor], 7)
+        axis.set_label_text(along[sensor].title(scene.name(sensor)))
     column, row = plan.chosen[pair[0]], plan.chosen[pair[1]]
     for shade, width in (("black", 2.6), ("white", 1.2)):  # legible on the dark and on the light end of the scale
         axes.add_patch(Rectangle((column - 0.5, row - 0.5), 1, 1, fill=False, edgecolor=shade, linewidth=width))

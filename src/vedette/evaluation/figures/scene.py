@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,13 +17,15 @@ from matplotlib.ticker import MaxNLocator, ScalarFormatter
 from vedette.evaluation.figures.labels import drawn_text
 from vedette.evaluation.figures.style import GREY, INK
 from vedette.kernels.base.types import Floats
-from vedette.recorded import Origin
 from vedette.scenarios import Scenario
 from vedette.scenarios.sections.field_of_view import FieldOfView, field_of_view
 from vedette.scenarios.sections.planners import STRATEGIES, NamedIndependent, NamedJoint, NamedLookahead
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.views import COAST, HOLE, INSIDE, NO_GO, REGION, Zone, zones
 from vedette.text import elided
+
+if TYPE_CHECKING:
+    from vedette.recorded import Origin
 
 _POINTS_ACROSS, _LETTER = 200.0, 4.2  # points of a column's axes, and of a letter of a name
 # Where a name may stand, the preferred side first: offset in points, and alignment.

@@ -7,9 +7,10 @@ Each field's description ends with its unit in brackets; [-] is a number without
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from inspect import isfunction
+from itertools import chain
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import (
@@ -88,16 +89,6 @@ def _not_tiny(value: float) -> float:
     return value
 
 
-def _too_large(value: Any, path: tuple[str | int, ...]) -> tuple[str | int, ...] | None:
-    """Path of the first number in a field that is beyond all sense, or None."""
-    if isinstance(value, float | int):
-        return path if abs(value) > _LARGEST else None
-    if isinstance(value, tuple):
-        found = (_too_large(item, (*path, index)) for index, item in enumerate(value))
-        return next((place for place in found if place), None)
-    return None
-
-
 Whole = Annotated[int, BeforeValidator(_whole)]
 Name = Annotated[str, AfterValidator(_word)]
 Sha256 = Annotated[str, AfterValidator(_digest)]
@@ -149,16 +140,21 @@ def attempt(findings: Iterator[Finding]) -> Iterator[Finding]:
         return
 
 
-def sections_in(value: Any, path: Path = ()) -> Iterator[tuple[Path, Section]]:
-    """A section and all in it, each with its path."""
-    inner: Iterable[tuple[str | int, Any]] = ()
-    if isinstance(value, Section):
-        yield path, value
-        inner = ((name, getattr(value, name)) for name in type(value).model_fields)
-    elif isinstance(value, tuple | dict):
-        inner = enumerate(value) if isinstance(value, tuple) else value.items()
-    for name, item in inner:
-        yield from sections_in(item, (*path, name))
+def sections_in(value: Any) -> list[tuple[Path, Section]]:
+    """A section and all in it, each with its path, from the outside in and in the order of the fields."""
+    found: list[tuple[Path, Section]] = []
+    left: list[tuple[Path, Any]] = [((), value)]
+    while left:
+        path, item = left.pop()
+        if isinstance(item, Section):
+            found.append((path, item))
+            inner: Mapping[Any, Any] = {name: getattr(item, name) for name in type(item).model_fields}
+        elif isinstance(item, tuple | dict):
+            inner = dict(enumerate(item)) if isinstance(item, tuple) else item
+        else:
+            continue
+        left += [((*path, name), inner[name]) for name in reversed(inner)]
+    return found
 
 
 def is_whole(value: Any) -> bool:
@@ -180,13 +176,11 @@ class Section(BaseModel):
         extra="forbid", frozen=True, strict=True, allow_inf_nan=False, validate_default=True, defer_build=True
     )
 
-    _checks: ClassVar[tuple[Check, ...]] = ()
-
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
-        parents = (parent for parent in reversed(cls.__mro__) if issubclass(parent, Section))
-        methods = (method for parent in parents for method in vars(parent).values())
-        cls._checks = tuple(method for method in methods if isfunction(method) and hasattr(method, "is_check"))
+        parents = [parent._checks for parent in reversed(cls.__bases__) if issubclass(parent, Section)]
+        own = [method for method in vars(cls).values() if isfunction(method) and hasattr(method, "is_check")]
+        cls._checks = tuple(dict.fromkeys([*chain(*parents), *own]))
 
     def findings(self) -> Iterator[Finding]:
         """What is wrong with the section beyond its fields one by one."""
@@ -196,12 +190,16 @@ class Section(BaseModel):
     @check
     def _numbers_within_reason(self) -> Iterator[Finding]:
         for name in type(self).model_fields:
-            path = _too_large(getattr(self, name), (name,))
-            if path:
-                value = getattr(self, name)
-                for part in path[1:]:
-                    value = value[part]
-                yield path, f"a number from {-_LARGEST:g} to {_LARGEST:g}", describe(value)
+            left: list[tuple[Path, Any]] = [((name,), getattr(self, name))]
+            while left:
+                path, value = left.pop()
+                if isinstance(value, tuple):
+                    left += [((*path, index), value[index]) for index in reversed(range(len(value)))]
+                elif isinstance(value, float | int) and abs(value) > _LARGEST:
+                    yield path, f"a number from {-_LARGEST:g} to {_LARGEST:g}", describe(value)
+                    break  # the first of a field is enough
+
+    _checks: ClassVar[tuple[Check, ...]] = (_numbers_within_reason,)
 
     @model_validator(mode="after")
     def _checked(self, info: ValidationInfo) -> Self:

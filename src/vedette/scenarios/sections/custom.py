@@ -138,7 +138,7 @@ def asked_for(made: Any, parts: dict[str, Any]) -> dict[str, Any]:
         parameters = inspect.signature(made).parameters
     except (ValueError, TypeError):  # some that are written in C have none
         return {}
-    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters.values()):
+    if inspect.Parameter.VAR_KEYWORD in [parameter.kind for parameter in parameters.values()]:
         return parts
     return {name: part for name, part in parts.items() if name in parameters}
 

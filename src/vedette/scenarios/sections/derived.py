@@ -44,7 +44,7 @@ class Derived(Section):
     """A section with fields of a class or function of the library."""
 
     of: ClassVar[str]  # module:name of the class or function
-    names: ClassVar[dict[str, str]]  # key of the file -> field or parameter of that
+    declared: ClassVar[tuple[Declared, ...]] = ()  # those of its fields or parameters that a file gives
 
     if TYPE_CHECKING:  # its fields are declared where the part is
 
@@ -53,14 +53,14 @@ class Derived(Section):
     def given(self) -> dict[str, Any]:
         """What the file says, by the names and in the units of the class or function; what it leaves open is not."""
         found = {}
-        for key, name in self.names.items():
-            value = getattr(self, key)
+        for each in self.declared:
+            value = getattr(self, each.key)
             if isinstance(value, Section):
                 value = value.build()  # type: ignore[attr-defined] # of a region, say
-            if _in_degrees(key, name) and value is not None:
+            if each.in_degrees and value is not None:
                 value = math.radians(value)
-            if value is not None or not _may_be_infinite(self.of, name):
-                found[name] = value
+            if value is not None or each.type != "Limit":
+                found[each.name] = value
         return found
 
 
@@ -83,7 +83,7 @@ class _OwnPart(Custom):
 class Declared(NamedTuple):
     """A field or parameter as it stands in the source: type and default in words of Python, and its description.
 
-    key: its name in a file.
+    key: its name in a file. in_degrees: whether a file gives it in degrees, and the library in radians.
     """
 
     key: str
@@ -91,15 +91,7 @@ class Declared(NamedTuple):
     type: str
     default: str | None
     description: str
-
-    @property
-    def in_degrees(self) -> bool:
-        """Whether a file gives it in degrees, and the library in radians."""
-        return _in_degrees(self.key, self.name)
-
-
-def _in_degrees(key: str, name: str) -> bool:
-    return key.endswith("_deg") and not name.endswith("_deg")
+    in_degrees: bool
 
 
 def derived(of: str, **which: tuple[str, ...]) -> Callable[[type[S]], type[S]]:
@@ -124,7 +116,7 @@ def _extended(
     first: tuple[str, ...] = (),
 ) -> type[S]:
     """A section with further fields and those of a class or function."""
-    names = {}
+    chosen = []
     for declared in _declared(of):
         own, key = section.model_fields.get(declared.key), declared.key
         annotation = _type(declared.type) if own is None else section.__annotations__.get(key, own.annotation)
@@ -134,12 +126,12 @@ def _extended(
             if declared.type in ("int", "float"):
                 raise TypeError(f"{of}.{declared.name}: expected a type of vedette.models.fields; got {declared.type}")
             continue
-        names[key] = declared.name
+        chosen.append(declared)
         if own is None or own.description is None:
             fields[key] = (annotation, _field(declared))
     found: Any = create_model(name, __base__=section, __module__=section.__module__, **fields)
-    found.__doc__, found.of, found.names = _summary(of) if "kind" in fields else section.__doc__, of, names
-    order = dict.fromkeys(("kind", *first, *names, *found.model_fields))
+    found.__doc__, found.of, found.declared = _summary(of) if "kind" in fields else section.__doc__, of, tuple(chosen)
+    order = dict.fromkeys(("kind", *first, *[each.key for each in chosen], *found.model_fields))
     found.__pydantic_fields__ = {key: found.model_fields[key] for key in order if key in found.model_fields}
     for word, text in _WORDS.findall(_source(of)):
         setattr(found, word, text)
@@ -248,16 +240,13 @@ def _declared(of: str) -> tuple[Declared, ...]:
     marks = [mark for mark in node.decorator_list if isinstance(mark, ast.Call)]
     keys = {ast.literal_eval(word.value): word.arg for mark in marks for word in mark.keywords if word.arg}
     stated = _fields(node) if isinstance(node, ast.ClassDef) else _parameters(node)
-    return tuple(
-        Declared(
-            keys.get(name) or re.sub("_rad$", "_deg", name),
-            name,
-            kind,
-            None if default is None else ast.unparse(default),
-            entries.get(name, ""),
-        )
-        for name, kind, default in stated
-    )
+    found = []
+    for name, kind, default in stated:
+        key = keys.get(name) or re.sub("_rad$", "_deg", name)
+        in_degrees = key.endswith("_deg") and not name.endswith("_deg")
+        said = None if default is None else ast.unparse(default)
+        found.append(Declared(key, name, kind, said, entries.get(name, ""), in_degrees))
+    return tuple(found)
 
 
 def _fields(node: ast.ClassDef) -> Iterator[tuple[str, str, ast.expr | None]]:
@@ -273,10 +262,6 @@ def _parameters(node: ast.FunctionDef) -> Iterator[tuple[str, str, ast.expr | No
     defaults = [*[None] * (len(of) - len(node.args.defaults)), *node.args.defaults, *node.args.kw_defaults]
     for argument, default in zip((*of, *later), defaults, strict=True):
         yield argument.arg, ast.unparse(argument.annotation) if argument.annotation else "", default
-
-
-def _may_be_infinite(of: str, name: str) -> bool:
-    return any(declared.name == name and declared.type == "Limit" for declared in _declared(of))
 
 
 def _type(words: str) -> Any:

@@ -42,7 +42,6 @@ class Still(_PlatformSection):
 
     kind: Literal["still"] = Field(default="still", description="Kind of platform [-].")
     of: ClassVar[str] = "vedette.platforms.steps:Still"
-    names: ClassVar[dict[str, str]] = {}
 
 
 @derived("vedette.platforms.courses:Courses", first=("speed", "speeds"))
