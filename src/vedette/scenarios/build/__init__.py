@@ -1,0 +1,28 @@
+"""What a scenario describes, as the objects that filters, planners and simulations take.
+
+Each section builds its own part (`vedette.scenarios.sections`); here they are put together.
+"""
+
+from vedette.scenarios.build.experiments import build_experiment, build_targets
+from vedette.scenarios.build.planners import build_parts, build_planner
+from vedette.scenarios.build.sensors import (
+    build_poses,
+    build_scan_times,
+    build_sensors,
+    build_true_sensors,
+    drop_outs,
+)
+from vedette.scenarios.build.trackers import told_of
+
+__all__ = [
+    "build_experiment",
+    "build_parts",
+    "build_planner",
+    "build_poses",
+    "build_scan_times",
+    "build_sensors",
+    "build_targets",
+    "build_true_sensors",
+    "drop_outs",
+    "told_of",
+]

@@ -1,0 +1,114 @@
+"""The planners of a scenario."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+from vedette.control import MobileSensor, Planner
+from vedette.errors import InputError
+from vedette.filters import Filter, labels_targets
+from vedette.fusion import Fusion, ParallelUpdate
+from vedette.scenarios.build.sensors import build_scan_times, build_sensors, first_actions
+from vedette.scenarios.build.trackers import keeps_lmbs, told_of
+from vedette.scenarios.loading import Scenario
+from vedette.scenarios.sections.deciding import Lookahead
+from vedette.scenarios.sections.fusion import IN_FULL, ONE_BELIEF, CustomFusion
+from vedette.scenarios.sections.planners import STRATEGIES, Named, NamedIndependent, strategy_of
+from vedette.scenarios.sections.strategies import Parts, Strategy
+from vedette.simulation.oracle import Timetable
+from vedette.tracking import Network
+
+
+def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planner | None:
+    """The planner of a strategy: `jdm` (joint), `idm` (independent), `lookahead` (joint, over several decisions),
+    `nearest`, `assigned`, `centroid` (rules of thumb), `oracle` and `told` (which know the targets), `random`,
+    `fixed` (sensors keep their first course), or one of the scenario's own; None for `still`, where the sensors are
+    never under way.
+
+    Args:
+        scenario: with the sensors that it steers.
+        name: of the strategy.
+        num_threads: share a decision; 0: one a processor.
+
+    Raises:
+        InputError: another name, joint or independent decisions with filters that have no labels, planners that
+            know the targets where these are unknown or lack components of the motion's states, or a custom part that
+            cannot be had.
+    """
+    model, folder = scenario.model, scenario.folder
+    if name not in (*STRATEGIES, *model.planners):
+        raise InputError(f"planner: expected one of {', '.join((*STRATEGIES, *model.planners))}; got {name!r}")
+    sensors = build_sensors(scenario)
+    strategy = strategy_of(model, name)
+    if wanted := strategy.misfit(model, labels=labels_targets(sensors[0].filter)):
+        raise InputError(f"planner {name}: expected {wanted}; got {name}")
+    parts = build_parts(scenario, sensors, strategy, num_threads)
+    if name in model.planners:
+        return Named(name, model.planners[name].planner(parts, folder))
+    try:
+        return strategy.planner(parts, folder)
+    except InputError as error:
+        raise InputError(f"planner {name}: {error}") from error
+
+
+def build_parts(
+    scenario: Scenario, sensors: tuple[MobileSensor, ...], strategy: Strategy, num_threads: int = 0
+) -> Parts:
+    """What the planner of a strategy is made of, the sensors as of `build_sensors`. Raises `InputError` as
+    `build_planner`.
+    """
+    model, folder = scenario.model, scenario.folder
+    control, fusion = model.control, _fusion_of_decisions(scenario, sensors[0].filter)
+    return Parts(
+        sensors,
+        fusion,
+        replace(control.build(model.horizon, num_threads), end=float(model.time.build()[-1])),
+        control.reward.build(folder),
+        control.search.build(folder),
+        control.others,
+        first_actions(scenario, sensors),
+        control.build_constraints(folder),
+        _notes_of_decisions(scenario, fusion, strategy),
+        (control.lookahead or Lookahead()).build(),
+        model.estimates_by.build(folder),
+        {"timetable": _timetable(scenario), "cutoff": model.ospa.cutoff},
+        partial(told_of, scenario),
+    )
+
+
+def _timetable(scenario: Scenario) -> Timetable:
+    """When the sensors scan and decide, and how what they say becomes one, for an oracle."""
+    model, num = scenario.model, len(scenario.model.sensors)
+    section, powers = model.fusion, (1.0,) * num
+    shared = section.kind in ONE_BELIEF or isinstance(section, CustomFusion) or section.feeds_back
+    if not isinstance(section, CustomFusion) and section.kind in ("clmb", "cm_delta_glmb") and not section.by_views:
+        powers = section.scaled_weights(num)
+    born, scans = model.birth, build_scan_times(scenario)
+    rebirths = born.from_measurements is not None or born.steps == "every"
+    return Timetable(
+        model.time.build(), model.decision_steps, powers, shared or model.network is not None, rebirths, scans
+    )
+
+
+def _notes_of_decisions(scenario: Scenario, fusion: Fusion, strategy: Strategy) -> tuple[str, ...]:
+    """What the decisions of a strategy say of their fusion, where the tracks are fused in another way, and of radio."""
+    model, section = scenario.model, scenario.model.fusion
+    reward = getattr(strategy, "reward", None) or model.control.reward
+    alone = isinstance(strategy, NamedIndependent) and (strategy.others or model.control.others) == "absent"
+    found = []
+    in_full = isinstance(fusion, ParallelUpdate) or reward.kind == "expected_loss"
+    if in_full and not alone and section.kind not in (*IN_FULL, "none"):
+        own = f"{section.kind} by views" if section.kind != "custom" and section.by_views else section.kind
+        found.append(f"joint rewards take all scans in full; tracks are fused by another rule ({own})")
+    if model.network is not None and model.network.build() != Network():
+        found.append("decided by one who hears every sensor at once, whatever the network lets through")
+    return tuple(found)
+
+
+def _fusion_of_decisions(scenario: Scenario, local: Filter) -> Fusion:
+    """A user's own; otherwise as the section says."""
+    section, num_sensors = scenario.model.fusion, len(scenario.model.sensors)
+    if isinstance(section, CustomFusion):
+        return section.build(num_sensors, scenario.folder)
+    return section.build_of_decisions(num_sensors, of_lmbs=keeps_lmbs(local))

@@ -1,0 +1,152 @@
+"""The sensors of a scenario: their filters and platforms, where they start and when they scan."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vedette.control import MobileSensor
+from vedette.filters import Filter, TwoStepFilter
+from vedette.kernels.base.types import Bools, Floats
+from vedette.models import SensorModel, TargetModel
+from vedette.platforms import Actions, ByCompass, Operated, Patrolling, Platform
+from vedette.platforms.base import SWITCH, actions_at
+from vedette.platforms.patrolling import CLOCKS
+from vedette.scenarios.loading import Scenario
+from vedette.scenarios.sections.control import revisited
+from vedette.scenarios.sections.custom import Custom, NotGiven
+from vedette.scenarios.sections.deciding import Lookahead
+from vedette.scenarios.sections.platforms import CustomPlatform
+from vedette.scenarios.sections.scenario import ScenarioModel
+from vedette.scenarios.sections.sensors import Sensor
+from vedette.scenarios.sections.tracking import CustomFilter
+from vedette.scenarios.sections.undetected import undetected_anywhere
+from vedette.simulation.true_sensors import TrueSensor
+
+
+def build_sensors(scenario: Scenario) -> tuple[MobileSensor, ...]:
+    """The sensors as planners steer them, each with its filter; the filters share the models of the targets.
+
+    Raises:
+        InputError: a custom model that cannot be had, or parts that do not fit together.
+    """
+    model, folder = scenario.model, scenario.folder
+    method, region = model.filter.gaussian_method, model.region.build()
+    birth = model.birth.build(model.motion, model.region)
+    targets = TargetModel(
+        model.motion.build(folder, method=method),
+        model.survival.build(folder),
+        replace(birth, anywhere=undetected_anywhere(model, birth)),
+    )
+    found = []
+    for sensor in model.sensors:
+        known = sensor.build(region, method, folder, model.filter.detection_taken_at)
+        local = model.filter.build(targets, known, folder)
+        _check_own(scenario, sensor, known, local)
+        found.append(MobileSensor(local, _platform(model, sensor, folder), _scan_times(model, sensor)))
+    return tuple(found)
+
+
+def _platform(model: ScenarioModel, sensor: Sensor, folder: Path) -> Platform:
+    """What carries a sensor, with its prices and switch; with an origin or a compass its actions are courses."""
+    section, price = sensor.platform, sensor.price
+    platform: Platform = section.build(folder)
+    if model.by_compass and platform.columns:
+        platform = ByCompass(platform, model.north())
+    if isinstance(section, CustomPlatform) and isinstance(price, str) and price not in platform.columns:
+        wanted = f"{section.function} to have a column {price}, as its price"
+        raise NotGiven(section, "function", wanted, ", ".join(platform.columns) or "no columns")
+    if isinstance(section, CustomPlatform) and sensor.switchable and SWITCH in platform.columns:
+        wanted = f"{section.function} to have no column {SWITCH}, as the sensor is switchable"
+        raise NotGiven(section, "function", wanted, ", ".join(platform.columns))
+    visits = revisited(model)
+    if visits is not None and section.top_speed > 0.0:
+        platform = Patrolling(platform, visits.places, visits.radius)
+    if price is None and sensor.budget is None and not sensor.switchable:
+        return platform
+    if sensor.budget is None:
+        return Operated(platform, price, sensor.switchable)
+    return Operated(platform, price, sensor.switchable, sensor.budget.seconds, sensor.budget.refill)
+
+
+def _scan_times(model: ScenarioModel, sensor: Sensor) -> Floats | None:
+    """s of the scans of a sensor, as far as decisions look ahead, past the last step too; None: at every step."""
+    if sensor.scans.steps(model.time.step_period)[0] == 1:
+        return None
+    lookahead, horizon = model.control.lookahead or Lookahead(), math.prod(model.horizon)
+    ahead = horizon + (lookahead.depth - 1) * (lookahead.period or horizon)
+    num = model.time.num_steps + math.ceil(ahead / model.time.step_period)
+    time = model.time.model_copy(update={"num_steps": num})
+    found: Floats = time.build()[sensor.scans.build(time)]
+    return found
+
+
+def _check_own(scenario: Scenario, section: Sensor, sensor: SensorModel, local: Filter) -> None:
+    """`NotGiven` where the user's own measurement or filter has less than the scenario asks of it."""
+    model, measured = scenario.model, section.measurement
+    born = model.birth.from_measurements is not None
+    if born and sensor.measurement.places is None and isinstance(measured, Custom):
+        wanted = f"{measured.function} to give a measurement with `places`, as targets are born of measurements"
+        raise NotGiven(measured, "function", wanted, "one without")
+    waits = section.scans.drop_out or section.scans.late or not section.scans.build(model.time).all()
+    waits = waits or section.switchable or (model.network is not None and model.network.delay)
+    if isinstance(model.filter, CustomFilter) and (born or waits) and not isinstance(local, TwoStepFilter):
+        why = "targets are born of measurements" if born else "it must predict without a scan"
+        wanted = f"{model.filter.function} to give a TwoStepFilter, with predict() and update(), as {why}"
+        raise NotGiven(model.filter, "function", wanted, f"a {type(local).__name__}")
+
+
+def build_true_sensors(scenario: Scenario, known: Sequence[SensorModel]) -> tuple[TrueSensor, ...]:
+    """The sensors as they are, beside what the filters know of them; errors as of `build_sensors`."""
+    model = scenario.model
+    region = model.region.build()
+    places = zip(model.sensors, known, strict=True)
+    return tuple(section.build_true(sensor, region, scenario.folder) for section, sensor in places)
+
+
+def drop_outs(scenario: Scenario) -> tuple[float, ...]:
+    """Probability of each sensor that a scan does not take place; () where all do."""
+    found = tuple(sensor.scans.drop_out or 0.0 for sensor in scenario.model.sensors)
+    return found if any(found) else ()
+
+
+def build_scan_times(scenario: Scenario) -> Bools:
+    """(num_sensors, num_steps) whether each sensor scans then."""
+    model = scenario.model
+    return np.array([sensor.scans.build(model.time) for sensor in model.sensors])
+
+
+def build_poses(scenario: Scenario) -> Floats:
+    """(num_sensors, pose_dim) where they start, all as long as the longest; what is not a sensor's own is 0."""
+    sensors, visits = scenario.model.sensors, revisited(scenario.model)
+    poses = [sensor.pose for sensor in sensors]
+    longest = max(map(len, poses)) if visits is None else CLOCKS
+    found = np.array([(*pose, *(0.0,) * (longest - len(pose))) for pose in poses])
+    if visits is None:
+        return found
+    patrols = [[0.0 if sensor.platform.top_speed > 0.0 else -1.0] * len(visits.places) for sensor in sensors]
+    return np.hstack([found, patrols])
+
+
+def first_actions(scenario: Scenario, sensors: tuple[MobileSensor, ...]) -> tuple[Actions, ...]:
+    """What each sensor does where nothing decides: its course at the start, or the first of its actions."""
+    found = []
+    places = zip(scenario.model.sensors, sensors, build_poses(scenario), strict=True)
+    for s, (section, sensor, pose) in enumerate(places):
+        row = section.platform.first_action(section.heading_deg)
+        own = actions_at(f"sensors[{s}].platform", sensor.platform, pose)
+        rows = own.values[:1] if row is None else np.array([row])
+        platform: Any = sensor.platform
+        while isinstance(platform, Operated | Patrolling):
+            platform = platform.platform
+        if row is not None and isinstance(platform, ByCompass):
+            rows = platform.of_plane(rows, pose)
+        if row is not None and isinstance(sensor.platform, Operated):
+            rows = sensor.platform.switched_on_and_off(rows)[:1]
+        found.append(Actions(own.columns, rows))
+    return tuple(found)
