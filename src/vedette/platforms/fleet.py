@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Floats
-from vedette.models.arguments import float_array
-from vedette.platforms.base import Platform, course_of, scans_of
+from vedette.models.arguments import float_array, provides
+from vedette.platforms.base import Platform, WithScans, course_of, scans_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,6 +31,7 @@ class Fleet:
     starts: Floats
     actions: tuple[Floats | None, ...]
     since: float
+    _switched: tuple[int, ...] = field(init=False, default=())  # places of those whose action may keep them off
 
     def __post_init__(self) -> None:
         num = len(self.platforms)
@@ -39,6 +40,9 @@ class Fleet:
         for s, (platform, action) in enumerate(zip(self.platforms, self.actions, strict=True)):
             if action is not None:
                 float_array(f"sensors[{s}] action", action, (len(platform.columns),))
+        under_way = [s for s, action in enumerate(self.actions) if action is not None]
+        switched = tuple([s for s in under_way if provides(self.platforms[s], WithScans)])
+        object.__setattr__(self, "_switched", switched)
 
     def poses(self, time: float) -> Floats:
         """(num_sensors, pose_dim) where all are at `time`, s, which is no earlier than `since`."""
@@ -52,10 +56,9 @@ class Fleet:
     def off(self, time: float) -> Bools:
         """(num_sensors,) whether the action of each keeps its sensor from scanning at `time`, s."""
         seconds, off = np.array([time - self.since]), np.zeros(len(self.platforms), np.bool_)
-        for s, (platform, action) in enumerate(zip(self.platforms, self.actions, strict=True)):
-            if action is not None:
-                rows = action[np.newaxis]
-                off[s] = not scans_of(f"sensors[{s}].platform", platform, self.starts[s], rows, seconds)[0, 0]
+        for s in self._switched:
+            platform, rows = self.platforms[s], np.array([self.actions[s]])
+            off[s] = not scans_of(f"sensors[{s}].platform", platform, self.starts[s], rows, seconds)[0, 0]
         return off
 
     def follow(self, actions: Sequence[Floats | None], time: float) -> Fleet:
