@@ -49,12 +49,13 @@ def test_help_imports_nothing_heavy() -> None:
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_check_imports_no_compiler() -> None:
+@pytest.mark.parametrize("words", [["check", "paper-a"], ["list"], ["schema"]])
+def test_what_only_reads_scenarios_imports_no_compiler_and_no_filters(words: list[str]) -> None:
     code = (
         "import sys; from vedette.cli import app\n"
-        "try: app(['check', 'paper-a'])\n"
+        f"try: app({words})\n"
         "except SystemExit: pass\n"
-        "sys.exit(', '.join({'numba', 'matplotlib'} & set(sys.modules)) or 0)"
+        "sys.exit(', '.join({'numba', 'matplotlib', 'vedette.filters', 'vedette.recorded'} & set(sys.modules)) or 0)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")

@@ -25,9 +25,11 @@ SCHEMA_FILE = "vedette.schema.json"
 
 def list_() -> None:
     """List the built-in scenarios."""
-    from vedette.scenarios import list_builtin, load_scenario
+    from vedette.scenarios import list_builtin
+    from vedette.scenarios.yaml_reader import read_yaml
 
-    described = {name: load_scenario(name).model.description for name in list_builtin()}
+    files = list_builtin()
+    described = {name: read_yaml(file.read_text("utf-8"), name).data["description"] for name, file in files.items()}
     print_names(described)
     publish([{"name": name, "description": text} for name, text in described.items()])
 

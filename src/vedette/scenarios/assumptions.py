@@ -14,9 +14,8 @@ from vedette.recorded import RecordedScans
 from vedette.scenarios.assumed_clutter import assumed_clutter, place_stds
 from vedette.scenarios.extents import measured_region, region_in_words
 from vedette.scenarios.sections import ScenarioModel
+from vedette.scenarios.sensors_file import EXPECTED_BIRTHS, measured_birth
 
-_EXISTENCE = 0.03  # of a birth where something was measured
-_EXPECTED = 0.5  # births from measurements, in the region between two scans
 _LOST_PER_SECOND = 0.001
 _BIRTH_STDS = 2.0  # of the noise across, where most was measured
 
@@ -66,24 +65,10 @@ def assumed_birth(
     """Return births from measurements; measured: the scans of each sensor."""
     std = _BIRTH_STDS * _spread(model, measured, folder)
     words["birth"] = (
-        f"{_EXPECTED:g} new targets per scan, from measurements that no track explains (std {std:.3g} m, {speed:g} m/s)"
+        f"{EXPECTED_BIRTHS:g} new targets per scan, from measurements that no track explains "
+        f"(std {std:.3g} m, {speed:g} m/s)"
     )
     return {"birth": measured_birth(std, speed, model.motion.state_dim)}
-
-
-def measured_birth(std: float, speed: float, state_dim: int) -> dict[str, Any]:
-    """Return a section `birth` with births from measurements; std: of positions, m. speed: std of velocities, m/s."""
-    rest = [0.1] * (state_dim - 4)  # a turn rate, rad/s
-    stds = [std, std, speed, speed, *rest]
-    return {"sites": [], "from_measurements": {"expected": _EXPECTED, "max_existence": _EXISTENCE, "std": stds}}
-
-
-def given_state_dim(given: Mapping[str, Any]) -> int:
-    """Return the dimension of the state by a section `motion`, if it is given."""
-    motion = given.get("motion")
-    found = motion.get("state_dim") if isinstance(motion, Mapping) else None
-    turns = isinstance(motion, Mapping) and motion.get("kind") == "coordinated_turn"
-    return found if isinstance(found, int) else 4 + turns
 
 
 def _time(recording: RecordedScans) -> dict[str, Any]:

@@ -11,16 +11,17 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.recorded import Conventions, RecordedScans
-from vedette.scenarios.assumptions import (
-    assumed_birth,
-    assumed_motion,
-    assumed_sections,
-    given_state_dim,
-    measured_birth,
-)
+from vedette.scenarios.assumptions import assumed_birth, assumed_motion, assumed_sections
 from vedette.scenarios.extents import reached_region, region_in_words
 from vedette.scenarios.loading import Scenario
-from vedette.scenarios.sensors_file import ENDLESS, STAND_INS, model_of_sensors, read_sensors_file
+from vedette.scenarios.sensors_file import (
+    ENDLESS,
+    STAND_INS,
+    given_state_dim,
+    measured_birth,
+    model_of_sensors,
+    read_sensors_file,
+)
 
 _MOST_STEPS = 100  # of a horizon
 

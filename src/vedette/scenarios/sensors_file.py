@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 
 from vedette.errors import InputError, ScenarioError
 from vedette.reading import read_text
-from vedette.scenarios.assumptions import given_state_dim, measured_birth
 from vedette.scenarios.diagnostics import read_section
 from vedette.scenarios.faults import Fault, describe
 from vedette.scenarios.loading import diagnose, place_fault
@@ -24,6 +23,8 @@ STAND_INS: dict[str, Any] = {
     "time": {"num_steps": 1},
     "region": {"x_min": -1e6, "x_max": 1e6, "y_min": -1e6, "y_max": 1e6},
 }
+EXPECTED_BIRTHS = 0.5  # births from measurements, in the region between two scans
+_EXISTENCE = 0.03  # of a birth where something was measured
 ENDLESS = 1_000_000  # steps, the most of a scenario
 _NAMED = 5  # sensors, in a summary
 _ASSUMED = ("region", "motion", "survival", "birth")  # each is assumed from the scans unless it is given
@@ -75,6 +76,21 @@ def check_sensors_file(path: FilePath) -> SensorsFile:
         faults.sort(key=lambda fault: fault.place)
         raise ScenarioError([_in_words_of_user(fault, document, data, path) for fault in faults])
     return SensorsFile(model.sensor_names, _quantities(model), _not_given(document.data))
+
+
+def measured_birth(std: float, speed: float, state_dim: int) -> dict[str, Any]:
+    """Return a section `birth` with births from measurements; std: of positions, m. speed: std of velocities, m/s."""
+    rest = [0.1] * (state_dim - 4)  # a turn rate, rad/s
+    stds = [std, std, speed, speed, *rest]
+    return {"sites": [], "from_measurements": {"expected": EXPECTED_BIRTHS, "max_existence": _EXISTENCE, "std": stds}}
+
+
+def given_state_dim(given: Mapping[str, Any]) -> int:
+    """Return the dimension of the state by a section `motion`, if it is given."""
+    motion = given.get("motion")
+    found = motion.get("state_dim") if isinstance(motion, Mapping) else None
+    turns = isinstance(motion, Mapping) and motion.get("kind") == "coordinated_turn"
+    return found if isinstance(found, int) else 4 + turns
 
 
 def _quantities(model: ScenarioModel) -> tuple[str, ...]:

@@ -159,7 +159,9 @@ def _without_scans(
     places = places_of(belief.tracks.labels, prediction.end.tracks.labels)
     own, horizon = np.flatnonzero((places >= 0) & exists), decision.horizon
     now = unchecked(LMB, single_gaussians(take_tracks(belief.tracks, own)), belief.existence_logit[own]).to_kernel()
-    paths = predict_paths(decision.motion, horizon.dt, horizon.poses.shape[1], now.tracks.components.means, now.tracks.components.covs)
+    paths = predict_paths(
+        decision.motion, horizon.dt, horizon.poses.shape[1], now.tracks.components.means, now.tracks.components.covs
+    )
     ends = np.ascontiguousarray(paths.means[:, -1]), np.ascontiguousarray(paths.covs[:, -1])
     rows = rows_without_scans(*ends, now.existence_logit, prediction.end.tracks.means[places[own]])
     return places[own], now, paths, rows
