@@ -67,7 +67,7 @@ def walks() -> dict[str, Counter[str]]:
     return {"scan": found, "decision": calls_of(lambda: planner.plan(state, poses, rng=rng))}
 
 
-@pytest.mark.parametrize(("walk", "most"), [("scan", 250), ("decision", 274)])
+@pytest.mark.parametrize(("walk", "most"), [("scan", 165), ("decision", 274)])
 def test_it_takes_few_calls(walks: dict[str, Counter[str]], walk: str, most: int) -> None:
     assert 50 < walks[walk].total() <= most, walks[walk].most_common()
 
@@ -79,10 +79,14 @@ def test_every_file_on_the_way_is_in_the_lists(walks: dict[str, Counter[str]]) -
     assert {file for file in on_the_way if Path(file).stem not in named} == {"control/settings.py"}  # data
 
 
-def test_the_list_of_a_decision_is_short() -> None:
-    steps = WALKS.split("When a decision by the expected loss")[1].split("Other decisions")[0]
-    files = set(re.findall(r"`(?:\w+/)*(\w+)(?:\.py)?`", steps)) - {"control", "kernels", "platform"}
-    assert 15 < len(files) <= 25, sorted(files)
+@pytest.mark.parametrize(
+    ("begins", "ends", "most"),
+    [("A scan of `paper-a`", "Inside the compiled", 15), ("When a decision by the expected loss", "Other decisions", 25)],
+)
+def test_the_list_is_short(begins: str, ends: str, most: int) -> None:
+    steps = WALKS.split(begins)[1].split(ends)[0]
+    files = set(re.findall(r"`((?:\w+/)*\w+)(?:\.py)?`", steps)) - {"control", "kernels", "platform", "kernels/planning"}
+    assert most - 10 < len(files) <= most, sorted(files)
 
 
 def test_a_decision_takes_few_files(walks: dict[str, Counter[str]]) -> None:
