@@ -18,7 +18,7 @@ Bools = NDArray[np.bool_]
 class Mixture(NamedTuple):
     """Gaussian components: one mixture of any total weight, or several that offsets tell apart.
 
-    All that makes, copies, takes, joins or merges components is in `vedette.kernels.gaussian.mixtures`, so that a
+    All that makes, copies, takes, joins or merges components is in `vedette.kernels.gaussian.components`, so that a
     column is added here and there.
     """
 
