@@ -14,7 +14,7 @@ from vedette.densities.tracks import places_of
 from vedette.divergence import power_integrals, reference_unit_volume
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import provides, reject
+from vedette.models.arguments import reject
 from vedette.models.functions import ModelFunction
 
 Exponents: TypeAlias = Sequence[tuple[float, float]]
@@ -120,7 +120,7 @@ def check_unit_volume(value: Any) -> None:
 
 def unit_volume_of(reward: Any, predicted: GLMB | LMB) -> float:
     """K of a reward; "reference" is 1 for a prediction that expects no target, where K has no say."""
-    value = reward.unit_volume if provides(reward, WithUnitVolume) else 1.0
+    value = getattr(reward, "unit_volume", 1.0)
     check_unit_volume(value)
     if value != "reference":
         return float(value)
