@@ -31,7 +31,7 @@ def run_chunks(work: Callable[[int, int], None], num_items: int, num_threads: in
     more than one where they are known to be quick.
     """
     num_workers = max(1, min(num_threads, num_items))
-    if num_workers == 1 and num_items <= first_piece:
+    if num_workers == 1 and 0 < num_items <= first_piece:
         work(0, num_items)
         return
     pieces = _Pieces(work, num_items, num_workers, first_piece)

@@ -59,7 +59,8 @@ def reward_figure(plan: Plan, *, pair: tuple[int, int] | None = None, scene: Sce
         raise InputError("plan: expected a sensor with a choice; got one action each")
     joint = [table for table in plan.tables if len(table.sensors) > 1]
     pair = pair or first_pair(plan.tables, plan.actions)
-    along = {sensor: action_axis(plan.actions[sensor]) for sensor in {*drawn, *(pair or ())}}
+    known = {*drawn, *(pair or ())} & {*range(len(plan.actions))}
+    along = {sensor: action_axis(plan.actions[sensor]) for sensor in known}
     groups = alike(along, drawn)
     if pair is None:
         joint = []
