@@ -81,11 +81,19 @@ def test_every_file_on_the_way_is_in_the_lists(walks: dict[str, Counter[str]]) -
 
 @pytest.mark.parametrize(
     ("begins", "ends", "most"),
-    [("A scan of `paper-a`", "Inside the compiled", 15), ("When a decision by the expected loss", "Other decisions", 25)],
+    [
+        ("A scan of `paper-a`", "Inside the compiled", 15),
+        ("When a decision by the expected loss", "Other decisions", 25),
+    ],
 )
 def test_the_list_is_short(begins: str, ends: str, most: int) -> None:
     steps = WALKS.split(begins)[1].split(ends)[0]
-    files = set(re.findall(r"`((?:\w+/)*\w+)(?:\.py)?`", steps)) - {"control", "kernels", "platform", "kernels/planning"}
+    files = set(re.findall(r"`((?:\w+/)*\w+)(?:\.py)?`", steps)) - {
+        "control",
+        "kernels",
+        "platform",
+        "kernels/planning",
+    }
     assert most - 10 < len(files) <= most, sorted(files)
 
 

@@ -11,7 +11,7 @@ import pytest
 from vedette.densities import GLMB, LMB, TrackTable
 from vedette.densities.containers import unchecked
 from vedette.errors import InputError
-from vedette.kernels.planning.validity import is_valid_glmb, is_valid_lmb
+from vedette.kernels.labelled.validity import is_valid_glmb, is_valid_lmb
 
 LABELS = np.array([[1, 0], [1, 2], [3, 0]])
 pytestmark = pytest.mark.lanes

@@ -17,8 +17,8 @@ from vedette.errors import InputError
 from vedette.filters import shared_targets
 from vedette.fusion import Fusion
 from vedette.kernels.base.types import Floats
+from vedette.kernels.labelled.validity import is_valid_glmb, is_valid_lmb
 from vedette.kernels.planning.ascent import Allowed
-from vedette.kernels.planning.validity import is_valid_glmb, is_valid_lmb
 from vedette.models import TargetModel
 from vedette.models.arguments import float_array, instance, reject, sequence, tell_degrees
 from vedette.platforms import Options, options_at

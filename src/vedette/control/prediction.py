@@ -16,7 +16,7 @@ from vedette.models import MotionModel, constant_survival, kernel_motion
 
 _Labelled = TypeVar("_Labelled", bound=Labelled)
 
-# Over the horizon nobody dies. One model for all decisions, by which what kernels take of a motion is found again.
+# No deaths over the horizon. All decisions share this model, so that the cached kernel input of a motion is found.
 ALWAYS_SURVIVES = constant_survival(1.0)
 
 
@@ -30,7 +30,7 @@ class Prediction(NamedTuple):
 
     @classmethod
     def of(cls, fused: LMB, motion: MotionModel, num_steps: int, period: float) -> Prediction:
-        """Carry it so many steps of `period` s; within `model_errors`."""
+        """Predict over `num_steps` steps of `period` seconds. Call it within `model_errors`."""
         tracks, logits = single_gaussians(fused.tracks).to_kernel(), fused.existence_logit
         own = kernel_motion(motion, ALWAYS_SURVIVES)
         paths = predict_paths(own, float(period), int(num_steps), tracks.components.means, tracks.components.covs)

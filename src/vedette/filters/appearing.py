@@ -22,15 +22,15 @@ from vedette.densities.containers import for_kernel
 from vedette.densities.label_sets import are_among
 from vedette.kernels.base.types import Floats, Ints, Mixture
 from vedette.kernels.steps.lmb import Reduction
-from vedette.kernels.steps.undetected import Arrivals, Cells, Left, survival_probabilities
-from vedette.models import BirthModel, SurvivalModel, TargetModel, UndetectedModel, kernel_motion
+from vedette.kernels.steps.undetected import Arrivals, Cells, Left
+from vedette.models import BirthModel, SurvivalModel, TargetModel, UndetectedModel
 from vedette.models.arguments import reject
 
 # Shape of the gamma prior of a learnt birth rate: half a target has been seen.
 _SHAPE = 0.5
 # Nodes along each side of a cell by which P_D is averaged: of 16 x 16 cells, and of cells that a user has chosen.
 _NODES, _NODES_OF_CHOSEN = 2, 3
-_STAY, _NOBODY = np.ones(1), np.zeros(2)
+_STAY, _NO_BIRTHS = np.ones(1), np.zeros(2)
 
 
 class Appearing(NamedTuple):
@@ -58,13 +58,13 @@ def appearing(birth: BirthModel) -> Appearing | None:
 
 @lru_cache(maxsize=100)
 def no_cells(state_dim: int) -> Cells:
-    """Those of no region."""
+    """Return an empty grid of cells, for births without a region."""
     none = np.empty((0, state_dim))
     return Cells(1, np.zeros(2), np.ones(2), none, none[:, np.newaxis], np.empty(0), np.empty(0))
 
 
 def tables_of(undetected: UndetectedTargets) -> Floats:
-    """(num_tables, num_cells) expected numbers in the cells; of a learnt birth rate those per unit of it, too."""
+    """Expected numbers in the cells, shape (num_tables, num_cells); a learnt birth rate adds a table per unit rate."""
     if undetected.cells is None:
         return np.empty((0, 0))
     expected, learnt = for_kernel(undetected.cells.expected), undetected.birth_rate
@@ -72,9 +72,9 @@ def tables_of(undetected: UndetectedTargets) -> Floats:
 
 
 def with_cells(before: UndetectedTargets, birth: BirthModel, dt: float, *, appear: bool) -> UndetectedTargets:
-    """With those that appear anywhere: at the first prediction who is there at first, or was born since the start.
+    """Return the undetected targets with cells, which the first prediction adds: initial numbers, or births since.
 
-    appear: whether targets have been born since; else nobody has. Raises `InputError` for a belief of other cells.
+    appear: whether the region has births in this period. Raises `InputError` for a belief with other cells.
     """
     places, cells = appearing(birth), before.cells
     if cells is not None:
@@ -90,7 +90,7 @@ def with_cells(before: UndetectedTargets, birth: BirthModel, dt: float, *, appea
 
 
 def _on_grid(before: UndetectedTargets, cells: UndetectedIntensity, places: Appearing | None) -> UndetectedTargets:
-    """The same, with the very grid of the model."""
+    """Return the same targets on the grid object of the model."""
     if places is None or cells.grid != places.model.grid:
         expected = "none" if places is None else f"those of the filter's births, {places.model.grid}"
         raise reject("belief.undetected.cells", expected, cells.grid)
@@ -114,30 +114,27 @@ def _rate_of(before: UndetectedTargets, birth: BirthModel, places: Appearing, dt
 def arrivals_of(
     before: UndetectedTargets, targets: TargetModel, born: Mixture, dt: float, most: int, *, appear: bool
 ) -> Arrivals:
-    """What changes the undetected targets within `dt` seconds, as kernels take it.
+    """Return the kernel input for the prediction of undetected targets over `dt` seconds.
 
-    born: intensity of those that have appeared at sites; most: components of the intensity; appear: whether targets
-    have appeared anywhere since. Targets in cells that a first prediction has made are not moved: see `with_cells`.
+    born: intensity of births at sites; most: largest number of components; appear: whether the region has births in
+    this period. Cells that the first prediction adds do not change (`with_cells`).
     """
     birth, places = targets.birth, appearing(targets.birth)
     if places is None or before.cells is None:
-        return Arrivals(born, most, 1.0, _STAY, _STAY, _NOBODY)
+        return without_change(born, most)
     model = places.model
     rates = [_rate_of(before, birth, places, dt)] + [1.0] * (before.birth_rate is not None)
     survival = -1.0 if model.survival is None else float(model.survival**dt)
     return Arrivals(born, most, survival, *model.shares(dt), np.array(rates) * appear * dt)
 
 
-def survival_in_cells(model: UndetectedModel, targets: TargetModel, dt: float) -> Floats | float:
-    """Probability of living through `dt` seconds, in each cell (num_cells,) or everywhere."""
-    if model.survival is not None:
-        return float(model.survival**dt)
-    motion = kernel_motion(targets.motion, targets.survival)
-    return survival_probabilities(motion, dt, model.grid.states(targets.state_dim, 1)[:, 0].copy())
+def without_change(born: Mixture, most: int) -> Arrivals:
+    """Return the kernel input for a period in which the numbers in the cells stay. Arguments: see `arrivals_of`."""
+    return Arrivals(born, most, 1.0, _STAY, _STAY, _NO_BIRTHS)
 
 
 def rate_after(learnt: LearntRate, left: Left, label: tuple[int, int]) -> LearntRate:
-    """What is known of a learnt birth rate after a scan. left: of the tables; label: of the first measurement."""
+    """Return the learnt birth rate after a scan. left: from its kernel; label: of its first measurement."""
     num = len(left.born_shares)
     labels = np.column_stack([np.full(num, label[0]), label[1] + np.arange(num)])
     return replace(

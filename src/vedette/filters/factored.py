@@ -126,7 +126,7 @@ class _OfFactors(OfKind[FactoredGLMB]):
         factoring = _factoring(self.max_split_error, self.max_factor_labels, step.num_scans, max_merging)
         before, undetected = no_undetected(self.targets.state_dim), prior.undetected
         if undetected is not None:
-            before = before_scan(undetected, prior.error, birth, step.sensor, scan.measurements, scan.pose)
+            before = before_scan(undetected, birth, step.sensor, scan.measurements, scan.pose)
             reduction = with_faint_candidates(reduction, undetected, birth)
         density, missed, left, report = step_factored(
             prior.density, before, prior.arrivals, *step.inputs, reduction, factoring

@@ -11,7 +11,7 @@ import numpy as np
 from vedette.densities import LMB, FactoredGLMB, Poisson, UndetectedIntensity, UndetectedTargets, as_lmb
 from vedette.densities.containers import unchecked
 from vedette.densities.label_sets import without_labels
-from vedette.filters.appearing import appearing, no_cells, rate_after, tables_of
+from vedette.filters.appearing import appearing, no_cells, rate_after, tables_of, without_change
 from vedette.filters.inputs import births_of, births_within
 from vedette.filters.limits import Limits
 from vedette.kernels.base.types import Floats, Lmb, Mixture
@@ -29,15 +29,15 @@ _COMPONENTS_A_SITE = 3
 
 @cache
 def no_undetected(state_dim: int) -> Undetected:
-    """No undetected targets, as kernels take them."""
+    """Return the kernel input for an empty intensity of undetected targets."""
     none, cells = no_births(state_dim).undetected, no_cells(state_dim)
-    return Undetected(none, np.empty((0, 0)), cells, np.empty((0, 2)), np.zeros(state_dim), 0, 0, 0.0, 0.0)
+    return Undetected(none, np.empty((0, 0)), cells, np.empty((0, 2)), np.zeros(state_dim), 0, 0, 0.0)
 
 
 @cache
 def no_arrivals(state_dim: int) -> Arrivals:
-    """Nobody appears, as kernels take it."""
-    return Arrivals(no_births(state_dim).undetected, 1, 1.0, np.ones(1), np.ones(1), np.zeros(2))
+    """Return the kernel input for a period without births."""
+    return without_change(no_births(state_dim).undetected, 1)
 
 
 def most_components(limits: Limits, birth: BirthModel) -> int:
@@ -97,25 +97,26 @@ def named_at(undetected: UndetectedTargets, step: Any, num_sites: int) -> Undete
 
 
 def before_scan(
-    undetected: UndetectedTargets, error: float, birth: BirthModel, sensor: SensorModel, scan: Floats, pose: Floats
+    undetected: UndetectedTargets, birth: BirthModel, sensor: SensorModel, scan: Floats, pose: Floats
 ) -> Undetected:
-    """The undetected targets and a scan's places, in the form that `step_factored` needs. error: see `SplitBirths`."""
-    intensity, label = undetected.intensity.to_kernel(), undetected.next_label
-    found, measured, learnt = appearing(birth), birth.from_measurements, undetected.birth_rate
-    none = no_undetected(birth.state_dim)
+    """Return the undetected targets and the places of the measurements in the form that `step_factored` needs."""
+    (step, index), found, measured = undetected.next_label, appearing(birth), birth.from_measurements
+    intensity, none = undetected.intensity.to_kernel(), no_undetected(birth.state_dim)
+    before = none._replace(intensity=intensity, step=step, first_index=index)
     if found is None or undetected.cells is None:
-        return Undetected(intensity, none.tables, none.cells, none.places, none.std, *label, error, 0.0)
-    rate, tables = 0.0 if learnt is None else learnt.rate, tables_of(undetected)
+        return before
+    learnt = undetected.birth_rate
+    rate = 0.0 if learnt is None else learnt.rate
+    before = before._replace(tables=tables_of(undetected), cells=found.cells, birth_rate=rate)
     if measured is None or not len(scan):
-        return Undetected(intensity, tables, found.cells, none.places, none.std, *label, error, rate)
-    places = sensor.measurement.positions(scan, pose)
-    return Undetected(intensity, tables, found.cells, places, measured.std, *label, error, rate)
+        return before
+    return before._replace(places=sensor.measurement.positions(scan, pose), std=measured.std)
 
 
 def after_scan(before: UndetectedTargets, missed: Mixture, left: Left, num_measurements: int) -> UndetectedTargets:
-    """The undetected targets after a scan.
+    """Return the undetected targets after a scan.
 
-    missed, left: intensity and cells, as the scan's kernel has left them.
+    missed, left: intensity of the undetected targets and expected numbers in the cells, from the scan's kernel.
     """
     label, cells, learnt = before.next_label, before.cells, before.birth_rate
     if cells is not None:

@@ -17,7 +17,7 @@ from vedette.densities.labelled import LABELLED
 from vedette.densities.tracks import take_tracks
 from vedette.errors import InputError
 from vedette.filters import Limits
-from vedette.filters.inputs import births_at, births_within, blame_model, model_errors, nobody
+from vedette.filters.inputs import births_at, births_within, model_errors, nobody
 from vedette.fusion.matching import OWN_LABELS
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.types import Floats, Ints, Lmb, ScanInput
@@ -64,7 +64,7 @@ def births_of_tracker(birth: BirthModel, local: Any) -> BirthModel:
 
 @lru_cache(maxsize=100)
 def _at_sites(birth: BirthModel) -> BirthModel:
-    """Those of the sites alone; made once a model, as what filters lay out of it is kept."""
+    """Return the births at sites; the same object for each model, since filters cache what they derive from it."""
     return replace(birth, from_measurements=None)
 
 
@@ -179,17 +179,13 @@ def _unexplained(belief: Lmb, sensor: SensorModel, scan: Any, pose: Any, number:
 
 
 def _born_of_one(belief: Labelled, sensor: SensorModel, scan: Any, pose: Any, begin: BirthsOfMeasurements) -> LMB:
-    """Who may be born where one sensor alone has scanned."""
+    """Return the birth candidates from the scan of a single sensor."""
     lmb = _as_kernel(belief)
     given = _look(lmb, sensor, scan, pose)
     places = sensor.measurement.positions(given.measurements, given.pose)
     models = sensor.to_kernel(), _truncation(sensor.meas_dim)
-    try:
-        born = births_unexplained(lmb, given, places, *models, LEAST_UNEXPLAINED, begin)
-    except Exception as error:
-        blame_model(error)
-        raise
-    return LMB.from_kernel(born)
+    with model_errors():
+        return LMB.from_kernel(births_unexplained(lmb, given, places, *models, LEAST_UNEXPLAINED, begin))
 
 
 @cache

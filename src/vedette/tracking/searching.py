@@ -10,10 +10,9 @@ import numpy as np
 
 from vedette.densities import UndetectedIntensity
 from vedette.errors import InputError
-from vedette.filters.appearing import survival_in_cells
 from vedette.kernels.base.types import Floats
-from vedette.kernels.steps.undetected import take_out_detected
-from vedette.models import SensorModel, UndetectedModel
+from vedette.kernels.steps.undetected import survival_probabilities, take_out_detected
+from vedette.models import SensorModel, UndetectedModel, kernel_motion
 from vedette.models.arguments import float_array, reject
 from vedette.tracking.base import AroundTracker, Stages, State, TrackerInfo
 from vedette.tracking.births import unexplained
@@ -40,6 +39,7 @@ class Searching(AroundTracker):
     """
 
     model: UndetectedModel
+    _middles: Floats = field(init=False, repr=False)  # (num_cells, state_dim)
     _nodes: Floats = field(init=False, repr=False)  # (num_cells, num_nodes, state_dim)
     _node_weights: Floats = field(init=False, repr=False)
 
@@ -50,6 +50,7 @@ class Searching(AroundTracker):
         if self.model.is_learnt:
             wanted = "a number, as it is the beliefs of filters with an intensity of undetected targets that learn it"
             raise reject("UndetectedModel.birth_rate", wanted, self.model.birth_rate)
+        object.__setattr__(self, "_middles", self.model.grid.states(self.targets.state_dim, 1)[:, 0].copy())
         object.__setattr__(self, "_nodes", self.model.grid.states(self.targets.state_dim))
         object.__setattr__(self, "_node_weights", self.model.grid.node_weights())
 
@@ -91,7 +92,14 @@ class Searching(AroundTracker):
         dt = float(time) - state.time
         if dt == 0.0:
             return before.expected
-        return self.model.predict(before.expected, dt, survival_in_cells(self.model, self.targets, dt))
+        return self.model.predict(before.expected, dt, self._survival(dt))
+
+    def _survival(self, dt: float) -> Floats | float:
+        """Probability of surviving `dt` seconds: in each cell, shape (num_cells,), or one number for all cells."""
+        if self.model.survival is not None:
+            return float(self.model.survival**dt)
+        motion = kernel_motion(self.targets.motion, self.targets.survival)
+        return survival_probabilities(motion, dt, self._middles)
 
     def _lost(
         self, before: State, after: State, looks: Sequence[tuple[SensorModel, Floats]], time: float

@@ -91,10 +91,12 @@ class Start(NamedTuple):
 
 
 def starts_of(task: Task, missing_existence: float, *, rng: np.random.Generator) -> Start:
-    """What the changes of the sensors' scans are added to. missing_existence: of a label that a sensor lacks."""
+    """Return the table's rows without any scan. missing_existence: existence of a label that a sensor lacks."""
     settings, given = task.settings, task.prediction.end.to_kernel()
-    drawn = Samples.draw(task.state.fused, task.sensors, settings, rng=rng) if task.sampled else None
-    samples = drawn or Samples.none(task.state.fused, settings)
+    if task.sampled:
+        samples = Samples.draw(task.state.fused, task.sensors, settings, rng=rng)
+    else:
+        samples = Samples.none(task.state.fused, settings)
     references = given.tracks.components.means
     prior = rows_without_scans(references, given.tracks.components.covs, given.existence_logit, references)
     shared = IDEAL_MODES[settings.ideal_measurements] == IDEAL or not task.sampled
@@ -121,7 +123,7 @@ def _alike(task: Task, *, shared: bool) -> list[tuple[int, ...]]:
 
 @lru_cache(maxsize=1000)
 def _model_key(model: SensorModel) -> tuple[object, ...]:
-    """All that a model says, the same of equal ones; made once."""
+    """Return a key that is equal for sensors with equal models (cached)."""
     return tuple(part.tobytes() if isinstance(part, np.ndarray) else part for part in model.to_kernel())
 
 
@@ -133,7 +135,7 @@ def _group(
     prior: Floats,
     rng: np.random.Generator,
 ) -> SensorGroup:
-    """scans: as of `scans_within`. prior: rows of the prediction."""
+    """Return the group of these sensors. scans: from `scans_within`. prior: rows of the prediction."""
     sensor, settings = task.sensors[members[0]], task.settings
     futures = samples.futures(sensor.filter.sensor.meas_dim, settings, rng=rng)
     courses = np.concatenate([task.options[s].courses for s in members])
@@ -149,9 +151,9 @@ def _group(
 def _without_scans(
     prediction: Prediction, belief: LMB, decision: Decision, prior: Floats
 ) -> tuple[Ints, Lmb, Paths, Floats]:
-    """Labels of a belief that exist and that the prediction has, as places there; what they are and become, and rows.
+    """Labels shared with the prediction (as places there), their tracks now, their paths, and their rows without scans.
 
-    Those of the fused belief are the prediction's own.
+    For the fused belief these are the prediction's own.
     """
     exists = belief.existence_logit > -np.inf
     if belief is prediction.fused and exists.all():

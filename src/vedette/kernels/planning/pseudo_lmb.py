@@ -26,7 +26,7 @@ from vedette.kernels.gaussian.components import copy_gaussian, make_components
 from vedette.kernels.gaussian.relinearisation import PairWork, make_pair_work
 from vedette.kernels.planning.ideal import Decision, ideal_scan, most_targets
 from vedette.kernels.steps.lmb import fill_existence, weigh_by_existence
-from vedette.kernels.steps.matching import Mixture, make_mixture, match_rows
+from vedette.kernels.steps.matching import MixtureRoom, make_mixture, match_rows
 
 
 class LmbResults(NamedTuple):
@@ -51,7 +51,7 @@ class LmbWork(NamedTuple):
     clusters: MarginalWork
     belief: Lmb  # after the latest step, one Gaussian a label
     all_rows: Ints  # 0, 1, 2, ...: all of them are kept
-    mixture: Mixture  # of one row
+    mixture: MixtureRoom  # of one row
 
 
 @kernel

@@ -19,7 +19,7 @@ UPDATED = 1
 RELINEARISED = 2
 
 
-class Mixture(NamedTuple):
+class MixtureRoom(NamedTuple):
     """Room for the components of one row's mixture, an entry for each option and component."""
 
     weights: Floats  # (num_entries,) linear, relative to the likeliest option
@@ -28,13 +28,13 @@ class Mixture(NamedTuple):
 
 
 @kernel
-def make_mixture(num_entries: int, state_dim: int) -> Mixture:
+def make_mixture(num_entries: int, state_dim: int) -> MixtureRoom:
     """Room for so many components."""
-    return Mixture(np.empty(num_entries), np.empty((num_entries, state_dim)), np.empty(num_entries, np.int64))
+    return MixtureRoom(np.empty(num_entries), np.empty((num_entries, state_dim)), np.empty(num_entries, np.int64))
 
 
 @inlined
-def _gather(row: int, rows: Rows, options: Options, marginals: Floats, out: Mixture) -> int:
+def _gather(row: int, rows: Rows, options: Options, marginals: Floats, out: MixtureRoom) -> int:
     """Write weights and updated means of the components that can be there; returns their number."""
     first, last, count, peak = rows.offsets[row], rows.offsets[row + 1], 0, -math.inf
     for option in range(options.offsets[row], options.offsets[row + 1]):
@@ -68,7 +68,7 @@ def _gather(row: int, rows: Rows, options: Options, marginals: Floats, out: Mixt
 
 
 @inlined
-def _gather_predicted(row: int, rows: Rows, out: Mixture) -> int:
+def _gather_predicted(row: int, rows: Rows, out: MixtureRoom) -> int:
     """Write the components as they were predicted, all of one weight; returns their number."""
     first, last = rows.offsets[row], rows.offsets[row + 1]
     for c in range(first, last):
@@ -80,7 +80,7 @@ def _gather_predicted(row: int, rows: Rows, out: Mixture) -> int:
 
 @inlined
 def _moments(
-    count: int, rows: Rows, options: Options, mixture: Mixture, out_mean: Floats, out_cov: Floats, n: int
+    count: int, rows: Rows, options: Options, mixture: MixtureRoom, out_mean: Floats, out_cov: Floats, n: int
 ) -> None:
     """Mean and covariance of the first `count` components; their means are left as deviations from the mean."""
     weights, means, sources = mixture.weights, mixture.means, mixture.sources
@@ -118,7 +118,7 @@ def _moments(
 
 @borrowing
 def match_rows(
-    chosen: Ints, rows: Rows, options: Options, marginals: Floats, mixture: Mixture, means: Floats, covs: Floats
+    chosen: Ints, rows: Rows, options: Options, marginals: Floats, mixture: MixtureRoom, means: Floats, covs: Floats
 ) -> None:
     """Mean and covariance of the mixture of each chosen row, where it is there, over its options and components.
 

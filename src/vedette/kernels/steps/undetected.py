@@ -56,7 +56,6 @@ class Undetected(NamedTuple):
     std: Floats  # (state_dim,) of a target that appears in a cell, about its place and at rest
     step: int  # of the labels
     first_index: int  # of the label of the scan's first measurement
-    error: float  # L1 error of taking births at sites as Poisson
     birth_rate: float  # 1/s, where it is learnt and the second table is of it
 
 
@@ -158,7 +157,6 @@ def predicted_undetected(before: Undetected, motion: Motion, dt: float, arrivals
         before.std,
         before.step,
         before.first_index,
-        before.error,
         before.birth_rate,
     )
 

@@ -1,6 +1,7 @@
-"""Whether a labelled density is one, in one call: a quick yes. What is wrong where it is no, its own checks tell.
+"""Fast validation of labelled densities.
 
-Tolerances are narrower than those of `vedette.densities.checks`: what passes here passes there, too.
+A density that passes here also passes `validate`, since the tolerances are narrower than those of
+`vedette.densities.checks`. One that fails must be given to `validate`, which reports the fault or accepts it.
 """
 
 from __future__ import annotations
