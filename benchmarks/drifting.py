@@ -30,7 +30,7 @@ from vedette.evaluation import ospa
 from vedette.kernels.base.types import Floats
 from vedette.models import Bias
 from vedette.recorded.instants import Look, without_bias
-from vedette.scenarios.build import build_experiment
+from vedette.scenarios.build import build_poses, build_tracking
 from vedette.scenarios.calibrated import problem_of
 from vedette.scenarios.of_recording import scenario_of_recording
 from vedette.tracking import LateScans, SensorScan
@@ -71,11 +71,11 @@ def redraw(folder: Path, scene: Scene, seconds: float, seed: int, first: float, 
     ships = write_scans(folder, scene, seconds, seed, drifts=DRIFTS)
     told = scenario_of_recording(folder / "told.yaml", folder / "scans.csv", speed=scene.speed).scenario
     true = scenario_of_recording(folder / "true.yaml", folder / "scans.csv", speed=scene.speed).scenario
-    problem, experiment = problem_of(told), build_experiment(true)
+    problem, tracking = problem_of(told), build_tracking(true)
     at_first = calibrate(replace(problem, recording=problem.recording.between(0.0, first)))
     problem = starting_from(problem, at_first)
     once = problem.with_biases(np.array([each.start for each in problem.parameters]))
-    late = LateScans(experiment.tracker, experiment.poses, window=5.0)
+    late = LateScans(tracking.tracker, build_poses(true), window=5.0)
     follower, spent = BiasFollower(problem, window, every), 0.0
     state = follower.initial()
     timelines, rows, scores = [late.initial()] * len(WAYS), list[tuple[float, ...]](), list[list[float]]()
@@ -98,7 +98,7 @@ def redraw(folder: Path, scene: Scene, seconds: float, seed: int, first: float, 
             timelines[w], _ = late.take(timelines[w], [without(scan, problem, bias)])
             belief = timelines[w].state
             assert belief.time is not None
-            found = experiment.estimate(belief.fused, belief.step).means[:, :2]
+            found = tracking.estimate(belief.fused, belief.step).means[:, :2]
             there = np.array([x + v * (belief.time + problem.recording.start) for x, v in ships])
             scores[-1].append(float(ospa(found, there, cutoff=scene.cutoff, order=1.0).total))
     table = np.array(rows)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from vedette.evaluation import run_scenario
+from vedette.evaluation import track_recording
 from vedette.scenarios.of_recording import OfRecording, scenario_of_recording
 from vedette.simulation import RunRecord
 
@@ -19,7 +19,7 @@ FILES = Path(__file__).parent / "recording"
 
 def main() -> tuple[OfRecording, RunRecord]:
     found = scenario_of_recording(FILES / "radars.yaml", FILES / "scans.csv", FILES / "truth.csv")
-    record = run_scenario(found.scenario, "still", seed=0)
+    record = track_recording(found.scenario, found.recording)
     for section, text in found.assumed.items():
         print(f"assumed {section}: {text}")
     print(f"{found.recording.num_measurements} measurements in {record.num_scans} scans,", end=" ")
@@ -31,7 +31,7 @@ def draw(result: tuple[OfRecording, RunRecord]):
     from vedette.evaluation.figures import scene_of, tracks_figure
 
     found, record = result
-    return tracks_figure(record, titles=["Recorded scans"], scene=scene_of(found.scenario, "still"))
+    return tracks_figure(record, titles=["Recorded scans"], scene=scene_of(found.scenario, record.planner))
 
 
 if __name__ == "__main__":

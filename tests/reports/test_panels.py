@@ -215,5 +215,5 @@ def test_a_video_has_its_clock_and_its_names(tmp_path: Path) -> None:
     drawing.show(7)
     (axes,) = drawing.figure.axes[:1]
     utc = utc_text(recording.start + recording.times[7])
-    assert axes.get_title() == f"Recorded scans, run 0: {utc[:10]} {utc[11:21]} UTC"
+    assert axes.get_title() == f"Recorded scans, scans.csv: {utc[:10]} {utc[11:21]} UTC"
     assert {"ship 0", "ship 1", "ship 2"} <= {each.get_text() for each in axes.texts}

@@ -61,7 +61,7 @@ def test_errors_are_told_where_targets_are_known(tmp_path: Path) -> None:
     words = words_of(record, scenario, tmp_path)
     for part in (
         "Run report",
-        "Recorded scans, seed 0, run 0",
+        "Recorded scans, scans.csv: ",
         "OSPA against time",
         "GOSPA (m)",
         "those of the recording",

@@ -15,7 +15,7 @@ from vedette.cli.compiling import compiling
 from vedette.cli.errors import check_ending
 from vedette.cli.options import BadRows, Overwrite, SensorsFile, Speed, Trust
 from vedette.cli.output import console, publish, say
-from vedette.cli.running import compile_if_cold, interruptible
+from vedette.cli.running import interruptible
 from vedette.cli.tracking import read_recording
 from vedette.errors import InputError
 
@@ -59,7 +59,6 @@ def calibrate(
     read, cautions = read_recording(sensors, scans, None, speed=speed, bad_rows=bad_rows, trust=trust)
     scenario, recording, assumed = read
     with interruptible("nothing was written"):
-        compile_if_cold(scenario)
         problem = problem_of(scenario, position=position)
         with compiling(), _counting() as watch:
             windows = list(calibrate_windows(problem, window or math.inf, watch))

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def run_document(record: RunRecord, scenario: Scenario | None) -> dict[str, Any]:
-    """Return the document of a run: decisions, mean OSPA over the scans that count, run times and diagnostics.
+    """Return the document of a run: scans, decisions, mean OSPA over the scans that count, run times, diagnostics.
 
     Without the scenario, OSPA has no unit and sensors have numbers.
     """
@@ -41,6 +41,7 @@ def run_document(record: RunRecord, scenario: Scenario | None) -> dict[str, Any]
         "planner": record.planner,
         "seed": record.seed,
         "run": record.run,
+        "recording": None if record.recording is None else record.recording._asdict(),
         "scans": record.num_scans,
         "stopped": record.stopped,
         "decisions": decisions,

@@ -34,12 +34,12 @@ def print_run(record: RunRecord, scenario: Scenario | None) -> None:
 
 
 def _title(record: RunRecord, scenario: Scenario | None) -> str:
-    """Scenario, planner with its description, seed, run and number of scans."""
+    """Scenario, planner with its description, seed, run and number of scans; of a recording scenario and scans."""
     from vedette.scenarios.sections.planners import strategy_words
 
     scans = counted(record.num_scans, "scan")
     words = strategy_words(scenario.model, record.planner) if scenario else ""
-    if scenario is not None and scenario.model.recording is not None:
+    if record.recording is not None or (scenario is not None and scenario.model.recording is not None):
         return f"{record.scenario}: {scans}"
     planner = f"planner {record.planner}{f' ({words})' if words else ''}"
     return f"{record.scenario}: {planner}, seed {record.seed}, run {record.run}, {scans}"

@@ -23,15 +23,15 @@ from vedette.text import counted
 
 if TYPE_CHECKING:
     from vedette.scenarios import Scenario
-    from vedette.simulation.loop import RunInterrupted, RunStopped
     from vedette.simulation.records import RunRecord
+    from vedette.simulation.runs import RunInterrupted, RunStopped
 
 
 def compile_if_cold(scenario: Scenario, planners: Sequence[str] = ("jdm",)) -> None:
-    """Compile the kernels of a scenario and its planners in two processes, if no kernel is compiled yet."""
+    """Compile the kernels of a simulation and its planners in two processes, if no kernel is compiled yet."""
     from vedette.kernels.base.places import is_cold
 
-    if is_cold():
+    if scenario.model.recording is None and is_cold():
         from vedette.evaluation.precompile import precompile
 
         with compiling():
@@ -110,7 +110,7 @@ def run(
     from vedette.evaluation.runs import run_scenario
     from vedette.scenarios import load_scenario
     from vedette.scenarios.dumping import dump_kept
-    from vedette.simulation.loop import RunInterrupted, RunStopped
+    from vedette.simulation.runs import RunInterrupted, RunStopped
     from vedette.simulation.storage import check_free, save_run
 
     loaded = load_scenario(scenario)

@@ -19,7 +19,6 @@ from vedette.cli.progress import bar
 from vedette.cli.run_summary import print_run
 from vedette.cli.running import (
     Approval,
-    compile_if_cold,
     end_stopped,
     interruptible,
     warn_of_recording,
@@ -29,6 +28,7 @@ from vedette.extras import without
 from vedette.text import counted
 
 if TYPE_CHECKING:
+    from vedette.recorded import RecordedScans
     from vedette.scenarios import Scenario
     from vedette.scenarios.of_recording import OfRecording
     from vedette.simulation.records import RunRecord
@@ -84,7 +84,7 @@ def track(
         raise usage_error(f"expected an origin in {sensors}, as {on_earth[0]} has degrees; got none", "--format")
     written: list[Path] = []
     with interruptible("nothing was written"):
-        record = _tracked(scenario, len(recording.times))
+        record = _tracked(scenario, recording)
         print_run(record, scenario)
         warned = warn_of_recording(record, scenario)
         sizes = counted(record.num_scans, "scan"), counted(recording.num_measurements, "measurement")
@@ -114,15 +114,14 @@ def _check_formats(formats: Sequence[str], out: Path | None) -> None:
         raise usage_error("expected with --out, which names the folder", "--format")
 
 
-def _tracked(scenario: Scenario, num_scans: int) -> RunRecord:
+def _tracked(scenario: Scenario, recording: RecordedScans) -> RunRecord:
     """Run the tracker over all scans; a run that stops ends the program."""
-    from vedette.evaluation.runs import run_scenario
-    from vedette.simulation.loop import RunInterrupted, RunStopped
+    from vedette.evaluation.runs import track_recording
+    from vedette.simulation.runs import RunInterrupted, RunStopped
 
-    compile_if_cold(scenario)
     try:
-        with compiling(), bar("scans", num_scans) as watch:
-            return run_scenario(scenario, "still", seed=0, watch=watch)
+        with compiling(), bar("scans", len(recording.times)) as watch:
+            return track_recording(scenario, recording, watch=watch)
     except (RunStopped, RunInterrupted) as error:
         end_stopped(error, "nothing was written")
 

@@ -34,7 +34,7 @@ from vedette.evaluation.metrics import (
     seen_targets,
 )
 from vedette.evaluation.rewards import MeanRewards, mean_rewards
-from vedette.evaluation.runs import measure_run, own_metrics, run_scenario
+from vedette.evaluation.runs import measure_run, own_metrics, run_scenario, track_recording
 from vedette.evaluation.statistics import PairedDifference, Summary, holm, paired_difference, summarise
 from vedette.evaluation.tables import decision_rows, strategy_csv, strategy_markdown, strategy_rows
 
@@ -83,4 +83,5 @@ __all__ = [
     "strategy_markdown",
     "strategy_rows",
     "summarise",
+    "track_recording",
 ]

@@ -11,8 +11,16 @@ import numpy as np
 from vedette.densities import Estimate
 from vedette.evaluation.metrics import Metric, RunMetrics, measure, ospa_of_run
 from vedette.kernels.base.types import Floats
+from vedette.recorded import RecordedScans
+from vedette.recorded.tracking import track
 from vedette.scenarios import Scenario, load_scenario
-from vedette.scenarios.build import build_experiment, build_planner, build_sensors, build_true_sensors
+from vedette.scenarios.build import (
+    build_experiment,
+    build_planner,
+    build_sensors,
+    build_tracking,
+    build_true_sensors,
+)
 from vedette.scenarios.sections.scoring import AnyMetric
 from vedette.simulation.journal import Score
 from vedette.simulation.loop import simulate
@@ -35,7 +43,7 @@ def run_scenario(
         scenario: as `vedette.scenarios.load_scenario` reads it, or the name or file that it is read by.
         planner: "jdm" (joint), "idm" (independent), "lookahead" (joint, over several decisions), "nearest", "assigned"
             or "centroid" (rules of thumb), "oracle" and "told" (which know the targets), "random", "fixed", "still",
-            or one of the scenario's own.
+            or one of the scenario's own; of no matter where the scans were recorded.
         seed, run: fix every random number; runs with equal seed and number are paired across strategies.
         num_threads: share a decision (0: one a processor) and change no result.
         watch: told the number of every scan that is done.
@@ -45,8 +53,33 @@ def run_scenario(
     """
     if not isinstance(scenario, Scenario):
         scenario = load_scenario(scenario)
+    if scenario.model.recording is not None:
+        return track_recording(scenario, seed=seed, run=run, watch=watch)
     decides = build_planner(scenario, planner, num_threads)
     return simulate(build_experiment(scenario), decides, seed=seed, run=run, score=score_of(scenario), watch=watch)
+
+
+def track_recording(
+    scenario: Scenario,
+    recording: RecordedScans | None = None,
+    *,
+    seed: int = 0,
+    run: int = 0,
+    watch: Callable[[int], None] | None = None,
+) -> RunRecord:
+    """Track the scans of a recording.
+
+    Args:
+        scenario: with a section `recording`, such as that of `vedette.scenarios.of_recording.scenario_of_recording`.
+        recording: its scans, where they are read already; None: they are read.
+        seed, run: fix the random numbers of filters that draw.
+        watch: told the number of every scan that is done.
+
+    Raises:
+        VedetteError: no recording, or the scenario's models or filters cannot do what is asked.
+    """
+    tracking, score = build_tracking(scenario, recording), score_of(scenario)
+    return track(tracking, score=score, seed=seed, run=run, watch=watch)
 
 
 def score_of(scenario: Scenario) -> Score:

@@ -23,8 +23,7 @@ from vedette.scenarios.build import build_experiment, build_parts, build_sensors
 from vedette.scenarios.sections.strategies import Strategy
 from vedette.simulation import Experiment, Moment, RunRecord, Truth, World
 from vedette.simulation.health import Health
-from vedette.simulation.journal import Journal
-from vedette.simulation.loop import SCENES, advance, run_stream, truth_of_run
+from vedette.simulation.loop import SCENES, advance, journal_of, run_stream, truth_of_run
 
 AnyScenario: TypeAlias = str | Path | Scenario
 Scenarios: TypeAlias = AnyScenario | Sequence[AnyScenario] | Callable[[np.random.Generator], AnyScenario]
@@ -111,7 +110,7 @@ class Episodes:
         experiment = self.built.experiment
         truth = truth_of_run(experiment, self._seed, number)
         self.world = World(experiment, seed=self._seed, run=number, truth=truth)
-        self._journal = Journal(experiment, "policy", self._seed, number, truth)
+        self._journal = journal_of(experiment, "policy", self._seed, number, truth)
         self.num_moved = 0
         self._advance()
 

@@ -15,6 +15,7 @@ from vedette.models import Bias
 from vedette.models.arguments import float_array
 from vedette.models.bias import LEAST_RANGE, NO_BIAS
 from vedette.platforms.compass import Compass, PlaneCompass, course_deg, wrapped
+from vedette.simulation.records import ScansFile
 from vedette.speaking import Speaking
 from vedette.text import counted
 from vedette.tracking import SensorScan
@@ -101,6 +102,7 @@ class RecordedScans(Speaking):
             has none.
         unused: columns that were not read.
         notes: what may mislead: slant ranges; of a sensor whose measurements were merged, how many and how wide.
+        file: that the rows came from.
     """
 
     times: Floats
@@ -112,6 +114,7 @@ class RecordedScans(Speaking):
     bearings: tuple[Bearings | None, ...]
     unused: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    file: ScansFile = field(default_factory=ScansFile)
 
     def _summary(self) -> str:
         sizes = f"{counted(len(self.times), 'instant')}, {counted(self.poses.shape[1], 'sensor')}"

@@ -34,6 +34,7 @@ class Reports:
         repeats: rows of the table, (kept, left out), where a target has a second report at one time: the first is kept.
         unused: columns of the table that were not read.
         notes: of the table, what may mislead.
+        sha256: of the table.
     """
 
     times: Floats
@@ -46,6 +47,7 @@ class Reports:
     repeats: tuple[tuple[int, int], ...] = ()
     unused: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    sha256: str = ""
 
 
 def parse_reports(
@@ -102,6 +104,7 @@ def parse_reports(
         repeats,
         unused,
         table.notes,
+        table.sha256,
     )
 
 

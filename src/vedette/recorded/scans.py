@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -41,6 +42,7 @@ from vedette.recorded.tables import (
     number,
     seconds,
 )
+from vedette.simulation.records import ScansFile
 from vedette.text import shown
 
 
@@ -69,7 +71,8 @@ def parse_scans(
     recording = _at_instants(found, rows, skipped + beyond)
     if any(site.bias != NO_BIAS for site in sites):
         recording = without_biases(recording, sites)
-    return replace(recording, unused=rows.unused, notes=table.notes)
+    file = ScansFile(Path(table.source).name, table.sha256)
+    return replace(recording, unused=rows.unused, notes=table.notes, file=file)
 
 
 @dataclass(frozen=True, slots=True)

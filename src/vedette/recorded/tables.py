@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import csv
 import hashlib
+import io
 import numbers
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from decimal import Decimal
 from pathlib import Path
@@ -39,6 +40,7 @@ class Table:
     """Columns as they came, the row number of each entry in its file, and a name for messages.
 
     bearings: from where the format counts them, "north" or "east"; None: it does not say. notes: what may mislead.
+    sha256: of the file, in hexadecimal digits; "" of columns in memory.
     """
 
     columns: Mapping[str, Sequence[Any]]
@@ -46,6 +48,7 @@ class Table:
     source: str
     bearings: Literal["east", "north"] | None = None
     notes: tuple[str, ...] = ()
+    sha256: str = ""
 
     def column(self, name: str) -> Sequence[Any]:
         """The cells of a column, or an error that says which there are."""
@@ -170,7 +173,7 @@ def seconds(time: Any) -> float:
     return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
 
 
-def read_table(path: str | Path, *, reports: bool = False) -> Table:
+def read_table(path: str | Path, *, reports: bool = False, sha256: str | None = None) -> Table:
     """A .csv file with a header line, or a .parquet file; or as `ais`, `asterix` and `bags` have it.
 
     These are AIS messages (.nmea, .ais), plots and tracks of radars (.ast, .asterix), and ROS 2 bags (.db3, .mcap).
@@ -178,10 +181,12 @@ def read_table(path: str | Path, *, reports: bool = False) -> Table:
     Args:
         path: of the file.
         reports: whether positions that targets report are asked for, of a file that may have scans, too.
+        sha256: that the file had when somebody kept it, in hexadecimal digits; None: nobody did.
 
     Raises:
         MissingPackageError: what reads it is not installed.
-        InputError: not there, another ending, not readable as what it says it is, rows not as long as the header.
+        InputError: not there, another ending, changed since `sha256` was kept, not readable as what it says it is, rows
+            not as long as the header.
     """
     file = Path(path)
     named = elided(printable(str(file)), 200)
@@ -194,42 +199,45 @@ def read_table(path: str | Path, *, reports: bool = False) -> Table:
         raise InputError(f"{named}: no such file; expected a table of records")
     if (size := file.stat().st_size) > _MOST_BYTES:
         raise InputError(f"{named}: expected a file of at most {_MOST_BYTES} bytes; got {size}")
-    if file.suffix.lower() in AIS_ENDINGS:
+    content, found = _content(file)
+    if sha256 not in (None, found):
+        wanted = f"the file of which sha256 was kept ({sha256[:12]}...)"
+        raise InputError(f"{file}: expected {wanted}; got another ({found[:12]}...), as it was changed since")
+    return replace(_parsed(file, content, reports), sha256=found)
+
+
+def _content(file: Path) -> tuple[bytes, str]:
+    """The bytes of a file, empty where a package reads them by its name, and their SHA-256 in hexadecimal digits."""
+    try:
+        with file.open("rb") as source:
+            if file.suffix.lower() in (".csv", ".parquet"):
+                content = source.read()
+                return content, hashlib.sha256(content).hexdigest()
+            return b"", hashlib.file_digest(source, "sha256").hexdigest()
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read: {_reason(error)}") from error
+
+
+def _parsed(file: Path, content: bytes, reports: bool) -> Table:
+    """The table of a file with an ending of `ENDINGS`."""
+    ending = file.suffix.lower()
+    if ending in AIS_ENDINGS:
         columns, rows, notes = read_ais(file)
         return Table(columns, rows, str(file), notes=notes)
-    if file.suffix.lower() in ASTERIX_ENDINGS:
+    if ending in ASTERIX_ENDINGS:
         columns, rows, notes = read_asterix(file, reports=reports)
         return Table(columns, rows, str(file), "north", notes)
-    if file.suffix.lower() in BAG_ENDINGS:
+    if ending in BAG_ENDINGS:
         return Table(*read_bag(file, reports=reports), str(file))
-    return _read_csv(file) if file.suffix.lower() == ".csv" else _read_parquet(file)
+    return _csv(file, content) if ending == ".csv" else _parquet(file, content)
 
 
-def check_unchanged(path: str | Path, sha256: str | None) -> None:
-    """That a file is the one of which somebody kept the SHA-256, in hexadecimal digits; None: nobody did.
-
-    Raises `InputError` where it is another; of one that is gone, whoever reads it says so.
-    """
-    if sha256 is None or not os.path.isfile(path):
-        return
-    if (found := sha256_of(path)) != sha256:
-        wanted = f"the file of which sha256 was kept ({sha256[:12]}...)"
-        raise InputError(f"{path}: expected {wanted}; got another ({found[:12]}...), as it was changed since")
-
-
-def sha256_of(path: str | Path) -> str:
-    """Of the bytes of a file, in hexadecimal digits. Raises `OSError` where it cannot be read."""
-    with Path(path).open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
-
-
-def _read_csv(file: Path) -> Table:
+def _csv(file: Path, content: bytes) -> Table:
     try:
-        with file.open(encoding="utf-8-sig", newline="") as lines:
-            reader = csv.reader(lines, strict=True)
-            header = header_of(reader, file)
-            rows = [(reader.line_num, cells) for cells in reader if cells]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        reader = csv.reader(io.TextIOWrapper(io.BytesIO(content), encoding="utf-8-sig", newline=""), strict=True)
+        header = header_of(reader, file)
+        rows = [(reader.line_num, cells) for cells in reader if cells]
+    except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{file}: cannot be read as CSV in UTF-8: {_reason(error)}") from error
     if len(set(header)) != len(header):
         raise InputError(f"{file}, row 1: expected each column name once; got {column_names(header)}")
@@ -250,12 +258,12 @@ def header_of(reader: Iterator[list[str]], file: Path) -> list[str]:
     return header
 
 
-def _read_parquet(file: Path) -> Table:
+def _parquet(file: Path, content: bytes) -> Table:
     need(f"{file}, which is a Parquet file,", "pyarrow")
     from pyarrow import ArrowException, parquet  # here, as most programs never need it
 
     try:
-        with parquet.ParquetFile(file) as source:
+        with parquet.ParquetFile(io.BytesIO(content)) as source:
             if source.metadata.num_rows > _MOST_REPORTS:
                 raise InputError(f"{file}: expected at most {_MOST_REPORTS} rows; got {source.metadata.num_rows}")
             table = source.read()

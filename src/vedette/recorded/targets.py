@@ -68,6 +68,7 @@ class RecordedTargets:
         usual_origin_deg: tuple[float, float] | None = None,
         time_origin: float | str | None = None,
         cleaning: Cleaning | None = None,
+        sha256: str | None = None,
     ) -> RecordedTargets:
         """Of a .csv or .parquet file with columns time, id and x, y or longitude, latitude (and vx, vy if it has them).
 
@@ -78,13 +79,13 @@ class RecordedTargets:
             usual_origin_deg: the same where `origin_deg` is None, and of no matter for x and y; None: the median of the
                 reports.
             time_origin, cleaning: see the class.
+            sha256: that the file has to have, in hexadecimal digits; None: any.
 
         Raises:
             InputError: names the file, row, column, what was expected and what came.
         """
-        reports = parse_reports(
-            read_table(path, reports=True), columns=columns, origin_deg=origin_deg, usual_origin_deg=usual_origin_deg
-        )
+        table = read_table(path, reports=True, sha256=sha256)
+        reports = parse_reports(table, columns=columns, origin_deg=origin_deg, usual_origin_deg=usual_origin_deg)
         return cls(reports, time_origin, cleaning or Cleaning())
 
     @classmethod

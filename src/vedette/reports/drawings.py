@@ -76,8 +76,8 @@ def group_drawings(group: Group) -> Iterator[Drawing]:
 def _tracks_drawings(group: Group) -> Iterator[Drawing]:
     for strategy, record in typical_records(group):
         typical = ", the typical one: its mean OSPA is the median" if group.comparison is not None else ""
-        caption = f"Run {record.run} of {strategy.name}{typical}."
-        figure = tracks_figure(record, titles=(f"{elided(strategy.name)}, run {record.run}",), scene=strategy.scene)
+        caption = f"{strategy.name}, {record.source}{typical}."
+        figure = tracks_figure(record, titles=(f"{elided(strategy.name)}, {record.source}",), scene=strategy.scene)
         yield Drawing(f"tracks-{strategy.cell.name}", f"Tracks, {strategy.name}", caption, figure)
 
 

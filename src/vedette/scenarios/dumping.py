@@ -40,12 +40,12 @@ def dump_scenario(model: ScenarioModel, *, folder: Path | None = None) -> str:
 
 def dump_kept(scenario: Scenario) -> str:
     """YAML text of a scenario that is kept beside its run: with the SHA-256 of its recordings, which may be changed."""
-    data = _anchored(scenario.model.model_dump(mode="json"), scenario.folder.resolve())
-    for section in (data["recording"], data["targets"]):
-        if section is not None and "sha256" in section:
-            from vedette.recorded.tables import sha256_of  # with it come the filters
-
-            section["sha256"] = sha256_of(section["path"])
+    model, folder = scenario.model, scenario.folder
+    data = _anchored(model.model_dump(mode="json"), folder.resolve())
+    if model.recording is not None:
+        data["recording"]["sha256"] = model.recording.build(model, folder).file.sha256
+    if isinstance(model.targets, RecordedTargets):
+        data["targets"]["sha256"] = model.targets.source(model, folder).reports.sha256
     return dump_data(data)
 
 

@@ -44,22 +44,23 @@ def recorded_findings(model: ScenarioModel, folder: FilePath) -> Iterator[Findin
     elif not os.path.isfile(file):  # a name can be too long, or hold what no name can: for pathlib, an error
         yield ("targets", "path"), "a file, relative to the scenario file", _absent(recorded.path)
     else:
-        if any(recorded.columns.findings()):
-            return
-        faults = list(_columns(recorded, file))
-        yield from faults
-        if not faults:
+        if not any(recorded.columns.findings()):
             yield from _content(recorded, model, folder)
 
 
 def _content(recorded: RecordedTargets, model: ScenarioModel, folder: FilePath) -> Iterator[Finding]:
-    """What is wrong with the rows, or with the scans or the region for them; where these are faulty, nothing."""
-    if not all(map(is_whole, (recorded, model.region, model.time))):
-        return
-    try:
-        recorded.source(model, folder).truth(model.time.build(), rng=np.random.default_rng(0))
-    except InputError as error:
-        yield ("targets", "path"), "a file of recorded targets that a run can use", str(error)
+    """What is wrong with the columns or rows, or with the scans or the region for them.
+
+    Where scans or region are faulty, the columns alone are looked at.
+    """
+    found = list[Finding]()
+    if all(map(is_whole, (recorded, model.region, model.time))):
+        try:
+            recorded.source(model, folder).truth(model.time.build(), rng=np.random.default_rng(0))
+            return
+        except InputError as error:
+            found = [(("targets", "path"), "a file of recorded targets that a run can use", str(error))]
+    yield from list(_columns(recorded, folder / recorded.path)) or found
 
 
 def _columns(recorded: RecordedTargets, file: FilePath) -> Iterator[Finding]:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 
@@ -17,20 +15,6 @@ from vedette.simulation.true_sensors import TrueSensor, scanning, true_sensors_o
 from vedette.simulation.truth import TargetSource
 from vedette.speaking import Speaking
 from vedette.tracking import Tracker
-
-
-class Recording(Protocol):
-    """Scans that are there already, instead of simulated ones: `vedette.recorded.RecordedScans`."""
-
-    @property
-    def scans(self) -> Sequence[Sequence[Floats | None]]:
-        """For each time one a sensor: (num, meas_dim) measurements; None where it did not scan."""
-        ...
-
-    @property
-    def poses(self) -> Floats:
-        """(num_scans, num_sensors, 3 or more) of the sensors at each time."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -53,7 +37,6 @@ class Experiment(Speaking):
         scans_at: (num_sensors, num_scans or more) whether each scans then; None: at every step.
         drop_out: of each sensor the probability that a scan does not take place; (): none.
         explain: whether decisions are kept with their explanations, see `vedette.control.Plan.explain`.
-        recording: scans that were recorded at `times`, from where; None: they are simulated.
 
     Raises:
         InputError: parts that do not fit together.
@@ -72,7 +55,6 @@ class Experiment(Speaking):
     scans_at: Bools | None = None
     drop_out: tuple[float, ...] = ()
     explain: bool = True
-    recording: Recording | None = None
     _scanning: tuple[TrueSensor, ...] = field(init=False, default=())
 
     def __post_init__(self) -> None:
@@ -98,8 +80,6 @@ class Experiment(Speaking):
             raise InputError(f"drop_out: expected {num} probabilities below 1, one a sensor; got {self.drop_out}")
         if self.scans_at is not None:
             self._check_scans_at(np.asarray(self.scans_at))
-        if self.recording is not None:
-            self._check_recording(self.recording)
 
     def _check_scans_at(self, table: Bools) -> None:
         wanted = f"booleans of shape ({self.num_sensors}, {len(self.times)} or more)"
@@ -107,14 +87,6 @@ class Experiment(Speaking):
             raise InputError(f"scans_at: expected {wanted}; got {table.dtype} of shape {table.shape}")
         if len(table) != self.num_sensors or table.shape[1] < len(self.times):
             raise InputError(f"scans_at: expected {wanted}; got shape {table.shape}")
-
-    def _check_recording(self, recording: Recording) -> None:
-        if self.decision_steps:
-            raise InputError("decision_steps: expected none, as where recorded sensors went is known; got some")
-        came = len(recording.scans), recording.poses.shape[:2]
-        if came != (len(self.times), (len(self.times), self.num_sensors)):
-            wanted = f"{len(self.times)} scans of {self.num_sensors} sensors"
-            raise InputError(f"recording: expected {wanted}; got {came[0]}, and poses of shape {recording.poses.shape}")
 
     @property
     def num_sensors(self) -> int:

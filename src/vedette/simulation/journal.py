@@ -12,9 +12,8 @@ from vedette.control import Plan
 from vedette.densities import Estimate, UndetectedIntensity
 from vedette.errors import VedetteError
 from vedette.kernels.base.types import Bools, Floats
-from vedette.simulation.experiment import Experiment
 from vedette.simulation.health import Health
-from vedette.simulation.records import Decision, RunRecord
+from vedette.simulation.records import Decision, RunRecord, ScansFile
 from vedette.simulation.truth import Truth
 from vedette.tracking import Stages, TrackerInfo, stage_of
 
@@ -27,21 +26,34 @@ STAGES = ("scans", "filter", "fusion", "estimate", "planning")
 class Journal:
     """The scans of a run that have an estimate; `step` is the scan at hand, counted from 1."""
 
-    def __init__(self, experiment: Experiment, planner: str, seed: int, run: int, truth: Truth) -> None:
-        self.experiment, self.planner, self.seed, self.run, self.truth = experiment, planner, seed, run, truth
+    def __init__(
+        self,
+        scenario: str,
+        planner: str,
+        seed: int,
+        run: int,
+        truth: Truth,
+        num_sensors: int,
+        *,
+        explain: bool = True,
+        recording: ScansFile | None = None,
+    ) -> None:
+        """Before the first scan; the arguments are those of the record, and whether explanations are kept."""
+        self.scenario, self.planner, self.seed, self.run = scenario, planner, seed, run
+        self.truth, self.recording, self._explain = truth, recording, explain
         self.step = 1
         self.estimates: list[Estimate] = []
         self._poses: list[Floats] = []
         self._off: list[Bools] = []
         self._decisions: list[Decision] = []
-        self.health = Health.unreported(len(experiment.times), experiment.num_sensors)
+        self.health = Health.unreported(truth.num_scans, num_sensors)
         self._clocks: list[Stages] = [Stages()]
         self._fusion: list[float] = []
 
     @property
     def time(self) -> float:
         """Of the scan at hand, s."""
-        return float(self.experiment.times[self.step - 1])
+        return float(self.truth.times[self.step - 1])
 
     def begin(self, step: int) -> Stages:
         """Turn to a scan; its stopwatch."""
@@ -66,10 +78,9 @@ class Journal:
         self.estimates.append(estimate)
 
     def decide(self, plan: Plan, undetected: UndetectedIntensity | None = None) -> None:
-        """Record the decision after the current scan, with its explanation if the experiment keeps explanations."""
-        explain = self.experiment.explain
-        kept = plan.settled(explained=explain)
-        found = undetected if explain and kept.explanation is not None else None
+        """Record the decision after the current scan, with its explanation if explanations are kept."""
+        kept = plan.settled(explained=self._explain)
+        found = undetected if self._explain and kept.explanation is not None else None
         self._decisions.append(Decision(self.step, self.time, self._poses[-1], kept, found))
 
     def stage(self, error: BaseException) -> str:
@@ -78,20 +89,21 @@ class Journal:
 
     def place(self, error: BaseException) -> str:
         """Which run, where in it."""
+        whose = f"{self.planner}, seed {self.seed}, run {self.run}" if self.recording is None else self.recording.name
         return (
-            f"{self.experiment.name}, {self.planner}, seed {self.seed}, run {self.run}: stopped at step "
-            f"{self.step} of {len(self.experiment.times)} ({self.time:g} s), in {self.stage(error)}"
+            f"{self.scenario}, {whose}: stopped at step {self.step} of {self.truth.num_scans} ({self.time:g} s), in "
+            f"{self.stage(error)}"
         )
 
     def record(self, ospa: Floats, stopped: str | None = None) -> RunRecord:
         """Of the scans that have an estimate."""
         num = len(self.estimates)
         return RunRecord(
-            scenario=self.experiment.name,
+            scenario=self.scenario,
             planner=self.planner,
             seed=self.seed,
             run=self.run,
-            times=self.experiment.times[:num],
+            times=self.truth.times[:num],
             truth=self.truth.first(num),
             poses=np.array(self._poses[:num]),
             off=np.array(self._off[:num]),
@@ -101,6 +113,7 @@ class Journal:
             health=self.health.first(num),
             timings=self._timings(num),
             stopped=stopped,
+            recording=self.recording,
         )
 
     def _timings(self, num_scans: int) -> dict[str, Floats]:

@@ -11,6 +11,7 @@ from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.reading import said
 from vedette.simulation.arrow import Columns, read_table, write_table
+from vedette.simulation.planned import PLANNED
 from vedette.simulation.records import Outline, RunRecord
 from vedette.simulation.tables import (
     LAYOUTS,
@@ -54,7 +55,7 @@ def decode_run(
 
     Raises `InputError`, naming `place` and the file, for files that are missing, damaged or do not fit together.
     """
-    tables, spent = _tables(files, place, timings)
+    tables, spent = _tables(facts, files, place, timings)
     with _fitting_together(place):
         record = record_of(facts, tables, spent)
         check_record(record)
@@ -68,13 +69,17 @@ def decode_outline(
 
     Tables of targets and tracks are not looked at.
     """
-    tables, spent = _tables(files, place, timings, OUTLINED)
+    tables, spent = _tables(facts, files, place, timings, OUTLINED)
     with _fitting_together(place):
         return outline_of(facts, tables, spent)
 
 
 def _tables(
-    files: Mapping[str, bytes], place: str, timings: bytes | None, wanted: Collection[str] = _FILES
+    facts: Mapping[str, Any],
+    files: Mapping[str, bytes],
+    place: str,
+    timings: bytes | None,
+    wanted: Collection[str] = _FILES,
 ) -> tuple[dict[str, Columns], dict[str, Floats]]:
     """The tables of the wanted files that there are, and the timings."""
     tables = {}
@@ -84,7 +89,7 @@ def _tables(
             continue
         if file in files:
             tables[name] = read_table(files[file], layout, f"{place}/{file}")
-        elif name in LAYOUTS:
+        elif name in LAYOUTS and not (name in PLANNED and facts.get("recording") is not None):
             raise InputError(f"{place}: expected a file {file}; got {shown(', '.join(files)) if files else 'none'}")
     return tables, {} if timings is None else decode_timings(timings, f"{place}/timings{ENDING}")
 

@@ -1,72 +1,25 @@
-"""The one loop: scans, a step of the tracker, an estimate, and at decision times a plan (paper, Algorithm 1)."""
+"""The simulation: scans, a step of the tracker, an estimate, and at decision times a plan (paper, Algorithm 1)."""
 
 from __future__ import annotations
 
-import sysconfig
-import traceback
 from collections.abc import Callable, Sequence
-from contextlib import nullcontext
-from pathlib import Path
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from vedette.control import KnowsTruth, Planner, RandomPlanner
 from vedette.densities import Estimate
-from vedette.errors import InputError, VedetteError
+from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Floats
 from vedette.plausible import told_elsewhere
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.journal import Journal, Score
 from vedette.simulation.records import RunRecord
+from vedette.simulation.runs import RunningTracker, record_of_run
 from vedette.simulation.scans import Scan, kept_scans, simulate_scans
 from vedette.simulation.truth import Truth
-from vedette.tracking import Central, Stages, State, TrackerInfo
-
-_LIBRARIES = (str(Path(__file__).parents[1]), *(sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")))
-
-
-def cause_of(error: Exception) -> str:
-    """What was raised, in words; where it is not this library's word, with the place in the user's own code."""
-    if isinstance(error, VedetteError):
-        return str(error)
-    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if not frame.filename.startswith(_LIBRARIES)]
-    place = f" ({Path(frames[-1].filename).name}, line {frames[-1].lineno}, {frames[-1].name})" if frames else ""
-    return f"{type(error).__name__}: {error}{place}"
-
-
-class RunStopped(VedetteError):
-    """A filter, a fusion, an estimate or a planner raised in the middle of a run; chained from that error.
-
-    Attributes:
-        step: the scan at which it happened, counted from 1.
-        time: of that scan, s.
-        stage: what was under way, in words: "the filter of sensor 2".
-        record: of the scans that were finished, its field `stopped` the message; None where not one was.
-    """
-
-    def __init__(self, message: str, step: int, time: float, stage: str, record: RunRecord | None) -> None:
-        super().__init__(message)
-        self.step = step
-        self.time = time
-        self.stage = stage
-        self.record = record
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (str(self), self.step, self.time, self.stage, self.record)
-
-
-class RunInterrupted(KeyboardInterrupt):
-    """Ctrl-C in the middle of a run.
-
-    Attributes:
-        record: of the scans that were finished, its field `stopped` the message; None where not one was.
-    """
-
-    def __init__(self, message: str, record: RunRecord | None) -> None:
-        super().__init__(message)
-        self.record = record
-
+from vedette.tracking import Stages, State, TrackerInfo
 
 # Streams of one run: strategies meet the same truth and the same luck in the scans, whatever else they draw.
 TRUTH, SCANS, FILTER, PLANNER, RANDOM_CONTROL, DROP_OUTS, SCENES = range(7)
@@ -104,7 +57,7 @@ class Moment(NamedTuple):
     time: float  # s
     poses: Floats  # (num_sensors, 3 or more) where the sensors scanned
     measurements: tuple[Floats | None, ...]  # of each sensor (num, meas_dim); None of one that did not scan
-    scans: tuple[Scan | None, ...]  # the same with the targets behind them, for evaluation; () where they were recorded
+    scans: tuple[Scan | None, ...]  # the same with the targets behind them, for evaluation
     off: Bools  # (num_sensors,) whether its action kept each sensor from scanning
     state: State  # what the tracker believes now
     info: TrackerInfo  # what it reports
@@ -136,12 +89,11 @@ class World:
         """
         self.experiment, self.seed, self.run = experiment, seed, run
         self.truth = truth_of_run(experiment, seed, run) if truth is None else truth
-        num = experiment.num_sensors
-        self._scan_rngs, self._filter_rngs = (sensor_streams(seed, run, stream, num) for stream in (SCANS, FILTER))
+        scans, filters = (sensor_streams(seed, run, stream, experiment.num_sensors) for stream in (SCANS, FILTER))
+        self._scan_rngs = scans
         self._scans_at = scans_of_run(experiment.scans_at, experiment.drop_out, len(experiment.times), seed, run)
-        tracker = experiment.tracker
-        self._tracker = tracker.told(self.truth) if isinstance(tracker, Central) else tracker
-        self.fleet, self._state = experiment.fleet(moving=moving), self._tracker.initial()
+        self._tracker = RunningTracker(experiment.tracker, experiment.estimate, self.truth, filters)
+        self.fleet = experiment.fleet(moving=moving)
         self.moment: Moment | None = None
 
     @property
@@ -175,30 +127,26 @@ class World:
             self.follow(actions)
         experiment, clock = self.experiment, Stages() if stages is None else stages
         step = 1 if self.moment is None else self.moment.step + 1
-        time, recording = float(experiment.times[step - 1]), experiment.recording
-        poses = self.fleet.poses(time) if recording is None else recording.poses[step - 1]
-        scans: tuple[Scan | None, ...] = ()
-        off = self.fleet.off(time) if recording is None else np.zeros(experiment.num_sensors, np.bool_)
+        time = float(experiment.times[step - 1])
+        poses, off = self.fleet.poses(time), self.fleet.off(time)
         with clock.timing("scans"):
-            if recording is None:
-                ids, states = self.truth.at(step - 1)
-                sensors = experiment.sensors_at(step, self._scans_at)
-                scans = kept_scans(simulate_scans(states, poses, sensors, ids=ids, rngs=self._scan_rngs), off)
-                measurements = tuple([None if scan is None else scan.measurements for scan in scans])
-            else:
-                measurements = tuple(recording.scans[step - 1])
-        with clock.timing("filter"):
-            state, info = self._tracker.step(self._state, measurements, poses, time, rngs=self._filter_rngs)
-        with clock.timing("estimate"):
-            estimate = experiment.estimate(state.fused, step)
-        self._state = state
-        self.moment = Moment(step, time, poses, measurements, scans, off, state, info, estimate)
+            ids, states = self.truth.at(step - 1)
+            sensors = experiment.sensors_at(step, self._scans_at)
+            scans = kept_scans(simulate_scans(states, poses, sensors, ids=ids, rngs=self._scan_rngs), off)
+            measurements = tuple([None if scan is None else scan.measurements for scan in scans])
+        tracked = self._tracker.step(step, measurements, poses, time, clock)
+        self.moment = Moment(step, time, poses, measurements, scans, off, *tracked)
         return self.moment
 
 
 def truth_of_run(experiment: Experiment, seed: int, run: int) -> Truth:
     """The targets of a run at all scans. Raises `VedetteError` where they cannot be had."""
     return experiment.targets.truth(experiment.times, rng=run_stream(seed, run, TRUTH))
+
+
+def journal_of(experiment: Experiment, planner: str, seed: int, run: int, truth: Truth) -> Journal:
+    """An empty journal of a run of an experiment."""
+    return Journal(experiment.name, planner, seed, run, truth, experiment.num_sensors, explain=experiment.explain)
 
 
 def advance(world: World, journal: Journal, watch: Callable[[int], None] | None = None) -> list[Moment]:
@@ -238,26 +186,12 @@ def simulate(
 
     Raises:
         VedetteError: the true targets cannot be had.
-        RunStopped: models, tracker, estimate, planner or score raised; it says where, is chained from what they raised,
-            and carries the record of the scans before.
-        RunInterrupted: a `KeyboardInterrupt`, likewise with the record of the scans before.
+        RunStopped, RunInterrupted: models, tracker, estimate, planner or score raised, see `record_of_run`.
     """
-    truth = truth_of_run(experiment, seed, run)
-    alone = "still" if experiment.recording is None else "recorded"
-    journal = Journal(experiment, planner.name if planner is not None else alone, seed, run, truth)
-    try:
-        # Of scans that are drawn nobody has exchanged the numbers.
-        with told_elsewhere() if experiment.recording is None else nullcontext():
-            _go(experiment, planner, journal, watch)
-        with journal.timing("score"):
-            return journal.record(score(truth, journal.estimates))
-    except KeyboardInterrupt as interrupt:
-        message = f"{journal.place(interrupt)}: interrupted"
-        raise RunInterrupted(message, journal.partial(score, message)) from interrupt
-    except Exception as error:
-        message = f"{journal.place(error)}: {cause_of(error)}"
-        record = journal.partial(score, message)
-        raise RunStopped(message, journal.step, journal.time, journal.stage(error), record) from error
+    name = "still" if planner is None else planner.name
+    journal = journal_of(experiment, name, seed, run, truth_of_run(experiment, seed, run))
+    with told_elsewhere():  # of scans that are drawn nobody has exchanged the numbers
+        return record_of_run(journal, score, partial(_go, experiment, planner, journal, watch))
 
 
 def _told(planner: Any, truth: Truth) -> Planner | None:

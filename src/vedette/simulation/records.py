@@ -1,9 +1,9 @@
-"""What a simulated run leaves behind."""
+"""What a run leaves behind."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -79,6 +79,13 @@ class Outline:
     timings: dict[str, Floats]
 
 
+class ScansFile(NamedTuple):
+    """The file that scans were read from: its name without folders, and its SHA-256, "" of columns in memory."""
+
+    name: str = "recorded scans"
+    sha256: str = ""
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class RunRecord(Tabled):
     """One run of one strategy on one scenario.
@@ -86,7 +93,8 @@ class RunRecord(Tabled):
     Attributes:
         scenario: name of the scenario.
         planner: name of the strategy.
-        seed: seed of the campaign; with `run` it fixes every random number.
+        seed: seed of the campaign; with `run` it fixes every random number; of recorded scans those of filters that
+            draw.
         run: index of the run within the campaign.
         times: (num_scans,) s.
         truth: the targets, scan by scan.
@@ -99,6 +107,7 @@ class RunRecord(Tabled):
         timings: for each stage (`scans`, `filter`, `fusion`, `estimate`, `planning`), (num_scans,) seconds of wall time
             that it took at each scan; of all that is here the only thing that the seed does not fix.
         stopped: where and why the run ended before its last scan; None: it did not.
+        recording: where its scans come from; None: they were simulated.
     """
 
     scenario: str
@@ -115,6 +124,12 @@ class RunRecord(Tabled):
     health: Health
     timings: dict[str, Floats]
     stopped: str | None = None
+    recording: ScansFile | None = None
+
+    @property
+    def source(self) -> str:
+        """What its scans come from, in words: `run 3`, or the name of the file of a recording."""
+        return f"run {self.run}" if self.recording is None else self.recording.name
 
     @property
     def num_scans(self) -> int:
@@ -149,7 +164,8 @@ class RunRecord(Tabled):
     def _summary(self) -> str:
         known = self.ospa[:, 0][~np.isnan(self.ospa[:, 0])]
         error = f", mean OSPA {known.mean():.4g}" if len(known) else ""
-        whose = f"of {elided(self.scenario)} by {elided(self.planner)}, seed {self.seed}, run {self.run}"
+        drawn = f"by {elided(self.planner)}, seed {self.seed}, run {self.run}"
+        whose = f"of {elided(self.scenario)} {drawn if self.recording is None else f'from {elided(self.source)}'}"
         sizes = f"{counted(self.num_scans, 'scan')}, {counted(self.num_sensors, 'sensor')}"
         return f"{whose}: {sizes}, {counted(len(self.decisions), 'decision')}{error}"
 

@@ -21,7 +21,7 @@ from vedette.simulation.arrow import Columns, Kind, Layout
 from vedette.simulation.explained import EXPLAINED, explained_tables, with_explanations
 from vedette.simulation.health import FUSION_COLUMNS, SENSOR_COLUMNS, Health
 from vedette.simulation.planned import OWN_REWARDS, PLANNED, decisions_of, planned_tables
-from vedette.simulation.records import OSPA_COLUMNS, Outline, RunRecord
+from vedette.simulation.records import OSPA_COLUMNS, Outline, RunRecord, ScansFile
 from vedette.simulation.truth import Truth
 from vedette.simulation.undetected_tables import UNDETECTED, undetected_tables, with_undetected
 
@@ -34,7 +34,7 @@ _TIME = {"step": Kind.INTEGER, "time_s": Kind.NUMBER}
 _LABEL = {"birth_step": Kind.INTEGER, "birth_site": Kind.INTEGER}
 _COUNTS = {"num_targets": Kind.INTEGER, "num_estimates": Kind.INTEGER}
 
-# All of a run but what names it and how long it took.
+# All of a run but what names it and how long it took; runs of recorded scans have none of `PLANNED`.
 LAYOUTS: dict[str, Layout] = {
     "scans": Layout({**_TIME, **_COUNTS, **dict.fromkeys(OSPA_COLUMNS, Kind.NUMBER), **FUSION_COLUMNS}),
     "truth": Layout({**_TIME, "target": Kind.INTEGER}, {"state_": Kind.NUMBER}),
@@ -68,18 +68,22 @@ def check_record(record: RunRecord) -> None:
     if record.off.shape != record.poses.shape[:2] or record.off.dtype != np.bool_:
         raise InputError(f"record.off: expected booleans of {record.poses.shape[:2]}; got {record.off.shape}")
     record.health.check(num_scans, record.num_sensors)
+    if record.recording is not None and record.decisions:
+        raise InputError(f"record.decisions: expected none of a recording; got {len(record.decisions)}")
     for decision in record.decisions:
         decision.check(record.times, record.poses)
 
 
 def tables_of(record: RunRecord) -> Tables:
-    """The tables of `LAYOUTS`, and those of `OPTIONAL` that the run has."""
+    """The tables of `LAYOUTS` that a run of its kind has, and those of `OPTIONAL` that the run has."""
     of_scans = {
         "scans": record.scan_columns(),
         "truth": _truth(record),
         "tracks": _tracks(record),
         "sensors": _sensors(record),
     }
+    if record.recording is not None:
+        return of_scans
     planned = {**planned_tables(record.decisions, record.num_sensors), **undetected_tables(record.decisions)}
     if not any(decision.plan.explanation is not None for decision in record.decisions):
         return {**of_scans, **planned}
@@ -98,9 +102,12 @@ def timings_of(table: Mapping[str, Any]) -> dict[str, Floats]:
 
 
 def run_facts(record: RunRecord) -> dict[str, Any]:
-    """What names a run: scenario, planner, seed and number; and why it stopped early, null where it did not."""
+    """What names a run: scenario, planner, seed and number; where recorded scans come from; and why it stopped early,
+    null where it did not.
+    """
     names = {"scenario": record.scenario, "planner": record.planner, "seed": record.seed, "run": record.run}
-    return {**names, "stopped": record.stopped}
+    recorded = {} if record.recording is None else {"recording": record.recording._asdict()}
+    return {**names, **recorded, "stopped": record.stopped}
 
 
 def record_of(
@@ -133,7 +140,12 @@ def record_of(
         health=outline.health,
         timings=timings,
         stopped=None if facts["stopped"] is None else str(facts["stopped"]),
+        recording=_recording_of(facts.get("recording")),
     )
+
+
+def _recording_of(fact: Any) -> ScansFile | None:
+    return None if fact is None else ScansFile(str(fact["name"]), str(fact["sha256"]))
 
 
 # What `outline_of` needs, of all the tables that a run may have.
@@ -156,7 +168,7 @@ def outline_of(
         seed=int(facts["seed"]),
         run=int(facts["run"]),
         times=scans["time_s"],
-        decisions=decisions_of(tables, poses),
+        decisions=decisions_of(tables, poses) if "decisions" in tables else (),
         ospa=np.stack([scans[name] for name in OSPA_COLUMNS], axis=1),
         num_targets=scans["num_targets"],
         health=Health(

@@ -108,7 +108,7 @@ def overview_figure(
     shade = colour(comparison.strategies.index(strategy))
     draw_tracks(left, record, scale, scene, shade)
     frame_tracks(left, [record], scale, scene)
-    left.set_title(f"{short_label(strategy)}, run {record.run}", pad=_TITLE_PAD)
+    left.set_title(f"{short_label(strategy)}, {record.source}", pad=_TITLE_PAD)
     above = right
     if several:
         _draw_gain(right, comparison)

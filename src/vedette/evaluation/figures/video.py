@@ -176,7 +176,7 @@ class _Drawing:
         if self._told.is_utc:
             utc = utc_text(time + self._told.start)
             clock = f"{utc[:10]} {utc[11:21]} UTC"
-        self._axes.set_title(f"{name}, run {self._record.run}: {clock}")
+        self._axes.set_title(f"{name}, {drawn_text(self._record.source)}: {clock}")
         self._draw_sensors(step)
         self._draw_truth(step)
         self._draw_estimates(step)

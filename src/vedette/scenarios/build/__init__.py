@@ -3,7 +3,7 @@
 Each section builds its own part (`vedette.scenarios.sections`); here they are put together.
 """
 
-from vedette.scenarios.build.experiments import build_experiment, build_targets
+from vedette.scenarios.build.experiments import build_experiment, build_targets, build_tracking
 from vedette.scenarios.build.planners import build_parts, build_planner
 from vedette.scenarios.build.sensors import (
     build_poses,
@@ -22,6 +22,7 @@ __all__ = [
     "build_scan_times",
     "build_sensors",
     "build_targets",
+    "build_tracking",
     "build_true_sensors",
     "drop_outs",
     "told_of",

@@ -1,7 +1,12 @@
-"""The experiment of a scenario: all that a run needs but a planner and a seed."""
+"""What a scenario describes as a run: an experiment to be simulated, or a recording to be tracked."""
 
 from __future__ import annotations
 
+import numpy as np
+
+from vedette.errors import InputError
+from vedette.recorded import RecordedScans
+from vedette.recorded.tracking import Tracking
 from vedette.scenarios.build.sensors import (
     build_poses,
     build_scan_times,
@@ -20,16 +25,19 @@ def build_experiment(scenario: Scenario) -> Experiment:
     """Everything a run needs but a planner and a seed.
 
     Raises:
-        InputError: a custom model or a recorded file that cannot be had, or parts that do not fit together.
+        InputError: a custom model or a recorded file that cannot be had, parts that do not fit together, or a scenario
+            of recorded scans.
     """
     model = scenario.model
+    if model.recording is not None:
+        wanted = "simulated scans (`vedette.evaluation.track_recording` takes recorded ones)"
+        raise InputError(f"{model.name}: expected {wanted}; got those of {model.recording.path}")
     sensors = build_sensors(scenario)
     tracker, times = build_tracker(scenario, tuple(sensor.filter for sensor in sensors)), build_scan_times(scenario)
     known = tuple(sensor.filter.sensor for sensor in sensors)
-    recording = None if model.recording is None else model.recording.build(model, scenario.folder)
     return Experiment(
         name=model.name,
-        times=model.time.build() if recording is None else recording.times,
+        times=model.time.build(),
         targets=model.targets.build(model, tracker.targets.motion, scenario.folder),
         tracker=tracker,
         platforms=tuple(sensor.platform for sensor in sensors),
@@ -43,9 +51,27 @@ def build_experiment(scenario: Scenario) -> Experiment:
         explain=model.control.explain,
         # Where they are what the tracker takes them for, a tracker of other sensors may stand in for this one.
         true_sensors=build_true_sensors(scenario, known) if any(sensor.truth for sensor in model.sensors) else (),
-        scans_at=None if times.all() or recording is not None else times,
-        recording=recording,
+        scans_at=None if times.all() else times,
         drop_out=drop_outs(scenario),
+    )
+
+
+def build_tracking(scenario: Scenario, recording: RecordedScans | None = None) -> Tracking:
+    """The recording of a scenario with its tracker; `recording`: its scans, where they are read already.
+
+    Raises `InputError` as `build_experiment`, or for a scenario whose scans are simulated.
+    """
+    model, folder = scenario.model, scenario.folder
+    if recording is None:
+        if model.recording is None:
+            raise InputError(f"{model.name}: expected a section `recording`; got a scenario whose scans are simulated")
+        recording = model.recording.build(model, folder)
+    return Tracking(
+        name=model.name,
+        recording=recording,
+        tracker=build_tracker(scenario, tuple(sensor.filter for sensor in build_sensors(scenario))),
+        estimate=model.estimates_by.build(folder),
+        truth=build_targets(scenario).truth(recording.times, rng=np.random.default_rng(0)),  # which draws nothing
     )
 
 

@@ -90,12 +90,11 @@ def _read(
 ) -> RecordedScans:
     """The scans of a file as it was when it last changed, read as a section says, in JSON as mappings have no hash."""
     from vedette.recorded import Conventions, parse_scans
-    from vedette.recorded.tables import check_unchanged, read_table
+    from vedette.recorded.tables import read_table
 
     own = RecordingSection.model_validate_json(section)
-    check_unchanged(file, own.sha256)
     conventions = Conventions(own.columns, own.units, own.bearings, own.gather, own.bad_rows)
-    return parse_scans(read_table(file), sites, conventions, origin)
+    return parse_scans(read_table(file, sha256=own.sha256), sites, conventions, origin)
 
 
 def noise_stds(sensor: Sensor) -> tuple[float, ...] | None:

@@ -175,9 +175,7 @@ def _read(
 ) -> RecordedSource:
     from vedette.recorded import Cleaning
     from vedette.recorded import RecordedTargets as RecordedSource
-    from vedette.recorded.tables import check_unchanged
 
-    check_unchanged(file, section.sha256)
     edges = region.build()
     return RecordedSource.from_file(
         file,
@@ -186,6 +184,7 @@ def _read(
         usual_origin_deg=origin,
         time_origin=section.time_origin,
         cleaning=Cleaning(**section.given(), region=edges if section.crop else None),
+        sha256=section.sha256,
     )
 
 
