@@ -22,8 +22,8 @@ from vedette.programs import MOST_BYTES, Program
 from vedette.scenarios import Scenario, load_scenario
 from vedette.scenarios.build import build_sensors
 from vedette.scenarios.overrides import with_fields
+from vedette.simulation.journal import RunStopped
 from vedette.simulation.records import RunRecord
-from vedette.simulation.runs import RunStopped
 from vedette.tracking.program import UNKNOWN_VARIANCE
 from waiting import PATIENCE, wait_until
 

@@ -33,7 +33,7 @@ from vedette.scenarios.dumping import dump_scenario, files_of
 from vedette.scenarios.overrides import with_fields
 from vedette.scenarios.summary import facts, one_line
 from vedette.scenarios.yaml_reader import read_yaml
-from vedette.simulation.runs import RunStopped
+from vedette.simulation.journal import RunStopped
 
 Check = Callable[[np.random.Generator], object]
 TryCases = Callable[[Check, int], None]

@@ -19,7 +19,7 @@ from vedette.errors import InputError
 from vedette.evaluation import run_scenario
 from vedette.scenarios import Scenario, load_scenario, with_fields
 from vedette.scenarios.sections.custom import Custom
-from vedette.simulation.runs import RunStopped
+from vedette.simulation.journal import RunStopped
 
 OWN = Path(__file__).with_name("own_parts.py")
 

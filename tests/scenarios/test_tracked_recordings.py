@@ -21,14 +21,13 @@ from vedette.cli import app
 from vedette.errors import InputError
 from vedette.evaluation import run_scenario, track_recording
 from vedette.evaluation.runs import score_of
-from vedette.recorded.tracking import Tracking, track
 from vedette.scenarios import load_scenario
 from vedette.scenarios.build import build_experiment, build_tracking
 from vedette.scenarios.code_checks import code_faults
 from vedette.scenarios.of_recording import OfRecording, scenario_of_recording
 from vedette.simulation import load_run, save_run
+from vedette.simulation.journal import RunInterrupted, RunStopped
 from vedette.simulation.records import ScansFile
-from vedette.simulation.runs import RunInterrupted, RunStopped
 
 OPENED: list[str] | None = None
 
@@ -83,7 +82,9 @@ def test_the_loop_is_steps_of_the_tracker_and_estimates(made: OfRecording) -> No
     assert record.planner == "recorded"
     assert not record.decisions
     assert not record.off.any()
-    np.testing.assert_array_equal(record.ospa, score_of(made.scenario)(parts.truth, record.estimates))
+    score = score_of(made.scenario)
+    assert score is not None
+    np.testing.assert_array_equal(record.ospa, score(parts.truth, record.estimates))
 
 
 def test_a_scenario_of_a_recording_is_tracked_whatever_the_planner(made: OfRecording) -> None:
@@ -170,12 +171,12 @@ def test_a_run_that_stops_says_where_and_keeps_the_scans_before(
 ) -> None:
     parts = build_tracking(made.scenario, made.recording)
     with pytest.raises(stop) as caught:
-        track(replace(parts, estimate=Stopping(error, parts.estimate)), score=score_of(made.scenario))
+        replace(parts, estimate=Stopping(error, parts.estimate)).run(score_of(made.scenario))
     place = f"stopped at step 4 of {len(made.recording.times)} ({made.recording.times[3]:g} s), in the estimate: "
     assert str(caught.value).startswith(f"scans, scans.csv: {place}{cause}")
     record = caught.value.record  # type: ignore[attr-defined]
     assert (record.num_scans, record.stopped) == (3, str(caught.value))
-    whole = track(parts, score=score_of(made.scenario))
+    whole = parts.run(score_of(made.scenario))
     assert record.ospa.tobytes() == whole.ospa[:3].tobytes()
 
 
@@ -213,8 +214,6 @@ def test_what_does_not_fit_together_is_refused(made: OfRecording) -> None:
         replace(parts, recording=one_sensor)
     with pytest.raises(InputError, match="truth: expected the times of the recording; got others"):
         replace(parts, truth=parts.truth.first(3))
-    with pytest.raises(InputError, match="tracker: expected a Tracker"):
-        Tracking("x", parts.recording, None, parts.estimate, parts.truth)  # type: ignore[arg-type]
     with pytest.raises(InputError, match=r"scans: expected simulated scans .*; got those of .*scans\.csv"):
         build_experiment(made.scenario)
     with pytest.raises(
@@ -225,5 +224,6 @@ def test_what_does_not_fit_together_is_refused(made: OfRecording) -> None:
 
 def test_own_code_is_tried_on_the_first_scans(made: OfRecording) -> None:
     assert code_faults(made.scenario) == []
-    first = build_tracking(made.scenario).first(3)
-    assert track(first, score=score_of(made.scenario)).num_scans == 3
+    parts = build_tracking(made.scenario)
+    assert [parts.first(num).run(None).num_scans for num in (1, 3)] == [1, 3]
+    assert parts.first(len(made.recording.times)).recording.num_measurements == made.recording.num_measurements

@@ -23,9 +23,9 @@ from vedette.scenarios import load_scenario
 from vedette.scenarios.build import build_experiment
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.health import FUSION_COLUMNS, SENSOR_COLUMNS, Health
+from vedette.simulation.journal import RunInterrupted, RunStopped
 from vedette.simulation.loop import simulate
 from vedette.simulation.records import RunRecord
-from vedette.simulation.runs import RunInterrupted, RunStopped
 from vedette.simulation.storage import load_run, read_manifest, save_run
 
 

@@ -17,10 +17,9 @@ from vedette.scenarios import load_scenario
 from vedette.scenarios.build import build_experiment, build_planner, build_sensors
 from vedette.simulation import RunRecord, simulate, simulate_scan
 from vedette.simulation.experiment import Experiment
-from vedette.simulation.journal import STAGES
+from vedette.simulation.journal import STAGES, RunStopped
 from vedette.simulation.loop import FILTER, PLANNER, SCANS, TRUTH, run_stream
 from vedette.simulation.replay import scans_of
-from vedette.simulation.runs import RunStopped
 from vedette.tracking import Central, CentralFilter, Distributed, State, Tracker, stage_of
 
 QUICK = PlanningSettings(num_samples=4, horizon_steps=2, num_threads=1)

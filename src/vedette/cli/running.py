@@ -23,8 +23,8 @@ from vedette.text import counted
 
 if TYPE_CHECKING:
     from vedette.scenarios import Scenario
+    from vedette.simulation.journal import RunInterrupted, RunStopped
     from vedette.simulation.records import RunRecord
-    from vedette.simulation.runs import RunInterrupted, RunStopped
 
 
 def compile_if_cold(scenario: Scenario, planners: Sequence[str] = ("jdm",)) -> None:
@@ -110,7 +110,7 @@ def run(
     from vedette.evaluation.runs import run_scenario
     from vedette.scenarios import load_scenario
     from vedette.scenarios.dumping import dump_kept
-    from vedette.simulation.runs import RunInterrupted, RunStopped
+    from vedette.simulation.journal import RunInterrupted, RunStopped
     from vedette.simulation.storage import check_free, save_run
 
     loaded = load_scenario(scenario)

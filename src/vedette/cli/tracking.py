@@ -117,7 +117,7 @@ def _check_formats(formats: Sequence[str], out: Path | None) -> None:
 def _tracked(scenario: Scenario, recording: RecordedScans) -> RunRecord:
     """Run the tracker over all scans; a run that stops ends the program."""
     from vedette.evaluation.runs import track_recording
-    from vedette.simulation.runs import RunInterrupted, RunStopped
+    from vedette.simulation.journal import RunInterrupted, RunStopped
 
     try:
         with compiling(), bar("scans", len(recording.times)) as watch:

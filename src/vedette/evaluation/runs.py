@@ -6,13 +6,8 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-import numpy as np
-
-from vedette.densities import Estimate
 from vedette.evaluation.metrics import Metric, RunMetrics, measure, ospa_of_run
-from vedette.kernels.base.types import Floats
 from vedette.recorded import RecordedScans
-from vedette.recorded.tracking import track
 from vedette.scenarios import Scenario, load_scenario
 from vedette.scenarios.build import (
     build_experiment,
@@ -25,7 +20,6 @@ from vedette.scenarios.sections.scoring import AnyMetric
 from vedette.simulation.journal import Score
 from vedette.simulation.loop import simulate
 from vedette.simulation.records import Measure, RunRecord
-from vedette.simulation.truth import Truth
 
 
 def run_scenario(
@@ -67,32 +61,27 @@ def track_recording(
     run: int = 0,
     watch: Callable[[int], None] | None = None,
 ) -> RunRecord:
-    """Track the scans of a recording.
+    """Track the recorded scans of a scenario.
 
     Args:
-        scenario: with a section `recording`, such as that of `vedette.scenarios.of_recording.scenario_of_recording`.
-        recording: its scans, where they are read already; None: they are read.
-        seed, run: fix the random numbers of filters that draw.
-        watch: told the number of every scan that is done.
+        scenario: such as that of `vedette.scenarios.of_recording.scenario_of_recording`.
+        recording: its scans; None: they are read.
+        seed, run, watch: as of `vedette.recorded.Tracking.run`.
 
     Raises:
-        VedetteError: no recording, or the scenario's models or filters cannot do what is asked.
+        VedetteError: scans that are not recorded, or models and filters that cannot do what is asked.
     """
-    tracking, score = build_tracking(scenario, recording), score_of(scenario)
-    return track(tracking, score=score, seed=seed, run=run, watch=watch)
+    return build_tracking(scenario, recording).run(score_of(scenario), seed=seed, run=run, watch=watch)
 
 
-def score_of(scenario: Scenario) -> Score:
-    """What gives the OSPA of estimates at each scan, under the cutoff, order and components of a scenario."""
+def score_of(scenario: Scenario) -> Score | None:
+    """What gives the OSPA of estimates at each scan, under the cutoff, order and components of a scenario; None where
+    nobody knows the targets.
+    """
     ospa = scenario.model.ospa
     if scenario.model.targets.kind == "unknown":
-        return _unscored
+        return None
     return partial(ospa_of_run, cutoff=ospa.cutoff, order=ospa.order, components=ospa.components)
-
-
-def _unscored(truth: Truth, estimates: Sequence[Estimate]) -> Floats:
-    """(num_scans, 3) NaN: nobody knows the targets."""
-    return np.full((len(estimates), 3), np.nan)
 
 
 def own_metrics(scenario: Scenario) -> tuple[Metric, ...]:

@@ -23,7 +23,8 @@ from vedette.scenarios.build import build_experiment, build_parts, build_sensors
 from vedette.scenarios.sections.strategies import Strategy
 from vedette.simulation import Experiment, Moment, RunRecord, Truth, World
 from vedette.simulation.health import Health
-from vedette.simulation.loop import SCENES, advance, journal_of, run_stream, truth_of_run
+from vedette.simulation.journal import Journal
+from vedette.simulation.loop import SCENES, advance, run_stream, truth_of_run
 
 AnyScenario: TypeAlias = str | Path | Scenario
 Scenarios: TypeAlias = AnyScenario | Sequence[AnyScenario] | Callable[[np.random.Generator], AnyScenario]
@@ -46,7 +47,9 @@ class Built:
             )
         parts = build_parts(self.scenario, build_sensors(self.scenario), Strategy())
         self.observer = Observer.of(parts._asdict(), num_labels)
-        self.score = score_of(self.scenario)
+        score = score_of(self.scenario)
+        assert score is not None  # nobody knows the targets of recordings alone
+        self.score = score
 
     @property
     def layout(self) -> Layout:
@@ -110,7 +113,7 @@ class Episodes:
         experiment = self.built.experiment
         truth = truth_of_run(experiment, self._seed, number)
         self.world = World(experiment, seed=self._seed, run=number, truth=truth)
-        self._journal = journal_of(experiment, "policy", self._seed, number, truth)
+        self._journal = Journal(experiment.name, "policy", self._seed, number, truth, experiment.num_sensors)
         self.num_moved = 0
         self._advance()
 
@@ -123,7 +126,7 @@ class Episodes:
         chosen, self.num_moved = self.built.observer.chosen(self.outlook, actions)
         with told_elsewhere():
             plan = plan_of("policy", self.outlook, chosen)
-            self._journal.decide(plan)
+            self._journal.decide(plan, explain=self.built.experiment.explain)
             self.world.follow(plan.chosen_actions)
             self._advance()
 

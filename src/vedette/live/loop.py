@@ -20,8 +20,8 @@ from vedette.models.arguments import reject
 from vedette.platforms.compass import Compass, PlaneCompass, courses_of
 from vedette.recorded import Conventions, Origin, Site
 from vedette.recorded.extents import PLACED, beyond_reach, is_within, places_of
+from vedette.simulation.journal import cause_of
 from vedette.simulation.loop import PLANNER
-from vedette.simulation.runs import cause_of
 from vedette.tracking import LateScans, SensorScan, Timeline
 
 Answer: TypeAlias = dict[str, Any]

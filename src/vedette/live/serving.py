@@ -19,7 +19,7 @@ from vedette.live.lines import CHUNK, LineSplitter
 from vedette.live.loop import Answer, encoded
 from vedette.live.messages import MOST_BYTES
 from vedette.live.remarks import Remarks
-from vedette.simulation.runs import cause_of
+from vedette.simulation.journal import cause_of
 
 MOST_CLIENTS = 128  # pages, too
 MOST_OF_ADDRESS = 64  # of these

@@ -22,7 +22,7 @@ from websockets.http11 import Request, Response
 from vedette.live.lines import LineSplitter
 from vedette.live.messages import MOST_BYTES
 from vedette.live.serving import BACKLOG, ENTER_WITHIN, Exchange, is_loopback, name_of, taken
-from vedette.simulation.runs import cause_of
+from vedette.simulation.journal import cause_of
 
 FRAMES_PER_SECOND = 10.0
 _LOG = logging.getLogger("vedette.live.web")

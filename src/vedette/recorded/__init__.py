@@ -8,6 +8,7 @@ from vedette.recorded.instants import RecordedScans, Site, without_biases
 from vedette.recorded.scans import parse_scans
 from vedette.recorded.tables import read_table, table_of
 from vedette.recorded.targets import RecordedTargets
+from vedette.recorded.tracking import Tracking
 
 __all__ = [
     "Cleaning",
@@ -18,6 +19,7 @@ __all__ = [
     "RecordedTargets",
     "RecordedTrack",
     "Site",
+    "Tracking",
     "parse_scans",
     "read_table",
     "table_of",

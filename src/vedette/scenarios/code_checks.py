@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from typing import Any
 
-import numpy as np
-
-from vedette.densities import Estimate
 from vedette.errors import VedetteError
 from vedette.filters import labels_targets
-from vedette.kernels.base.types import Floats
-from vedette.recorded.tracking import track
 from vedette.scenarios.build import build_experiment, build_planner, build_sensors, build_tracking
 from vedette.scenarios.faults import Told
 from vedette.scenarios.loading import Scenario, document_of, place_fault
 from vedette.scenarios.sections.custom import NotGiven, customs
+from vedette.simulation.journal import RunStopped, cause_of
 from vedette.simulation.loop import simulate
-from vedette.simulation.runs import RunStopped, cause_of
-from vedette.simulation.truth import Truth
 
 _SCANS = 3  # that are tried: enough for one that is missing, and one after births
 # These are made of other parts, and so as parts of the whole.
@@ -76,12 +70,8 @@ def _track(scenario: Scenario) -> None:
         tried.insert(0, replace(scenario, model=model))
     for each in tried:
         if each.model.recording is not None:
-            track(build_tracking(each).first(_SCANS), score=_unscored)
+            build_tracking(each).first(_SCANS).run(None)
         else:
             experiment = build_experiment(each)
             few = replace(experiment, times=experiment.times[:_SCANS], decision_steps=())
-            simulate(few, None, seed=0, run=0, score=_unscored)
-
-
-def _unscored(_: Truth, estimates: Sequence[Estimate]) -> Floats:
-    return np.zeros((len(estimates), 3))
+            simulate(few, None, seed=0, run=0, score=None)

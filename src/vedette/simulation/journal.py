@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import sysconfig
+import traceback
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
-from typing import TypeAlias
+from pathlib import Path
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -21,6 +24,49 @@ Score: TypeAlias = Callable[[Truth, Sequence[Estimate]], Floats]
 
 # What the time of a run is spent on. A tracker's own time is the filters', but for what it says was the fusion's.
 STAGES = ("scans", "filter", "fusion", "estimate", "planning")
+_LIBRARIES = (str(Path(__file__).parents[1]), *(sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")))
+
+
+def cause_of(error: Exception) -> str:
+    """What was raised, in words; where it is not this library's word, with the place in the user's own code."""
+    if isinstance(error, VedetteError):
+        return str(error)
+    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if not frame.filename.startswith(_LIBRARIES)]
+    place = f" ({Path(frames[-1].filename).name}, line {frames[-1].lineno}, {frames[-1].name})" if frames else ""
+    return f"{type(error).__name__}: {error}{place}"
+
+
+class RunStopped(VedetteError):
+    """A filter, a fusion, an estimate or a planner raised in the middle of a run; chained from that error.
+
+    Attributes:
+        step: the scan at which it happened, counted from 1.
+        time: of that scan, s.
+        stage: what was under way, in words: "the filter of sensor 2".
+        record: of the scans that were finished, its field `stopped` the message; None where not one was.
+    """
+
+    def __init__(self, message: str, step: int, time: float, stage: str, record: RunRecord | None) -> None:
+        super().__init__(message)
+        self.step = step
+        self.time = time
+        self.stage = stage
+        self.record = record
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (str(self), self.step, self.time, self.stage, self.record)
+
+
+class RunInterrupted(KeyboardInterrupt):
+    """Ctrl-C in the middle of a run.
+
+    Attributes:
+        record: of the scans that were finished, its field `stopped` the message; None where not one was.
+    """
+
+    def __init__(self, message: str, record: RunRecord | None) -> None:
+        super().__init__(message)
+        self.record = record
 
 
 class Journal:
@@ -34,13 +80,11 @@ class Journal:
         run: int,
         truth: Truth,
         num_sensors: int,
-        *,
-        explain: bool = True,
-        recording: ScansFile | None = None,
+        file: ScansFile | None = None,
     ) -> None:
-        """Before the first scan; the arguments are those of the record, and whether explanations are kept."""
+        """Before the first scan; file: of recorded scans."""
         self.scenario, self.planner, self.seed, self.run = scenario, planner, seed, run
-        self.truth, self.recording, self._explain = truth, recording, explain
+        self.truth, self.file = truth, file
         self.step = 1
         self.estimates: list[Estimate] = []
         self._poses: list[Floats] = []
@@ -77,10 +121,10 @@ class Journal:
         self._off.append(off)
         self.estimates.append(estimate)
 
-    def decide(self, plan: Plan, undetected: UndetectedIntensity | None = None) -> None:
+    def decide(self, plan: Plan, undetected: UndetectedIntensity | None = None, *, explain: bool) -> None:
         """Record the decision after the current scan, with its explanation if explanations are kept."""
-        kept = plan.settled(explained=self._explain)
-        found = undetected if self._explain and kept.explanation is not None else None
+        kept = plan.settled(explained=explain)
+        found = undetected if explain and kept.explanation is not None else None
         self._decisions.append(Decision(self.step, self.time, self._poses[-1], kept, found))
 
     def stage(self, error: BaseException) -> str:
@@ -89,11 +133,9 @@ class Journal:
 
     def place(self, error: BaseException) -> str:
         """Which run, where in it."""
-        whose = f"{self.planner}, seed {self.seed}, run {self.run}" if self.recording is None else self.recording.name
-        return (
-            f"{self.scenario}, {whose}: stopped at step {self.step} of {self.truth.num_scans} ({self.time:g} s), in "
-            f"{self.stage(error)}"
-        )
+        whose = f"{self.planner}, seed {self.seed}, run {self.run}" if self.file is None else self.file.name
+        place = f"step {self.step} of {self.truth.num_scans} ({self.time:g} s), in {self.stage(error)}"
+        return f"{self.scenario}, {whose}: stopped at {place}"
 
     def record(self, ospa: Floats, stopped: str | None = None) -> RunRecord:
         """Of the scans that have an estimate."""
@@ -113,7 +155,7 @@ class Journal:
             health=self.health.first(num),
             timings=self._timings(num),
             stopped=stopped,
-            recording=self.recording,
+            recording=self.file,
         )
 
     def _timings(self, num_scans: int) -> dict[str, Floats]:
@@ -121,13 +163,38 @@ class Journal:
         spent = {stage: np.array([clock.seconds.get(stage, 0.0) for clock in clocks]) for stage in STAGES}
         return spent | {"filter": np.maximum(spent["filter"] - fusion, 0.0), "fusion": fusion}
 
-    def partial(self, score: Score, stopped: str) -> RunRecord | None:
+    def _partial(self, score: Score | None, stopped: str) -> RunRecord | None:
         """The record of a run that stopped; None where no scan was finished. OSPA is NaN where it cannot be had."""
-        num = len(self.estimates)
-        if num == 0:
+        if not self.estimates:
             return None
         try:
-            ospa = score(self.truth.first(num), self.estimates)
+            return self.record(self._scored(score), stopped)
         except VedetteError:
-            ospa = np.full((num, 3), np.nan)
-        return self.record(ospa, stopped)
+            return self.record(self._scored(None), stopped)
+
+    def _scored(self, score: Score | None) -> Floats:
+        num = len(self.estimates)
+        return np.full((num, 3), np.nan) if score is None else score(self.truth.first(num), self.estimates)
+
+    def filled(self, go: Callable[[], None], score: Score | None) -> RunRecord:
+        """Return the record of a run whose scans `go` takes and writes down here.
+
+        Args:
+            go: goes through the scans.
+            score: (num_scans, 3) OSPA of the estimates against the truth; None: NaN.
+
+        Raises:
+            RunStopped: `go` or the score raised; it is chained from that.
+            RunInterrupted: a `KeyboardInterrupt`, likewise.
+        """
+        try:
+            go()
+            with self.timing("score"):
+                return self.record(self._scored(score))
+        except KeyboardInterrupt as interrupt:
+            message = f"{self.place(interrupt)}: interrupted"
+            raise RunInterrupted(message, self._partial(score, message)) from interrupt
+        except Exception as error:
+            message = f"{self.place(error)}: {cause_of(error)}"
+            record = self._partial(score, message)
+            raise RunStopped(message, self.step, self.time, self.stage(error), record) from error

@@ -9,17 +9,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vedette.control import KnowsTruth, Planner, RandomPlanner
-from vedette.densities import Estimate
+from vedette.densities import Estimate, Estimator
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Floats
 from vedette.plausible import told_elsewhere
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.journal import Journal, Score
 from vedette.simulation.records import RunRecord
-from vedette.simulation.runs import RunningTracker, record_of_run
 from vedette.simulation.scans import Scan, kept_scans, simulate_scans
 from vedette.simulation.truth import Truth
-from vedette.tracking import Stages, State, TrackerInfo
+from vedette.tracking import Central, Stages, State, Tracker, TrackerInfo
 
 # Streams of one run: strategies meet the same truth and the same luck in the scans, whatever else they draw.
 TRUTH, SCANS, FILTER, PLANNER, RANDOM_CONTROL, DROP_OUTS, SCENES = range(7)
@@ -48,6 +47,27 @@ def scans_of_run(
     streams = sensor_streams(seed, run, DROP_OUTS, len(drop_out))
     there = np.array([rng.random(num_scans) >= share for rng, share in zip(streams, drop_out, strict=True)])
     return there if scans_at is None else there & scans_at[:, :num_scans]
+
+
+class RunningTracker:
+    """A tracker in the middle of a run, of simulated scans or of recorded ones, told the truth where it is to be."""
+
+    def __init__(
+        self, tracker: Tracker, estimate: Estimator, truth: Truth, rngs: Sequence[np.random.Generator]
+    ) -> None:
+        self._tracker = tracker.told(truth) if isinstance(tracker, Central) else tracker
+        self._estimate, self._rngs, self._state = estimate, rngs, self._tracker.initial()
+
+    def step(
+        self, step: int, scans: Sequence[Any], poses: Floats, time: float, clock: Stages
+    ) -> tuple[State, TrackerInfo, Estimate]:
+        """Take the scans of a step; what is believed, what the tracker reports, and what is read off the belief."""
+        with clock.timing("filter"):
+            state, info = self._tracker.step(self._state, scans, poses, time, rngs=self._rngs)
+        with clock.timing("estimate"):
+            estimate = self._estimate(state.fused, step)
+        self._state = state
+        return state, info, estimate
 
 
 class Moment(NamedTuple):
@@ -144,11 +164,6 @@ def truth_of_run(experiment: Experiment, seed: int, run: int) -> Truth:
     return experiment.targets.truth(experiment.times, rng=run_stream(seed, run, TRUTH))
 
 
-def journal_of(experiment: Experiment, planner: str, seed: int, run: int, truth: Truth) -> Journal:
-    """An empty journal of a run of an experiment."""
-    return Journal(experiment.name, planner, seed, run, truth, experiment.num_sensors, explain=experiment.explain)
-
-
 def advance(world: World, journal: Journal, watch: Callable[[int], None] | None = None) -> list[Moment]:
     """The scans up to the next decision, or else to the end, each written down in the journal of the run.
 
@@ -172,7 +187,7 @@ def simulate(
     *,
     seed: int,
     run: int,
-    score: Score,
+    score: Score | None,
     watch: Callable[[int], None] | None = None,
 ) -> RunRecord:
     """One run of a strategy.
@@ -181,17 +196,18 @@ def simulate(
         experiment: the parts of the run.
         planner: decides at the experiment's decision steps; None: the sensors never move, and no decision is made.
         seed, run: fix every random number; runs with equal seed and number are paired across planners.
-        score: (num_scans, 3) OSPA of the estimates against the truth, see `vedette.evaluation.ospa_of_run`.
+        score: (num_scans, 3) OSPA of the estimates against the truth, see `vedette.evaluation.ospa_of_run`; None: NaN.
         watch: told the number of every scan that is done.
 
     Raises:
         VedetteError: the true targets cannot be had.
-        RunStopped, RunInterrupted: models, tracker, estimate, planner or score raised, see `record_of_run`.
+        RunStopped, RunInterrupted: models, tracker, estimate, planner or score raised, see `Journal.filled`.
     """
     name = "still" if planner is None else planner.name
-    journal = journal_of(experiment, name, seed, run, truth_of_run(experiment, seed, run))
+    truth = truth_of_run(experiment, seed, run)
+    journal = Journal(experiment.name, name, seed, run, truth, experiment.num_sensors)
     with told_elsewhere():  # of scans that are drawn nobody has exchanged the numbers
-        return record_of_run(journal, score, partial(_go, experiment, planner, journal, watch))
+        return journal.filled(partial(_go, experiment, planner, journal, watch), score)
 
 
 def _told(planner: Any, truth: Truth) -> Planner | None:
@@ -211,5 +227,5 @@ def _go(experiment: Experiment, planner: Planner | None, journal: Journal, watch
         if planner is not None and moment.step in experiment.decision_steps:
             with journal.timing("planning"):
                 plan = planner.plan(moment.state, moment.poses, rng=planner_rng)
-            journal.decide(plan, moment.state.undetected)
+            journal.decide(plan, moment.state.undetected, explain=experiment.explain)
             world.follow(plan.chosen_actions)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.recorded import RecordedScans
-from vedette.recorded.tracking import Tracking
+from vedette.recorded import RecordedScans, Tracking
 from vedette.scenarios.build.sensors import (
     build_poses,
     build_scan_times,
@@ -57,22 +56,17 @@ def build_experiment(scenario: Scenario) -> Experiment:
 
 
 def build_tracking(scenario: Scenario, recording: RecordedScans | None = None) -> Tracking:
-    """The recording of a scenario with its tracker; `recording`: its scans, where they are read already.
+    """The recording of a scenario (None: it is read) with its tracker.
 
     Raises `InputError` as `build_experiment`, or for a scenario whose scans are simulated.
     """
     model, folder = scenario.model, scenario.folder
-    if recording is None:
-        if model.recording is None:
-            raise InputError(f"{model.name}: expected a section `recording`; got a scenario whose scans are simulated")
-        recording = model.recording.build(model, folder)
-    return Tracking(
-        name=model.name,
-        recording=recording,
-        tracker=build_tracker(scenario, tuple(sensor.filter for sensor in build_sensors(scenario))),
-        estimate=model.estimates_by.build(folder),
-        truth=build_targets(scenario).truth(recording.times, rng=np.random.default_rng(0)),  # which draws nothing
-    )
+    if model.recording is None:
+        raise InputError(f"{model.name}: expected a section `recording`; got a scenario whose scans are simulated")
+    recording = recording or model.recording.build(model, folder)
+    tracker = build_tracker(scenario, tuple(sensor.filter for sensor in build_sensors(scenario)))
+    truth = build_targets(scenario).truth(recording.times, rng=np.random.default_rng(0))  # which draws nothing
+    return Tracking(model.name, recording, tracker, model.estimates_by.build(folder), truth)
 
 
 def build_targets(scenario: Scenario) -> TargetSource:
