@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -40,7 +41,7 @@ def of_opensky(table: Table) -> tuple[Table, dict[str, str]]:
         first.setdefault((str(table.columns["icao24"][i]), str(table.columns[time][i])), i)
     kept = list(first.values())
     columns = {name: [cells[i] for i in kept] for name, cells in table.columns.items()}
-    found = Table(columns, [table.rows[i] for i in kept], table.source, notes=notes)
+    found = replace(table, columns=columns, rows=[table.rows[i] for i in kept], notes=notes)
     names = {"time": time, "id": "icao24", "longitude": "lon", "latitude": "lat"}
     if not _are_there(table, _VELOCITY, kept):
         return found, names
