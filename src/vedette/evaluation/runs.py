@@ -37,7 +37,7 @@ def run_scenario(
         scenario: as `vedette.scenarios.load_scenario` reads it, or the name or file that it is read by.
         planner: "jdm" (joint), "idm" (independent), "lookahead" (joint, over several decisions), "nearest", "assigned"
             or "centroid" (rules of thumb), "oracle" and "told" (which know the targets), "random", "fixed", "still",
-            or one of the scenario's own; of no matter where the scans were recorded.
+            or one of the scenario's own; not used if the scans are recorded.
         seed, run: fix every random number; runs with equal seed and number are paired across strategies.
         num_threads: share a decision (0: one a processor) and change no result.
         watch: told the number of every scan that is done.
@@ -75,9 +75,7 @@ def track_recording(
 
 
 def score_of(scenario: Scenario) -> Score | None:
-    """What gives the OSPA of estimates at each scan, under the cutoff, order and components of a scenario; None where
-    nobody knows the targets.
-    """
+    """Return the OSPA of estimates at each scan as a function, as the scenario defines it; None: unknown targets."""
     ospa = scenario.model.ospa
     if scenario.model.targets.kind == "unknown":
         return None

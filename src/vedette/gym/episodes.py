@@ -48,7 +48,7 @@ class Built:
         parts = build_parts(self.scenario, build_sensors(self.scenario), Strategy())
         self.observer = Observer.of(parts._asdict(), num_labels)
         score = score_of(self.scenario)
-        assert score is not None  # nobody knows the targets of recordings alone
+        assert score is not None  # only the targets of recordings are unknown
         self.score = score
 
     @property

@@ -181,12 +181,12 @@ def read_table(path: str | Path, *, reports: bool = False, sha256: str | None = 
     Args:
         path: of the file.
         reports: whether positions that targets report are asked for, of a file that may have scans, too.
-        sha256: that the file had when somebody kept it, in hexadecimal digits; None: nobody did.
+        sha256: SHA-256 that the file must have, in hexadecimal digits; None: any.
 
     Raises:
         MissingPackageError: what reads it is not installed.
-        InputError: not there, another ending, changed since `sha256` was kept, not readable as what it says it is, rows
-            not as long as the header.
+        InputError: not there, another ending, another `sha256`, not readable as what it says it is, rows not as long as
+            the header.
     """
     file = Path(path)
     named = elided(printable(str(file)), 200)

@@ -79,7 +79,7 @@ class RecordedTargets:
             usual_origin_deg: the same where `origin_deg` is None, and of no matter for x and y; None: the median of the
                 reports.
             time_origin, cleaning: see the class.
-            sha256: that the file has to have, in hexadecimal digits; None: any.
+            sha256: as of `read_table`.
 
         Raises:
             InputError: names the file, row, column, what was expected and what came.

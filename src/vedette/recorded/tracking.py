@@ -19,14 +19,14 @@ from vedette.tracking import Tracker
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tracking:
-    """A recording and what tracks its targets.
+    """A recording with its tracker.
 
     Attributes:
         name: of the scenario, for records.
         recording: the scans.
         tracker: of its sensors.
         estimate: reads the targets off the fused belief, given the number of the instant (from 1).
-        truth: the targets at the times of the recording; none where they are unknown.
+        truth: the targets at the times of the recording; no targets if they are unknown.
 
     Raises:
         InputError: a tracker of other sensors, or targets at other times.
@@ -57,7 +57,7 @@ class Tracking:
         Args:
             score: (num_scans, 3) OSPA of the estimates against the truth; None: NaN.
             seed, run: fix the random numbers of filters that draw.
-            watch: told the number of every instant that is done.
+            watch: called with the number of each instant after it.
         """
         recording, num = self.recording, len(self.tracker.sensors)
         journal = Journal(self.name, "recorded", seed, run, self.truth, num, recording.file)

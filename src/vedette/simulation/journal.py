@@ -82,7 +82,7 @@ class Journal:
         num_sensors: int,
         file: ScansFile | None = None,
     ) -> None:
-        """Before the first scan; file: of recorded scans."""
+        """An empty journal. file: of recorded scans; None: they are simulated."""
         self.scenario, self.planner, self.seed, self.run = scenario, planner, seed, run
         self.truth, self.file = truth, file
         self.step = 1
@@ -177,10 +177,10 @@ class Journal:
         return np.full((num, 3), np.nan) if score is None else score(self.truth.first(num), self.estimates)
 
     def filled(self, go: Callable[[], None], score: Score | None) -> RunRecord:
-        """Return the record of a run whose scans `go` takes and writes down here.
+        """Return the record of a run; `go` processes its scans and notes each of them here.
 
         Args:
-            go: goes through the scans.
+            go: processes the scans, one after the other.
             score: (num_scans, 3) OSPA of the estimates against the truth; None: NaN.
 
         Raises:

@@ -50,7 +50,7 @@ def scans_of_run(
 
 
 class RunningTracker:
-    """A tracker in the middle of a run, of simulated scans or of recorded ones, told the truth where it is to be."""
+    """A tracker with its state during a run; a filter that needs the true targets receives them."""
 
     def __init__(
         self, tracker: Tracker, estimate: Estimator, truth: Truth, rngs: Sequence[np.random.Generator]
@@ -61,7 +61,7 @@ class RunningTracker:
     def step(
         self, step: int, scans: Sequence[Any], poses: Floats, time: float, clock: Stages
     ) -> tuple[State, TrackerInfo, Estimate]:
-        """Take the scans of a step; what is believed, what the tracker reports, and what is read off the belief."""
+        """Process the scans of a step; return the new state, the tracker's report and the estimate."""
         with clock.timing("filter"):
             state, info = self._tracker.step(self._state, scans, poses, time, rngs=self._rngs)
         with clock.timing("estimate"):

@@ -65,7 +65,7 @@ def build_tracking(scenario: Scenario, recording: RecordedScans | None = None) -
         raise InputError(f"{model.name}: expected a section `recording`; got a scenario whose scans are simulated")
     recording = recording or model.recording.build(model, folder)
     tracker = build_tracker(scenario, tuple(sensor.filter for sensor in build_sensors(scenario)))
-    truth = build_targets(scenario).truth(recording.times, rng=np.random.default_rng(0))  # which draws nothing
+    truth = build_targets(scenario).truth(recording.times, rng=np.random.default_rng(0))  # draws nothing
     return Tracking(model.name, recording, tracker, model.estimates_by.build(folder), truth)
 
 
