@@ -30,11 +30,11 @@ _LIGHTEST = 1e-9  # expected number of targets below which a component is merged
 @kernel
 def predicted_intensity(intensity: Mixture, motion: Motion, dt: float, born: Mixture, max_components: int) -> Mixture:
     """The intensity `dt` seconds later with those born since, condensed."""
-    return condensed(stacked_mixtures(_moved(intensity, motion, dt), born), max_components)
+    return condensed(stacked_mixtures(moved(intensity, motion, dt), born), max_components)
 
 
 @kernel
-def _moved(intensity: Mixture, motion: Motion, dt: float) -> Mixture:
+def moved(intensity: Mixture, motion: Motion, dt: float) -> Mixture:
     """Survival and motion over `dt` seconds, component by component."""
     num, dim = intensity.means.shape
     out, scratch = make_components(num, dim), make_scratch(dim, 1)

@@ -1,0 +1,277 @@
+"""Likelihood ratios of gaps: whether a label that begins is the target of one that ended, or a target just born."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.densities import FactoredGLMB, TrackHistory, UndetectedTargets, as_lmb
+from vedette.errors import InputError
+from vedette.filters import FactoredGlmbFilter
+from vedette.kernels.base.types import Bools, Floats, Ints, Mixture
+from vedette.kernels.gaussian.components import components_of, joined_components, taken_components
+from vedette.kernels.gaussian.intensities import moved
+from vedette.models import SensorModel, TargetModel
+from vedette.models.arguments import probability
+from vedette.models.motion import kernel_motion
+
+# Estimates of a new label that are compared with the motion of one that ended: more say little about the gap.
+_FIRST_ESTIMATES = 10
+# Standard deviations of a birth's position that stand for "anywhere", as in the filter.
+_WIDE = 3.0
+# Share of a variance below which a scan is taken to have said nothing in that direction.
+_LEAST_INFORMATION = 1e-6
+_MOST_CERTAIN = 1.0 - 1e-12
+# Scans after which a label that ended is forgotten.
+_LONGEST_GAP = 200
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Watch:
+    """What is known of the targets, and how they were watched.
+
+    Attributes:
+        targets: motion, survival and births, as the filters have them; births at sites or anywhere in a region.
+        sensors: one a sensor.
+        times: (num_scans,) of the scans, s.
+        poses: (num_scans, num_sensors, 3 or more) of the sensors.
+        scanned: (num_scans, num_sensors) whether each sensor scanned.
+        prob_hidden: probability that a target which exists, and is not detected for a while, was out of sight all that
+            time although the detection models do not say so: behind an island, or silent. 0: scans miss a target
+            independently, as filters assume, and 12 misses at a probability of detection of .95 are next to impossible.
+
+    Raises:
+        InputError: arrays of other shapes, no probability, or births from measurements without a region.
+    """
+
+    targets: TargetModel
+    sensors: tuple[SensorModel, ...]
+    times: Floats
+    poses: Floats
+    scanned: Bools
+    prob_hidden: float
+
+    def __post_init__(self) -> None:
+        shape = len(self.times), len(self.sensors)
+        if self.poses.shape[:2] != shape or self.scanned.shape != shape:
+            got = f"{self.poses.shape[:2]}, {self.scanned.shape}"
+            raise InputError(f"poses, scanned: expected entries for each scan and sensor, {shape}; got {got}")
+        probability("prob_hidden", self.prob_hidden)
+        measured = self.targets.birth.from_measurements
+        if measured is not None and measured.region is None and self.targets.birth.anywhere is None:
+            raise InputError("targets.birth.from_measurements: expected births in a region; got none")
+
+    def step(self, scan: int) -> float:
+        """Seconds since the scan before; the first counts as one second after it."""
+        return float(self.times[scan] - self.times[scan - 1]) if scan else 1.0
+
+    def moved(self, mixture: Mixture, first: int, last: int) -> Mixture:
+        """A mixture at scan `first`, after survival and motion to scan `last`."""
+        motion = kernel_motion(self.targets.motion, self.targets.survival)
+        for scan in range(first + 1, last + 1):
+            mixture = moved(mixture, motion, self.step(scan))
+        return mixture
+
+
+class _Information(NamedTuple):
+    """What scans say about a state: exp(linear'u - u'matrix u / 2) with u = state - reference, up to a factor."""
+
+    scan: int
+    reference: Floats  # (dim,)
+    linear: Floats  # (dim,)
+    matrix: Floats  # (dim, dim), positive semidefinite
+
+
+@dataclass(slots=True)
+class _Lost:
+    """The labels that have ended so far: their targets' densities if they live, and what the scans since say.
+
+    Log weights are of the probability that the target existed at the last estimate and has survived until now.
+    """
+
+    tracks: list[int]
+    mixture: Mixture
+    log_missed: Floats  # (num,) that all scans since have missed it where it was predicted
+    detected: Floats  # (num,) probability that a scan since would have detected it
+
+    def add(self, track: int, history: TrackHistory) -> None:
+        with np.errstate(divide="ignore"):
+            weight = np.log(history.existence[-1:])
+        new = components_of(weight, history.means[-1:].copy(), history.covs[-1:].copy())
+        self.mixture = joined_components([self.mixture, new])
+        self.tracks.append(track)
+        self.log_missed, self.detected = np.append(self.log_missed, 0.0), np.append(self.detected, 0.0)
+
+    def keep(self, places: Ints) -> None:
+        """Keep the labels at `places` alone."""
+        self.tracks = [self.tracks[place] for place in places.tolist()]
+        self.mixture = taken_components(self.mixture, places)
+        self.log_missed, self.detected = self.log_missed[places], self.detected[places]
+
+    def thin(self, watch: Watch, scan: int) -> None:
+        """Take note of a scan at which none of them was detected."""
+        log_missed = np.zeros(len(self.tracks))
+        with np.errstate(divide="ignore"):
+            for s in np.flatnonzero(watch.scanned[scan]).tolist():
+                seen = watch.sensors[s].mean_detection(self.mixture.means, self.mixture.covs, watch.poses[scan, s])
+                log_missed += np.log1p(-seen)
+        self.detected -= np.exp(self.mixture.log_weights + self.log_missed) * np.expm1(log_missed)
+        self.log_missed = self.log_missed + log_missed
+
+    def log_unseen(self, prob_hidden: float) -> Floats:
+        """(num,) log probability that all scans since have missed the target, if it lives."""
+        with np.errstate(divide="ignore"):
+            return np.asarray(np.logaddexp(np.log(prob_hidden), np.log1p(-prob_hidden) + self.log_missed))
+
+    def log_gone(self, prob_hidden: float) -> Floats:
+        """(num,) log probability that no scan since has detected the target, alive or not."""
+        return np.asarray(np.log1p(-(1.0 - prob_hidden) * np.minimum(self.detected, _MOST_CERTAIN)))
+
+
+def gap_log_ratios(histories: Sequence[TrackHistory], watch: Watch) -> Floats:
+    """Return, for each pair of labels, the log likelihood ratio of one target with a gap against all else.
+
+    Label i ended with existence r and density N(m, P) at its last estimate; label j begins n scans later. With P_S(n)
+    the probability of surviving to then, U = h + (1 - h) * product of 1 - P_D over the scans between (h is
+    `prob_hidden`), p_i the density N(m, P) moved to then, L_j the likelihood of the first scans of j, D the intensity
+    of undetected targets there, G the probability that target i, which may have died, is detected by no scan until the
+    last of these, and e the existence of j at that scan, as j may be clutter:
+
+        ratio(i, j) = r P_S(n) U * integral p_i(x) L_j(x) dx / (G * integral D(x) L_j(x) dx / e).
+
+    That is exact for linear Gaussian models and a probability of detection that is the same everywhere, if the first
+    estimate of j is of the scan that began it. D is the intensity that the default filter has of targets no scan has
+    detected. L_j is the product of the information that each estimate of j adds to the one before, moved to its time;
+    the first estimate is divided by the component of D that it began from, so that this prior counts in D alone.
+
+    Args:
+        histories: of all labels, see `track_histories`.
+        watch: models, times and poses.
+
+    Returns:
+        (num_labels, num_labels) of the row's label going on as the column's; -inf where it cannot.
+    """
+    num, dim = len(histories), watch.targets.state_dim
+    ratios = np.full((num, num), -np.inf)
+    begins = [min(history.label[0], int(history.steps[0])) - 1 for history in histories]
+    compared = [history.steps[:_FIRST_ESTIMATES] - 1 for history in histories]
+    lost = _Lost([], components_of(np.empty(0), np.empty((0, dim)), np.empty((0, dim, dim))), np.empty(0), np.empty(0))
+    pending: dict[int, dict[int, float]] = {}  # log ratios without G, by the columns' and rows' labels
+    for scan, undetected in enumerate(_undetected(watch, begins)):
+        if lost.tracks:
+            lost.mixture = watch.moved(lost.mixture, scan - 1, scan)
+        for j in [j for j, begin in enumerate(begins) if begin == scan and lost.tracks]:
+            prior = _births_at(undetected, histories[j], scan, watch)
+            told = list(_told(histories[j], scan, prior, watch))
+            same = lost.mixture._replace(log_weights=lost.mixture.log_weights + lost.log_unseen(watch.prob_hidden))
+            fits, born = (_log_fits(mixture, scan, told, watch) for mixture in (same, prior))
+            log_exists = np.log(histories[j].existence[:_FIRST_ESTIMATES][-1])
+            pending[j] = dict(zip(lost.tracks, fits - np.logaddexp.reduce(born) + log_exists, strict=True))
+        if lost.tracks:
+            lost.thin(watch, scan)
+        log_gone = dict(zip(lost.tracks, lost.log_gone(watch.prob_hidden), strict=True))
+        for j in [j for j in pending if compared[j][-1] == scan]:
+            for i, log_ratio in pending.pop(j).items():
+                ratios[i, j] = log_ratio - log_gone[i] if i in log_gone else -np.inf
+        lost.keep(np.flatnonzero([scan - histories[i].steps[-1] < _LONGEST_GAP for i in lost.tracks]))
+        for i in [i for i, history in enumerate(histories) if history.steps[-1] - 1 == scan]:
+            lost.add(i, histories[i])
+    return ratios
+
+
+def _undetected(watch: Watch, begins: Sequence[int]) -> Iterator[FactoredGLMB]:
+    """At each scan the belief before it of a filter without detections: the undetected targets are those of any filter.
+
+    begins: scan at which each label begins, by which a birth rate is learnt.
+    """
+    filters = [FactoredGlmbFilter(watch.targets, sensor) for sensor in watch.sensors]
+    belief, rng = filters[0].initial(), np.random.default_rng(0)
+    for scan in range(len(watch.times)):
+        undetected = belief.undetected
+        if undetected is not None and undetected.birth_rate is not None:
+            number = float(sum(0 < begin < scan for begin in begins))
+            learnt = replace(undetected.birth_rate, past=number)
+            belief = belief.with_fields(undetected=replace(undetected, birth_rate=learnt))
+        belief, _ = filters[0].predict(belief, watch.step(scan), scan + 1)
+        yield belief
+        for s in np.flatnonzero(watch.scanned[scan]).tolist():
+            nothing = np.empty((0, watch.sensors[s].meas_dim))
+            belief, _ = filters[s].update(belief, nothing, watch.poses[scan, s], rng=rng)
+
+
+def _births_at(belief: FactoredGLMB, history: TrackHistory, scan: int, watch: Watch) -> Mixture:
+    """The intensity of undetected targets where a label began, those that appeared anywhere as one wide Gaussian."""
+    undetected, labels = belief.undetected, as_lmb(belief)
+    assert isinstance(undetected, UndetectedTargets)
+    sites = labels.tracks.to_kernel().components
+    at_sites = sites._replace(log_weights=np.log(labels.existence))
+    found = [undetected.intensity.to_kernel(), at_sites]
+    birth = watch.targets.birth
+    if undetected.cells is not None and birth.from_measurements is not None:
+        std = birth.from_measurements.std * np.where(np.arange(birth.state_dim) < 2, _WIDE, 1.0)
+        back = watch.times[scan] - history.times[0]
+        place = watch.targets.motion.propagate(history.means[:1], back) * (np.arange(birth.state_dim) < 2)
+        grid = undetected.cells.grid
+        cell = grid.cells_at(place)
+        density = undetected.cells.expected[cell] * (cell >= 0) / np.prod(grid.cell_size)
+        with np.errstate(divide="ignore"):
+            weight = np.log(density * 2.0 * np.pi * std[0] * std[1])
+        found.append(components_of(weight, place, np.diag(std**2)[np.newaxis]))
+    return joined_components(found)
+
+
+def _told(history: TrackHistory, scan: int, prior: Mixture, watch: Watch) -> Iterator[_Information]:
+    """What the scans of each of the first estimates say. prior: at `scan`, at which the label began."""
+    first = int(history.steps[0]) - 1
+    before = watch.moved(prior, scan, first)
+    fits = before.log_weights + _log_densities(before, history.means[0], history.covs[0])
+    before = taken_components(before, np.array([int(np.argmax(fits))]))
+    yield _information(first, before, history.means[0], history.covs[0])
+    for k, (last, now) in enumerate(pairwise((history.steps[:_FIRST_ESTIMATES] - 1).tolist())):
+        own = components_of(np.zeros(1), history.means[k : k + 1].copy(), history.covs[k : k + 1].copy())
+        yield _information(now, watch.moved(own, last, now), history.means[k + 1], history.covs[k + 1])
+
+
+def _log_densities(mixture: Mixture, mean: Floats, cov: Floats) -> Floats:
+    """(num,) log of the integrals of N(x; mean, cov) times each component without its weight, up to a constant."""
+    spread, apart = mixture.covs + cov, mixture.means - mean
+    squared = (apart * np.linalg.solve(spread, apart[..., np.newaxis])[..., 0]).sum(axis=-1)
+    return np.asarray(-0.5 * (squared + np.linalg.slogdet(spread)[1]))
+
+
+def _information(scan: int, before: Mixture, mean: Floats, cov: Floats) -> _Information:
+    """The quotient of N(mean, cov) and the Gaussian before the scan, where that is wider.
+
+    With cov = R R' and the eigenvectors of 1 - R' P^-1 R, P the covariance before, what the scan said in each direction
+    is the eigenvalue, from 0 (nothing) to 1 (all that is known).
+    """
+    root, precision = np.linalg.cholesky(cov), np.linalg.inv(before.covs[0])
+    values, axes = np.linalg.eigh(np.eye(len(mean)) - root.T @ precision @ root)
+    is_told = values > _LEAST_INFORMATION
+    whitened = axes.T @ root.T @ precision @ (mean - before.means[0])
+    back = axes.T @ np.linalg.inv(root)
+    return _Information(scan, mean, back.T @ (is_told * whitened), (back.T * (is_told * values)) @ back)
+
+
+def _log_fits(mixture: Mixture, scan: int, told: Sequence[_Information], watch: Watch) -> Floats:
+    """(num,) log of weight times likelihood of what scans say, for each component of a mixture at `scan`.
+
+    The integral of N(x; m, P) exp(y'u - u'Yu / 2) with u = x - c, d = m - c, g = y - Y d is
+    |1 + P Y|^(-1/2) exp(y'd - d'Yd / 2 + g'(1 + P Y)^-1 P g / 2).
+    """
+    for information in told:
+        mixture = watch.moved(mixture, scan, information.scan)
+        scan, apart = information.scan, mixture.means - information.reference
+        grown = np.eye(mixture.means.shape[1]) + mixture.covs @ information.matrix
+        solved = np.linalg.solve(grown, mixture.covs)
+        covs = np.ascontiguousarray(0.5 * (solved + solved.transpose(0, 2, 1)), np.float64)
+        slope = information.linear - apart @ information.matrix
+        shift = (covs @ slope[..., np.newaxis])[..., 0]
+        exponents = apart @ information.linear - 0.5 * ((apart @ information.matrix) * apart).sum(axis=-1)
+        logs = exponents + 0.5 * (slope * shift).sum(axis=-1) - 0.5 * np.linalg.slogdet(grown)[1]
+        mixture = components_of(mixture.log_weights + logs, mixture.means + shift, covs)
+    return mixture.log_weights

@@ -1,0 +1,107 @@
+"""Joined tracks: labels that end and begin again across a gap are one track where the likelihood of the gap says so."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from vedette.densities import Estimate, track_histories
+from vedette.evaluation.gaps import Watch, gap_log_ratios
+from vedette.evaluation.scans import scans_of_record
+from vedette.filters import labels_targets, shared_targets
+from vedette.kernels.base.types import Floats
+from vedette.models.arguments import probability
+from vedette.scenarios import Scenario
+from vedette.scenarios.build import build_sensors
+from vedette.simulation.records import RunRecord
+
+# By benchmarks/joined_tracks.py: the least threshold with at most two wrong joins in a hundred runs of ten targets.
+PROB_HIDDEN, THRESHOLD = 0.1, 0.95
+Label = tuple[int, int]
+
+
+class Join(NamedTuple):
+    """Label `ended` goes on as label `began` (birth step and index each), with this probability."""
+
+    ended: Label
+    began: Label
+    probability: float
+
+
+def joins_of_run(
+    record: RunRecord, scenario: Scenario, *, prob_hidden: float = PROB_HIDDEN, threshold: float = THRESHOLD
+) -> tuple[Join, ...]:
+    """Return the joins of a run's labels by the models of its scenario, in the order of `began`.
+
+    There are none of filters whose targets have no labels.
+
+    prob_hidden: see `Watch`. threshold: the least probability of a join. Raises `InputError` for numbers that are no
+    probabilities, and `VedetteError` for models or a recording that cannot be built.
+    """
+    filters = tuple(sensor.filter for sensor in build_sensors(scenario))
+    if not all(map(labels_targets, filters)):
+        return ()
+    scanned = np.array([[scan is not None for scan in scans] for scans in scans_of_record(record, scenario)])
+    sensors = tuple(local.sensor for local in filters)
+    watch = Watch(shared_targets(filters), sensors, record.times, record.poses, scanned, prob_hidden)
+    return joins_of(record.estimates, watch, threshold=threshold)
+
+
+def joins_of(estimates: Sequence[Estimate], watch: Watch, *, threshold: float = THRESHOLD) -> tuple[Join, ...]:
+    """As `joins_of_run`, of estimates of successive scans. Raises `InputError` for another number of scans."""
+    probability("threshold", threshold)
+    histories = track_histories(estimates, watch.times)
+    log_ratios = gap_log_ratios(histories, watch)
+    shares = _shares(log_ratios)
+    joins = [
+        Join(histories[i].label, histories[j].label, float(shares[i, j]))
+        for i, j in zip(*_assigned(log_ratios), strict=True)
+        if shares[i, j] >= threshold and log_ratios[i, j] > -np.inf
+    ]
+    return tuple(sorted(joins, key=lambda join: join.began))
+
+
+def _shares(log_ratios: Floats) -> Floats:
+    """(num, num) probability of each join among those of either of its labels, and none.
+
+    Exact where one of the two has no other; else somewhat low, as a rival may itself be joined elsewhere.
+    """
+    rows, columns = (np.logaddexp.reduce(log_ratios, axis=axis, initial=-np.inf) for axis in (1, 0))
+    others = np.logaddexp(rows[:, np.newaxis], columns)
+    with np.errstate(invalid="ignore"):
+        twice = np.where(log_ratios > -np.inf, np.exp(log_ratios - others), 0.0)
+    return np.asarray(np.exp(log_ratios - np.logaddexp(0.0, others + np.log1p(-np.minimum(twice, 0.5)))))
+
+
+def _assigned(log_ratios: Floats) -> tuple[list[int], list[int]]:
+    """Rows and columns of the joins of the largest summed log ratio, each row and column at most once."""
+    from scipy.optimize import linear_sum_assignment
+
+    gains = np.maximum(log_ratios, 0.0)
+    rows, columns = linear_sum_assignment(gains, maximize=True)
+    chosen = gains[rows, columns] > 0.0
+    return rows[chosen].tolist(), columns[chosen].tolist()
+
+
+def track_names(joins: Sequence[Join]) -> dict[Label, Label]:
+    """Return, for each label that continues another, the first label of its track."""
+    names: dict[Label, Label] = {}
+    for join in sorted(joins, key=lambda join: join.began):
+        names[join.began] = names.get(join.ended, join.ended)
+    return names
+
+
+def with_joined_tracks(record: RunRecord, joins: Sequence[Join]) -> RunRecord:
+    """Return the record with every label replaced by the first of its track, so that measures score whole tracks."""
+    names = track_names(joins)
+    return replace(record, estimates=tuple(_renamed(estimate, names) for estimate in record.estimates))
+
+
+def _renamed(estimate: Estimate, names: dict[Label, Label]) -> Estimate:
+    labels = [names.get((step, index), (step, index)) for step, index in estimate.labels.tolist()]
+    order = sorted(range(len(labels)), key=labels.__getitem__)
+    own = np.array(labels, np.int64).reshape(-1, 2)[order]
+    return Estimate(own, estimate.means[order], estimate.covs[order], estimate.existence[order])

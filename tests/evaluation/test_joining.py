@@ -1,0 +1,162 @@
+"""Joined tracks: the likelihood ratio of a gap against enumeration, and what is made of it."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vedette import models
+from vedette.densities import Estimate, track_histories
+from vedette.errors import InputError
+from vedette.evaluation.gaps import Watch, gap_log_ratios
+from vedette.evaluation.joining import joins_of, track_names
+
+DT, SURVIVAL, DETECTION, SIGMA, NOISE = 2.0, 0.97, 0.8, 0.6, 3.0
+LAST, BEGINS, ENDS = 2, 6, 9  # scans, from 1
+SITE = np.array([40.0, 5.0, 1.0, 0.0]), np.diag([900.0, 700.0, 16.0, 9.0]), 0.01
+F = np.eye(4) + DT * np.eye(4, k=2)
+Q = SIGMA**2 * np.kron([[DT**4 / 4, DT**3 / 2], [DT**3 / 2, DT**2]], np.eye(2))
+H = np.eye(2, 4)
+
+
+def updated(mean: Any, cov: Any, z: Any) -> tuple[Any, Any, float]:
+    """Kalman update of a position, and the log likelihood."""
+    spread = H @ cov @ H.T + NOISE**2 * np.eye(2)
+    gain, apart = cov @ H.T @ np.linalg.inv(spread), z - H @ mean
+    log = -0.5 * (apart @ np.linalg.solve(spread, apart) + np.linalg.slogdet(2.0 * np.pi * spread)[1])
+    return mean + gain @ apart, (np.eye(4) - gain @ H) @ cov, float(log)
+
+
+def moved(mean: Any, cov: Any) -> tuple[Any, Any]:
+    return F @ mean, F @ cov @ F.T + Q
+
+
+def gone(existence: float, hidden: float) -> float:
+    """Probability that no scan after the last estimate detects the target: all deaths and detections enumerated."""
+    num, total = ENDS - LAST, 1.0 - existence
+    for lives in range(num + 1):
+        path = SURVIVAL**lives * (1.0 - SURVIVAL if lives < num else 1.0)
+        missed = sum(
+            float(np.prod([DETECTION if seen else 1.0 - DETECTION for seen in pattern]))
+            for pattern in itertools.product([False, True], repeat=lives)
+            if not any(pattern)
+        )
+        total += existence * path * (hidden + (1.0 - hidden) * missed)
+    return float(total)
+
+
+def watch_of(hidden: float, **changed: Any) -> Watch:
+    region = models.Region(-1e3, 1e3, -1e3, 1e3)
+    mean, cov, existence = SITE
+    birth = models.BirthModel(np.array([existence]), mean[None], cov[None], frozenset({BEGINS}))
+    targets = models.TargetModel(models.constant_velocity(SIGMA), models.constant_survival(SURVIVAL), birth)
+    sensor = models.SensorModel(
+        models.position(),
+        models.constant_noise([NOISE, NOISE]),
+        models.constant_detection(DETECTION),
+        models.region_clutter(1.0, region, "position"),
+    )
+    given: dict[str, Any] = {
+        "poses": np.zeros((ENDS, 1, 3)),
+        "scanned": np.ones((ENDS, 1), np.bool_),
+        "prob_hidden": hidden,
+    }
+    return Watch(targets, (sensor,), DT * np.arange(float(ENDS)), **{**given, **changed})
+
+
+def estimates_of(rows: dict[int, list[tuple[tuple[int, int], Any, Any, float]]]) -> list[Estimate]:
+    """Estimates of all scans; rows: label, mean, covariance and existence of those of each scan."""
+    found = []
+    for step in range(1, ENDS + 1):
+        own = sorted(rows.get(step, []))
+        if not own:
+            found.append(Estimate.empty(4))
+            continue
+        labels, means, covs, existence = zip(*own, strict=True)
+        found.append(Estimate(np.array(labels), np.array(means), np.array(covs), np.array(existence)))
+    return found
+
+
+def scene() -> tuple[list[Estimate], float, tuple[Any, Any], list[Any]]:
+    """Estimates of a label that ends and one that begins, the log likelihood of the second's scans as a birth, the last
+    estimate of the first, and these scans."""
+    rng = np.random.default_rng(3)
+    ended = np.array([0.0, 0.0, 4.0, 1.0]), np.diag([16.0, 9.0, 1.0, 2.0])
+    zs = [np.array([33.0, 9.0]) + DT * k * np.array([4.0, 1.0]) + rng.normal(0.0, NOISE, 2) for k in range(4)]
+    rows: dict[int, Any] = {LAST: [((1, 0), *ended, 0.8)]}
+    mean, cov, total = *SITE[:2], 0.0
+    for step, z in zip(range(BEGINS, ENDS + 1), zs, strict=True):
+        if step > BEGINS:
+            mean, cov = moved(mean, cov)
+        mean, cov, log = updated(mean, cov, z)
+        total += log
+        rows[step] = [((BEGINS, 0), mean, cov, 0.9)]
+    return estimates_of(rows), total, ended, zs
+
+
+@pytest.mark.parametrize("hidden", [0.0, 0.3, 1.0])
+def test_the_ratio_of_a_gap_is_that_of_enumeration(hidden: float) -> None:
+    estimates, log_born, (mean, cov), zs = scene()
+    watch = watch_of(hidden)
+    log_same = np.log(0.8) + (BEGINS - LAST) * np.log(SURVIVAL)
+    log_same += np.log(hidden + (1.0 - hidden) * (1.0 - DETECTION) ** (BEGINS - LAST - 1))
+    for _ in range(LAST, BEGINS):
+        mean, cov = moved(mean, cov)
+    for k, z in enumerate(zs):
+        if k:
+            mean, cov = moved(mean, cov)
+        mean, cov, log = updated(mean, cov, z)
+        log_same += log
+    expected = np.log(0.9) + log_same - np.log(gone(0.8, hidden)) - np.log(SITE[2]) - log_born
+    ratios = gap_log_ratios(track_histories(estimates, watch.times), watch)
+    assert ratios[0, 1] == pytest.approx(expected, abs=1e-7)
+    assert (ratios[[0, 1, 1], [0, 0, 1]] == -np.inf).all()
+    joins = joins_of(estimates, watch, threshold=0.0)
+    if expected > 0.0:
+        assert [(join.ended, join.began) for join in joins] == [((1, 0), (BEGINS, 0))]
+        assert joins[0].probability == pytest.approx(1.0 / (1.0 + np.exp(-expected)))
+
+
+def test_scans_that_did_not_take_place_miss_nothing() -> None:
+    estimates, *_ = scene()
+    scanned = np.ones((ENDS, 1), np.bool_)
+    scanned[LAST : BEGINS - 1] = False
+    histories, missed = track_histories(estimates, watch_of(0.0).times), watch_of(0.0)
+    blind, unseen = watch_of(0.0, scanned=scanned), watch_of(1.0)
+    ratio, least, most = (gap_log_ratios(histories, watch)[0, 1] for watch in (blind, missed, unseen))
+    assert least < ratio
+    log_seen = np.log(gone(0.8, 1.0))
+    assert ratio > most + log_seen  # of no scan the hypothesis that the target died is no more probable
+
+
+def test_one_of_two_ended_labels_goes_on() -> None:
+    estimates, *_ = scene()
+    first = estimates[LAST - 1]
+    both = [np.concatenate([part, part]) for part in (first.means, first.covs, first.existence)]
+    estimates[LAST - 1] = Estimate(np.array([[1, 0], [1, 1]]), *both)
+    watch = watch_of(1.0)
+    (join,) = joins_of(estimates, watch, threshold=0.0)
+    assert join.probability == pytest.approx(0.5, abs=0.01)
+    assert joins_of(estimates, watch, threshold=0.6) == ()
+
+
+def test_tracks_are_named_by_their_first_label() -> None:
+    from vedette.evaluation.joining import Join
+
+    joins = (Join((1, 0), (7, 2), 0.9), Join((7, 2), (20, 0), 0.8), Join((3, 1), (9, 0), 0.7))
+    assert track_names(joins) == {(7, 2): (1, 0), (20, 0): (1, 0), (9, 0): (3, 1)}
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"hidden": 1.5}, "prob_hidden: expected"),
+        ({"hidden": 0.5, "poses": np.zeros((2, 1, 3))}, "poses, scanned: expected entries for each scan and sensor"),
+    ],
+)
+def test_what_a_watch_refuses(changed: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        watch_of(changed.pop("hidden"), **changed)
