@@ -72,6 +72,14 @@ def write_recording(
     (folder / "radars.yaml").write_text(SENSORS, "utf-8")
 
 
+def silence(path: Path, first: float, last: float) -> None:
+    """Between two times, in s from the start, every scan of a file has found nothing."""
+    head, *rows = path.read_text("utf-8").splitlines()
+    cells = [row.split(",") for row in rows]
+    cells = [[*row[:2], "", "", *row[4:]] if _iso(first) <= row[0] < _iso(last) else row for row in cells]
+    path.write_text("\n".join([head, *dict.fromkeys(map(",".join, cells))]) + "\n", "utf-8")
+
+
 def _iso(time: float) -> str:
     return (START + datetime.timedelta(seconds=time)).isoformat(timespec="milliseconds")
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner, Result
 
-from recordings import write_recording
+from recordings import silence, write_recording
 from vedette.cli import app
 from vedette.simulation.storage import load_run
 
@@ -38,6 +39,22 @@ def test_scans_become_tracks_results_and_a_picture(place: Path) -> None:
     assert (again.exit_code, "out exists" in again.stderr) == (1, True)
     told = CliRunner().invoke(app, ["results", "out"])
     assert (told.exit_code, "mean OSPA" in told.stdout) == (0, True)
+
+
+def test_tracks_are_joined_across_gaps_unless_that_is_switched_off(place: Path) -> None:
+    write_recording(place)
+    silence(place / "scans.csv", 45.0, 75.0)
+    given = ("scans.csv", "--sensors", "radars.yaml", "--truth", "truth.csv")
+    result = call(*given, "--out", "joined")
+    assert "  joined      3 gaps between labels of one track (--no-join: none)\n" in result.stdout
+    assert "joined" not in call(*given, "--no-join", "--out", "apart").stdout
+    tables = []
+    for folder in ("joined", "apart"):
+        with (place / folder / "tracks/tracks.csv").open(newline="") as file:
+            tables.append(list(csv.DictReader(file)))
+    joined, apart = tables
+    assert [row["label"] for row in joined] == [row["label"] for row in apart] == [row["track"] for row in apart]
+    assert len({row["track"] for row in joined}) == len({row["label"] for row in joined}) - 3
 
 
 def test_a_mistyped_file_is_named_itself(place: Path) -> None:

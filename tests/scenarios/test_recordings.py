@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from recordings import ORIGIN, RADARS, SHIPS, write_recording
+from recordings import ORIGIN, RADARS, SHIPS, silence, write_recording
 from vedette.errors import InputError, ScenarioError
-from vedette.evaluation.runs import run_scenario
+from vedette.evaluation.joining import joins_of_run, with_joined_tracks
+from vedette.evaluation.runs import measure_run, run_scenario
 from vedette.evaluation.scans import scan_table, scans_of_record
 from vedette.evaluation.track_table import table_of_run, write_tracks
 from vedette.models import Bias
@@ -356,9 +357,36 @@ def test_tracks_are_written_as_others_read_them(folder: Path) -> None:
             write_tracks(folder / f"t.{ending}", {name: cells for name, cells in columns.items() if name != "lon_deg"})
 
 
+def test_a_ship_keeps_its_track_over_a_gap(folder: Path) -> None:
+    import json
+
+    silence(folder / "scans.csv", 45.0, 75.0)
+    made = scenario_of_recording(folder / "radars.yaml", folder / "scans.csv", folder / "truth.csv")
+    record = run_scenario(made.scenario, "still", seed=0)
+    joins = joins_of_run(record, made.scenario)
+    tables = [table_of_run(record, made.scenario, own) for own in ((), joins)]
+    tracks = []
+    for table in tables:
+        own = {name: set[str]() for name in ("ship 0", "ship 1", "ship 2")}
+        for target, track in zip(table["target"], table["track"], strict=True):
+            if target is not None:
+                own[target].add(track)
+        tracks.append([len(names) for names in own.values()])
+    assert tracks == [[2, 2, 2], [1, 1, 1]]
+    assert tables[0]["track"] == tables[0]["label"] == tables[1]["label"]
+    joined = with_joined_tracks(record, joins)
+    assert measure_run(joined, made.scenario).label_switches.sum() == 0
+    assert measure_run(record, made.scenario).label_switches.sum() == 3
+    for estimate in joined.estimates:
+        estimate.validate()
+    write_tracks(folder / "tracks.geojson", tables[1])
+    features = json.loads((folder / "tracks.geojson").read_text("utf-8"))["features"]
+    assert sorted(len(each["properties"]["labels"]) for each in features)[-3:] == [2, 2, 2]
+
+
 def rows_of(columns: Mapping[str, Any]) -> dict[tuple[str, float], tuple[float, float]]:
     """Longitude and latitude by label and time, to a millisecond."""
-    names = ("label", "time_s", "lon_deg", "lat_deg")
+    names = ("track", "time_s", "lon_deg", "lat_deg")
     return {(label, round(t, 3)): (lon, lat) for label, t, lon, lat in zip(*map(columns.get, names), strict=True)}
 
 

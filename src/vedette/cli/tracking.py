@@ -28,6 +28,7 @@ from vedette.extras import without
 from vedette.text import counted
 
 if TYPE_CHECKING:
+    from vedette.evaluation.joining import Join
     from vedette.recorded import RecordedScans
     from vedette.scenarios import Scenario
     from vedette.scenarios.of_recording import OfRecording
@@ -60,6 +61,9 @@ def track(
             autocompletion=one_of(*FORMATS),
         ),
     ] = None,
+    join: Annotated[
+        bool, typer.Option("--join/--no-join", help="Join tracks across gaps, where they are probably of one target.")
+    ] = True,
     speed: Speed = 10.0,
     bad_rows: BadRows = "refuse",
     trust: Trust = False,
@@ -69,6 +73,7 @@ def track(
     Prints tracks and diagnostics, and errors if the targets' own reports are given. --out writes tracks, tables and
     figures.
     """
+    from vedette.evaluation.joining import joins_of_run, with_joined_tracks
     from vedette.simulation.storage import check_free
 
     _check_formats(formats or (), out)
@@ -89,9 +94,12 @@ def track(
         warned = warn_of_recording(record, scenario)
         sizes = counted(record.num_scans, "scan"), counted(recording.num_measurements, "measurement")
         say(f"{scans}: {', '.join(sizes)}, {counted(len(scenario.model.sensors), 'sensor')}")
-        say(f"  tracks      {_tracks(record)}")
+        joins = joins_of_run(record, scenario) if join else ()
+        say(f"  tracks      {_tracks(with_joined_tracks(record, joins))}")
+        if joins:
+            say(f"  joined      {counted(len(joins), 'gap')} between labels of one track (--no-join: none)")
         if out is not None:
-            written = _save(record, scenario, out, formats, overwrite=overwrite)
+            written = _save(record, scenario, out, formats, joins, overwrite=overwrite)
     if out is not None:
         if lacking := without("vedette track --out: figures", "matplotlib"):
             note(lacking)
@@ -100,7 +108,8 @@ def track(
                 _draw(record, scenario, out)
         say(f"Wrote {out}: {', '.join(_contents(out, written))}")
     origin = {"assumptions": assumed, "skipped": recording.skipped, "warnings": [*cautions, *warned]}
-    publish({**run_document(record, scenario), **origin, "folder": out, "written": written})
+    joined = [join._asdict() for join in joins]
+    publish({**run_document(record, scenario), **origin, "joins": joined, "folder": out, "written": written})
 
 
 def _check_formats(formats: Sequence[str], out: Path | None) -> None:
@@ -127,7 +136,13 @@ def _tracked(scenario: Scenario, recording: RecordedScans) -> RunRecord:
 
 
 def _save(
-    record: RunRecord, scenario: Scenario, out: Path, formats: Sequence[str] | None, *, overwrite: bool
+    record: RunRecord,
+    scenario: Scenario,
+    out: Path,
+    formats: Sequence[str] | None,
+    joins: Sequence[Join],
+    *,
+    overwrite: bool,
 ) -> list[Path]:
     """Write the results folder and the tracks; returns the files of tracks."""
     from vedette.evaluation.track_table import table_of_run, write_tracks
@@ -140,7 +155,7 @@ def _save(
         save_run(record, out, scenario_text=dump_kept(scenario), overwrite=overwrite)
     usual = ("csv", "geojson") if scenario.model.origin is not None else ("csv",)
     written = [out / "tracks" / f"tracks.{name}" for name in dict.fromkeys(formats or usual)]
-    table = table_of_run(record, scenario)
+    table = table_of_run(record, scenario, joins)
     for path in written:
         write_tracks(path, table)
     return written

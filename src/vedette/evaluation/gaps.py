@@ -166,6 +166,8 @@ def gap_log_ratios(histories: Sequence[TrackHistory], watch: Watch) -> Floats:
             lost.mixture = watch.moved(lost.mixture, scan - 1, scan)
         for j in [j for j, begin in enumerate(begins) if begin == scan and lost.tracks]:
             prior = _births_at(undetected, histories[j], scan, watch)
+            if not (prior.log_weights > -np.inf).any():
+                continue  # the models say that no target is born then, and nothing of how the label began
             told = list(_told(histories[j], scan, prior, watch))
             same = lost.mixture._replace(log_weights=lost.mixture.log_weights + lost.log_unseen(watch.prob_hidden))
             fits, born = (_log_fits(mixture, scan, told, watch) for mixture in (same, prior))
@@ -205,22 +207,19 @@ def _undetected(watch: Watch, begins: Sequence[int]) -> Iterator[FactoredGLMB]:
 
 def _births_at(belief: FactoredGLMB, history: TrackHistory, scan: int, watch: Watch) -> Mixture:
     """The intensity of undetected targets where a label began, those that appeared anywhere as one wide Gaussian."""
-    undetected, labels = belief.undetected, as_lmb(belief)
+    undetected, labels, birth = belief.undetected, as_lmb(belief), watch.targets.birth
     assert isinstance(undetected, UndetectedTargets)
-    sites = labels.tracks.to_kernel().components
-    at_sites = sites._replace(log_weights=np.log(labels.existence))
+    at_sites = labels.tracks.to_kernel().components._replace(log_weights=np.log(labels.existence))
     found = [undetected.intensity.to_kernel(), at_sites]
-    birth = watch.targets.birth
     if undetected.cells is not None and birth.from_measurements is not None:
-        std = birth.from_measurements.std * np.where(np.arange(birth.state_dim) < 2, _WIDE, 1.0)
-        back = watch.times[scan] - history.times[0]
-        place = watch.targets.motion.propagate(history.means[:1], back) * (np.arange(birth.state_dim) < 2)
-        grid = undetected.cells.grid
-        cell = grid.cells_at(place)
-        density = undetected.cells.expected[cell] * (cell >= 0) / np.prod(grid.cell_size)
+        grid, in_plane = undetected.cells.grid, np.arange(birth.state_dim) < 2
+        std = birth.from_measurements.std * np.where(in_plane, _WIDE, 1.0)
+        place = watch.targets.motion.propagate(history.means[:1], watch.times[scan] - history.times[0]) * in_plane
+        nearest = np.argmin(((grid.centres - place[0, :2]) ** 2).sum(axis=1))  # also of a place outside the region
+        density = undetected.cells.expected[nearest] / np.prod(grid.cell_size)
         with np.errstate(divide="ignore"):
             weight = np.log(density * 2.0 * np.pi * std[0] * std[1])
-        found.append(components_of(weight, place, np.diag(std**2)[np.newaxis]))
+        found.append(components_of(np.array([weight]), place, np.diag(std**2)[np.newaxis]))
     return joined_components(found)
 
 

@@ -36,14 +36,18 @@ _DIAGONAL_KNOWN = 2  # a kind of covariance: of these, what is on the diagonal c
 
 
 def geojson(table: Table) -> bytes:
-    """A feature a track, a line through its places (a point where there is one), with times and existence by place."""
+    """A feature a track, a line through its places (a point where there is one), with times and existence by place.
+
+    `label` is the first label of a track; `labels` has all.
+    """
     features = []
-    for label, rows in _tracks("GeoJSON", table).items():
+    for track, rows in _tracks("GeoJSON", table).items():
         places = [[table["lon_deg"][row], table["lat_deg"][row]] for row in rows]
         places = [[round(degrees, _DIGITS) for degrees in place] for place in places]
         line = {"type": "LineString", "coordinates": places}
         geometry = line if len(places) > 1 else {"type": "Point", "coordinates": places[0]}
-        told: dict[str, Any] = {"label": label, "target": _most_common([table["target"][row] for row in rows])}
+        told: dict[str, Any] = {"label": track, "target": _most_common([table["target"][row] for row in rows])}
+        told["labels"] = list(dict.fromkeys(table["label"][row] for row in rows))
         for name in ("time_s", "utc", "existence"):
             if name in table:
                 told[name] = [table[name][row] for row in rows]
@@ -52,7 +56,7 @@ def geojson(table: Table) -> bytes:
 
 
 def czml(table: Table) -> bytes:
-    """A packet a track, for a globe: a point with its path, at height 0, named by its target or else its label.
+    """A packet a track, for a globe: a point with its path, at height 0, named by its target or else its first label.
 
     Times that are no dates are taken as seconds since 1970.
     """
@@ -114,12 +118,12 @@ def mcap(table: Table) -> bytes:
 
 
 def _tracks(kind: str, table: Table) -> dict[str, list[int]]:
-    """Rows of every label, for a format of places on the Earth."""
+    """Rows of every track, for a format of places on the Earth."""
     if "lon_deg" not in table:
         raise InputError(f"{kind}: expected tracks in longitude and latitude, by an origin of the scenario; got metres")
     tracks = defaultdict(list)
-    for row, label in enumerate(table["label"]):
-        tracks[label].append(row)
+    for row, track in enumerate(table["track"]):
+        tracks[track].append(row)
     return tracks
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from vedette.densities.telling import state_columns
 from vedette.errors import InputError
+from vedette.evaluation.joining import Join, track_names
 from vedette.evaluation.metrics.matching import match_run
 from vedette.evaluation.told import told_by
 from vedette.evaluation.track_formats import czml, geojson, mcap, utc_text
@@ -33,16 +34,18 @@ def track_table(
     is_utc: bool = False,
     names: Sequence[str] = (),
     compass: Compass | None = None,
+    joins: Sequence[Join] = (),
 ) -> dict[str, list[Any]]:
     """One row an estimate, by columns.
 
-    `time_s` is that of the record plus `start`; `utc` where that is since 1970. `label` is `birth step.index`; `x_m`,
+    `time_s` is that of the record plus `start`; `utc` where that is since 1970. `label` is `birth step.index`; `track`
+    the first label of its track, another than `label` after a gap that `joins` close; `x_m`,
     `y_m`, `vx_mps`, `vy_mps` the estimate, `std_...` its standard deviations (velocities only where the state goes on
     with them: four components or more), `existence` the probability that it is there. `lon_deg`, `lat_deg` with an
     origin; with a compass `course_deg`, clockwise from true north, and `speed_mps`. `target` names the true target that
     OSPA's assignment gives it, nearer than `cutoff` (m); None: none.
 
-    names: of the true targets, by their ids; else `id + 1`.
+    names: of the true targets, by their ids; else `id + 1`. joins: see `vedette.evaluation.joining`.
     """
     matching = match_run(record.truth, record.estimates, cutoff=cutoff, order=1.0)
     partners = dict(
@@ -63,7 +66,9 @@ def track_table(
     table: dict[str, list[Any]] = {"time_s": times}
     if is_utc:
         table["utc"] = [utc_text(time) for time in times]
-    table["label"] = [f"{label[0]}.{label[1]}" for _, label, *_ in rows]
+    tracks = track_names(joins)
+    table["label"] = [_label(label) for _, label, *_ in rows]
+    table["track"] = [_label(tracks.get(label, label)) for _, label, *_ in rows]
     dim = len(rows[0][2]) if rows else 4
     means, covs = (np.array([row[part] for row in rows]) for part in (2, 3))
     table |= state_columns(means.reshape(-1, dim), covs.reshape(-1, dim, dim))
@@ -78,7 +83,7 @@ def track_table(
     return table
 
 
-def table_of_run(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
+def table_of_run(record: RunRecord, scenario: Scenario, joins: Sequence[Join] = ()) -> dict[str, list[Any]]:
     """As `track_table`, with what the run's scenario says of place, time and targets."""
     model = scenario.model
     origin = None if model.origin is None else model.origin.build()
@@ -91,6 +96,7 @@ def table_of_run(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
         is_utc=is_utc,
         names=names,
         compass=model.north() if model.by_compass else None,
+        joins=joins,
     )
 
 
@@ -121,6 +127,10 @@ def check_format(path: Path) -> None:
         need(f"writing {ending} files", package)
 
 
+def _label(label: tuple[int, ...]) -> str:
+    return ".".join(map(str, label))
+
+
 def _name(target: int | None, names: Sequence[str]) -> str | None:
     if target is None:
         return None
@@ -143,7 +153,7 @@ def _parquet(table: Mapping[str, Sequence[Any]]) -> bytes:
     import pyarrow as pa
     from pyarrow import parquet
 
-    texts = {"utc", "label", "target", "sensor"}
+    texts = {"utc", "label", "track", "target", "sensor"}
     arrays = {name: pa.array(cells, pa.string() if name in texts else pa.float64()) for name, cells in table.items()}
     content = io.BytesIO()
     parquet.write_table(pa.table(arrays), content, compression="zstd")
