@@ -102,7 +102,7 @@ def test_the_ratio_of_a_gap_is_that_of_enumeration(hidden: float) -> None:
     estimates, log_born, (mean, cov), zs = scene()
     watch = watch_of(hidden)
     log_same = np.log(0.8) + (BEGINS - LAST) * np.log(SURVIVAL)
-    log_same += np.log(hidden + (1.0 - hidden) * (1.0 - DETECTION) ** (BEGINS - LAST - 1))
+    log_same += np.log(hidden / (BEGINS - LAST) + (1.0 - hidden) * (1.0 - DETECTION) ** (BEGINS - LAST - 1))
     for _ in range(LAST, BEGINS):
         mean, cov = moved(mean, cov)
     for k, z in enumerate(zs):

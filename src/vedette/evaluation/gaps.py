@@ -40,9 +40,10 @@ class Watch:
         times: (num_scans,) of the scans, s.
         poses: (num_scans, num_sensors, 3 or more) of the sensors.
         scanned: (num_scans, num_sensors) whether each sensor scanned.
-        prob_hidden: probability that a target which exists, and is not detected for a while, was out of sight all that
-            time although the detection models do not say so: behind an island, or silent. 0: scans miss a target
-            independently, as filters assume, and 12 misses at a probability of detection of .95 are next to impossible.
+        prob_hidden: probability that a target which exists, and is not detected for a while, is out of sight although
+            the detection models do not say so: behind an island, or silent; after n scans it then reappears with
+            probability 1 / n. 0: scans miss a target independently, as filters assume, and 12 misses at a probability
+            of detection of .95 are next to impossible.
 
     Raises:
         InputError: arrays of other shapes, no probability, or births from measurements without a region.
@@ -94,6 +95,7 @@ class _Lost:
     """
 
     tracks: list[int]
+    num_scans: Floats  # (num,) since the last estimate
     mixture: Mixture
     log_missed: Floats  # (num,) that all scans since have missed it where it was predicted
     detected: Floats  # (num,) probability that a scan since would have detected it
@@ -104,12 +106,15 @@ class _Lost:
         new = components_of(weight, history.means[-1:].copy(), history.covs[-1:].copy())
         self.mixture = joined_components([self.mixture, new])
         self.tracks.append(track)
-        self.log_missed, self.detected = np.append(self.log_missed, 0.0), np.append(self.detected, 0.0)
+        self.num_scans, self.log_missed, self.detected = (
+            np.append(values, 0.0) for values in (self.num_scans, self.log_missed, self.detected)
+        )
 
     def keep(self, places: Ints) -> None:
         """Keep the labels at `places` alone."""
         self.tracks = [self.tracks[place] for place in places.tolist()]
         self.mixture = taken_components(self.mixture, places)
+        self.num_scans = self.num_scans[places]
         self.log_missed, self.detected = self.log_missed[places], self.detected[places]
 
     def thin(self, watch: Watch, scan: int) -> None:
@@ -123,9 +128,10 @@ class _Lost:
         self.log_missed = self.log_missed + log_missed
 
     def log_unseen(self, prob_hidden: float) -> Floats:
-        """(num,) log probability that all scans since have missed the target, if it lives."""
+        """(num,) log probability that all scans since have missed the target and this one may not, if it lives."""
         with np.errstate(divide="ignore"):
-            return np.asarray(np.logaddexp(np.log(prob_hidden), np.log1p(-prob_hidden) + self.log_missed))
+            hidden = np.log(prob_hidden / self.num_scans)
+            return np.asarray(np.logaddexp(hidden, np.log1p(-prob_hidden) + self.log_missed))
 
     def log_gone(self, prob_hidden: float) -> Floats:
         """(num,) log probability that no scan since has detected the target, alive or not."""
@@ -135,15 +141,15 @@ class _Lost:
 def gap_log_ratios(histories: Sequence[TrackHistory], watch: Watch) -> Floats:
     """Return, for each pair of labels, the log likelihood ratio of one target with a gap against all else.
 
-    Label i ended with existence r and density N(m, P) at its last estimate; label j begins n scans later. With P_S(n)
-    the probability of surviving to then, U = h + (1 - h) * product of 1 - P_D over the scans between (h is
+    Label i ended with existence r and density N(m, P) at its last estimate; the first of label j is n scans later. With
+    P_S(n) the probability of surviving to then, U = h / n + (1 - h) * product of 1 - P_D over the scans between (h is
     `prob_hidden`), p_i the density N(m, P) moved to then, L_j the likelihood of the first scans of j, D the intensity
     of undetected targets there, G the probability that target i, which may have died, is detected by no scan until the
     last of these, and e the existence of j at that scan, as j may be clutter:
 
         ratio(i, j) = r P_S(n) U * integral p_i(x) L_j(x) dx / (G * integral D(x) L_j(x) dx / e).
 
-    That is exact for linear Gaussian models and a probability of detection that is the same everywhere, if the first
+    That is exact for linear Gaussian models and a probability of detection that is the same everywhere, where the first
     estimate of j is of the scan that began it. D is the intensity that the default filter has of targets no scan has
     detected. L_j is the product of the information that each estimate of j adds to the one before, moved to its time;
     the first estimate is divided by the component of D that it began from, so that this prior counts in D alone.
@@ -157,18 +163,20 @@ def gap_log_ratios(histories: Sequence[TrackHistory], watch: Watch) -> Floats:
     """
     num, dim = len(histories), watch.targets.state_dim
     ratios = np.full((num, num), -np.inf)
-    begins = [min(history.label[0], int(history.steps[0])) - 1 for history in histories]
+    begins = [int(history.steps[0]) - 1 for history in histories]
     compared = [history.steps[:_FIRST_ESTIMATES] - 1 for history in histories]
-    lost = _Lost([], components_of(np.empty(0), np.empty((0, dim)), np.empty((0, dim, dim))), np.empty(0), np.empty(0))
+    nothing = components_of(np.empty(0), np.empty((0, dim)), np.empty((0, dim, dim)))
+    lost = _Lost([], np.empty(0), nothing, np.empty(0), np.empty(0))
     pending: dict[int, dict[int, float]] = {}  # log ratios without G, by the columns' and rows' labels
     for scan, undetected in enumerate(_undetected(watch, begins)):
         if lost.tracks:
             lost.mixture = watch.moved(lost.mixture, scan - 1, scan)
+            lost.num_scans += 1.0
         for j in [j for j, begin in enumerate(begins) if begin == scan and lost.tracks]:
-            prior = _births_at(undetected, histories[j], scan, watch)
+            prior = _births_at(undetected, histories[j], watch)
             if not (prior.log_weights > -np.inf).any():
                 continue  # the models say that no target is born then, and nothing of how the label began
-            told = list(_told(histories[j], scan, prior, watch))
+            told = list(_told(histories[j], prior, watch))
             same = lost.mixture._replace(log_weights=lost.mixture.log_weights + lost.log_unseen(watch.prob_hidden))
             fits, born = (_log_fits(mixture, scan, told, watch) for mixture in (same, prior))
             log_exists = np.log(histories[j].existence[:_FIRST_ESTIMATES][-1])
@@ -188,7 +196,7 @@ def gap_log_ratios(histories: Sequence[TrackHistory], watch: Watch) -> Floats:
 def _undetected(watch: Watch, begins: Sequence[int]) -> Iterator[FactoredGLMB]:
     """At each scan the belief before it of a filter without detections: the undetected targets are those of any filter.
 
-    begins: scan at which each label begins, by which a birth rate is learnt.
+    begins: scan of each label's first estimate, by which a birth rate is learnt.
     """
     filters = [FactoredGlmbFilter(watch.targets, sensor) for sensor in watch.sensors]
     belief, rng = filters[0].initial(), np.random.default_rng(0)
@@ -205,7 +213,7 @@ def _undetected(watch: Watch, begins: Sequence[int]) -> Iterator[FactoredGLMB]:
             belief, _ = filters[s].update(belief, nothing, watch.poses[scan, s], rng=rng)
 
 
-def _births_at(belief: FactoredGLMB, history: TrackHistory, scan: int, watch: Watch) -> Mixture:
+def _births_at(belief: FactoredGLMB, history: TrackHistory, watch: Watch) -> Mixture:
     """The intensity of undetected targets where a label began, those that appeared anywhere as one wide Gaussian."""
     undetected, labels, birth = belief.undetected, as_lmb(belief), watch.targets.birth
     assert isinstance(undetected, UndetectedTargets)
@@ -214,7 +222,7 @@ def _births_at(belief: FactoredGLMB, history: TrackHistory, scan: int, watch: Wa
     if undetected.cells is not None and birth.from_measurements is not None:
         grid, in_plane = undetected.cells.grid, np.arange(birth.state_dim) < 2
         std = birth.from_measurements.std * np.where(in_plane, _WIDE, 1.0)
-        place = watch.targets.motion.propagate(history.means[:1], watch.times[scan] - history.times[0]) * in_plane
+        place = history.means[:1] * in_plane
         nearest = np.argmin(((grid.centres - place[0, :2]) ** 2).sum(axis=1))  # also of a place outside the region
         density = undetected.cells.expected[nearest] / np.prod(grid.cell_size)
         with np.errstate(divide="ignore"):
@@ -223,14 +231,13 @@ def _births_at(belief: FactoredGLMB, history: TrackHistory, scan: int, watch: Wa
     return joined_components(found)
 
 
-def _told(history: TrackHistory, scan: int, prior: Mixture, watch: Watch) -> Iterator[_Information]:
-    """What the scans of each of the first estimates say. prior: at `scan`, at which the label began."""
-    first = int(history.steps[0]) - 1
-    before = watch.moved(prior, scan, first)
-    fits = before.log_weights + _log_densities(before, history.means[0], history.covs[0])
-    before = taken_components(before, np.array([int(np.argmax(fits))]))
-    yield _information(first, before, history.means[0], history.covs[0])
-    for k, (last, now) in enumerate(pairwise((history.steps[:_FIRST_ESTIMATES] - 1).tolist())):
+def _told(history: TrackHistory, prior: Mixture, watch: Watch) -> Iterator[_Information]:
+    """What the scans of each of the first estimates say. prior: of births, before the first of these."""
+    scans = (history.steps[:_FIRST_ESTIMATES] - 1).tolist()
+    fits = prior.log_weights + _log_densities(prior, history.means[0], history.covs[0])
+    before = taken_components(prior, np.array([int(np.argmax(fits))]))
+    yield _information(scans[0], before, history.means[0], history.covs[0])
+    for k, (last, now) in enumerate(pairwise(scans)):
         own = components_of(np.zeros(1), history.means[k : k + 1].copy(), history.covs[k : k + 1].copy())
         yield _information(now, watch.moved(own, last, now), history.means[k + 1], history.covs[k + 1])
 
