@@ -21,6 +21,8 @@ from vedette.models.motion import kernel_motion
 
 # Estimates of a new label that are compared with the motion of one that ended: more say little about the gap.
 _FIRST_ESTIMATES = 10
+# Estimates from which on a label counts as a birth, and the shape of the prior of their number.
+_LASTING, _SHAPE = 3, 0.5
 # Standard deviations of a birth's position that stand for "anywhere", as in the filter.
 _WIDE = 3.0
 # Share of a variance below which a scan is taken to have said nothing in that direction.
@@ -145,9 +147,10 @@ def gap_log_ratios(histories: Sequence[TrackHistory], watch: Watch) -> Floats:
     P_S(n) the probability of surviving to then, U = h / n + (1 - h) * product of 1 - P_D over the scans between (h is
     `prob_hidden`), p_i the density N(m, P) moved to then, L_j the likelihood of the first scans of j, D the intensity
     of undetected targets there, G the probability that target i, which may have died, is detected by no scan until the
-    last of these, and e the existence of j at that scan, as j may be clutter:
+    last of these, b the number of births that the record shows in terms of those expected (`births_found`), and e the
+    existence of j at that scan, as j may be clutter:
 
-        ratio(i, j) = r P_S(n) U * integral p_i(x) L_j(x) dx / (G * integral D(x) L_j(x) dx / e).
+        ratio(i, j) = r P_S(n) U * integral p_i(x) L_j(x) dx / (G * (b + (1 - e) / e) * integral D(x) L_j(x) dx).
 
     That is exact for linear Gaussian models and a probability of detection that is the same everywhere, where the first
     estimate of j is of the scan that began it. D is the intensity that the default filter has of targets no scan has
@@ -163,7 +166,7 @@ def gap_log_ratios(histories: Sequence[TrackHistory], watch: Watch) -> Floats:
     """
     num, dim = len(histories), watch.targets.state_dim
     ratios = np.full((num, num), -np.inf)
-    begins = [int(history.steps[0]) - 1 for history in histories]
+    begins, births = [int(history.steps[0]) - 1 for history in histories], births_found(histories, watch)
     compared = [history.steps[:_FIRST_ESTIMATES] - 1 for history in histories]
     nothing = components_of(np.empty(0), np.empty((0, dim)), np.empty((0, dim, dim)))
     lost = _Lost([], np.empty(0), nothing, np.empty(0), np.empty(0))
@@ -179,8 +182,9 @@ def gap_log_ratios(histories: Sequence[TrackHistory], watch: Watch) -> Floats:
             told = list(_told(histories[j], prior, watch))
             same = lost.mixture._replace(log_weights=lost.mixture.log_weights + lost.log_unseen(watch.prob_hidden))
             fits, born = (_log_fits(mixture, scan, told, watch) for mixture in (same, prior))
-            log_exists = np.log(histories[j].existence[:_FIRST_ESTIMATES][-1])
-            pending[j] = dict(zip(lost.tracks, fits - np.logaddexp.reduce(born) + log_exists, strict=True))
+            others = births - 1.0 + 1.0 / histories[j].existence[:_FIRST_ESTIMATES][-1]
+            log_ratios = fits - np.logaddexp.reduce(born) - np.log(others)
+            pending[j] = dict(zip(lost.tracks, log_ratios, strict=True))
         if lost.tracks:
             lost.thin(watch, scan)
         log_gone = dict(zip(lost.tracks, lost.log_gone(watch.prob_hidden), strict=True))
@@ -191,6 +195,25 @@ def gap_log_ratios(histories: Sequence[TrackHistory], watch: Watch) -> Floats:
         for i in [i for i, history in enumerate(histories) if history.steps[-1] - 1 == scan]:
             lost.add(i, histories[i])
     return ratios
+
+
+def births_found(histories: Sequence[TrackHistory], watch: Watch) -> float:
+    """Return the number of births that a record shows, divided by the number that the models expect.
+
+    It is the posterior mean for a gamma prior of shape 1/2, as where a birth rate is learnt: (1/2 + number of labels of
+    three estimates and more) / (1/2 + expected number). 1 where the rate of births anywhere is learnt or given apart.
+    """
+    birth = watch.targets.birth
+    measured = birth.from_measurements
+    if birth.anywhere is not None or (measured is not None and measured.is_learnt):
+        return 1.0
+    expected = 0.0
+    for scan in range(len(watch.times)):
+        own = float(birth.existence.sum()) if birth.is_active(scan + 1) else 0.0
+        own += 0.0 if measured is None else float(measured.expected)
+        expected += own if birth.period is None else own * watch.step(scan) / birth.period
+    number = sum(len(history.steps) >= _LASTING for history in histories)
+    return (_SHAPE + number) / (_SHAPE + expected)
 
 
 def _undetected(watch: Watch, begins: Sequence[int]) -> Iterator[FactoredGLMB]:

@@ -19,7 +19,7 @@ from vedette.scenarios.build import build_sensors
 from vedette.simulation.records import RunRecord
 
 # Chosen by the scenes 0 to 39 of benchmarks/joined_tracks.py; more of the one has the effect of less of the other.
-PROB_HIDDEN, THRESHOLD = 0.5, 0.9
+PROB_HIDDEN, THRESHOLD = 0.5, 0.95
 Label = tuple[int, int]
 
 
