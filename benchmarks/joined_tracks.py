@@ -34,8 +34,8 @@ from pages import write_between
 from vedette import models
 from vedette.densities import Estimate, best_estimate, track_histories
 from vedette.evaluation import match_run
-from vedette.evaluation.gaps import Watch
 from vedette.evaluation.joining import PROB_HIDDEN, THRESHOLD, Join, joins_of, track_names
+from vedette.evaluation.watch import Watch
 from vedette.filters import FactoredGlmbFilter
 from vedette.kernels.base.types import Bools, Floats
 from vedette.simulation.truth import Truth
@@ -188,7 +188,7 @@ def interval(count: int, num: int) -> str:
     z, p = 1.96, count / num
     middle, half = p + z * z / (2 * num), z * math.sqrt(p * (1 - p) / num + z * z / (4 * num * num))
     low, high = ((middle + sign * half) / (1 + z * z / num) for sign in (-1, 1))
-    return f"{100 * p:.0f} ({100 * low:.0f} to {100 * high:.0f})"
+    return f"{100 * p:.0f} ({100 * max(low, 0.0):.0f} to {100 * high:.0f})"
 
 
 def compared(kind: str, gap: int, numbers: Sequence[int], hidden: float, threshold: float) -> str:

@@ -11,8 +11,9 @@ import pytest
 from vedette import models
 from vedette.densities import Estimate, track_histories
 from vedette.errors import InputError
-from vedette.evaluation.gaps import Watch, gap_log_ratios
+from vedette.evaluation.gaps import gap_log_ratios
 from vedette.evaluation.joining import joins_of, track_names
+from vedette.evaluation.watch import Watch
 
 DT, SURVIVAL, DETECTION, SIGMA, NOISE = 2.0, 0.97, 0.8, 0.6, 3.0
 LAST, BEGINS, ENDS = 2, 6, 9  # scans, from 1

@@ -3,81 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from vedette.densities import FactoredGLMB, TrackHistory, UndetectedTargets, as_lmb
-from vedette.errors import InputError
-from vedette.filters import FactoredGlmbFilter
-from vedette.kernels.base.types import Bools, Floats, Ints, Mixture
+from vedette.densities import TrackHistory
+from vedette.evaluation.watch import Watch, births_at, births_found, undetected_before
+from vedette.kernels.base.types import Floats, Ints, Mixture
 from vedette.kernels.gaussian.components import components_of, joined_components, taken_components
-from vedette.kernels.gaussian.intensities import moved
-from vedette.models import SensorModel, TargetModel
-from vedette.models.arguments import probability
-from vedette.models.motion import kernel_motion
 
 # Estimates of a new label that are compared with the motion of one that ended: more say little about the gap.
 _FIRST_ESTIMATES = 10
-# Estimates from which on a label counts as a birth, and the shape of the prior of their number.
-_LASTING, _SHAPE = 3, 0.5
-# Standard deviations of a birth's position that stand for "anywhere", as in the filter.
-_WIDE = 3.0
 # Share of a variance below which a scan is taken to have said nothing in that direction.
 _LEAST_INFORMATION = 1e-6
 _MOST_CERTAIN = 1.0 - 1e-12
 # Scans after which a label that ended is forgotten.
 _LONGEST_GAP = 200
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Watch:
-    """What is known of the targets, and how they were watched.
-
-    Attributes:
-        targets: motion, survival and births, as the filters have them; births at sites or anywhere in a region.
-        sensors: one a sensor.
-        times: (num_scans,) of the scans, s.
-        poses: (num_scans, num_sensors, 3 or more) of the sensors.
-        scanned: (num_scans, num_sensors) whether each sensor scanned.
-        prob_hidden: probability that a target which exists, and is not detected for a while, is out of sight although
-            the detection models do not say so: behind an island, or silent; after n scans it then reappears with
-            probability 1 / n. 0: scans miss a target independently, as filters assume, and 12 misses at a probability
-            of detection of .95 are next to impossible.
-
-    Raises:
-        InputError: arrays of other shapes, no probability, or births from measurements without a region.
-    """
-
-    targets: TargetModel
-    sensors: tuple[SensorModel, ...]
-    times: Floats
-    poses: Floats
-    scanned: Bools
-    prob_hidden: float
-
-    def __post_init__(self) -> None:
-        shape = len(self.times), len(self.sensors)
-        if self.poses.shape[:2] != shape or self.scanned.shape != shape:
-            got = f"{self.poses.shape[:2]}, {self.scanned.shape}"
-            raise InputError(f"poses, scanned: expected entries for each scan and sensor, {shape}; got {got}")
-        probability("prob_hidden", self.prob_hidden)
-        measured = self.targets.birth.from_measurements
-        if measured is not None and measured.region is None and self.targets.birth.anywhere is None:
-            raise InputError("targets.birth.from_measurements: expected births in a region; got none")
-
-    def step(self, scan: int) -> float:
-        """Seconds since the scan before; the first counts as one second after it."""
-        return float(self.times[scan] - self.times[scan - 1]) if scan else 1.0
-
-    def moved(self, mixture: Mixture, first: int, last: int) -> Mixture:
-        """A mixture at scan `first`, after survival and motion to scan `last`."""
-        motion = kernel_motion(self.targets.motion, self.targets.survival)
-        for scan in range(first + 1, last + 1):
-            mixture = moved(mixture, motion, self.step(scan))
-        return mixture
 
 
 class _Information(NamedTuple):
@@ -171,12 +114,12 @@ def gap_log_ratios(histories: Sequence[TrackHistory], watch: Watch) -> Floats:
     nothing = components_of(np.empty(0), np.empty((0, dim)), np.empty((0, dim, dim)))
     lost = _Lost([], np.empty(0), nothing, np.empty(0), np.empty(0))
     pending: dict[int, dict[int, float]] = {}  # log ratios without G, by the columns' and rows' labels
-    for scan, undetected in enumerate(_undetected(watch, begins)):
+    for scan, undetected in enumerate(undetected_before(watch, begins)):
         if lost.tracks:
             lost.mixture = watch.moved(lost.mixture, scan - 1, scan)
             lost.num_scans += 1.0
         for j in [j for j, begin in enumerate(begins) if begin == scan and lost.tracks]:
-            prior = _births_at(undetected, histories[j], watch)
+            prior = births_at(undetected, histories[j], watch)
             if not (prior.log_weights > -np.inf).any():
                 continue  # the models say that no target is born then, and nothing of how the label began
             told = list(_told(histories[j], prior, watch))
@@ -195,63 +138,6 @@ def gap_log_ratios(histories: Sequence[TrackHistory], watch: Watch) -> Floats:
         for i in [i for i, history in enumerate(histories) if history.steps[-1] - 1 == scan]:
             lost.add(i, histories[i])
     return ratios
-
-
-def births_found(histories: Sequence[TrackHistory], watch: Watch) -> float:
-    """Return the number of births that a record shows, divided by the number that the models expect.
-
-    It is the posterior mean for a gamma prior of shape 1/2, as where a birth rate is learnt: (1/2 + number of labels of
-    three estimates and more) / (1/2 + expected number). 1 where the rate of births anywhere is learnt or given apart.
-    """
-    birth = watch.targets.birth
-    measured = birth.from_measurements
-    if birth.anywhere is not None or (measured is not None and measured.is_learnt):
-        return 1.0
-    expected = 0.0
-    for scan in range(len(watch.times)):
-        own = float(birth.existence.sum()) if birth.is_active(scan + 1) else 0.0
-        own += 0.0 if measured is None else float(measured.expected)
-        expected += own if birth.period is None else own * watch.step(scan) / birth.period
-    number = sum(len(history.steps) >= _LASTING for history in histories)
-    return (_SHAPE + number) / (_SHAPE + expected)
-
-
-def _undetected(watch: Watch, begins: Sequence[int]) -> Iterator[FactoredGLMB]:
-    """At each scan the belief before it of a filter without detections: the undetected targets are those of any filter.
-
-    begins: scan of each label's first estimate, by which a birth rate is learnt.
-    """
-    filters = [FactoredGlmbFilter(watch.targets, sensor) for sensor in watch.sensors]
-    belief, rng = filters[0].initial(), np.random.default_rng(0)
-    for scan in range(len(watch.times)):
-        undetected = belief.undetected
-        if undetected is not None and undetected.birth_rate is not None:
-            number = float(sum(0 < begin < scan for begin in begins))
-            learnt = replace(undetected.birth_rate, past=number)
-            belief = belief.with_fields(undetected=replace(undetected, birth_rate=learnt))
-        belief, _ = filters[0].predict(belief, watch.step(scan), scan + 1)
-        yield belief
-        for s in np.flatnonzero(watch.scanned[scan]).tolist():
-            nothing = np.empty((0, watch.sensors[s].meas_dim))
-            belief, _ = filters[s].update(belief, nothing, watch.poses[scan, s], rng=rng)
-
-
-def _births_at(belief: FactoredGLMB, history: TrackHistory, watch: Watch) -> Mixture:
-    """The intensity of undetected targets where a label began, those that appeared anywhere as one wide Gaussian."""
-    undetected, labels, birth = belief.undetected, as_lmb(belief), watch.targets.birth
-    assert isinstance(undetected, UndetectedTargets)
-    at_sites = labels.tracks.to_kernel().components._replace(log_weights=np.log(labels.existence))
-    found = [undetected.intensity.to_kernel(), at_sites]
-    if undetected.cells is not None and birth.from_measurements is not None:
-        grid, in_plane = undetected.cells.grid, np.arange(birth.state_dim) < 2
-        std = birth.from_measurements.std * np.where(in_plane, _WIDE, 1.0)
-        place = history.means[:1] * in_plane
-        nearest = np.argmin(((grid.centres - place[0, :2]) ** 2).sum(axis=1))  # also of a place outside the region
-        density = undetected.cells.expected[nearest] / np.prod(grid.cell_size)
-        with np.errstate(divide="ignore"):
-            weight = np.log(density * 2.0 * np.pi * std[0] * std[1])
-        found.append(components_of(np.array([weight]), place, np.diag(std**2)[np.newaxis]))
-    return joined_components(found)
 
 
 def _told(history: TrackHistory, prior: Mixture, watch: Watch) -> Iterator[_Information]:

@@ -9,8 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.densities import Estimate, track_histories
-from vedette.evaluation.gaps import Watch, gap_log_ratios
+from vedette.evaluation.gaps import gap_log_ratios
 from vedette.evaluation.scans import scans_of_record
+from vedette.evaluation.watch import Watch
 from vedette.filters import labels_targets, shared_targets
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import probability

@@ -1,0 +1,128 @@
+"""How targets were watched, and the births that may begin the labels of a record."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vedette.densities import FactoredGLMB, TrackHistory, UndetectedTargets, as_lmb
+from vedette.errors import InputError
+from vedette.filters import FactoredGlmbFilter
+from vedette.kernels.base.types import Bools, Floats, Mixture
+from vedette.kernels.gaussian.components import components_of, joined_components
+from vedette.kernels.gaussian.intensities import moved
+from vedette.models import SensorModel, TargetModel
+from vedette.models.arguments import probability
+from vedette.models.motion import kernel_motion
+
+# Estimates from which on a label counts as a birth, and the shape of the prior of their number.
+_LASTING, _SHAPE = 3, 0.5
+# Standard deviations of a birth's position that stand for "anywhere", as in the filter.
+_WIDE = 3.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Watch:
+    """What is known of the targets, and how they were watched.
+
+    Attributes:
+        targets: motion, survival and births, as the filters have them; births at sites or anywhere in a region.
+        sensors: one a sensor.
+        times: (num_scans,) of the scans, s.
+        poses: (num_scans, num_sensors, 3 or more) of the sensors.
+        scanned: (num_scans, num_sensors) whether each sensor scanned.
+        prob_hidden: probability that a target which exists, and is not detected for a while, is out of sight although
+            the detection models do not say so: behind an island, or silent; after n scans it then reappears with
+            probability 1 / n. 0: scans miss a target independently, as filters assume, and 12 misses at a probability
+            of detection of .95 are next to impossible.
+
+    Raises:
+        InputError: arrays of other shapes, no probability, or births from measurements without a region.
+    """
+
+    targets: TargetModel
+    sensors: tuple[SensorModel, ...]
+    times: Floats
+    poses: Floats
+    scanned: Bools
+    prob_hidden: float
+
+    def __post_init__(self) -> None:
+        shape = len(self.times), len(self.sensors)
+        if self.poses.shape[:2] != shape or self.scanned.shape != shape:
+            got = f"{self.poses.shape[:2]}, {self.scanned.shape}"
+            raise InputError(f"poses, scanned: expected entries for each scan and sensor, {shape}; got {got}")
+        probability("prob_hidden", self.prob_hidden)
+        measured = self.targets.birth.from_measurements
+        if measured is not None and measured.region is None and self.targets.birth.anywhere is None:
+            raise InputError("targets.birth.from_measurements: expected births in a region; got none")
+
+    def step(self, scan: int) -> float:
+        """Seconds since the scan before; the first counts as one second after it."""
+        return float(self.times[scan] - self.times[scan - 1]) if scan else 1.0
+
+    def moved(self, mixture: Mixture, first: int, last: int) -> Mixture:
+        """A mixture at scan `first`, after survival and motion to scan `last`."""
+        motion = kernel_motion(self.targets.motion, self.targets.survival)
+        for scan in range(first + 1, last + 1):
+            mixture = moved(mixture, motion, self.step(scan))
+        return mixture
+
+
+def births_found(histories: Sequence[TrackHistory], watch: Watch) -> float:
+    """Return the number of births that a record shows, divided by the number that the models expect.
+
+    It is the posterior mean for a gamma prior of shape 1/2, as where a birth rate is learnt: (1/2 + number of labels of
+    three estimates and more) / (1/2 + expected number). 1 where the rate of births anywhere is learnt or given apart.
+    """
+    birth = watch.targets.birth
+    measured = birth.from_measurements
+    if birth.anywhere is not None or (measured is not None and measured.is_learnt):
+        return 1.0
+    expected = 0.0
+    for scan in range(len(watch.times)):
+        own = float(birth.existence.sum()) if birth.is_active(scan + 1) else 0.0
+        own += 0.0 if measured is None else float(measured.expected)
+        expected += own if birth.period is None else own * watch.step(scan) / birth.period
+    number = sum(len(history.steps) >= _LASTING for history in histories)
+    return (_SHAPE + number) / (_SHAPE + expected)
+
+
+def undetected_before(watch: Watch, begins: Sequence[int]) -> Iterator[FactoredGLMB]:
+    """At each scan the belief before it of a filter without detections: the undetected targets are those of any filter.
+
+    begins: scan of each label's first estimate, by which a birth rate is learnt.
+    """
+    filters = [FactoredGlmbFilter(watch.targets, sensor) for sensor in watch.sensors]
+    belief, rng = filters[0].initial(), np.random.default_rng(0)
+    for scan in range(len(watch.times)):
+        undetected = belief.undetected
+        if undetected is not None and undetected.birth_rate is not None:
+            number = float(sum(0 < begin < scan for begin in begins))
+            learnt = replace(undetected.birth_rate, past=number)
+            belief = belief.with_fields(undetected=replace(undetected, birth_rate=learnt))
+        belief, _ = filters[0].predict(belief, watch.step(scan), scan + 1)
+        yield belief
+        for s in np.flatnonzero(watch.scanned[scan]).tolist():
+            nothing = np.empty((0, watch.sensors[s].meas_dim))
+            belief, _ = filters[s].update(belief, nothing, watch.poses[scan, s], rng=rng)
+
+
+def births_at(belief: FactoredGLMB, history: TrackHistory, watch: Watch) -> Mixture:
+    """The intensity of undetected targets where a label began, those that appeared anywhere as one wide Gaussian."""
+    undetected, labels, birth = belief.undetected, as_lmb(belief), watch.targets.birth
+    assert isinstance(undetected, UndetectedTargets)
+    at_sites = labels.tracks.to_kernel().components._replace(log_weights=np.log(labels.existence))
+    found = [undetected.intensity.to_kernel(), at_sites]
+    if undetected.cells is not None and birth.from_measurements is not None:
+        grid, in_plane = undetected.cells.grid, np.arange(birth.state_dim) < 2
+        std = birth.from_measurements.std * np.where(in_plane, _WIDE, 1.0)
+        place = history.means[:1] * in_plane
+        nearest = np.argmin(((grid.centres - place[0, :2]) ** 2).sum(axis=1))  # also of a place outside the region
+        density = undetected.cells.expected[nearest] / np.prod(grid.cell_size)
+        with np.errstate(divide="ignore"):
+            weight = np.log(density * 2.0 * np.pi * std[0] * std[1])
+        found.append(components_of(np.array([weight]), place, np.diag(std**2)[np.newaxis]))
+    return joined_components(found)
