@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from vedette.densities import Estimate, track_histories
 from vedette.errors import InputError
 from vedette.evaluation.gaps import gap_log_ratios
 from vedette.evaluation.joining import joins_of, track_names
-from vedette.evaluation.watch import Watch
+from vedette.evaluation.watch import Watch, births_found
 
 DT, SURVIVAL, DETECTION, SIGMA, NOISE = 2.0, 0.97, 0.8, 0.6, 3.0
 LAST, BEGINS, ENDS = 2, 6, 9  # scans, from 1
@@ -65,7 +66,8 @@ def watch_of(hidden: float, **changed: Any) -> Watch:
         "scanned": np.ones((ENDS, 1), np.bool_),
         "prob_hidden": hidden,
     }
-    return Watch(targets, (sensor,), DT * np.arange(float(ENDS)), **{**given, **changed})
+    given |= {"targets": targets, "sensors": (sensor,), "times": DT * np.arange(float(ENDS))}
+    return Watch(**{**given, **changed})
 
 
 def estimates_of(rows: dict[int, list[tuple[tuple[int, int], Any, Any, float]]]) -> list[Estimate]:
@@ -162,3 +164,27 @@ def test_tracks_are_named_by_their_first_label() -> None:
 def test_what_a_watch_refuses(changed: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
         watch_of(changed.pop("hidden"), **changed)
+
+
+def targets_of(region: models.Region | None, expected: Any, period: float | None = None) -> models.TargetModel:
+    measured = models.MeasurementBirth(expected, 0.1, np.array([6.0, 6.0, 4.0, 4.0]), region)
+    birth = replace(models.BirthModel.none(4), from_measurements=measured, period=period)
+    return models.TargetModel(models.constant_velocity(SIGMA), models.constant_survival(SURVIVAL), birth)
+
+
+@pytest.mark.parametrize(
+    ("expected", "period", "births"),
+    [(0.5, None, 1.5 / 5.0), (0.5, 4.0, 1.5 / (0.5 + 0.5 * 17.0 / 4.0)), ("learnt", None, 1.0)],
+)
+def test_births_are_counted_by_labels_that_last(expected: Any, period: float | None, births: float) -> None:
+    estimates, *_ = scene()
+    region = models.Region(-1e3, 1e3, -1e3, 1e3)
+    watch = watch_of(0.5, targets=targets_of(region, expected, period))
+    histories = track_histories(estimates, watch.times)
+    assert births_found(histories, watch) == pytest.approx(births)
+    assert np.isfinite(gap_log_ratios(histories, watch)[0, 1])
+
+
+def test_births_need_a_region() -> None:
+    with pytest.raises(InputError, match="expected births in a region; got none"):
+        watch_of(0.5, targets=targets_of(None, 0.5))
