@@ -14,9 +14,8 @@ from vedette.calibration.maximum import Maximum, Terms, covariance, holding, max
 from vedette.calibration.parameters import Parameter, Problem
 from vedette.calibration.registration import BIASES, Pairs, linked, matched, register
 from vedette.kernels.base.types import Floats
-from vedette.recorded.instants import COMPONENTS
+from vedette.quantities import COMPONENTS, QUANTITIES
 
-_FAR = {"range": 300.0, "bearing": math.radians(3.0), "x": 300.0, "y": 300.0}  # of measurements, biases in them
 _NEARER = 3.0  # times the noise that was found, in the second round
 _QUANTILE = 1.959964  # of the normal distribution, 97.5 %
 _COMPARED = ("clock", "x", "y")  # with those of the first sensor
@@ -140,7 +139,7 @@ def _guess(problem: Problem, said: Floats, own: Sequence[int], watch: Callable[[
     Tracks by noise as wide as biases may be, then by narrower noise, and what fits them.
     """
     values, sites = problem.values(said), problem.sites
-    far = np.array([[_FAR[name] for name in (*COMPONENTS[site.kind], *COMPONENTS[site.kind])[:2]] for site in sites])
+    far = np.array([[QUANTITIES[name].far for name in 2 * COMPONENTS[site.kind]][:2] for site in sites])
     asked, unknown = np.zeros((len(sites), len(BIASES)), bool), np.ones((len(sites), len(BIASES)))
     places = {}
     for i, each in enumerate(problem.parameters):

@@ -15,8 +15,8 @@ from scipy.optimize import linear_sum_assignment
 
 from vedette.densities import as_lmb, track_moments
 from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.quantities import COMPONENTS, angles
 from vedette.recorded import RecordedScans, Site
-from vedette.recorded.instants import COMPONENTS
 from vedette.tracking import Tracker
 
 BIASES = ("range", "bearing", "clock", "x", "y")  # of each sensor, in this order, SI, bearings counter-clockwise
@@ -116,8 +116,8 @@ def _slopes(offsets: Floats, kind: str) -> Floats:
 
 
 def _wrapped(gaps: Floats, kind: str) -> Floats:
-    if COMPONENTS[kind][0] == "bearing":
-        gaps[..., 0] = np.remainder(gaps[..., 0] + math.pi, 2.0 * math.pi) - math.pi
+    for place in angles(COMPONENTS[kind]):
+        gaps[..., place] = np.remainder(gaps[..., place] + math.pi, 2.0 * math.pi) - math.pi
     return gaps
 
 

@@ -11,7 +11,8 @@ from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import reject
 from vedette.platforms.compass import course_deg
-from vedette.recorded.instants import COMPONENTS
+from vedette.quantities import COMPONENTS, PLACED, QUANTITIES, si_column
+from vedette.recorded.extents import places_of
 from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_scan_times, build_true_sensors, drop_outs
 from vedette.scenarios.sections.recording import RecordingSection, sites_of
@@ -87,7 +88,7 @@ def scan_table(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
     told = [site for site in sites if "bearing" in COMPONENTS[site.kind]]
     compass = bool(told) and all(site.compass for site in told)
     unit = "deg" if compass else "rad"
-    names = {"bearing": f"bearing_{unit}", "range": "range_m", "x": "x_m", "y": "y_m"}
+    names = {name: si_column(name) for name in QUANTITIES} | {"bearing": f"bearing_{unit}"}
     wanted = dict.fromkeys(names[name] for site in sites for name in COMPONENTS[site.kind])
     table: dict[str, list[Any]] = {
         name: [] for name in ("time", "sensor", *wanted, "own_x_m", "own_y_m", f"own_heading_{unit}")
@@ -109,7 +110,4 @@ def scan_table(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
 
 def in_plane(measurements: Floats, kind: str, pose: Floats) -> Floats:
     """(n, 2) where measurements of a kind of `LIE` lie, m; of rays (n, 1) bearings in rad, of circles (n, 1) radii."""
-    if kind == "bearing_range":
-        bearings, ranges = measurements[:, 0], measurements[:, 1]
-        return np.asarray(pose[:2] + ranges[:, np.newaxis] * np.column_stack([np.cos(bearings), np.sin(bearings)]))
-    return measurements[:, : 2 if kind == "position" else 1]
+    return places_of(measurements, pose, kind) if kind in PLACED else measurements[:, :1]

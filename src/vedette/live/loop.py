@@ -18,8 +18,9 @@ from vedette.kernels.base.types import Floats
 from vedette.live.messages import Message, read_message
 from vedette.models.arguments import reject
 from vedette.platforms.compass import Compass, PlaneCompass, courses_of
+from vedette.quantities import PLACED
 from vedette.recorded import Conventions, Origin, Site
-from vedette.recorded.extents import PLACED, beyond_reach, is_within, places_of
+from vedette.recorded.extents import beyond_reach, is_within, places_of
 from vedette.simulation.journal import cause_of
 from vedette.simulation.loop import PLANNER
 from vedette.tracking import LateScans, SensorScan, Timeline

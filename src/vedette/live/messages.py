@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 
 from vedette.errors import InputError
 from vedette.models.arguments import reject
+from vedette.quantities import COMPONENTS
 from vedette.reading import parse_json, said
 from vedette.recorded import Conventions, Origin, Site, parse_scans
-from vedette.recorded.instants import COMPONENTS
 from vedette.recorded.tables import Table, is_number
 from vedette.text import shown
 from vedette.tracking import SensorScan
@@ -43,7 +43,7 @@ def read_message(
     """The scan that a line tells of.
 
     `{"sensor": name or number from 1, "time": s or ISO 8601, "measurements": [[...], ...], "pose": ...}`: measurements
-    as `vedette.recorded.scans.COMPONENTS` has them, in rad (of a sensor with a compass in degrees) and m unless
+    as `vedette.quantities.COMPONENTS` has them, in rad (of a sensor with a compass in degrees) and m unless
     `conventions.units` says another; angles count as `conventions.bearings` says, else as the sensor tells them. The
     pose, which may be left out, is `[x, y, heading_rad, ...]`, or `{"lon": , "lat": , "course_deg": }`, where the
     course, clockwise from true north as in plans, may be left out; or with `heading_deg`, which counts as bearings do

@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
+import numpy as np
+
+from vedette.kernels.base.types import Floats
 from vedette.models.arguments import reject
+from vedette.models.measurement import wrap_angles
+from vedette.quantities import QUANTITIES
 
 LEAST_RANGE = 1.0  # m; what is left of a range where a bias is taken off or added
 
@@ -20,6 +26,7 @@ class Bias:
             counter-clockwise.
         clock: s; how far its times are ahead.
         x, y: m; of where the sensor is said to be, or of the positions that it measures.
+        range_rate: m/s.
 
     Raises:
         InputError: a number that is not finite.
@@ -30,6 +37,7 @@ class Bias:
     clock: float = 0.0
     x: float = 0.0
     y: float = 0.0
+    range_rate: float = 0.0
 
     def __post_init__(self) -> None:
         for each in fields(self):
@@ -42,3 +50,16 @@ class Bias:
 
 
 NO_BIAS = Bias()
+
+
+def with_offsets(measured: Floats, offsets: Floats, components: Sequence[str]) -> Floats:
+    """(num, meas_dim) measurements plus (meas_dim,) offsets, angles in (-pi, pi], ranges at least `LEAST_RANGE`.
+
+    components: the quantities that are measured, of `vedette.quantities.QUANTITIES`.
+    """
+    found = measured + offsets
+    for i, name in enumerate(components):
+        quantity = QUANTITIES[name]
+        least = quantity.least + LEAST_RANGE
+        found[:, i] = wrap_angles(found[:, i]) if quantity.is_angle else np.maximum(found[:, i], least)
+    return found

@@ -17,6 +17,7 @@ from vedette.models.fields import NonNegative, Reals, part
 from vedette.models.functions import ModelFunction, describe, model_function, numbers_at, require_kind
 from vedette.models.measurement import MeasurementModel, angular_flags, wrap_angular
 from vedette.models.probe import probe_log_intensity
+from vedette.quantities import COMPONENTS, QUANTITIES
 
 # Scans of clutter that a check draws and looks up in the intensity.
 _NUM_TRIAL_SCANS = 8
@@ -159,6 +160,11 @@ class _BoxSampler:
         num = int(rng.poisson(self.rate))
         drawn = rng.uniform(self.low, self.high, size=(num, len(self.low)))
         return wrap_angular(drawn, measurement.angular) if measurement.meas_dim == len(self.low) else drawn
+
+
+def angular_of(kind: str) -> Bools:
+    """(meas_dim,) which components of a kind of measurement are angles."""
+    return np.array([QUANTITIES[name].is_angle for name in COMPONENTS[kind]])
 
 
 def log_or_minus_infinity(value: float) -> float:

@@ -15,6 +15,7 @@ from vedette.models.arguments import dimension, float_array, params_vector, pose
 from vedette.models.fields import part
 from vedette.models.functions import ModelFunction, model_function, require_kind, write_rows
 from vedette.models.probe import probe_array, probe_covariance, probe_jacobian
+from vedette.quantities import QUANTITIES
 
 
 @model_function("measurement")
@@ -37,9 +38,8 @@ def _places(measurements: Floats, pose: Floats) -> Floats:
 @part("position", "measurement")
 def position() -> MeasurementModel:
     """z = [px, py] of the target in m, in the frame of the region; the sensor's pose plays no part."""
-    angular = np.array([False, False])
     functions = _position, np.empty(0), _position_jacobian
-    return MeasurementModel(2, *functions, angular, _places, is_linear=True, components=("x", "y"))
+    return MeasurementModel(2, *functions, places=_places, is_linear=True, components=("x", "y"))
 
 
 def angular_flags(name: str, angular: Sequence[bool] | Bools, meas_dim: int) -> Bools:
@@ -73,16 +73,19 @@ class MeasurementModel:
         function: model function of kind `measurement`.
         params: its parameter vector; anything array-like is converted.
         jacobian: model function of kind `measurement_jacobian` (same parameters), or None: sigma points are used.
-        angular: one boolean a component, true where it is an angle in radians; () means none. Residuals of angles are
-            wrapped to (-pi, pi].
-        least: (meas_dim,) least value of each component without noise, such as 0 of a range; () means none.
+        angular: one boolean a component, true where it is an angle in radians; () means as `components` says, else
+            none. Residuals of angles are wrapped to (-pi, pi].
+        least: (meas_dim,) least value of each component without noise, such as 0 of a range; () means as `components`
+            says, else none.
         places: plain function of (n, meas_dim) measurements and a pose: the (n, 2) positions where they were taken of a
             target; None where a measurement does not say where. Births from measurements need it.
         is_linear: whether measurements are linear in the state: a Jacobian then serves however wide a Gaussian is.
-        components: what they are, as `Bias` names it: "bearing", "range", "x", "y"; () where they have no such names.
+        components: the quantity that each component is: "bearing", "range", "range_rate", "x" or "y" (the names of
+            `vedette.quantities.QUANTITIES`, which a `Bias` has too); () where they are others.
 
     Raises:
-        InputError: a function of another kind, a bad dimension or parameter, a wrong number of angular flags.
+        InputError: a function of another kind, a bad dimension or parameter, a wrong number of angular flags, an
+            unknown component.
     """
 
     meas_dim: int
@@ -97,17 +100,20 @@ class MeasurementModel:
 
     def __post_init__(self) -> None:
         dimension("MeasurementModel.meas_dim", self.meas_dim)
-        if self.components and len(self.components) != self.meas_dim:
-            raise reject("MeasurementModel.components", f"{self.meas_dim} names, or none", self.components)
+        known = [QUANTITIES[name] for name in self.components if name in QUANTITIES]
+        if self.components and len(known) != self.meas_dim:
+            wanted = f"{self.meas_dim} names among {', '.join(QUANTITIES)}, or none"
+            raise reject("MeasurementModel.components", wanted, self.components)
         require_kind("MeasurementModel.function", self.function, "measurement")
         if self.jacobian is not None:
             require_kind("MeasurementModel.jacobian", self.jacobian, "measurement_jacobian")
         if self.places is not None and not callable(self.places):
             raise reject("MeasurementModel.places", "a function or None", self.places)
         object.__setattr__(self, "params", params_vector("MeasurementModel.params", self.params))
-        least = self.least if len(self.least) else np.full(self.meas_dim, -np.inf)
+        least = self.least if np.size(self.least) else [each.least for each in known] or np.full(self.meas_dim, -np.inf)
         object.__setattr__(self, "least", float_array("MeasurementModel.least", least, (self.meas_dim,), finite=False))
-        object.__setattr__(self, "angular", angular_flags("MeasurementModel.angular", self.angular, self.meas_dim))
+        angular = self.angular if np.size(self.angular) else [each.is_angle for each in known]
+        object.__setattr__(self, "angular", angular_flags("MeasurementModel.angular", angular, self.meas_dim))
 
     def measure(self, states: ArrayLike, pose: ArrayLike) -> Floats:
         """(n, meas_dim) noise-free measurements of (n, state_dim) states.

@@ -82,19 +82,17 @@ def _places(measurements: Floats, pose: Floats) -> Floats:
 @part("bearing_range", "measurement")
 def bearing_range() -> MeasurementModel:
     """z = [bearing in rad, range in m] (paper: z_k); the bearing counter-clockwise from east, in (-pi, pi]."""
-    angular, least = np.array([True, False]), np.array([-np.inf, 0.0])
     functions = _bearing_range, np.empty(0), _bearing_range_jacobian
-    return MeasurementModel(2, *functions, angular, _places, least, components=("bearing", "range"))
+    return MeasurementModel(2, *functions, places=_places, components=("bearing", "range"))
 
 
 @part("bearing_only", "measurement")
 def bearing_only() -> MeasurementModel:
     """z = [bearing in rad], counter-clockwise from east, in (-pi, pi]."""
-    return MeasurementModel(1, _bearing, np.empty(0), _bearing_jacobian, np.array([True]), components=("bearing",))
+    return MeasurementModel(1, _bearing, np.empty(0), _bearing_jacobian, components=("bearing",))
 
 
 @part("range_only", "measurement")
 def range_only() -> MeasurementModel:
     """z = [range in m]."""
-    functions = _range, np.empty(0), _range_jacobian
-    return MeasurementModel(1, *functions, np.array([False]), least=np.zeros(1), components=("range",))
+    return MeasurementModel(1, _range, np.empty(0), _range_jacobian, components=("range",))

@@ -14,7 +14,7 @@ import numpy as np
 from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import non_negative, one_of, reject
-from vedette.models.clutter import NO_OFFSETS, ClutterModel, log_or_minus_infinity
+from vedette.models.clutter import NO_OFFSETS, ClutterModel, angular_of, log_or_minus_infinity
 from vedette.models.fields import NonNegative, part
 from vedette.models.functions import ModelFunction, model_function, write_rows
 from vedette.models.measurement import MeasurementModel
@@ -89,11 +89,11 @@ def _range(measurement: Floats, pose: Floats, params: Floats) -> float:
     return params[0] + math.log(distance * arc) if arc > 0.0 else -math.inf
 
 
-_KINDS: dict[str, tuple[ModelFunction, tuple[bool, ...]]] = {
-    "bearing_range": (_bearing_range, (True, False)),
-    "bearing_only": (_bearing, (True,)),
-    "range_only": (_range, (False,)),
-    "position": (_position, (False, False)),
+_KINDS: dict[str, ModelFunction] = {
+    "bearing_range": _bearing_range,
+    "bearing_only": _bearing,
+    "range_only": _range,
+    "position": _position,
 }
 
 
@@ -129,6 +129,5 @@ def region_clutter(rate: NonNegative, region: Region, kind: str) -> ClutterModel
     if not isinstance(region, Region):
         raise reject("region", "a Region", region)
     rate = non_negative("rate", rate)
-    function, angular = _KINDS[kind]
     params = np.concatenate([[log_or_minus_infinity(rate / region.area)], region.bounds, NO_OFFSETS])
-    return ClutterModel(rate, function, params, _RegionSampler(rate, region), len(angular), np.array(angular))
+    return ClutterModel(rate, _KINDS[kind], params, _RegionSampler(rate, region), angular=angular_of(kind))

@@ -15,7 +15,7 @@ from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats
 from vedette.kernels.gaussian.scratch import wrap_angle
 from vedette.models.arguments import non_negative, one_of, positive, reject
-from vedette.models.clutter import NO_OFFSETS, ClutterModel, log_or_minus_infinity
+from vedette.models.clutter import NO_OFFSETS, ClutterModel, angular_of, log_or_minus_infinity
 from vedette.models.fields import HalfWidth, NonNegative, Positive, part
 from vedette.models.functions import ModelFunction, model_function
 from vedette.models.measurement import MeasurementModel
@@ -65,10 +65,7 @@ def _bearing_range(measurement: Floats, pose: Floats, params: Floats) -> float:
     return _log_density(dx, dy, pose[2], params) + math.log(distance)
 
 
-_KINDS: dict[str, tuple[ModelFunction, tuple[bool, ...]]] = {
-    "position": (_position, (False, False)),
-    "bearing_range": (_bearing_range, (True, False)),
-}
+_KINDS: dict[str, ModelFunction] = {"position": _position, "bearing_range": _bearing_range}
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +123,6 @@ def around_sensor(
         raise reject("half_width_rad", "an angle in (0, pi]", half_width_rad)
     rate, is_square = non_negative("rate", rate), radius is None
     size = positive("half_side", half_side) if is_square else positive("radius", radius)
-    function, angular = _KINDS[kind]
     params = np.array([log_or_minus_infinity(rate), size, float(is_square), half_width_rad, *NO_OFFSETS])
     sampler = _AroundSampler(rate, size, is_square, half_width_rad)
-    return ClutterModel(rate, function, params, sampler, len(angular), np.array(angular))
+    return ClutterModel(rate, _KINDS[kind], params, sampler, angular=angular_of(kind))

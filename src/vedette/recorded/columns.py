@@ -7,9 +7,10 @@ from collections.abc import Mapping, Sequence
 from vedette.errors import InputError
 from vedette.models.arguments import reject
 from vedette.platforms.compass import PlaneCompass
-from vedette.recorded.conventions import ANGLES, OTHER_NAMES, QUANTITIES, Conventions
+from vedette.quantities import ANGLES, COMPONENTS
+from vedette.recorded.conventions import OTHER_NAMES, UNITS, Conventions
 from vedette.recorded.geography import Origin
-from vedette.recorded.instants import COMPONENTS, Site
+from vedette.recorded.instants import Site
 from vedette.recorded.tables import Table, are_dates, column_names
 from vedette.text import shown
 
@@ -22,7 +23,7 @@ class ScanColumns:
         self.compass = origin or PlaneCompass()
         self.bearings = tuple(conventions.bearings or ("north" if site.compass else table.bearings) for site in sites)
         self._columns: dict[str, tuple[str, float]] = {}
-        for quantity, units in QUANTITIES.items():
+        for quantity, units in UNITS.items():
             if (found := self._found(quantity, units)) is not None:
                 self._columns[quantity] = found
         self._time = self._plain("time")

@@ -8,16 +8,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 from vedette.models.arguments import reject
+from vedette.quantities import ANGLES, LENGTHS, QUANTITIES
 from vedette.recorded.instants import Bearings
 
 # What a row may say: the quantity, and the units that the end of a column's name may give it.
-LENGTHS = {"m": 1.0, "km": 1000.0, "nmi": 1852.0}
-ANGLES = {"rad": 1.0, "deg": math.pi / 180.0}
-QUANTITIES: dict[str, Mapping[str, float]] = {
-    "range": LENGTHS,
-    "bearing": ANGLES,
-    "x": LENGTHS,
-    "y": LENGTHS,
+UNITS: dict[str, Mapping[str, float]] = {
+    **{name: each.units for name, each in QUANTITIES.items()},
     "lon": {"deg": 1.0},
     "lat": {"deg": 1.0},
     "own_x": LENGTHS,
@@ -40,7 +36,8 @@ ONE_PLACE, ONE_PLACE_SHARE = 50.0, 0.001
 MOST = {
     **dict.fromkeys(("lon", "own_lon"), 360.0),
     **dict.fromkeys(("lat", "own_lat"), 90.0),
-    **dict.fromkeys(("bearing", "own_heading"), 2.0 * math.pi),
+    "own_heading": 2.0 * math.pi,
+    **{name: each.most for name, each in QUANTITIES.items() if each.most < math.inf},
 }
 OVER_A_TURN = math.radians(10.0)  # what a bias or noise may add to an angle
 
@@ -69,7 +66,7 @@ class Conventions:
     bad_rows: Literal["refuse", "skip"] = "refuse"
 
     def __post_init__(self) -> None:
-        known = ("time", "sensor", *QUANTITIES)
+        known = ("time", "sensor", *UNITS)
         for where, given in (("columns", self.columns), ("units", self.units)):
             if not isinstance(given, Mapping):
                 raise reject(where, "a mapping of quantities, such as {range: nmi}", given)
@@ -77,8 +74,8 @@ class Conventions:
                 if name not in known:
                     raise reject(where, f"quantities among {', '.join(known)}", name)
         for name, unit in self.units.items():
-            if unit not in QUANTITIES.get(name, {}):
-                raise reject(f"units.{name}", f"one of {', '.join(QUANTITIES.get(name, ())) or 'none'}", unit)
+            if unit not in UNITS.get(name, {}):
+                raise reject(f"units.{name}", f"one of {', '.join(UNITS.get(name, ())) or 'none'}", unit)
         if self.bearings not in ("east", "north", None):
             raise reject("bearings", "east or north", self.bearings)
         if self.bad_rows not in ("refuse", "skip"):

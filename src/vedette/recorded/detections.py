@@ -10,10 +10,11 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.models.arguments import reject
+from vedette.quantities import QUANTITIES, si_column
 from vedette.recorded.tables import Table
 from vedette.text import shown
 
-_COLUMNS = {"bearing": "bearing_rad", "range": "range_m", "x": "x_m", "y": "y_m", "lon": "lon_deg", "lat": "lat_deg"}
+_COLUMNS = {**{name: si_column(name) for name in QUANTITIES}, "lon": "lon_deg", "lat": "lat_deg"}
 Place: TypeAlias = tuple[float, float]
 
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.kernels.base.types import Bools, Floats
+from vedette.quantities import PLACED
 
-PLACED = ("bearing_range", "position")  # kinds of measurements that are places in the plane
 MARGIN = 0.05  # of the longer side of an extent, around it
 _LONELY = 0.9  # a value is far from all others where the third on its side is nearer than this share of its distance
 _FEWEST, _FEWEST_TIMES = 20, 10  # rows and times of a recording; of fewer no row is taken for wild
@@ -22,7 +22,7 @@ def places_of(scan: Floats, pose: Floats, kind: str) -> Floats:
         return np.empty((0, 2))
     if kind == "position":
         return scan
-    return np.asarray(pose[:2] + scan[:, 1:] * np.column_stack([np.cos(scan[:, 0]), np.sin(scan[:, 0])]))
+    return np.asarray(pose[:2] + scan[:, 1:2] * np.column_stack([np.cos(scan[:, 0]), np.sin(scan[:, 0])]))
 
 
 def box_of(places: Floats, share: float = MARGIN) -> Floats:

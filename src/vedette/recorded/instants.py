@@ -13,22 +13,15 @@ from numpy.typing import ArrayLike
 from vedette.kernels.base.types import Floats
 from vedette.models import Bias
 from vedette.models.arguments import float_array
-from vedette.models.bias import LEAST_RANGE, NO_BIAS
+from vedette.models.bias import NO_BIAS, with_offsets
 from vedette.platforms.compass import Compass, PlaneCompass, course_deg, wrapped
+from vedette.quantities import COMPONENTS, angles
 from vedette.simulation.records import ScansFile
 from vedette.speaking import Speaking
 from vedette.text import counted
 from vedette.tracking import SensorScan
 
 Bearings = Literal["east", "north"]
-
-# Components of a measurement of a kind, by their quantities.
-COMPONENTS = {
-    "bearing_range": ("bearing", "range"),
-    "bearing_only": ("bearing",),
-    "range_only": ("range",),
-    "position": ("x", "y"),
-}
 
 
 def turned(angles: ArrayLike, bearings: Bearings | None, compass: Compass, place: ArrayLike) -> Floats:
@@ -42,7 +35,7 @@ class Site:
 
     Attributes:
         name: as the rows name it; its number, from 1, will do too.
-        kind: of its measurements, a key of `COMPONENTS`.
+        kind: of its measurements, a key of `vedette.quantities.COMPONENTS`.
         pose: [px, py, heading_rad, ...] where the rows do not say.
         bias: what the rows say too much, which is taken off as they are read; ranges that would be below 1 m without it
             are taken as 1 m.
@@ -79,10 +72,9 @@ class Site:
         return np.asarray(self.pose if pose is None else pose, np.float64)[:2]
 
     def _with_bearings(self, measurements: Floats, change: Callable[[Floats], Floats]) -> Floats:
-        if not self.compass or "bearing" not in COMPONENTS[self.kind]:
-            return measurements
-        found, place = measurements.copy(), COMPONENTS[self.kind].index("bearing")
-        found[:, place] = change(found[:, place])
+        found = measurements.copy()
+        for place in angles(COMPONENTS[self.kind]) if self.compass else ():
+            found[:, place] = change(found[:, place])
         return found
 
 
@@ -204,23 +196,17 @@ def without_biases(recording: RecordedScans, sites: Sequence[Site]) -> RecordedS
 def bias_of(site: Site, bearings: Bearings | None) -> tuple[Floats, Floats]:
     """Return what the bias of a sensor adds to measurements, (meas_dim,) in rad and m, and to its place, (2,) in m."""
     bias, is_place = site.bias, site.kind == "position"
-    turn = -bias.bearing if bearings == "north" else bias.bearing
-    own = {"bearing": turn, "range": bias.range, "x": bias.x, "y": bias.y}
-    measured = np.array([own[component] for component in COMPONENTS[site.kind]])
+    measured = np.array([getattr(bias, component) for component in COMPONENTS[site.kind]])
+    if bearings == "north":
+        measured[[*angles(COMPONENTS[site.kind])]] *= -1.0
     return measured, np.zeros(2) if is_place else np.array([bias.x, bias.y])
 
 
 def without_bias(look: Look, site: Site, bearings: Bearings | None) -> Look:
     """A scan as its sensor would have made it without its bias."""
-    kind, bias = site.kind, site.bias
-    if bias == NO_BIAS:
+    if site.bias == NO_BIAS:
         return look
     measured, place = bias_of(site, bearings)
-    scan, pose = look.scan - measured, look.pose.copy()
-    for i, component in enumerate(COMPONENTS[kind]):
-        if component == "range":
-            scan[:, i] = np.maximum(scan[:, i], LEAST_RANGE)
-        elif component == "bearing":
-            scan[:, i] = np.remainder(scan[:, i] + math.pi, 2.0 * math.pi) - math.pi
+    scan, pose = with_offsets(look.scan, -measured, COMPONENTS[site.kind]), look.pose.copy()
     pose[:2] -= place
-    return Look(look.time - bias.clock, look.sensor, scan, pose)
+    return Look(look.time - site.bias.clock, look.sensor, scan, pose)

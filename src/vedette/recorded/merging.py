@@ -10,7 +10,8 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Floats, Ints
-from vedette.recorded.instants import COMPONENTS, RecordedScans, Site
+from vedette.quantities import COMPONENTS, QUANTITIES, angles
+from vedette.recorded.instants import RecordedScans, Site
 from vedette.text import counted, shown
 
 _CLOSE = 3.0  # noise standard deviations between two measurements of one target
@@ -53,7 +54,7 @@ def merged(
 
 def _told(site: Site, before: int, after: int, offsets: Floats) -> str:
     """How many measurements became how many, and the root mean square of their offsets from their means."""
-    units = [(math.degrees(1.0), "deg") if name == "bearing" else (1.0, "m") for name in COMPONENTS[site.kind]]
+    units = [(QUANTITIES[name].per_si, QUANTITIES[name].unit) for name in COMPONENTS[site.kind]]
     spread = np.sqrt((offsets**2).mean(axis=0)) if len(offsets) else np.zeros(len(units))
     parts = [
         f"{name} {unit * value:.3g} {word}"
@@ -93,8 +94,8 @@ def _close(scan: Floats, kind: str, stds: Floats, distance: float) -> Bools:
 def _wrapped(values: Floats, kind: str) -> Floats:
     """Measurements or their differences, bearings in [-pi, pi)."""
     found = values.copy()
-    if COMPONENTS[kind][0] == "bearing":
-        found[..., 0] = np.remainder(found[..., 0] + math.pi, 2.0 * math.pi) - math.pi
+    for place in angles(COMPONENTS[kind]):
+        found[..., place] = np.remainder(found[..., place] + math.pi, 2.0 * math.pi) - math.pi
     return found
 
 

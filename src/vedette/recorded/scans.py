@@ -12,20 +12,12 @@ import numpy as np
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.models.bias import NO_BIAS
+from vedette.quantities import ANGLES, COMPONENTS, PLACED, QUANTITIES
 from vedette.recorded.columns import ScanColumns
-from vedette.recorded.conventions import (
-    ANGLES,
-    MOST,
-    ONE_PLACE,
-    ONE_PLACE_SHARE,
-    OVER_A_TURN,
-    QUANTITIES,
-    Conventions,
-)
-from vedette.recorded.extents import PLACED, places_of, wild
+from vedette.recorded.conventions import MOST, ONE_PLACE, ONE_PLACE_SHARE, OVER_A_TURN, UNITS, Conventions
+from vedette.recorded.extents import places_of, wild
 from vedette.recorded.geography import PLANE_REACH, Origin
 from vedette.recorded.instants import (
-    COMPONENTS,
     Look,
     RecordedScans,
     Site,
@@ -140,9 +132,10 @@ class _Rows(ScanColumns):
         if not math.isfinite(value):
             raise self.table.fault(i, name, "a finite number")
         most = MOST.get(quantity, FARTHEST)
-        over = OVER_A_TURN if QUANTITIES[quantity] is ANGLES else 1e-9 * most
-        if abs(value) > most + over or (quantity == "range" and value < 0.0):
-            limits = f"from {0 if quantity == 'range' else -most / unit:g} to {most / unit:g}"
+        over = OVER_A_TURN if UNITS[quantity] is ANGLES else 1e-9 * most
+        least = max(-most, QUANTITIES[quantity].least) if quantity in QUANTITIES else -most
+        if not least - (over if least else 0.0) <= value <= most + over:
+            limits = f"from {least / unit:g} to {most / unit:g}"
             raise self.table.fault(i, name, f"a number {limits}")
         return value
 
@@ -162,7 +155,7 @@ class _Rows(ScanColumns):
         if quantities[0] == "lon":
             return self._agreed(i, self._plane(i, *quantities), "x", "y")
         return tuple(
-            self._angle(i, quantity, s, pose) if quantity == "bearing" else self._value(i, quantity)
+            self._angle(i, quantity, s, pose) if QUANTITIES[quantity].is_angle else self._value(i, quantity)
             for quantity in quantities
         )
 

@@ -10,8 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vedette.kernels.base.types import Floats
+from vedette.quantities import PLACED
 from vedette.recorded import RecordedScans
-from vedette.recorded.extents import PLACED, places_of
+from vedette.recorded.extents import places_of
 from vedette.scenarios.sections import ScenarioModel
 
 _FASTER = 1.5  # times the speed that targets hardly exceed, which still count as neighbours

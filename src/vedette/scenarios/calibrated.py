@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path as FilePath
@@ -16,9 +15,10 @@ from vedette.kernels.base.types import Floats
 from vedette.models import Bias, Region, SensorModel, TargetModel
 from vedette.models.clutter import at_raw_measurements
 from vedette.plausible import told_elsewhere
+from vedette.quantities import COMPONENTS, QUANTITIES, in_file
 from vedette.reading import read_text
 from vedette.recorded import RecordedScans
-from vedette.recorded.instants import COMPONENTS, Bearings, bias_of
+from vedette.recorded.instants import Bearings, bias_of
 from vedette.scenarios.build import build_sensors
 from vedette.scenarios.dumping import dump_data
 from vedette.scenarios.loading import Scenario
@@ -28,10 +28,8 @@ from vedette.scenarios.yaml_reader import MOST_BYTES, read_yaml
 from vedette.tracking import Central, Tracker
 
 _LIMITS = Limits(min_existence=1e-3)
-_DEGREE = 180.0 / math.pi
-# A standard deviation from which on nothing is known: of biases; of logarithms, of log-odds.
-_UNKNOWN = {"range": 1000.0, "bearing": 10.0, "clock": 5.0, "x": 1000.0, "y": 1000.0}
-_UNKNOWN_LOG, _UNKNOWN_ODDS = 1.0, 4.0
+# A standard deviation from which on nothing is known: of clocks, s; of logarithms, of log-odds.
+_UNKNOWN_CLOCK, _UNKNOWN_LOG, _UNKNOWN_ODDS = 5.0, 1.0, 4.0
 _WIDER = 3.0  # times the region, along each axis: noise at its edge stays in it
 _BUILT_IN = ("region", "around_sensor", "measurement_space")  # clutter that can be had at the raw measurement
 _NOT_CONVERGED = "# The optimiser stopped before it converged: these values may be inaccurate."
@@ -140,22 +138,23 @@ def _biases(
     elif position and "bearing" in components:
         asked.remove("bearing")
     for name in asked:
-        turns = name == "bearing"
-        per_si = (-_DEGREE if clockwise else _DEGREE) if turns else 1.0
-        start = getattr(said, name) * abs(per_si)
-        called, unit = ("bearing_deg", "deg") if turns else (name, "s" if name == "clock" else "m")
-        yield Parameter(s, "bias", name, called, unit, start, per_si, "plain", _UNKNOWN[name])
+        if name == "clock":
+            yield Parameter(s, "bias", name, name, "s", said.clock, 1.0, "plain", _UNKNOWN_CLOCK)
+            continue
+        known = QUANTITIES[name]
+        start, per_si = getattr(said, name) * known.per_si, known.per_si
+        per_si = -per_si if clockwise and known.is_angle else per_si
+        yield Parameter(s, "bias", name, in_file(name), known.unit, start, per_si, "plain", known.unknown)
 
 
 def _of_models(s: int, sensor: Sensor) -> Iterator[Parameter]:
     """Of noise, detection and clutter what the sections have numbers for."""
     noise, components = sensor.noise, COMPONENTS[sensor.measurement.kind]
     for i, component in enumerate(components):
-        unit, per_si, name = "rad" if component == "bearing" else "m", 1.0, ""
+        known = QUANTITIES[component]
+        unit, per_si, name = known.si, 1.0, ""
         if noise.kind == "range_dependent":
-            name = f"sigma_{component}"
-            if component == "bearing":
-                name, unit, per_si = "sigma_bearing_deg", "deg", _DEGREE
+            name, unit, per_si = f"sigma_{in_file(component)}", known.unit, known.per_si
             start = getattr(noise, name)
         elif noise.kind in ("constant", "by_axis"):
             name, start = f"std.{i}", noise.std[i]

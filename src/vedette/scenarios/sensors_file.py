@@ -8,13 +8,13 @@ from pathlib import Path as FilePath
 from typing import Any, NamedTuple
 
 from vedette.errors import InputError, ScenarioError
+from vedette.quantities import COMPONENTS
 from vedette.reading import read_text
 from vedette.scenarios.diagnostics import read_section
 from vedette.scenarios.faults import Fault, describe
 from vedette.scenarios.loading import diagnose, place_fault
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.recording import RecordingSection
-from vedette.scenarios.sections.sensing import COMPONENTS
 from vedette.scenarios.yaml_reader import MOST_BYTES, Document, read_yaml
 from vedette.text import counted
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Literal
 
+from vedette.quantities import COMPONENTS, QUANTITIES
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.base import Section
@@ -13,7 +14,6 @@ from vedette.scenarios.sections.control import Control
 from vedette.scenarios.sections.courses import as_courses
 from vedette.scenarios.sections.fusion import AnyFusion, CustomFusion
 from vedette.scenarios.sections.platforms import Steps
-from vedette.scenarios.sections.sensing import COMPONENTS
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.tracking import AnyFilter, Filter
 from vedette.scenarios.sections.true_sensors import BiasSection
@@ -192,8 +192,8 @@ def _noise(section: Section, measured: str) -> str:
     stds, components = getattr(section, "std", ()), COMPONENTS.get(measured, ())
     if not isinstance(stds, tuple) or len(stds) != len(components):
         return settings(section)
-    units = ("rad" if name == "bearing" else "m" for name in components)
-    named = ", ".join(f"{name} {std:g} {unit}" for name, std, unit in zip(components, stds, units, strict=True))
+    pairs = zip(components, stds, strict=True)
+    named = ", ".join(f"{in_words(name)} {std:g} {QUANTITIES[name].si}" for name, std in pairs)
     return ", ".join(
         [f"{in_words(getattr(section, 'kind', ''))}, std {named}", *plain_values(section, {"std": ("std", None)})]
     )

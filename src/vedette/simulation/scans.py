@@ -14,9 +14,8 @@ from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.gaussian.scans import add_noise, mixed_scan, seen_with
 from vedette.models import SensorModel
 from vedette.models.arguments import float_array, generator, pose_vector, reject
-from vedette.models.bias import LEAST_RANGE, NO_BIAS
+from vedette.models.bias import NO_BIAS, with_offsets
 from vedette.models.functions import numbers_at, write_rows
-from vedette.models.measurement import wrap_angular
 from vedette.simulation.true_sensors import TrueSensor
 from vedette.speaking import Speaking
 from vedette.tracking import Stages
@@ -157,15 +156,9 @@ def _shown(sensor: TrueSensor, states: Floats, pose: Floats) -> tuple[Floats, Fl
 
 def _biased(sensor: TrueSensor, measured: Floats) -> Floats:
     """What the sensor says of what it has measured."""
-    model = sensor.model.measurement
-    offsets = [getattr(sensor.bias, name) for name in model.components]
-    if not any(offsets):
-        return measured
-    said = wrap_angular(measured + offsets, model.angular)
-    for i, name in enumerate(model.components):
-        if name == "range":
-            said[:, i] = np.maximum(said[:, i], LEAST_RANGE)
-    return said
+    names = sensor.model.measurement.components
+    offsets = np.array([getattr(sensor.bias, name) for name in names])
+    return with_offsets(measured, offsets, names) if offsets.any() else measured
 
 
 def _detected_at(sensor: TrueSensor, states: Floats, pose: Floats, measured: Floats) -> Floats:

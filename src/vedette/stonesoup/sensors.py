@@ -40,6 +40,7 @@ from vedette.models import (
     region_clutter,
 )
 from vedette.models.arguments import float_array, positive_definite, reject
+from vedette.quantities import QUANTITIES
 from vedette.stonesoup.motions import Layout
 
 # What each measures, by the names of `vedette.recorded.table_of_detections`; how; and as which clutter knows it.
@@ -170,7 +171,7 @@ def clutter_of(source: Any, model: Any) -> ClutterModel:
         wanted = "a ClutterModel or a SimpleDetectionSimulator of Stone Soup, or a ClutterModel of vedette.models"
         raise reject("clutter", wanted, type(source).__name__)
     bounds = float_array("clutter.meas_range", np.asarray(source.meas_range, np.float64), (len(quantities), 2))
-    angular = [name == "bearing" for name in quantities]
+    angular = [QUANTITIES[name].is_angle for name in quantities]
     if any(angular):
         bounds[angular] += pose_of(model)[2]
     return measurement_space_clutter(float(source.clutter_rate), bounds[:, 0], bounds[:, 1], angular=angular)

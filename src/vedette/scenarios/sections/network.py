@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field
 
+from vedette.quantities import PLACED
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import Whole, check
 from vedette.scenarios.sections.derived import Part, derived
 from vedette.scenarios.sections.fusion import BY_LABEL, OF_SCANS, Fusion
-from vedette.scenarios.sections.sensing import WITHOUT_PLACE
 from vedette.scenarios.sections.tracking import UNLABELLED
 
 if TYPE_CHECKING:  # with these comes the compiler, which a check does without
@@ -69,7 +69,7 @@ def births_from_measurements(model: ScenarioModel) -> Iterator[Finding]:
     if model.filter.kind in UNLABELLED:
         yield path, f"none, as {model.filter.kind} filters have no labels", "births from measurements"
     for i, sensor in enumerate(model.sensors):
-        if sensor.measurement.kind in WITHOUT_PLACE:
+        if sensor.measurement.kind not in (*PLACED, "custom"):
             wanted = "a measurement that says where a target is, for birth.from_measurements"
             yield ("sensors", i, "measurement", "kind"), wanted, describe(sensor.measurement.kind)
     if len(model.sensors) > 1 and isinstance(fusion, Fusion) and fusion.kind in BY_LABEL:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Iterator
 from dataclasses import replace
@@ -13,10 +12,10 @@ from typing import TYPE_CHECKING, Literal
 from pydantic import Field
 
 from vedette.errors import InputError
+from vedette.quantities import COMPONENTS, QUANTITIES, in_file
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import SHA256_FIELD, NonNegative, Section, Sha256, attempt, is_whole
 from vedette.scenarios.sections.field_of_view import reach_of
-from vedette.scenarios.sections.sensing import COMPONENTS
 
 if TYPE_CHECKING:
     from vedette.recorded import Origin, RecordedScans, Site
@@ -101,8 +100,8 @@ def noise_stds(sensor: Sensor) -> tuple[float, ...] | None:
     """Least standard deviation of each component that a sensor measures, rad and m; None of a custom noise."""
     noise = sensor.noise
     if noise.kind == "range_dependent":
-        least = {"bearing": math.radians(noise.sigma_bearing_deg), "range": noise.sigma_range}
-        return tuple(least[name] for name in COMPONENTS.get(sensor.measurement.kind, ()))
+        names = COMPONENTS.get(sensor.measurement.kind, ())
+        return tuple(QUANTITIES[name].in_si * getattr(noise, f"sigma_{in_file(name)}") for name in names)
     return tuple(noise.std) if noise.kind in ("constant", "by_axis") else None
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field
 
+from vedette.quantities import COMPONENTS, PLACED, angles
 from vedette.scenarios.faults import Finding, Path, describe
 from vedette.scenarios.sections.base import Positive, Section, check
 from vedette.scenarios.sections.derived import Part, derived, one_of
@@ -16,21 +17,11 @@ from vedette.scenarios.sections.derived import Part, derived, one_of
 if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
     from vedette.models import NoiseModel
 
-# Components of each kind of measurement.
-COMPONENTS = {
-    "bearing_range": ("bearing", "range"),
-    "bearing_only": ("bearing",),
-    "range_only": ("range",),
-    "position": ("x", "y"),
-}
-# Kinds of measurement that do not say where a target is.
-WITHOUT_PLACE = ("bearing_only", "range_only")
-
 
 def components(measurement: Measurement) -> tuple[int | None, tuple[int, ...]]:
     """Number of components of a measurement, None of one of the user's own; and which of them are known as angles."""
     names = COMPONENTS.get(measurement.kind, ())
-    return len(names) or None, tuple(i for i, name in enumerate(names) if name == "bearing")
+    return len(names) or None, angles(names)
 
 
 class RangeDependentNoise(Section):
@@ -120,7 +111,7 @@ def clutter_findings(measurement: Measurement, clutter: Clutter, path: Path) -> 
     kind = measurement.kind
     if clutter.kind == "region" and kind == "custom":
         yield path, "measurement_space or custom clutter for a custom measurement", "region clutter"
-    if clutter.kind == "around_sensor" and kind not in ("position", "bearing_range"):
+    if clutter.kind == "around_sensor" and kind not in PLACED:
         wanted = f"region, measurement_space or custom clutter for a {kind} measurement"
         yield path, wanted if kind != "custom" else wanted.replace("region, ", ""), "around_sensor clutter"
 

@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, Any, Literal
 from pydantic import Field
 
 from vedette.plausible import told_elsewhere
+from vedette.quantities import COMPONENTS, PLACED, QUANTITIES, in_file
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import Section
 from vedette.scenarios.sections.sensing import (
-    COMPONENTS,
-    WITHOUT_PLACE,
     Clutter,
     Detection,
     Measurement,
@@ -58,19 +57,20 @@ class BiasSection(Section):
     clock: float = Field(default=0.0, description="Of times: how far its clock is ahead [s].")
     x: float = Field(default=0.0, description="Of where it is said to be, or of positions that it measures, east [m].")
     y: float = Field(default=0.0, description="The same, north [m].")
+    range_rate: float = Field(default=0.0, description="Of range rates [m/s].")
 
     def findings_beside(self, measurement: Measurement) -> Iterator[Finding]:
         """What is wrong with it where a sensor measures so."""
         measured = COMPONENTS.get(measurement.kind, ())
-        for name, component in (("range", "range"), ("bearing_deg", "bearing")):
-            if getattr(self, name) and component not in measured:
-                yield (name,), f"0, as no {component} is measured ({measurement.kind})", describe(getattr(self, name))
+        for component in (name for name in QUANTITIES if name not in ("x", "y", *measured)):
+            if value := getattr(self, name := in_file(component)):
+                yield (name,), f"0, as no {component} is measured ({measurement.kind})", describe(value)
 
     def build(self) -> Bias:
         """In SI units."""
         from vedette.models import Bias
 
-        return Bias(self.range, math.radians(self.bearing_deg), self.clock, self.x, self.y)
+        return Bias(self.range, math.radians(self.bearing_deg), self.clock, self.x, self.y, self.range_rate)
 
 
 class TrueSensor(Section):
@@ -105,7 +105,7 @@ class TrueSensor(Section):
         if self.clutter is not None:
             yield from clutter_findings(measurement, self.clutter, ("truth", "clutter"))
             yield from clutter_box_findings(measurement, self.clutter, ("truth", "clutter"))
-        if self.detection_of == "measurement" and measurement.kind in WITHOUT_PLACE:
+        if self.detection_of == "measurement" and measurement.kind not in (*PLACED, "custom"):
             wanted = f"state, as a {measurement.kind} measurement does not say where the target is"
             yield ("truth", "detection_of"), wanted, describe(self.detection_of)
 

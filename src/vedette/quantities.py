@@ -1,0 +1,79 @@
+"""The quantities that sensors measure, and the kinds of measurements: one table for models, recordings and files."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+# Units as they end the names of columns, and one of each in SI units; the first is the SI unit.
+LENGTHS = {"m": 1.0, "km": 1000.0, "nmi": 1852.0}
+ANGLES = {"rad": 1.0, "deg": math.pi / 180.0}
+SPEEDS = {"mps": 1.0, "kmh": 1.0 / 3.6, "kn": 1852.0 / 3600.0}
+
+
+class Quantity(NamedTuple):
+    """A quantity that sensors measure.
+
+    units: one of `LENGTHS`, `ANGLES`, `SPEEDS`. unit: in scenario files and messages, of which `per_si` make one SI
+    unit. least: least value without noise or bias, SI. most: largest size in a recording, SI; inf: as of places. far:
+    SI, of measurements whose bias is unknown, the standard deviation. unknown: standard deviation from which on nothing
+    is known of a bias, in `unit`.
+    """
+
+    units: Mapping[str, float]
+    unit: str
+    per_si: float
+    least: float
+    most: float
+    far: float
+    unknown: float
+
+    @property
+    def is_angle(self) -> bool:
+        """Whether it is an angle: residuals are then wrapped."""
+        return self.units is ANGLES
+
+    @property
+    def in_si(self) -> float:
+        """How many SI units one of `unit` is."""
+        return self.units.get(self.unit, 1.0)
+
+    @property
+    def si(self) -> str:
+        """The SI unit in messages."""
+        return "rad" if self.is_angle else self.unit
+
+
+_LENGTH = Quantity(LENGTHS, "m", 1.0, -math.inf, math.inf, 300.0, 1000.0)
+QUANTITIES = {
+    "bearing": Quantity(ANGLES, "deg", 180.0 / math.pi, -math.inf, 2.0 * math.pi, math.radians(3.0), 10.0),
+    "range": _LENGTH._replace(least=0.0),
+    "range_rate": Quantity(SPEEDS, "m/s", 1.0, -math.inf, 1e5, 10.0, 100.0),
+    "x": _LENGTH,
+    "y": _LENGTH,
+}
+# The components of each kind of measurement.
+COMPONENTS = {
+    "bearing_range": ("bearing", "range"),
+    "bearing_only": ("bearing",),
+    "range_only": ("range",),
+    "position": ("x", "y"),
+}
+# The kinds that say where a target is.
+PLACED = tuple(kind for kind, names in COMPONENTS.items() if names[:2] in (("bearing", "range"), ("x", "y")))
+
+
+def in_file(name: str) -> str:
+    """Return the name of a quantity in a scenario file: `bearing_deg`, `range`."""
+    return f"{name}_deg" if QUANTITIES[name].is_angle else name
+
+
+def si_column(name: str) -> str:
+    """Return the name of a quantity's column in SI units: `bearing_rad`, `range_m`."""
+    return f"{name}_{next(iter(QUANTITIES[name].units))}"
+
+
+def angles(names: tuple[str, ...]) -> tuple[int, ...]:
+    """Return which components are angles."""
+    return tuple(i for i, name in enumerate(names) if QUANTITIES[name].is_angle)
