@@ -20,9 +20,11 @@ STATES = np.hstack([RNG.uniform(-1000, 1000, (30, 2)), RNG.normal(0, 10, (30, 2)
 OFFSETS = STATES[:, :2] - POSE[:2]
 RANGES = np.linalg.norm(OFFSETS, axis=1)
 BEARINGS = np.arctan2(OFFSETS[:, 1], OFFSETS[:, 0])
+RATES = (OFFSETS * STATES[:, 2:]).sum(axis=1) / RANGES
 
 MEASUREMENTS = {
     "bearing_range": (models.bearing_range(), np.stack([BEARINGS, RANGES], axis=1)),
+    "bearing_range_rate": (models.bearing_range_rate(), np.stack([BEARINGS, RANGES, RATES], axis=1)),
     "bearing_only": (models.bearing_only(), BEARINGS[:, None]),
     "range_only": (models.range_only(), RANGES[:, None]),
     "position": (models.position(), STATES[:, :2]),
@@ -57,7 +59,7 @@ def test_bearings_cover_all_quadrants_and_never_minus_pi():
     np.testing.assert_allclose(bearings, [0, math.pi / 2, math.pi, -math.pi / 2, -3 * math.pi / 4])
 
 
-@pytest.mark.parametrize("kind", ["bearing_range", "bearing_only", "range_only"])
+@pytest.mark.parametrize("kind", ["bearing_range", "bearing_range_rate", "bearing_only", "range_only"])
 def test_a_target_at_the_sensor_has_a_finite_jacobian(kind):
     measurement, _ = MEASUREMENTS[kind]
     np.testing.assert_array_equal(jacobian(measurement, np.zeros(4), np.zeros(3)), np.zeros((measurement.meas_dim, 4)))

@@ -105,7 +105,7 @@ std: [0.02, 3.0] -> std: [0.02]
 std: [0.02, 3.0] -> std: [0.02, -3.0]
     15:39: sensor_defaults.noise.std[1]: expected a number above 0, got -3.0
 kind: constant, std: [0.02, 3.0] -> kind: range_dependent, sigma_bearing: 1
-    15:34: sensor_defaults.noise.sigma_bearing: expected one of eta_bearing, eta_range, kind, sigma_bearing_deg, sigma_range, got an unknown key (did you mean sigma_bearing_deg?)
+    15:34: sensor_defaults.noise.sigma_bearing: expected one of eta_bearing, eta_range, kind, sigma_bearing_deg, sigma_range, sigma_range_rate, got an unknown key (did you mean sigma_bearing_deg?)
 sensor_defaults:\n  noise: { -> sensor_defaults:\n  nose: {
     15:3: sensor_defaults.nose: expected one of bias, budget, clutter, compass, detection, heading_deg, measurement, moves_from, noise, platform, price, scans, switchable, truth, got an unknown key (did you mean noise?)
 position: [0.0, 40.0] -> position: [0.0, 40.0, 1.0]

@@ -196,7 +196,7 @@ def test_dates_are_utc() -> None:
         (renamed({"range": "reach"}), {}, "expected a column of range, as sensor 'north' measures bearing_range; got"),
         (renamed({"time": "when"}), {}, "expected a column 'time'; got columns when, sensor, range, bearing_rad"),
         (ROWS, {"columns": {"range": "reach"}}, "expected a column 'reach'; got columns time, sensor"),
-        (ROWS, {"columns": {"speed": "v"}}, "columns: expected quantities among time, sensor, range"),
+        (ROWS, {"columns": {"speed": "v"}}, "columns: expected quantities among time, sensor, bearing, range"),
         (ROWS, {"units": {"range": "ft"}}, "units.range: expected one of m, km, nmi; got ft"),
         (ROWS, {"gather": -1.0}, "gather: expected seconds, at least 0; got -1.0"),
         (

@@ -102,7 +102,11 @@ def test_positions_of_several_sensors_name_them() -> None:
         ([(START, [object()])], ("x", "y"), r"scan 1, detection 1, state_vector: expected 2 .*got 'None'"),
         ([(START, []), 7], ("x", "y"), r"scan 2: expected a time and detections; got '7'"),
         ([(START, 7)], ("x", "y"), r"scan 1: expected a time and detections"),
-        ([], ("x", "speed"), r"quantities: expected None and names among bearing, range, x, y, lon, lat; got speed"),
+        (
+            [],
+            ("x", "speed"),
+            r"quantities: expected None and names among bearing, range, range_rate, x, y, lon, lat; got speed",
+        ),
         (
             [(START, polar((0.0, 0.0), 0.0)), (after(1), [Detection([[1.0], [2.0]])])],
             ("bearing", "range"),

@@ -35,7 +35,16 @@ def ais(time: float | None, **said: Any) -> str:
     return f"\\{body}*{total:02X}\\{line}"
 
 
-def plot(time: float, rho: float, theta: float, sic: int = 2, level: float | None = None, garbled: int = 0) -> bytes:
+def plot(
+    time: float,
+    rho: float,
+    theta: float,
+    sic: int = 2,
+    level: float | None = None,
+    garbled: int = 0,
+    doppler: tuple[int, float] | None = None,
+) -> bytes:
+    """A data block of one plot; doppler: whether the speed is doubtful, and the speed in m/s."""
     category = CATS[48][-1]
     said: dict[str, Any] = {
         "010": (("SAC", 1), ("SIC", sic)),
@@ -44,6 +53,8 @@ def plot(time: float, rho: float, theta: float, sic: int = 2, level: float | Non
     }
     if level is not None:
         said["090"] = (("V", 0), ("G", garbled), ("FL", (level, "FL")))
+    if doppler is not None:
+        said["120"] = {"CAL": (("D", doppler[0]), 0, ("CAL", (doppler[1], "m/s")))}
     record = category.cv_record.create(said)
     block: bytes = category.create([record]).unparse().to_bytes()
     return block
@@ -168,6 +179,14 @@ def test_messages_that_are_not_complete_are_counted(tmp_path: Path) -> None:
     (tmp_path / "ships.nmea").write_text("\n".join(whole), "ascii")
     with pytest.raises(InputError, match=r"got 1 line with a position but no time \(first: row 2\)"):
         read_table(tmp_path / "ships.nmea")
+
+
+def test_valid_doppler_speeds_are_range_rates(tmp_path: Path) -> None:
+    plots = [plot(0.0, 5.0, 45.0, doppler=(0, -20.0)), plot(1.0, 5.0, 45.0, doppler=(1, 30.0)), plot(2.0, 5.0, 45.0)]
+    (tmp_path / "radar.ast").write_bytes(b"".join(plots))
+    assert read_table(tmp_path / "radar.ast").columns["range_rate_mps"] == [-20.0, None, None]
+    (tmp_path / "radar.ast").write_bytes(b"".join(plots[1:]))
+    assert "range_rate_mps" not in read_table(tmp_path / "radar.ast").columns
 
 
 def test_records_without_a_place_are_told(tmp_path: Path) -> None:

@@ -141,21 +141,22 @@ def _guess(problem: Problem, said: Floats, own: Sequence[int], watch: Callable[[
     values, sites = problem.values(said), problem.sites
     far = np.array([[QUANTITIES[name].far for name in 2 * COMPONENTS[site.kind]][:2] for site in sites])
     asked, unknown = np.zeros((len(sites), len(BIASES)), bool), np.ones((len(sites), len(BIASES)))
-    places = {}
+    # Range rates are not in the first guess: their noise is as wide as their bias may be.
+    places, wide = {}, QUANTITIES["range_rate"].far
     for i, each in enumerate(problem.parameters):
-        if each.kind == "bias" and i in own:
+        if each.kind == "bias" and i in own and each.component in BIASES:
             at = each.sensor, BIASES.index(each.component)
             places[i], asked[at], unknown[at] = at, True, each.unknown / abs(each.per_si)
     stds = far
     for _ in range(3):
         recording = problem.without_biases(values)
         watch()
-        pairs = matched(problem.tracker(_with_noise(problem, values, stds))[0], recording, sites, stds)
+        pairs = matched(problem.tracker(_with_noise(problem, values, stds, wide))[0], recording, sites, stds)
         found = register(pairs, sites, asked, unknown, stds, _period(problem))
         for i, at in places.items():
             values[i] += problem.parameters[i].per_si * found.biases[at]
         stds = np.minimum(stds, _NEARER * found.stds)
-    values = _with_noise(problem, values, found.stds)
+    values = _with_noise(problem, values, found.stds, None)
     return problem.free(_with_counts(problem, values, pairs).tolist()), pairs
 
 
@@ -166,13 +167,14 @@ def _period(problem: Problem) -> float:
     return max(1e-3, float(recording.times[-1])) / max(1, min(num for num in nums if num))
 
 
-def _with_noise(problem: Problem, values: Floats, stds: Floats) -> Floats:
-    """The values with noise of these standard deviations, (num_sensors, 2)."""
+def _with_noise(problem: Problem, values: Floats, stds: Floats, rates: float | None) -> Floats:
+    """The values with noise of these standard deviations, (num_sensors, 2), and of range rates, m/s; None: as said."""
     values = values.copy()
     for i, each in enumerate(problem.parameters):
         if each.kind == "noise":
-            component = COMPONENTS[problem.sites[each.sensor].kind].index(each.component)
-            values[i] = abs(each.per_si) * stds[each.sensor, component]
+            place = COMPONENTS[problem.sites[each.sensor].kind].index(each.component)
+            own = stds[each.sensor, place] if place < 2 else rates
+            values[i] = each.start if own is None else abs(each.per_si) * own
     return values
 
 

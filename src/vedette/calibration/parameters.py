@@ -47,11 +47,10 @@ class Parameter:
     @property
     def label(self) -> str:
         """The name in words, such as "range bias"."""
+        component = self.component.replace("_", " ")
         if self.kind == "bias":
-            return "clock offset" if self.component == "clock" else f"{self.component} bias"
-        return {"noise": f"{self.component} noise std", "detection": "detection prob.", "clutter": "clutter rate"}[
-            self.kind
-        ]
+            return "clock offset" if self.component == "clock" else f"{component} bias"
+        return {"noise": f"{component} noise std", "detection": "detection prob.", "clutter": "clutter rate"}[self.kind]
 
     def to_free(self, value: float) -> float:
         """On the scale."""

@@ -34,7 +34,8 @@ _POSITION, _SPEED = 1e4, 30.0  # m, m/s: what holds a piece of which measurement
 class Pairs(NamedTuple):
     """Measurements that were matched with tracks.
 
-    times: (n,) s. sensors, tracks: (n,) numbers. measured: (n, 2), NaN where there is no second component. poses:
+    times: (n,) s. sensors, tracks: (n,) numbers. measured: (n, 2) the first two components, NaN where there is no
+    second one; range rates are left to the likelihood. poses:
     (n, 2) of the sensors. states: (n, 4) of the tracks, predicted. missed, false, scans: (num_sensors,) tracks without
     a measurement, measurements without a track, and scans.
     """
@@ -88,21 +89,22 @@ def _assigned(scan: Floats, offsets: Floats, place: Floats, kind: str, stds: Flo
     if not len(scan) or not len(offsets):
         return []
     predicted = _measured_of(offsets, place, kind)
-    gaps = _wrapped(scan[:, None, :] - predicted[None], kind) / stds[: scan.shape[1]]
+    num = predicted.shape[1]
+    gaps = _wrapped(scan[:, None, :num] - predicted[None], kind) / stds[:num]
     costs = np.minimum((gaps**2).sum(axis=2), _GATE**2)
     found = linear_sum_assignment(costs)
     return [(i, j) for i, j in zip(*(each.tolist() for each in found), strict=True) if costs[i, j] < _GATE**2]
 
 
 def _measured_of(offsets: Floats, places: Floats, kind: str) -> Floats:
-    """(n, components) of targets at offsets from sensors at places."""
+    """(n, at most 2) first components of the measurements of targets at offsets from sensors at places."""
     values = {
         "bearing": np.arctan2(offsets[:, 1], offsets[:, 0]),
         "range": np.hypot(offsets[:, 0], offsets[:, 1]),
         "x": (offsets + places)[:, 0],
         "y": (offsets + places)[:, 1],
     }
-    return np.stack([values[component] for component in COMPONENTS[kind]], axis=1)
+    return np.stack([values[component] for component in COMPONENTS[kind][:2]], axis=1)
 
 
 def _slopes(offsets: Floats, kind: str) -> Floats:
@@ -112,7 +114,7 @@ def _slopes(offsets: Floats, kind: str) -> Floats:
     distance, one, none = np.sqrt(square), np.ones(len(x)), np.zeros(len(x))
     values = {"bearing": (-y / square, x / square), "range": (x / distance, y / distance)}
     values |= {"x": (one, none), "y": (none, one)}
-    return np.stack([np.stack(values[component], axis=1) for component in COMPONENTS[kind]], axis=1)
+    return np.stack([np.stack(values[component], axis=1) for component in COMPONENTS[kind][:2]], axis=1)
 
 
 def _wrapped(gaps: Floats, kind: str) -> Floats:
@@ -203,7 +205,7 @@ def _linearised(
         rows = np.flatnonzero((pairs.sensors == s) & (pieces >= 0))
         if not len(rows):
             continue
-        names, bias = COMPONENTS[site.kind], dict(zip(BIASES, biases[s].tolist(), strict=True))
+        names, bias = COMPONENTS[site.kind][:2], dict(zip(BIASES, biases[s].tolist(), strict=True))
         piece = states[pieces[rows]]
         after = (pairs.times[rows] - bias["clock"] - middles[pieces[rows]])[:, None]
         moves = 0.0 if site.kind == "position" else biases[s, 3:]

@@ -91,7 +91,7 @@ def _lives(record: RunRecord, scenario: Scenario, scans: Scans, placed: list[int
 
 
 def measured_by(scan: Floats, kind: str, stds: Floats, pose: Floats, mean: Floats, cov: Floats) -> Bools:
-    """(num,) whether each measurement of a scan lies within the gate of an estimate."""
+    """(num,) whether each measurement of a scan lies within the gate of an estimate, by its place."""
     if kind == "position":
         off, turn = scan - mean, np.eye(2)
     else:
@@ -99,19 +99,19 @@ def measured_by(scan: Floats, kind: str, stds: Floats, pose: Floats, mean: Float
         distance = max(float(np.hypot(*ahead)), 1.0)
         along = ahead / distance
         turn = np.array([[-along[1] / distance, along[0] / distance], along])
-        off = scan - [math.atan2(ahead[1], ahead[0]), distance]
+        off = scan[:, :2] - [math.atan2(ahead[1], ahead[0]), distance]
         off[:, 0] = np.remainder(off[:, 0] + math.pi, 2.0 * math.pi) - math.pi
     spread = turn @ cov @ turn.T + np.diag(stds**2)
     return np.asarray(np.einsum("ni,ij,nj->n", off, np.linalg.inv(spread), off) <= _GATE**2)
 
 
 def noise_stds(scenario: Scenario, placed: list[int]) -> dict[int, Floats]:
-    """For each sensor the least standard deviations of its two components; 0 where a custom noise gives none."""
+    """For each sensor the least standard deviations of a place's two components; 0 where a custom noise gives none."""
     model = scenario.model
     region, method, found = model.region.build(), model.filter.gaussian_method, {}
     for s in placed:
         local = model.sensors[s].build(region, method, scenario.folder, model.filter.detection_taken_at)
-        found[s] = np.zeros(2) if local.noise.least_stds is None else np.asarray(local.noise.least_stds)
+        found[s] = np.zeros(2) if local.noise.least_stds is None else np.asarray(local.noise.least_stds)[:2]
     return found
 
 

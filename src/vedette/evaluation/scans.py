@@ -11,7 +11,8 @@ from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import reject
 from vedette.platforms.compass import course_deg
-from vedette.quantities import COMPONENTS, PLACED, QUANTITIES, si_column
+from vedette.quantities import COMPONENTS, OWN_VELOCITY, PLACED, QUANTITIES, is_doppler, si_column
+from vedette.recorded.conventions import OWN_SPEEDS
 from vedette.recorded.extents import places_of
 from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_scan_times, build_true_sensors, drop_outs
@@ -25,7 +26,13 @@ from vedette.simulation.true_sensors import scanning
 
 UNKNOWN = -2  # origin of a measurement that was recorded
 # How the measurements of a kind lie in the plane; of other kinds they do not.
-LIE: dict[str, str] = {"bearing_range": "point", "position": "position", "bearing_only": "ray", "range_only": "circle"}
+LIE: dict[str, str] = {
+    "bearing_range": "point",
+    "bearing_range_rate": "point",
+    "position": "position",
+    "bearing_only": "ray",
+    "range_only": "circle",
+}
 Scans: TypeAlias = tuple[tuple[Scan | None, ...], ...]
 
 
@@ -73,10 +80,11 @@ def _recorded(record: RunRecord, section: RecordingSection, scenario: Scenario) 
 def scan_table(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
     """The scans of a run by columns, a row a measurement, as `vedette.recorded.parse_scans` reads them.
 
-    `time`, `sensor`, what the sensors measure (`bearing_deg`, `range_m`, `x_m`, `y_m`), and where they were (`own_x_m`,
-    `own_y_m`, `own_heading_deg`). Angles are degrees clockwise from true north where every sensor with a bearing has a
-    compass; else they are `bearing_rad` and `own_heading_rad` from the east, which a reader must be told
-    (`bearings: east`). What biases the scenario knows of are taken off.
+    `time`, `sensor`, what the sensors measure (`bearing_deg`, `range_m`, `range_rate_mps`, `x_m`, `y_m`), and where
+    they were (`own_x_m`, `own_y_m`, `own_heading_deg`; where range rates are measured `own_vx_mps`, `own_vy_mps`).
+    Angles are degrees clockwise from true north where every sensor with a bearing has a compass; else they are
+    `bearing_rad` and `own_heading_rad` from the east, which a reader must be told (`bearings: east`). What biases the
+    scenario knows of are taken off.
 
     Raises:
         VedetteError: as of `scans_of_record`, or measurements of a kind that rows cannot tell.
@@ -90,16 +98,17 @@ def scan_table(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
     unit = "deg" if compass else "rad"
     names = {name: si_column(name) for name in QUANTITIES} | {"bearing": f"bearing_{unit}"}
     wanted = dict.fromkeys(names[name] for site in sites for name in COMPONENTS[site.kind])
-    table: dict[str, list[Any]] = {
-        name: [] for name in ("time", "sensor", *wanted, "own_x_m", "own_y_m", f"own_heading_{unit}")
-    }
+    own = ["own_x_m", "own_y_m", f"own_heading_{unit}"]
+    if any(is_doppler(site.kind) for site in sites):
+        own += [f"{name}_mps" for name in OWN_SPEEDS]
+    table: dict[str, list[Any]] = {name: [] for name in ("time", "sensor", *wanted, *own)}
     for time, scans, poses in zip(record.times.tolist(), scans_of_record(record, scenario), record.poses, strict=True):
         for site, scan, pose in zip(sites, scans, poses, strict=True):
             if scan is None:
                 continue
             heading = float(course_deg(site.north, pose[2], pose)) if compass else float(pose[2])
-            of_all = {"time": time, "sensor": site.name, "own_x_m": pose[0], "own_y_m": pose[1]}
-            of_all[f"own_heading_{unit}"] = heading
+            placed = zip(own, (*pose[:2], heading, *pose[OWN_VELOCITY:]), strict=False)
+            of_all = {"time": time, "sensor": site.name, **dict(placed)}
             columns = [names[name] for name in COMPONENTS[site.kind]]
             for row in (site.told(scan.measurements, pose) if compass else scan.measurements).tolist() or [()]:
                 cells = {**of_all, **dict(zip(columns, row, strict=False))}

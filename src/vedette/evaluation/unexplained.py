@@ -91,7 +91,7 @@ def _left(record: RunRecord, scenario: Scenario, placed: list[int]) -> dict[int,
                 explained |= measured_by(scan.measurements, kind, stds[s], pose, mean[:2], cov[:2, :2])
             own = scan.measurements[~explained]
             along = np.full(len(own), stds[s].max())
-            if kind == "bearing_range":
+            if LIE[kind] == "point":
                 along = np.maximum(stds[s][1], stds[s][0] * own[:, 1])
             left[s].append(_Left(float(record.times[k]), places_of(own, pose, kind), along))
     return left

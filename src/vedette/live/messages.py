@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from vedette.errors import InputError
 from vedette.models.arguments import reject
-from vedette.quantities import COMPONENTS
+from vedette.quantities import COMPONENTS, is_doppler
 from vedette.reading import parse_json, said
 from vedette.recorded import Conventions, Origin, Site, parse_scans
 from vedette.recorded.tables import Table, is_number
@@ -18,7 +18,7 @@ from vedette.tracking import SensorScan
 
 MOST_BYTES = 1_000_000  # of a line
 MOST_MEASUREMENTS = 2000  # of a scan
-_KEYS = ("sensor", "time", "measurements", "pose")
+_KEYS = ("sensor", "time", "measurements", "pose", "velocity")
 
 
 def is_message(line: bytes) -> bool:
@@ -47,7 +47,7 @@ def read_message(
     `conventions.units` says another; angles count as `conventions.bearings` says, else as the sensor tells them. The
     pose, which may be left out, is `[x, y, heading_rad, ...]`, or `{"lon": , "lat": , "course_deg": }`, where the
     course, clockwise from true north as in plans, may be left out; or with `heading_deg`, which counts as bearings do
-    and needs `bearings` or a compass.
+    and needs `bearings` or a compass. Of a sensor that measures range rates `"velocity": [vx, vy]` is its own, m/s.
 
     Args:
         line: of UTF-8 text.
@@ -69,6 +69,7 @@ def read_message(
     if "pose.heading_deg" not in pose and conventions.bearings is None and not site.compass:
         conventions = replace(conventions, bearings="east")
     course = pose.pop("pose.course_deg", None)
+    pose |= _velocity(data.get("velocity"), f"{place}, velocity", site)
     num, names = max(len(rows), 1), COMPONENTS[site.kind]
     columns: dict[str, list[Any]] = {"time": [time] * num, "sensor": [site.name] * num}
     columns |= {name: [row[j] for row in rows] if rows else [None] for j, name in enumerate(names)}
@@ -97,6 +98,8 @@ _OF_POSE = {
     "pose.lon": "own_lon",
     "pose.lat": "own_lat",
     "pose.heading_deg": "own_heading",
+    "velocity.x": "own_vx",
+    "velocity.y": "own_vy",
 }
 
 
@@ -158,6 +161,17 @@ def _pose(given: Any, field: str, site: Site) -> tuple[dict[str, float], list[fl
         wanted = "[x, y, heading_rad" + (", ...]" if len(site.pose) > 3 else "]")
         raise reject(field, f"numbers {wanted}, or lon and lat", given)
     return dict(zip(("pose.x", "pose.y", "pose.heading_rad"), given, strict=False)), given[3:]
+
+
+def _velocity(given: Any, field: str, site: Site) -> dict[str, float]:
+    """What it says as columns of a table."""
+    if given is None:
+        return {}
+    if not is_doppler(site.kind):
+        raise reject(field, f"none, as sensor {shown(site.name)} measures no range rates", given)
+    if not isinstance(given, list) or len(given) != 2 or not all(map(_is_number, given)):
+        raise reject(field, "numbers [vx, vy]", given)
+    return dict(zip(("velocity.x", "velocity.y"), given, strict=True))
 
 
 def _is_number(value: Any) -> bool:

@@ -19,7 +19,7 @@ from vedette.models.kinematics import constant_velocity, coordinated_turn
 from vedette.models.measurement import MeasurementModel, NoiseModel, position
 from vedette.models.motion import MotionModel, SurvivalModel, constant_survival, kernel_motion
 from vedette.models.noise import axis_noise, constant_noise, range_dependent_noise
-from vedette.models.polar import bearing_only, bearing_range, range_only
+from vedette.models.polar import bearing_only, bearing_range, bearing_range_rate, range_only
 from vedette.models.region import Region
 from vedette.models.region_clutter import region_clutter
 from vedette.models.sensor import SensorModel
@@ -49,6 +49,7 @@ __all__ = [
     "axis_noise",
     "bearing_only",
     "bearing_range",
+    "bearing_range_rate",
     "camera",
     "constant_detection",
     "constant_noise",

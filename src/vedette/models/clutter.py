@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.errors import InputError, ModelError
+from vedette.kernels.base.compile import inlined
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models.arguments import dimension, float_array, generator, non_negative, params_vector, pose_vector, reject
 from vedette.models.fields import NonNegative, Reals, part
@@ -126,7 +127,10 @@ def _box(measurement: Floats, pose: Floats, params: Floats) -> float:
     return params[0]  # type: ignore[no-any-return]
 
 
-NO_OFFSETS = np.zeros(4)  # the last params of clutter that is uniform in the plane: see `at_raw_measurements`
+# The last params of clutter that is uniform in the plane, see `at_raw_measurements`: what is added to up to three
+# components of a measurement, and to x, y of the sensor.
+NO_OFFSETS = np.zeros(5)
+LARGEST_RATE = 300.0  # m/s, of a false measurement where nothing is said
 
 
 def at_raw_measurements(clutter: ClutterModel, bias: Floats, moved: Floats) -> ClutterModel:
@@ -144,7 +148,7 @@ def at_raw_measurements(clutter: ClutterModel, bias: Floats, moved: Floats) -> C
     if clutter.log_intensity is _box:
         params[1 : 1 + len(bias)] -= bias
     else:
-        params[-4 : len(params) - 4 + len(bias)], params[-2:] = bias, moved
+        params[-5 : len(params) - 5 + len(bias)], params[-2:] = bias, moved
     return replace(clutter, params=params)
 
 
@@ -160,6 +164,19 @@ class _BoxSampler:
         num = int(rng.poisson(self.rate))
         drawn = rng.uniform(self.low, self.high, size=(num, len(self.low)))
         return wrap_angular(drawn, measurement.angular) if measurement.meas_dim == len(self.low) else drawn
+
+
+@inlined
+def log_density_of_rate(range_rate: float, largest: float) -> float:
+    """Log density of the range rate of a false measurement, uniform from -largest to largest, s/m."""
+    return -math.log(2.0 * largest) if abs(range_rate) <= largest else -math.inf
+
+
+def with_rates(drawn: Floats, kind: str, largest: float, rng: np.random.Generator) -> Floats:
+    """Draw the range rates of false measurements whose other components are given, where the kind has them."""
+    if "range_rate" in COMPONENTS[kind]:
+        drawn[:, COMPONENTS[kind].index("range_rate")] = rng.uniform(-largest, largest, len(drawn))
+    return drawn
 
 
 def angular_of(kind: str) -> Bools:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vedette.errors import InputError
+from vedette.kernels.base.compile import inlined
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import float_array, non_negative, positive, reject
 from vedette.models.fields import NonNegativePair, PositivePair, Positives, part
@@ -19,8 +20,8 @@ def _constant(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
             out[i, j] = params[i] * params[i] if i == j else 0.0
 
 
-@model_function("measurement_noise_cov")
-def _bearing_range(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
+@inlined
+def _write_polar(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
     dx, dy = state[0] - pose[0], state[1] - pose[1]
     square = dx * dx + dy * dy
     sigma_range = params[0] + params[1] * square
@@ -29,6 +30,20 @@ def _bearing_range(state: Floats, pose: Floats, params: Floats, out: Floats) -> 
     out[0, 1] = 0.0
     out[1, 0] = 0.0
     out[1, 1] = sigma_range * sigma_range
+
+
+@model_function("measurement_noise_cov")
+def _bearing_range(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
+    _write_polar(state, pose, params, out)
+
+
+@model_function("measurement_noise_cov")
+def _bearing_range_rate(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
+    _write_polar(state, pose, params, out)
+    for i in range(2):
+        out[i, 2] = 0.0
+        out[2, i] = 0.0
+    out[2, 2] = params[4] * params[4]
 
 
 @model_function("measurement_noise_cov")
@@ -88,20 +103,29 @@ def range_dependent_noise(
     eta_range: float = 0.0,
     sigma_bearing: float | None = None,
     eta_bearing: float = 0.0,
+    sigma_range_rate: float | None = None,
 ) -> NoiseModel:
     """Noise that grows with the distance d of the target (paper section IV; paper-notes 3).
 
     Standard deviations sigma_range + eta_range d^2 and sigma_bearing + eta_bearing d. With only `sigma_bearing` given
-    it serves a bearing-only sensor, with only `sigma_range` a range-only one, with both [bearing, range].
+    it serves a bearing-only sensor, with only `sigma_range` a range-only one, with both [bearing, range]. With
+    `sigma_range_rate` beside these two it serves [bearing, range, range rate].
 
     Args:
         sigma_range: m, above 0 (paper: 10).
         eta_range: 1/m (paper: 5e-5).
         sigma_bearing: rad, above 0 (paper: pi/180).
         eta_bearing: rad/m (paper: 5e-6).
+        sigma_range_rate: m/s, above 0, at every distance.
     """
     ranges = _growth("range", sigma_range, eta_range)
     bearings = _growth("bearing", sigma_bearing, eta_bearing)
+    if sigma_range_rate is not None:
+        if not (ranges and bearings):
+            raise reject("sigma_range_rate", "None where no sigma_range and sigma_bearing are given", sigma_range_rate)
+        rate = positive("sigma_range_rate", sigma_range_rate)
+        stds = np.array([bearings[0], ranges[0], rate])
+        return NoiseModel(_bearing_range_rate, np.array([*ranges, *bearings, rate]), 3, stds)
     if ranges and bearings:
         return NoiseModel(_bearing_range, np.array(ranges + bearings), 2, np.array([bearings[0], ranges[0]]))
     if bearings:

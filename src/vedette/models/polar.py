@@ -1,8 +1,10 @@
-"""Built-in bearing-range, bearing-only and range-only measurements.
+"""Built-in measurements of bearings, ranges and range rates.
 
 A bearing is atan2(dy, dx) from the +x axis in (-pi, pi] rad, not relative to the heading (paper-notes 2); a range
-is in metres. A target exactly at the sensor has no bearing and no direction of range: its Jacobian rows are zero, so
-that such a measurement moves nothing.
+is in metres. A range rate is the time derivative of the range in m/s: the component of the target's velocity relative
+to the sensor along the line of sight, positive where the target moves away. A target exactly at the sensor has no
+bearing and no line of sight: its range rate is 0 and its Jacobian rows are zero, so that such a measurement moves
+nothing.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from vedette.kernels.base.types import Floats
 from vedette.models.fields import part
 from vedette.models.functions import model_function
 from vedette.models.measurement import MeasurementModel
+from vedette.quantities import OWN_VELOCITY
 
 
 @inlined
@@ -53,6 +56,38 @@ def _bearing_range_jacobian(state: Floats, pose: Floats, params: Floats, out: Fl
     _range_row(state, pose, out, 1)
 
 
+@inlined
+def _relative_velocity(state: Floats, pose: Floats) -> tuple[float, float]:
+    if pose.shape[0] < OWN_VELOCITY + 2:
+        return state[2], state[3]
+    return state[2] - pose[OWN_VELOCITY], state[3] - pose[OWN_VELOCITY + 1]
+
+
+@model_function("measurement")
+def _bearing_range_rate(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
+    dx, dy = state[0] - pose[0], state[1] - pose[1]
+    vx, vy = _relative_velocity(state, pose)
+    distance = math.sqrt(dx * dx + dy * dy)
+    out[0] = math.atan2(dy, dx)
+    out[1] = distance
+    out[2] = (dx * vx + dy * vy) / distance if distance > 0.0 else 0.0
+
+
+@model_function("measurement_jacobian")
+def _bearing_range_rate_jacobian(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
+    _bearing_row(state, pose, out, 0)
+    _range_row(state, pose, out, 1)
+    dx, dy = state[0] - pose[0], state[1] - pose[1]
+    vx, vy = _relative_velocity(state, pose)
+    square = dx * dx + dy * dy
+    # The velocity across the line of sight over the distance, at which the line turns.
+    turning = (dx * vy - dy * vx) / square if square > 0.0 else 0.0
+    for j in range(out.shape[1]):
+        out[2, j] = 0.0
+    out[2, 0], out[2, 1] = -turning * out[1, 1], turning * out[1, 0]
+    out[2, 2], out[2, 3] = out[1, 0], out[1, 1]
+
+
 @model_function("measurement")
 def _bearing(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
     out[0] = math.atan2(state[1] - pose[1], state[0] - pose[0])
@@ -84,6 +119,17 @@ def bearing_range() -> MeasurementModel:
     """z = [bearing in rad, range in m] (paper: z_k); the bearing counter-clockwise from east, in (-pi, pi]."""
     functions = _bearing_range, np.empty(0), _bearing_range_jacobian
     return MeasurementModel(2, *functions, places=_places, components=("bearing", "range"))
+
+
+@part("bearing_range_rate", "measurement")
+def bearing_range_rate() -> MeasurementModel:
+    """z = [bearing in rad, range in m, range rate in m/s], of a Doppler radar; the range rate positive where it grows.
+
+    The range rate is relative to the sensor, whose velocity in m/s are components 6 and 7 of its pose, those after the
+    components of cameras and budgets; a sensor with a shorter pose is at rest. States are [px, py, vx, vy, ...].
+    """
+    functions = _bearing_range_rate, np.empty(0), _bearing_range_rate_jacobian
+    return MeasurementModel(3, *functions, places=_places, components=("bearing", "range", "range_rate"))
 
 
 @part("bearing_only", "measurement")

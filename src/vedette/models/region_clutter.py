@@ -13,15 +13,22 @@ import numpy as np
 
 from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import non_negative, one_of, reject
-from vedette.models.clutter import NO_OFFSETS, ClutterModel, angular_of, log_or_minus_infinity
-from vedette.models.fields import NonNegative, part
+from vedette.models.arguments import non_negative, one_of, positive, reject
+from vedette.models.clutter import (
+    LARGEST_RATE,
+    NO_OFFSETS,
+    ClutterModel,
+    angular_of,
+    log_density_of_rate,
+    log_or_minus_infinity,
+    with_rates,
+)
+from vedette.models.fields import NonNegative, Positive, part
 from vedette.models.functions import ModelFunction, model_function, write_rows
 from vedette.models.measurement import MeasurementModel
 from vedette.models.region import Region
 
-# params of every function here: log(rate / area), x_min, x_max, y_min, y_max; what is added to the two components of a
-# measurement (the second one is unused where there is one); what is added to x, y of the sensor
+# params of every function here: log(rate / area), x_min, x_max, y_min, y_max; the largest range rate; `NO_OFFSETS`
 
 
 @inlined
@@ -50,23 +57,33 @@ def _arc_in_quadrant(radius: float, x_low: float, x_high: float, y_low: float, y
 
 @model_function("log_clutter_intensity")
 def _position(measurement: Floats, pose: Floats, params: Floats) -> float:
-    inside = _inside(measurement[0] + params[5], measurement[1] + params[6], params)
+    inside = _inside(measurement[0] + params[6], measurement[1] + params[7], params)
     return params[0] if inside else -math.inf
 
 
-@model_function("log_clutter_intensity")
-def _bearing_range(measurement: Floats, pose: Floats, params: Floats) -> float:
-    bearing, distance = measurement[0] + params[5], measurement[1] + params[6]
-    x = pose[0] + params[7] + distance * math.cos(bearing)
-    y = pose[1] + params[8] + distance * math.sin(bearing)
+@inlined
+def _at_range(measurement: Floats, pose: Floats, params: Floats) -> float:
+    bearing, distance = measurement[0] + params[6], measurement[1] + params[7]
+    x = pose[0] + params[9] + distance * math.cos(bearing)
+    y = pose[1] + params[10] + distance * math.sin(bearing)
     if not (distance > 0.0 and _inside(x, y, params)):
         return -math.inf
     return params[0] + math.log(distance)  # type: ignore[no-any-return]
 
 
 @model_function("log_clutter_intensity")
+def _bearing_range(measurement: Floats, pose: Floats, params: Floats) -> float:
+    return _at_range(measurement, pose, params)
+
+
+@model_function("log_clutter_intensity")
+def _bearing_range_rate(measurement: Floats, pose: Floats, params: Floats) -> float:
+    return _at_range(measurement, pose, params) + log_density_of_rate(measurement[2] + params[8], params[5])
+
+
+@model_function("log_clutter_intensity")
 def _bearing(measurement: Floats, pose: Floats, params: Floats) -> float:
-    bearing, x, y = measurement[0] + params[5], pose[0] + params[7], pose[1] + params[8]
+    bearing, x, y = measurement[0] + params[6], pose[0] + params[9], pose[1] + params[10]
     near, far = _clip_ray(x, math.cos(bearing), params[1], params[2], 0.0, math.inf)
     near, far = _clip_ray(y, math.sin(bearing), params[3], params[4], near, far)
     if not near < far:
@@ -76,7 +93,7 @@ def _bearing(measurement: Floats, pose: Floats, params: Floats) -> float:
 
 @model_function("log_clutter_intensity")
 def _range(measurement: Floats, pose: Floats, params: Floats) -> float:
-    distance, x, y = measurement[0] + params[5], pose[0] + params[7], pose[1] + params[8]
+    distance, x, y = measurement[0] + params[6], pose[0] + params[9], pose[1] + params[10]
     if not distance > 0.0:
         return -math.inf
     x_low, x_high, y_low, y_high = params[1] - x, params[2] - x, params[3] - y, params[4] - y
@@ -91,6 +108,7 @@ def _range(measurement: Floats, pose: Floats, params: Floats) -> float:
 
 _KINDS: dict[str, ModelFunction] = {
     "bearing_range": _bearing_range,
+    "bearing_range_rate": _bearing_range_rate,
     "bearing_only": _bearing,
     "range_only": _range,
     "position": _position,
@@ -101,6 +119,8 @@ _KINDS: dict[str, ModelFunction] = {
 class _RegionSampler:
     rate: float
     region: Region
+    kind: str
+    max_range_rate: float
 
     def __call__(
         self, pose: Floats, measurement: MeasurementModel, *, state_dim: int, rng: np.random.Generator
@@ -110,24 +130,30 @@ class _RegionSampler:
         states[:, :2] = self.region.sample(num, rng=rng)
         drawn = np.empty((num, measurement.meas_dim))
         write_rows(measurement.function, states, pose, measurement.params, drawn)
-        return drawn
+        return with_rates(drawn, self.kind, self.max_range_rate, rng)
 
 
 @part("region", "clutter")
-def region_clutter(rate: NonNegative, region: Region, kind: str) -> ClutterModel:
+def region_clutter(
+    rate: NonNegative, region: Region, kind: str, *, max_range_rate: Positive | None = None
+) -> ClutterModel:
     """Poisson clutter, uniform over the surveillance region (paper section IV; paper-notes 5).
 
-    It is drawn by putting uniform positions, at rest, through the sensor's measurement function.
+    It is drawn by putting uniform positions, at rest, through the sensor's measurement function. Range rates are
+    uniform from -max_range_rate to max_range_rate.
 
     Args:
         rate: expected number a scan (paper: 25).
         region: the surveillance region.
-        kind: "bearing_range", "bearing_only", "range_only" or "position": what the sensor measures. Clutter of another
-            measurement is a `ClutterModel` with a log intensity and sampler of one's own.
+        kind: a key of `vedette.quantities.COMPONENTS`, what the sensor measures. Clutter of another measurement is a
+            `ClutterModel` with a log intensity and sampler of one's own.
+        max_range_rate: largest range rate of a false measurement, either way, where range rates are measured; none: 300
+            [m/s].
     """
     one_of("kind", kind, _KINDS)
     if not isinstance(region, Region):
         raise reject("region", "a Region", region)
     rate = non_negative("rate", rate)
-    params = np.concatenate([[log_or_minus_infinity(rate / region.area)], region.bounds, NO_OFFSETS])
-    return ClutterModel(rate, _KINDS[kind], params, _RegionSampler(rate, region), angular=angular_of(kind))
+    most = LARGEST_RATE if max_range_rate is None else positive("max_range_rate", max_range_rate)
+    params = np.concatenate([[log_or_minus_infinity(rate / region.area)], region.bounds, [most], NO_OFFSETS])
+    return ClutterModel(rate, _KINDS[kind], params, _RegionSampler(rate, region, kind, most), angular=angular_of(kind))

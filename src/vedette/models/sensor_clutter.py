@@ -11,17 +11,25 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vedette.kernels.base.compile import kernel
+from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import Floats
 from vedette.kernels.gaussian.scratch import wrap_angle
 from vedette.models.arguments import non_negative, one_of, positive, reject
-from vedette.models.clutter import NO_OFFSETS, ClutterModel, angular_of, log_or_minus_infinity
+from vedette.models.clutter import (
+    LARGEST_RATE,
+    NO_OFFSETS,
+    ClutterModel,
+    angular_of,
+    log_density_of_rate,
+    log_or_minus_infinity,
+    with_rates,
+)
 from vedette.models.fields import HalfWidth, NonNegative, Positive, part
 from vedette.models.functions import ModelFunction, model_function
 from vedette.models.measurement import MeasurementModel
 
 # params of every function here: log rate, radius or half side, 1 of a square and 0 of a disc, half width of the sector,
-# and what is added to the two components of a measurement and to x, y of the sensor
+# the largest range rate; `NO_OFFSETS`
 
 
 @kernel
@@ -51,21 +59,35 @@ def _log_density(dx: float, dy: float, heading: float, params: Floats) -> float:
 
 @model_function("log_clutter_intensity")
 def _position(measurement: Floats, pose: Floats, params: Floats) -> float:
-    dx = measurement[0] + params[4] - (pose[0] + params[6])
-    dy = measurement[1] + params[5] - (pose[1] + params[7])
+    dx = measurement[0] + params[5] - (pose[0] + params[8])
+    dy = measurement[1] + params[6] - (pose[1] + params[9])
     return _log_density(dx, dy, pose[2], params)
 
 
-@model_function("log_clutter_intensity")
-def _bearing_range(measurement: Floats, pose: Floats, params: Floats) -> float:
-    bearing, distance = measurement[0] + params[4], measurement[1] + params[5]
+@inlined
+def _at_range(measurement: Floats, pose: Floats, params: Floats) -> float:
+    bearing, distance = measurement[0] + params[5], measurement[1] + params[6]
     if not distance > 0.0:
         return -math.inf
     dx, dy = distance * math.cos(bearing), distance * math.sin(bearing)
     return _log_density(dx, dy, pose[2], params) + math.log(distance)
 
 
-_KINDS: dict[str, ModelFunction] = {"position": _position, "bearing_range": _bearing_range}
+@model_function("log_clutter_intensity")
+def _bearing_range(measurement: Floats, pose: Floats, params: Floats) -> float:
+    return _at_range(measurement, pose, params)
+
+
+@model_function("log_clutter_intensity")
+def _bearing_range_rate(measurement: Floats, pose: Floats, params: Floats) -> float:
+    return _at_range(measurement, pose, params) + log_density_of_rate(measurement[2] + params[7], params[4])
+
+
+_KINDS: dict[str, ModelFunction] = {
+    "position": _position,
+    "bearing_range": _bearing_range,
+    "bearing_range_rate": _bearing_range_rate,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +96,8 @@ class _AroundSampler:
     size: float
     is_square: bool
     half_width: float
+    kind: str
+    max_range_rate: float
 
     def __call__(
         self, pose: Floats, measurement: MeasurementModel, *, state_dim: int, rng: np.random.Generator
@@ -92,7 +116,7 @@ class _AroundSampler:
         distances = reach * np.sqrt(share[:, 1])
         states[:, 0] = pose[0] + distances * np.cos(angles)
         states[:, 1] = pose[1] + distances * np.sin(angles)
-        return measurement.measure(states, pose)
+        return with_rates(measurement.measure(states, pose), self.kind, self.max_range_rate, rng)
 
 
 @part("around_sensor", "clutter")
@@ -103,6 +127,7 @@ def around_sensor(
     radius: Positive | None = None,
     half_side: Positive | None = None,
     half_width_rad: HalfWidth = math.pi,
+    max_range_rate: Positive | None = None,
 ) -> ClutterModel:
     """Clutter uniform over a disc, a square along the axes, or a sector of either, centred on the sensor.
 
@@ -111,10 +136,12 @@ def around_sensor(
 
     Args:
         rate: expected number a scan in the figure.
-        kind: "position" or "bearing_range": what the sensor measures.
+        kind: "position", "bearing_range" or "bearing_range_rate": what the sensor measures.
         radius: of a disc [m].
         half_side: of a square along the axes, half its side; one of the two is to be given [m].
         half_width_rad: greatest angle from the heading, either side [rad].
+        max_range_rate: largest range rate of a false measurement, either way, where range rates are measured, uniform
+            up to it; none: 300 [m/s].
     """
     one_of("kind", kind, _KINDS)
     if (radius is None) == (half_side is None):
@@ -123,6 +150,7 @@ def around_sensor(
         raise reject("half_width_rad", "an angle in (0, pi]", half_width_rad)
     rate, is_square = non_negative("rate", rate), radius is None
     size = positive("half_side", half_side) if is_square else positive("radius", radius)
-    params = np.array([log_or_minus_infinity(rate), size, float(is_square), half_width_rad, *NO_OFFSETS])
-    sampler = _AroundSampler(rate, size, is_square, half_width_rad)
+    most = LARGEST_RATE if max_range_rate is None else positive("max_range_rate", max_range_rate)
+    params = np.array([log_or_minus_infinity(rate), size, float(is_square), half_width_rad, most, *NO_OFFSETS])
+    sampler = _AroundSampler(rate, size, is_square, half_width_rad, kind, most)
     return ClutterModel(rate, _KINDS[kind], params, sampler, angular=angular_of(kind))

@@ -22,8 +22,10 @@ _DEGREE = "\N{DEGREE SIGN}"
 def read_asterix(file: Path, *, reports: bool = False) -> tuple[dict[str, list[Any]], list[int], tuple[str, ...]]:
     """Plots of rotating radars, category 048, or tracks of a system, category 062; a sensor is "SAC/SIC".
 
-    Of plots `time`, `sensor`, `range_nmi`, `bearing_deg` from the north. Ranges are along the ground where a plot has a
-    valid flight level, which is taken as the height above the radar; others are slant. Of tracks, where there are no
+    Of plots `time`, `sensor`, `range_nmi`, `bearing_deg` from the north, and where any plot has a valid Doppler speed
+    (I048/120, CAL) `range_rate_mps`, taken as positive where the range grows, as the standard gives no sign. Ranges are
+    along the ground where a plot has a valid flight level, which is taken as the height above the radar; others are
+    slant. Of tracks, where there are no
     plots or `reports` are asked for, `time`, `sensor`, `longitude`, `latitude`, and what targets have: `id` (the number
     of the track), and `vx`, `vy` where every one says them. Times are seconds from midnight UTC of the first one's day.
     Other categories are passed over, records without a time and place left out. Returns the columns, the number of each
@@ -57,6 +59,8 @@ def read_asterix(file: Path, *, reports: bool = False) -> tuple[dict[str, list[A
     notes = () if not slant else (_of_slant_ranges(slant, len(numbers)),)
     if left := without.count(read):
         notes = (*notes, f"left out: {counted(left, 'record')} of category {read:03} without a time or place")
+    if set(columns.get("range_rate_mps", ())) == {None}:
+        del columns["range_rate_mps"]
     kept = {name: cells for name, cells in columns.items() if name not in ("vx", "vy") or None not in cells}
     return kept, numbers, notes
 
@@ -94,7 +98,16 @@ def _plot(record: Any) -> dict[str, Any] | None:
     slant, azimuth = _quantity(polar, "RHO", "NM"), _quantity(polar, "THETA", _DEGREE)
     ground = _ground_range(_MILE * slant, _height(record.get_item("090")))
     reach = slant if ground is None else ground / _MILE
-    return {**_source(source, time), "range_nmi": reach, "bearing_deg": azimuth, "is_slant": ground is None}
+    row = {**_source(source, time), "range_nmi": reach, "bearing_deg": azimuth, "is_slant": ground is None}
+    return {**row, "range_rate_mps": _range_rate(record.get_item("120"))}
+
+
+def _range_rate(doppler: Any) -> float | None:
+    """m/s, of a calculated Doppler speed that is there and not doubtful."""
+    calculated = None if doppler is None else doppler.variation.get_item("CAL")
+    if calculated is None or calculated.variation.get_item("D").as_uint():
+        return None
+    return _quantity(calculated, "CAL", "m/s")
 
 
 def _height(level: Any) -> float | None:

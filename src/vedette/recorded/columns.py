@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from vedette.errors import InputError
+from vedette.kernels.base.types import Floats
 from vedette.models.arguments import reject
 from vedette.platforms.compass import PlaneCompass
-from vedette.quantities import ANGLES, COMPONENTS
-from vedette.recorded.conventions import OTHER_NAMES, UNITS, Conventions
+from vedette.quantities import ANGLES, COMPONENTS, is_doppler
+from vedette.recorded.conventions import OTHER_NAMES, OWN_SPEEDS, UNITS, Conventions
 from vedette.recorded.geography import Origin
 from vedette.recorded.instants import Site
 from vedette.recorded.tables import Table, are_dates, column_names
@@ -44,8 +47,22 @@ class ScanColumns:
         measured = {name for site in self.sites for name in COMPONENTS[site.kind]}
         measured |= {"lon", "lat"} if "x" in measured else set()
         own = {"own_x", "own_y", "own_lon", "own_lat", "own_heading"}
+        own |= {*OWN_SPEEDS} if any(is_doppler(site.kind) for site in self.sites) else set()
         used = {self._columns[name][0] for name in measured | own if name in self._columns} | {self._time, self._sensor}
         return tuple(name for name in self.table.columns if name not in used)
+
+    def without_velocity(self, poses: Floats) -> tuple[str, ...]:
+        """Return a note of each sensor that measures range rates and moves, at (num_instants, num_sensors, ...) poses,
+        without columns of its velocity.
+        """
+        if {*OWN_SPEEDS} <= set(self._columns):
+            return ()
+        what = "measures range rates and moves, but its velocity is not given: they are taken as relative to the ground"
+        return tuple(
+            f"{site.name} {what} (columns {', '.join(OWN_SPEEDS)})"
+            for s, site in enumerate(self.sites)
+            if is_doppler(site.kind) and np.ptp(poses[:, s, :2], axis=0).any()
+        )
 
     def _plain(self, quantity: str) -> str:
         """The column of time or sensor."""
@@ -109,13 +126,15 @@ class ScanColumns:
 
     def _check_places(self) -> None:
         """That places have both of their numbers."""
-        pairs = [("own_x", "own_y"), ("own_lon", "own_lat")]
+        pairs = [("own_x", "own_y"), ("own_lon", "own_lat"), OWN_SPEEDS]
         if any(site.kind == "position" for site in self.sites):
             pairs += [("x", "y"), ("lon", "lat")]
         for pair in pairs:
             there = [name for name in pair if name in self._columns]
             if len(there) == 1:
                 (missing,) = set(pair) - set(there)
-                wanted = f"a column of {missing} beside it, as a place has both"
+                wanted = (
+                    f"a column of {missing} beside it, as a {'velocity' if pair is OWN_SPEEDS else 'place'} has both"
+                )
                 name = shown(self._columns[there[0]][0])
                 raise InputError(f"{self.table.source}, column {name}: expected {wanted}; got none")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from vedette.models.arguments import reject
-from vedette.quantities import ANGLES, LENGTHS, QUANTITIES
+from vedette.quantities import ANGLES, LENGTHS, QUANTITIES, SPEEDS
 from vedette.recorded.instants import Bearings
 
 # What a row may say: the quantity, and the units that the end of a column's name may give it.
@@ -21,7 +21,10 @@ UNITS: dict[str, Mapping[str, float]] = {
     "own_lon": {"deg": 1.0},
     "own_lat": {"deg": 1.0},
     "own_heading": ANGLES,
+    "own_vx": SPEEDS,
+    "own_vy": SPEEDS,
 }
+OWN_SPEEDS = ("own_vx", "own_vy")  # of a sensor, east and north, read where it measures range rates
 OTHER_NAMES = {
     "lon": ("longitude",),
     "lat": ("latitude",),
@@ -37,6 +40,7 @@ MOST = {
     **dict.fromkeys(("lon", "own_lon"), 360.0),
     **dict.fromkeys(("lat", "own_lat"), 90.0),
     "own_heading": 2.0 * math.pi,
+    **dict.fromkeys(OWN_SPEEDS, QUANTITIES["range_rate"].most),
     **{name: each.most for name, each in QUANTITIES.items() if each.most < math.inf},
 }
 OVER_A_TURN = math.radians(10.0)  # what a bias or noise may add to an angle

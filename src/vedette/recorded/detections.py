@@ -30,8 +30,8 @@ def table_of_detections(
         reader: pairs of a time (a `datetime`; without a zone it is taken as UTC) and a set of detections, each with a
             `state_vector`. A set without any is a scan that found nothing, where `sensor` says whose; it was
             where that sensor last said.
-        quantities: of the elements of the state vector, such as ("bearing", "range"): bearing, range, x, y, lon or
-            lat; None: an element that is not taken.
+        quantities: of the elements of the state vector, such as ("bearing", "range"): bearing, range, range_rate, x,
+            y, lon or lat; None: an element that is not taken.
         sensor: that all are of; None: each says so in its `metadata["sensor"]`.
 
     Raises:

@@ -12,9 +12,9 @@ import numpy as np
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.models.bias import NO_BIAS
-from vedette.quantities import ANGLES, COMPONENTS, PLACED, QUANTITIES
+from vedette.quantities import ANGLES, COMPONENTS, OWN_VELOCITY, PLACED, QUANTITIES, is_doppler
 from vedette.recorded.columns import ScanColumns
-from vedette.recorded.conventions import MOST, ONE_PLACE, ONE_PLACE_SHARE, OVER_A_TURN, UNITS, Conventions
+from vedette.recorded.conventions import MOST, ONE_PLACE, ONE_PLACE_SHARE, OVER_A_TURN, OWN_SPEEDS, UNITS, Conventions
 from vedette.recorded.extents import places_of, wild
 from vedette.recorded.geography import PLANE_REACH, Origin
 from vedette.recorded.instants import (
@@ -61,10 +61,11 @@ def parse_scans(
         raise InputError(f"{table.source}: expected at least one row that can be read; got none of {len(table.rows)}")
     found, beyond = _without_wild(found, table, sites)
     recording = _at_instants(found, rows, skipped + beyond)
+    notes = (*table.notes, *rows.without_velocity(recording.poses))
     if any(site.bias != NO_BIAS for site in sites):
         recording = without_biases(recording, sites)
     file = ScansFile(Path(table.source).name, table.sha256)
-    return replace(recording, unused=rows.unused, notes=table.notes, file=file)
+    return replace(recording, unused=rows.unused, notes=notes, file=file)
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,7 +170,11 @@ class _Rows(ScanColumns):
             place = self._value(i, "own_x"), self._value(i, "own_y")
         has_heading = "own_heading" in self._columns
         heading = self._angle(i, "own_heading", s, place) if has_heading else site.pose[2]
-        return (*place, heading, *site.pose[3:])
+        rest = site.pose[3:]
+        if is_doppler(site.kind) and {*OWN_SPEEDS} <= set(self._columns):
+            velocity = tuple(self._value(i, quantity) for quantity in OWN_SPEEDS)
+            rest = (*rest[: OWN_VELOCITY - 3], *velocity, *rest[OWN_VELOCITY - 1 :])
+        return (*place, heading, *rest)
 
     def _agreed(self, i: int, place: tuple[float, ...], x: str, y: str) -> tuple[float, ...]:
         """A place in degrees, with which one in metres has to agree where the row has that, too."""

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vedette.kernels.base.types import Floats
-from vedette.quantities import PLACED
+from vedette.quantities import COMPONENTS, PLACED, is_doppler
 from vedette.recorded import RecordedScans
 from vedette.recorded.extents import places_of
 from vedette.scenarios.sections import ScenarioModel
@@ -115,11 +115,21 @@ def assumed_clutter(
             sensors.append(sensor)
             continue
         rate, why = _rate(model, recording, s, folder, speed)
-        sensors.append({**sensor, "clutter": {"kind": "region", "rate": rate}})
+        clutter = {"kind": "region", "rate": rate, **_range_rates(model.sensors[s].measurement.kind, recording, s)}
+        sensors.append({**sensor, "clutter": clutter})
         rates.setdefault(why, []).append(f"{model.sensor_names[s]} {rate:g}")
     if rates:
         words["clutter"] = "; ".join(f"{', '.join(each)} per scan ({why})" for why, each in rates.items())
     return {"sensors": sensors}
+
+
+def _range_rates(kind: str, recording: RecordedScans, s: int) -> dict[str, float]:
+    """Return the largest range rate of false measurements, a tenth above the largest of the recording."""
+    if not is_doppler(kind):
+        return {}
+    place = COMPONENTS[kind].index("range_rate")
+    rates = [np.empty(0), *(scan[:, place] for scans in recording.scans if (scan := scans[s]) is not None)]
+    return {"max_range_rate": max(1.0, float(f"{1.1 * np.abs(np.concatenate(rates)).max(initial=0.0):.3g}"))}
 
 
 def _rate(model: ScenarioModel, recording: RecordedScans, s: int, folder: FilePath, speed: float) -> tuple[float, str]:

@@ -203,7 +203,8 @@ def _in_truth(sensor: Sensor) -> list[tuple[str, str]]:
     """Its bias, where it is not what the filters take it for, and when it scans if not at every step."""
     found, truth = [], sensor.truth
     if sensor.bias != BiasSection():
-        found.append(("bias", settings(sensor.bias)))
+        none = [name for name in BiasSection.model_fields if getattr(sensor.bias, name) == 0.0]
+        found.append(("bias", settings(sensor.bias, {name: (name, None) for name in none})))
     if truth is not None:
         parts = {name: getattr(truth, name) for name in type(truth).model_fields}
         sections = [(name, value) for name, value in parts.items() if isinstance(value, Section)]

@@ -17,6 +17,8 @@ from vedette.models import SensorModel, TargetModel
 from vedette.platforms import Actions, ByCompass, Operated, Patrolling, Platform
 from vedette.platforms.base import SWITCH, actions_at
 from vedette.platforms.patrolling import CLOCKS
+from vedette.platforms.velocity import WithVelocity
+from vedette.quantities import OWN_VELOCITY, is_doppler
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections.control import revisited
 from vedette.scenarios.sections.custom import Custom, NotGiven
@@ -58,6 +60,8 @@ def _platform(model: ScenarioModel, sensor: Sensor, folder: Path) -> Platform:
     platform: Platform = section.build(folder)
     if model.by_compass and platform.columns:
         platform = ByCompass(platform, model.north())
+    if is_doppler(sensor.measurement.kind) and platform.columns and len(section.components()) + 3 <= OWN_VELOCITY:
+        platform = WithVelocity(platform)
     if isinstance(section, CustomPlatform) and isinstance(price, str) and price not in platform.columns:
         wanted = f"{section.function} to have a column {price}, as its price"
         raise NotGiven(section, "function", wanted, ", ".join(platform.columns) or "no columns")
@@ -142,7 +146,7 @@ def first_actions(scenario: Scenario, sensors: tuple[MobileSensor, ...]) -> tupl
         own = actions_at(f"sensors[{s}].platform", sensor.platform, pose)
         rows = own.values[:1] if row is None else np.array([row])
         platform: Any = sensor.platform
-        while isinstance(platform, Operated | Patrolling):
+        while isinstance(platform, Operated | Patrolling | WithVelocity):
             platform = platform.platform
         if row is not None and isinstance(platform, ByCompass):
             rows = platform.of_plane(rows, pose)

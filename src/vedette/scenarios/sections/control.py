@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
+from vedette.quantities import is_doppler
 from vedette.scenarios.faults import Finding, Path, describe
 from vedette.scenarios.sections.base import (
     Count,
@@ -221,6 +222,9 @@ def one_patrol(model: ScenarioModel) -> Iterator[Finding]:
     for s, sensor in enumerate(model.sensors):
         if numbers and len(sensor.platform.components()) > 2:
             yield ("sensors", s, "platform"), "a pose of at most five components, beside revisit", "more"
+        if numbers and is_doppler(sensor.measurement.kind):
+            wanted = "no range rate, beside revisit, as poses have the velocity of a sensor or the times of its visits"
+            yield ("sensors", s, "measurement", "kind"), wanted, describe(sensor.measurement.kind)
     for i in numbers[1:]:
         yield ("control", "constraints", i, "kind"), "one constraint revisit with all places", "another"
 

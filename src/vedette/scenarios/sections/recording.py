@@ -27,7 +27,8 @@ class RecordingSection(Section):
     """Scans from a CSV or Parquet file with a row a measurement: time, sensor, and what it measured.
 
     The sensors are as `sensors` says, at their positions unless a row has `own_x` and `own_y`, or `own_lon` and
-    `own_lat`, and `own_heading`. A row with empty cells says that a sensor scanned and found nothing.
+    `own_lat`, and `own_heading`. Of range rates `own_vx` and `own_vy` say how the sensor moves; else it is at rest.
+    A row with empty cells says that a sensor scanned and found nothing.
     Rows beyond a sensor's reach, or far beyond all others, are left out and named.
     """
 
@@ -35,11 +36,13 @@ class RecordingSection(Section):
     sha256: Sha256 | None = Field(default=None, description=SHA256_FIELD)
     columns: dict[str, str] = Field(
         default={},
-        description="Names of the columns of time, sensor, range, bearing, x, y, lon, lat, own_x, own_y, own_lon, "
-        "own_lat, own_heading, where they differ from these, with or without a unit at the end (range_km) [-].",
+        description="Names of the columns of time, sensor, range, bearing, range_rate, x, y, lon, lat, own_x, own_y, "
+        "own_lon, own_lat, own_heading, own_vx, own_vy, where they differ from these, with or without a unit at "
+        "the end (range_km) [-].",
     )
     units: dict[str, str] = Field(
-        default={}, description="Units of quantities whose columns do not name them: m, km, nmi; deg, rad [-]."
+        default={},
+        description="Units of quantities whose columns do not name them: m, km, nmi; deg, rad; mps, kmh, kn [-].",
     )
     bearings: Literal["east", "north"] | None = Field(
         default=None,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field
 
-from vedette.quantities import COMPONENTS, PLACED, angles
+from vedette.quantities import COMPONENTS, PLACED, angles, is_doppler
 from vedette.scenarios.faults import Finding, Path, describe
 from vedette.scenarios.sections.base import Positive, Section, check
 from vedette.scenarios.sections.derived import Part, derived, one_of
@@ -27,7 +27,7 @@ def components(measurement: Measurement) -> tuple[int | None, tuple[int, ...]]:
 class RangeDependentNoise(Section):
     """Standard deviations that grow with the distance d (paper section IV), evaluated at the predicted state.
 
-    Range: sigma_range + eta_range d^2. Bearing: sigma_bearing + eta_bearing d.
+    Range: sigma_range + eta_range d^2. Bearing: sigma_bearing + eta_bearing d. Range rate: sigma_range_rate.
     """
 
     kind: Literal["range_dependent"] = Field(default="range_dependent", description="Kind of noise [-].")
@@ -35,16 +35,23 @@ class RangeDependentNoise(Section):
     eta_range: float = Field(default=5e-5, ge=0.0, description="Range, growth with the square of distance [1/m].")
     sigma_bearing_deg: Positive = Field(default=1.0, description="Bearing, the same at distance 0 [deg].")
     eta_bearing: float = Field(default=5e-6, ge=0.0, description="Bearing, growth with distance [rad/m].")
+    sigma_range_rate: Positive | None = Field(
+        default=None, description="Range rate, at every distance; needed where it is measured [m/s]."
+    )
 
     def build(self, folder: FilePath, *, kind: str, **_: Any) -> NoiseModel:
         """Measurement noise: the parts that the kind of measurement has."""
         from vedette.models import range_dependent_noise
 
-        ranges = {"sigma_range": self.sigma_range, "eta_range": self.eta_range}
-        bearings = {"sigma_bearing": math.radians(self.sigma_bearing_deg), "eta_bearing": self.eta_bearing}
-        return range_dependent_noise(
-            **(ranges if kind != "bearing_only" else {}), **(bearings if kind != "range_only" else {})
-        )
+        parts: dict[str, dict[str, float | None]] = {
+            "range": {"sigma_range": self.sigma_range, "eta_range": self.eta_range},
+            "bearing": {"sigma_bearing": math.radians(self.sigma_bearing_deg), "eta_bearing": self.eta_bearing},
+            "range_rate": {"sigma_range_rate": self.sigma_range_rate},
+        }
+        own: dict[str, Any] = {}
+        for name in COMPONENTS[kind]:
+            own |= parts[name]
+        return range_dependent_noise(**own)
 
 
 class _Clutter(Part):
@@ -62,7 +69,7 @@ class _Clutter(Part):
 class ClutterAroundSensor(_Clutter):
     """Poisson clutter, uniform over a disc or a square around the sensor, or the part of it about its heading.
 
-    For a position or bearing_range measurement. It moves and turns with the sensor.
+    For a position, bearing_range or bearing_range_rate measurement. It moves and turns with the sensor.
     """
 
     kind: Literal["around_sensor"] = Field(default="around_sensor", description="Kind of clutter [-].")
@@ -91,6 +98,8 @@ def noise_findings(measurement: Measurement, noise: Noise, path: Path) -> Iterat
     if noise.kind == "range_dependent" and kind in ("position", "custom"):
         others = "constant, by_axis or custom" if kind == "position" else "constant or custom"
         yield path, f"{others} noise for a {kind} measurement", "range_dependent noise"
+    elif noise.kind == "range_dependent" and is_doppler(kind) and noise.sigma_range_rate is None:
+        yield (*path, "sigma_range_rate"), "a number above 0, as range rates are measured", "none"
     elif noise.kind == "by_axis" and kind not in ("position", "custom"):
         yield path, f"range_dependent, constant or custom noise for a {kind} measurement", "by_axis noise"
     elif noise.kind == "constant" and dim is not None and len(noise.std) != dim:

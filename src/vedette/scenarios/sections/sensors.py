@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import Field, create_model
 
 from vedette.plausible import told_elsewhere
+from vedette.quantities import OWN_VELOCITY, is_doppler
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import (
     DetectionAt,
@@ -236,9 +237,10 @@ class Sensor(Section):
     def pose(self) -> tuple[float, ...]:
         """Where it starts: [px, py, heading_rad], and what else its platform has."""
         pose = (*self.position, math.radians(self.heading_deg), *self.platform.components())
-        if self.budget is None:
-            return pose
-        return (*pose, *(0.0,) * (5 - len(pose)), self.budget.seconds)
+        if self.budget is not None:
+            pose = (*pose, *(0.0,) * (5 - len(pose)), self.budget.seconds)
+        # A custom platform may have a velocity at the start.
+        return (*pose, *(0.0,) * (OWN_VELOCITY + 2 - len(pose))) if is_doppler(self.measurement.kind) else pose
 
     def build(
         self, region: Region, method: GaussianMethod, folder: Path, detection_at: DetectionAt = "centre"

@@ -89,7 +89,7 @@ class TrueSensor(Section):
     detection_of: Literal["state", "measurement"] = Field(
         default="state",
         description="Where the probability of detection is taken: at the target's true state, or at the position that "
-        "was measured of it, noise included (of a position or bearing_range measurement) [-].",
+        "was measured of it, noise included (of a position, bearing_range or bearing_range_rate measurement) [-].",
     )
 
     def findings_beside(self, known: Measurement) -> Iterator[Finding]:
