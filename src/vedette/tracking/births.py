@@ -25,6 +25,7 @@ from vedette.kernels.labelled.births import BirthsOfMeasurements, births_of_meas
 from vedette.kernels.steps.explained import births_unexplained, prob_explained
 from vedette.models import BirthModel, MeasurementBirth, SensorModel
 from vedette.models.arguments import pose_vector, reject
+from vedette.tracking.birth_velocities import with_velocities
 
 # What a track explains surer than this is no birth: each costs a track until the next scan.
 LEAST_UNEXPLAINED = 0.01
@@ -110,8 +111,10 @@ def births_from_scans(
     begin = BirthsOfMeasurements(model.std, float(model.expected), float(model.max_existence), step, first)
     scanned = [s for s, scan in enumerate(scans) if scan is not None]
     if len(scanned) == 1:
-        return _born_of_one(belief, sensors[scanned[0]], scans[scanned[0]], poses[scanned[0]], begin)
-    return _born(unexplained(model, belief, sensors, scans, poses), begin)
+        made = _born_of_one(belief, sensors[scanned[0]], scans[scanned[0]], poses[scanned[0]], begin)
+    else:
+        made = _born(unexplained(model, belief, sensors, scans, poses), begin)
+    return with_velocities(made, model.std, sensors, scans, poses)
 
 
 def births_waiting(birth: BirthModel, before: LMB | None, found: LMB | None) -> LMB | None:
