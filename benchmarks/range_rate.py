@@ -1,6 +1,6 @@
 """What range rates are worth: velocities of new tracks, and labels at crossings, from the same scans with and without.
 
-    python benchmarks/range_rate.py                       # 100 scenes with one radar, 100 with two
+    python benchmarks/range_rate.py                       # 1000 scenes with one radar, 1000 with two
     python benchmarks/range_rate.py --scenes 10
     python benchmarks/range_rate.py --write docs/tracking.md
 
@@ -175,7 +175,7 @@ def table(found: dict[str, list[Found]], radars: int) -> list[str]:
 def main() -> None:
     """Run, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scenes", type=int, default=100)
+    parser.add_argument("--scenes", type=int, default=1000)
     parser.add_argument("--write", type=Path, metavar="PAGE", help="Markdown page with a place for the table")
     given = parser.parse_args()
     lines = ["| radars | what | without | with | ratio (95 % interval) |", "| --- | --- | ---: | ---: | ---: |"]

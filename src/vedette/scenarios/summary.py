@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any, Literal
 
 from vedette.quantities import COMPONENTS, QUANTITIES
 from vedette.scenarios.loading import Scenario
@@ -199,18 +200,26 @@ def _noise(section: Section, measured: str) -> str:
     )
 
 
+def _bias(section: BiasSection) -> str:
+    """Return its values that are not 0."""
+    none = [name for name in BiasSection.model_fields if getattr(section, name) == 0.0]
+    return settings(section, {name: (name, None) for name in none}) or "none"
+
+
 def _in_truth(sensor: Sensor) -> list[tuple[str, str]]:
     """Its bias, where it is not what the filters take it for, and when it scans if not at every step."""
     found, truth = [], sensor.truth
     if sensor.bias != BiasSection():
-        none = [name for name in BiasSection.model_fields if getattr(sensor.bias, name) == 0.0]
-        found.append(("bias", settings(sensor.bias, {name: (name, None) for name in none})))
+        found.append(("bias", _bias(sensor.bias)))
     if truth is not None:
         parts = {name: getattr(truth, name) for name in type(truth).model_fields}
         sections = [(name, value) for name, value in parts.items() if isinstance(value, Section)]
-        kind = sensor.measurement.kind
+        special: dict[str, Callable[[Any], str]] = {
+            "noise": partial(_noise, measured=sensor.measurement.kind),
+            "bias": _bias,
+        }
         found += [
-            (f"true {in_words(name)}", _noise(value, kind) if name == "noise" else settings(value))
+            (f"true {in_words(name)}", special[name](value) if name in special else settings(value))
             for name, value in sections
         ]
         found += [("detection of", "the measurement")] if truth.detection_of == "measurement" else []

@@ -64,7 +64,8 @@ class BiasSection(Section):
         measured = COMPONENTS.get(measurement.kind, ())
         for component in (name for name in QUANTITIES if name not in ("x", "y", *measured)):
             if value := getattr(self, name := in_file(component)):
-                yield (name,), f"0, as no {component} is measured ({measurement.kind})", describe(value)
+                words = component.replace("_", " ")
+                yield (name,), f"0, as no {words} is measured ({measurement.kind})", describe(value)
 
     def build(self) -> Bias:
         """In SI units."""
