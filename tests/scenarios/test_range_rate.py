@@ -16,6 +16,7 @@ from vedette.calibration import calibrate
 from vedette.errors import InputError, ScenarioError
 from vedette.evaluation.metrics import ospa_of_run
 from vedette.evaluation.scans import scan_table
+from vedette.live import live_of
 from vedette.live.messages import read_message
 from vedette.quantities import OWN_VELOCITY
 from vedette.recorded import Conventions, Site, parse_scans
@@ -23,7 +24,7 @@ from vedette.recorded.tables import Table
 from vedette.scenarios import Scenario, parse_scenario
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.scenarios.calibrated import problem_of
-from vedette.scenarios.of_recording import scenario_of_recording
+from vedette.scenarios.of_recording import scenario_of_recording, scenario_of_sensors
 from vedette.scenarios.sections.recording import sites_of
 from vedette.simulation import simulate
 
@@ -146,6 +147,25 @@ def test_a_line_has_a_range_rate_and_the_velocity_of_its_sensor() -> None:
     ):
         with pytest.raises(InputError, match=words):
             read_message(json.dumps(said | change).encode(), "line 1", sites, Conventions({}, {}))
+
+
+def test_lines_become_tracks_with_velocities(tmp_path: Path) -> None:
+    (tmp_path / "radars.yaml").write_text(
+        "region: {x_min: -1000.0, x_max: 1000.0, y_min: -1000.0, y_max: 1000.0}\nsensor_defaults:\n"
+        "  measurement: {kind: bearing_range_rate}\n  noise: {kind: constant, std: [0.005, 5.0, 0.2]}\n"
+        "  detection: {kind: constant, probability: 0.95}\n  clutter: {kind: region, rate: 0.1}\n"
+        "sensors:\n  - {name: a, position: [-900.0, 0.0]}\n",
+        "utf-8",
+    )
+    live = live_of(scenario_of_sensors(tmp_path / "radars.yaml", speed=15.0))
+    state = live.initial()
+    for k in range(4):
+        rows = [[0.0, 900.0 - 14.0 * k, -7.0], [0.0, 5000.0, 0.0]]
+        line = {"sensor": "a", "time": 2.0 * k, "measurements": rows, "pose": [-900.0, 0.0, 0.0]}
+        state, answers = live.take(state, json.dumps(line).encode())
+    (answer,) = answers
+    assert answer["beyond"] == 1
+    assert [round(each["vx"]) for each in answer["tracks"]] == [-7]
 
 
 def test_a_constraint_on_visits_has_no_room_for_velocities() -> None:

@@ -18,7 +18,7 @@ from vedette.kernels.base.types import Floats
 from vedette.live.messages import Message, read_message
 from vedette.models.arguments import reject
 from vedette.platforms.compass import Compass, PlaneCompass, courses_of
-from vedette.quantities import PLACED
+from vedette.quantities import COMPONENTS, PLACED
 from vedette.recorded import Conventions, Origin, Site
 from vedette.recorded.extents import beyond_reach, is_within, places_of
 from vedette.simulation.journal import cause_of
@@ -141,7 +141,7 @@ class Live:
         site, pose = self.sites[scan.sensor], np.asarray(scan.pose)
         if self.within is None or site.kind not in PLACED:
             return scan, 0
-        measured = np.asarray(scan.measurements, np.float64).reshape(-1, 2)
+        measured = np.asarray(scan.measurements, np.float64).reshape(-1, len(COMPONENTS[site.kind]))
         places = places_of(measured, pose, site.kind)
         inside = is_within(places, self.within) & ~beyond_reach(places, pose[:2], site.reach)
         return replace(scan, measurements=measured[inside]), int(np.count_nonzero(~inside))

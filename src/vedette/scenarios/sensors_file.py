@@ -15,6 +15,7 @@ from vedette.scenarios.faults import Fault, describe
 from vedette.scenarios.loading import diagnose, place_fault
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.recording import RecordingSection
+from vedette.scenarios.wording import in_words
 from vedette.scenarios.yaml_reader import MOST_BYTES, Document, read_yaml
 from vedette.text import counted
 
@@ -95,7 +96,7 @@ def given_state_dim(given: Mapping[str, Any]) -> int:
 
 def _quantities(model: ScenarioModel) -> tuple[str, ...]:
     kinds = dict.fromkeys(sensor.measurement.kind for sensor in model.sensors)
-    return tuple(dict.fromkeys(name for kind in kinds for name in COMPONENTS.get(kind, (kind,))))
+    return tuple(dict.fromkeys(in_words(name) for kind in kinds for name in COMPONENTS.get(kind, (kind,))))
 
 
 def _not_given(given: Mapping[str, Any]) -> tuple[str, ...]:
