@@ -48,6 +48,7 @@ def test_the_jacobian_is_the_derivative_where_both_move(state_dim):
     model.check(STATES, POSE)
     for state in np.hstack([STATES, np.ones((20, 1))])[:, :state_dim]:
         out = np.full((3, state_dim), np.nan)
+        assert model.jacobian is not None
         model.jacobian(state, POSE, model.params, out)
         slopes = central_differences(lambda moved: model.measure(moved, POSE)[0], state, 1e-4)
         np.testing.assert_allclose(out, slopes, atol=1e-7)
