@@ -130,7 +130,6 @@ def no_time(dt: Any) -> bool:
 
 
 @cache
-@cache
 def no_births(state_dim: int) -> LMB:
     """Return an LMB without targets; made once for each dimension."""
     return LMB.empty(state_dim)
