@@ -47,7 +47,7 @@ def test_a_time_in_milliseconds(place: Path) -> None:
 
 def test_a_quantity_that_there_is_none_of(place: Path) -> None:
     told = refused("radars.yaml", "bearing: brg_deg", "bearings: brg_deg")
-    assert told.startswith("radars.yaml: recording.columns: expected quantities among time, sensor, range, ")
+    assert told.startswith("radars.yaml: recording.columns: expected quantities among time, sensor, bearing, range, ")
     assert told.endswith("; got bearings")
 
 
