@@ -53,6 +53,8 @@ QUANTITIES = {
     "x": _LENGTH,
     "y": _LENGTH,
 }
+# Those that only a measurement can be biased in; a bias of x, y is also of the place of the sensor.
+ONLY_MEASURED = ("bearing", "range", "range_rate")
 # The components of each kind of measurement.
 COMPONENTS = {
     "bearing_range": ("bearing", "range"),

@@ -15,8 +15,9 @@ from scipy.optimize import linear_sum_assignment
 
 from vedette.densities import as_lmb, track_moments
 from vedette.kernels.base.types import Bools, Floats, Ints
-from vedette.quantities import COMPONENTS, angles
+from vedette.quantities import COMPONENTS
 from vedette.recorded import RecordedScans, Site
+from vedette.recorded.instants import with_wrapped_angles
 from vedette.tracking import Tracker
 
 BIASES = ("range", "bearing", "clock", "x", "y")  # of each sensor, in this order, SI, bearings counter-clockwise
@@ -35,9 +36,9 @@ class Pairs(NamedTuple):
     """Measurements that were matched with tracks.
 
     times: (n,) s. sensors, tracks: (n,) numbers. measured: (n, 2) the first two components, NaN where there is no
-    second one; range rates are left to the likelihood. poses:
-    (n, 2) of the sensors. states: (n, 4) of the tracks, predicted. missed, false, scans: (num_sensors,) tracks without
-    a measurement, measurements without a track, and scans.
+    second one; range rates are left to the likelihood. poses: (n, 2) of the sensors. states: (n, 4) of the tracks,
+    predicted. missed, false, scans: (num_sensors,) tracks without a measurement, measurements without a track, and
+    scans.
     """
 
     times: Floats
@@ -90,7 +91,7 @@ def _assigned(scan: Floats, offsets: Floats, place: Floats, kind: str, stds: Flo
         return []
     predicted = _measured_of(offsets, place, kind)
     num = predicted.shape[1]
-    gaps = _wrapped(scan[:, None, :num] - predicted[None], kind) / stds[:num]
+    gaps = with_wrapped_angles(scan[:, None, :num] - predicted[None], kind) / stds[:num]
     costs = np.minimum((gaps**2).sum(axis=2), _GATE**2)
     found = linear_sum_assignment(costs)
     return [(i, j) for i, j in zip(*(each.tolist() for each in found), strict=True) if costs[i, j] < _GATE**2]
@@ -115,12 +116,6 @@ def _slopes(offsets: Floats, kind: str) -> Floats:
     values = {"bearing": (-y / square, x / square), "range": (x / distance, y / distance)}
     values |= {"x": (one, none), "y": (none, one)}
     return np.stack([np.stack(values[component], axis=1) for component in COMPONENTS[kind][:2]], axis=1)
-
-
-def _wrapped(gaps: Floats, kind: str) -> Floats:
-    for place in angles(COMPONENTS[kind]):
-        gaps[..., place] = np.remainder(gaps[..., place] + math.pi, 2.0 * math.pi) - math.pi
-    return gaps
 
 
 def linked(pairs: Pairs, num_sensors: int) -> Bools:
@@ -213,7 +208,7 @@ def _linearised(
         slopes, dim = _slopes(offsets, site.kind), len(names)
         predicted = _measured_of(offsets, pairs.poses[rows] - moves, site.kind)
         predicted += [bias[name] for name in names]
-        residuals[rows, :dim] = _wrapped(pairs.measured[rows, :dim] - predicted, site.kind)
+        residuals[rows, :dim] = with_wrapped_angles(pairs.measured[rows, :dim] - predicted, site.kind)
         own[rows, :dim] = np.concatenate([slopes, after[..., None] * slopes], axis=2)
         of_bias[rows, :dim, 2] = -(slopes @ piece[:, 2:, None])[..., 0]
         if site.kind != "position":

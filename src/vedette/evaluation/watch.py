@@ -13,14 +13,13 @@ from vedette.filters import FactoredGlmbFilter
 from vedette.kernels.base.types import Bools, Floats, Mixture
 from vedette.kernels.gaussian.components import components_of, joined_components
 from vedette.kernels.gaussian.intensities import moved
+from vedette.kernels.steps.undetected import WIDE
 from vedette.models import SensorModel, TargetModel
 from vedette.models.arguments import probability
 from vedette.models.motion import kernel_motion
 
 # Estimates from which on a label counts as a birth, and the shape of the prior of their number.
 _LASTING, _SHAPE = 3, 0.5
-# Standard deviations of a birth's position that stand for "anywhere", as in the filter.
-_WIDE = 3.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,7 +117,7 @@ def births_at(belief: FactoredGLMB, history: TrackHistory, watch: Watch) -> Mixt
     found = [undetected.intensity.to_kernel(), at_sites]
     if undetected.cells is not None and birth.from_measurements is not None:
         grid, in_plane = undetected.cells.grid, np.arange(birth.state_dim) < 2
-        std = birth.from_measurements.std * np.where(in_plane, _WIDE, 1.0)
+        std = birth.from_measurements.std * np.where(in_plane, WIDE, 1.0)
         place = history.means[:1] * in_plane
         nearest = np.argmin(((grid.centres - place[0, :2]) ** 2).sum(axis=1))  # also of a place outside the region
         density = undetected.cells.expected[nearest] / np.prod(grid.cell_size)

@@ -13,12 +13,21 @@ from numpy.typing import ArrayLike
 from vedette.errors import InputError, ModelError
 from vedette.kernels.base.compile import inlined
 from vedette.kernels.base.types import Bools, Floats
-from vedette.models.arguments import dimension, float_array, generator, non_negative, params_vector, pose_vector, reject
+from vedette.models.arguments import (
+    dimension,
+    float_array,
+    generator,
+    non_negative,
+    params_vector,
+    pose_vector,
+    positive,
+    reject,
+)
 from vedette.models.fields import NonNegative, Reals, part
 from vedette.models.functions import ModelFunction, describe, model_function, numbers_at, require_kind
 from vedette.models.measurement import MeasurementModel, angular_flags, wrap_angular
 from vedette.models.probe import probe_log_intensity
-from vedette.quantities import COMPONENTS, QUANTITIES
+from vedette.quantities import COMPONENTS, QUANTITIES, is_doppler
 
 # Scans of clutter that a check draws and looks up in the intensity.
 _NUM_TRIAL_SCANS = 8
@@ -127,10 +136,7 @@ def _box(measurement: Floats, pose: Floats, params: Floats) -> float:
     return params[0]  # type: ignore[no-any-return]
 
 
-# The last params of clutter that is uniform in the plane, see `at_raw_measurements`: what is added to up to three
-# components of a measurement, and to x, y of the sensor.
-NO_OFFSETS = np.zeros(5)
-LARGEST_RATE = 300.0  # m/s, of a false measurement where nothing is said
+_LARGEST_RATE = 300.0  # m/s, the default largest range rate of clutter
 
 
 def at_raw_measurements(clutter: ClutterModel, bias: Floats, moved: Floats) -> ClutterModel:
@@ -166,15 +172,25 @@ class _BoxSampler:
         return wrap_angular(drawn, measurement.angular) if measurement.meas_dim == len(self.low) else drawn
 
 
+def plane_params(max_range_rate: float | None) -> Floats:
+    """(6,) the last params of clutter that is uniform in the plane; `InputError` for a rate that is not above 0.
+
+    The largest range rate (None: 300 m/s), and zeros for what is added to up to three components of a measurement and
+    to x, y of the sensor, see `at_raw_measurements`.
+    """
+    largest = _LARGEST_RATE if max_range_rate is None else positive("max_range_rate", max_range_rate)
+    return np.array([largest, 0.0, 0.0, 0.0, 0.0, 0.0])
+
+
 @inlined
-def log_density_of_rate(range_rate: float, largest: float) -> float:
-    """Log density of the range rate of a false measurement, uniform from -largest to largest, s/m."""
-    return -math.log(2.0 * largest) if abs(range_rate) <= largest else -math.inf
+def log_density_of_rate(measurement: Floats, params: Floats) -> float:
+    """Log density of the third component, a range rate, s/m: uniform up to the largest. params: end `plane_params`."""
+    return -math.log(2.0 * params[-6]) if abs(measurement[2] + params[-3]) <= params[-6] else -math.inf
 
 
 def with_rates(drawn: Floats, kind: str, largest: float, rng: np.random.Generator) -> Floats:
     """Draw the range rates of false measurements whose other components are given, where the kind has them."""
-    if "range_rate" in COMPONENTS[kind]:
+    if is_doppler(kind):
         drawn[:, COMPONENTS[kind].index("range_rate")] = rng.uniform(-largest, largest, len(drawn))
     return drawn
 

@@ -13,14 +13,13 @@ import numpy as np
 
 from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import non_negative, one_of, positive, reject
+from vedette.models.arguments import non_negative, one_of, reject
 from vedette.models.clutter import (
-    LARGEST_RATE,
-    NO_OFFSETS,
     ClutterModel,
     angular_of,
     log_density_of_rate,
     log_or_minus_infinity,
+    plane_params,
     with_rates,
 )
 from vedette.models.fields import NonNegative, Positive, part
@@ -28,7 +27,7 @@ from vedette.models.functions import ModelFunction, model_function, write_rows
 from vedette.models.measurement import MeasurementModel
 from vedette.models.region import Region
 
-# params of every function here: log(rate / area), x_min, x_max, y_min, y_max; the largest range rate; `NO_OFFSETS`
+# params of every function here: log(rate / area), x_min, x_max, y_min, y_max; `plane_params`
 
 
 @inlined
@@ -78,7 +77,7 @@ def _bearing_range(measurement: Floats, pose: Floats, params: Floats) -> float:
 
 @model_function("log_clutter_intensity")
 def _bearing_range_rate(measurement: Floats, pose: Floats, params: Floats) -> float:
-    return _at_range(measurement, pose, params) + log_density_of_rate(measurement[2] + params[8], params[5])
+    return _at_range(measurement, pose, params) + log_density_of_rate(measurement, params)
 
 
 @model_function("log_clutter_intensity")
@@ -154,6 +153,7 @@ def region_clutter(
     if not isinstance(region, Region):
         raise reject("region", "a Region", region)
     rate = non_negative("rate", rate)
-    most = LARGEST_RATE if max_range_rate is None else positive("max_range_rate", max_range_rate)
-    params = np.concatenate([[log_or_minus_infinity(rate / region.area)], region.bounds, [most], NO_OFFSETS])
-    return ClutterModel(rate, _KINDS[kind], params, _RegionSampler(rate, region, kind, most), angular=angular_of(kind))
+    own = plane_params(max_range_rate)
+    params = np.concatenate([[log_or_minus_infinity(rate / region.area)], region.bounds, own])
+    sampler = _RegionSampler(rate, region, kind, float(own[0]))
+    return ClutterModel(rate, _KINDS[kind], params, sampler, angular=angular_of(kind))

@@ -16,12 +16,11 @@ from vedette.kernels.base.types import Floats
 from vedette.kernels.gaussian.scratch import wrap_angle
 from vedette.models.arguments import non_negative, one_of, positive, reject
 from vedette.models.clutter import (
-    LARGEST_RATE,
-    NO_OFFSETS,
     ClutterModel,
     angular_of,
     log_density_of_rate,
     log_or_minus_infinity,
+    plane_params,
     with_rates,
 )
 from vedette.models.fields import HalfWidth, NonNegative, Positive, part
@@ -29,7 +28,7 @@ from vedette.models.functions import ModelFunction, model_function
 from vedette.models.measurement import MeasurementModel
 
 # params of every function here: log rate, radius or half side, 1 of a square and 0 of a disc, half width of the sector,
-# the largest range rate; `NO_OFFSETS`
+# `plane_params`
 
 
 @kernel
@@ -80,7 +79,7 @@ def _bearing_range(measurement: Floats, pose: Floats, params: Floats) -> float:
 
 @model_function("log_clutter_intensity")
 def _bearing_range_rate(measurement: Floats, pose: Floats, params: Floats) -> float:
-    return _at_range(measurement, pose, params) + log_density_of_rate(measurement[2] + params[7], params[4])
+    return _at_range(measurement, pose, params) + log_density_of_rate(measurement, params)
 
 
 _KINDS: dict[str, ModelFunction] = {
@@ -150,7 +149,7 @@ def around_sensor(
         raise reject("half_width_rad", "an angle in (0, pi]", half_width_rad)
     rate, is_square = non_negative("rate", rate), radius is None
     size = positive("half_side", half_side) if is_square else positive("radius", radius)
-    most = LARGEST_RATE if max_range_rate is None else positive("max_range_rate", max_range_rate)
-    params = np.array([log_or_minus_infinity(rate), size, float(is_square), half_width_rad, most, *NO_OFFSETS])
-    sampler = _AroundSampler(rate, size, is_square, half_width_rad, kind, most)
+    own = plane_params(max_range_rate)
+    params = np.array([log_or_minus_infinity(rate), size, float(is_square), half_width_rad, *own])
+    sampler = _AroundSampler(rate, size, is_square, half_width_rad, kind, float(own[0]))
     return ClutterModel(rate, _KINDS[kind], params, sampler, angular=angular_of(kind))

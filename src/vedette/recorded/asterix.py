@@ -25,11 +25,11 @@ def read_asterix(file: Path, *, reports: bool = False) -> tuple[dict[str, list[A
     Of plots `time`, `sensor`, `range_nmi`, `bearing_deg` from the north, and where any plot has a valid Doppler speed
     (I048/120, CAL) `range_rate_mps`, taken as positive where the range grows, as the standard gives no sign. Ranges are
     along the ground where a plot has a valid flight level, which is taken as the height above the radar; others are
-    slant. Of tracks, where there are no
-    plots or `reports` are asked for, `time`, `sensor`, `longitude`, `latitude`, and what targets have: `id` (the number
-    of the track), and `vx`, `vy` where every one says them. Times are seconds from midnight UTC of the first one's day.
-    Other categories are passed over, records without a time and place left out. Returns the columns, the number of each
-    record, and warnings of plots without a flight level and of what was left out.
+    slant. Of tracks, where there are no plots or `reports` are asked for, `time`, `sensor`, `longitude`, `latitude`,
+    and what targets have: `id` (the number of the track), and `vx`, `vy` where every one says them. Times are seconds
+    from midnight UTC of the first one's day. Other categories are passed over, records without a time and place left
+    out. Returns the columns, the number of each record, and warnings of plots without a flight level and of what was
+    left out.
 
     Raises:
         MissingPackageError: libasterix is not installed.

@@ -29,6 +29,14 @@ def turned(angles: ArrayLike, bearings: Bearings | None, compass: Compass, place
     return compass.angle(angles, place) if bearings == "north" else wrapped(angles)
 
 
+def with_wrapped_angles(values: Floats, kind: str) -> Floats:
+    """Return measurements of a kind, or their differences (..., meas_dim), with angles in [-pi, pi)."""
+    found = values.copy()
+    for place in angles(COMPONENTS[kind]):
+        found[..., place] = np.remainder(found[..., place] + math.pi, 2.0 * math.pi) - math.pi
+    return found
+
+
 @dataclass(frozen=True, slots=True)
 class Site:
     """A sensor of a recording.

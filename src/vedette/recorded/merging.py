@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -10,8 +9,8 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Floats, Ints
-from vedette.quantities import COMPONENTS, QUANTITIES, angles
-from vedette.recorded.instants import RecordedScans, Site
+from vedette.quantities import COMPONENTS, QUANTITIES
+from vedette.recorded.instants import RecordedScans, Site, with_wrapped_angles
 from vedette.text import counted, shown
 
 _CLOSE = 3.0  # noise standard deviations between two measurements of one target
@@ -69,8 +68,8 @@ def _means(scan: Floats, kind: str, stds: Floats, distance: float) -> tuple[Floa
     clusters, means, offsets = _clusters(scan, kind, stds, distance), list[Floats](), [np.empty((0, scan.shape[1]))]
     for cluster in range(int(clusters.max(initial=-1)) + 1):
         own = scan[clusters == cluster]
-        off = _wrapped(own - own[0], kind)
-        means.append(_wrapped(own[:1] + off.mean(axis=0), kind)[0])
+        off = with_wrapped_angles(own - own[0], kind)
+        means.append(with_wrapped_angles(own[:1] + off.mean(axis=0), kind)[0])
         if len(own) > 1:
             offsets.append(off - off.mean(axis=0))
     return np.array(means).reshape(-1, scan.shape[1]), np.concatenate(offsets)
@@ -87,16 +86,8 @@ def _clusters(scan: Floats, kind: str, stds: Floats, distance: float) -> Ints:
 
 def _close(scan: Floats, kind: str, stds: Floats, distance: float) -> Bools:
     """(num, num) whether two measurements lie within a number of standard deviations."""
-    gaps = _wrapped(scan[:, None] - scan[None], kind) / stds
+    gaps = with_wrapped_angles(scan[:, None] - scan[None], kind) / stds
     return np.asarray((gaps**2).sum(axis=2) <= distance**2)
-
-
-def _wrapped(values: Floats, kind: str) -> Floats:
-    """Measurements or their differences, bearings in [-pi, pi)."""
-    found = values.copy()
-    for place in angles(COMPONENTS[kind]):
-        found[..., place] = np.remainder(found[..., place] + math.pi, 2.0 * math.pi) - math.pi
-    return found
 
 
 def crowded(

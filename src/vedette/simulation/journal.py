@@ -28,7 +28,7 @@ _LIBRARIES = (str(Path(__file__).parents[1]), *(sysconfig.get_path(name) for nam
 
 
 def cause_of(error: Exception) -> str:
-    """What was raised, in words; where it is not this library's word, with the place in the user's own code."""
+    """Return the message of an error; with its type and place in the user's code if the library did not raise it."""
     if isinstance(error, VedetteError):
         return str(error)
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if not frame.filename.startswith(_LIBRARIES)]

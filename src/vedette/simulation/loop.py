@@ -206,7 +206,7 @@ def simulate(
     name = "still" if planner is None else planner.name
     truth = truth_of_run(experiment, seed, run)
     journal = Journal(experiment.name, name, seed, run, truth, experiment.num_sensors)
-    with told_elsewhere():  # of scans that are drawn nobody has exchanged the numbers
+    with told_elsewhere():  # no warnings of implausible numbers in simulated scans
         return journal.filled(partial(_go, experiment, planner, journal, watch), score)
 
 

@@ -10,7 +10,7 @@ from vedette.kernels.base.types import Bools
 from vedette.models import Bias, DetectionModel, SensorModel
 from vedette.models.arguments import one_of, reject
 from vedette.models.bias import NO_BIAS
-from vedette.quantities import QUANTITIES
+from vedette.quantities import ONLY_MEASURED
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,7 +46,7 @@ class TrueSensor:
             raise reject("TrueSensor.detection_of", expected, self.detection_of)
         if not isinstance(self.bias, Bias):
             raise reject("TrueSensor.bias", "a Bias", self.bias)
-        for name in (each for each in QUANTITIES if each not in ("x", "y")):
+        for name in ONLY_MEASURED:
             if getattr(self.bias, name) and name not in self.model.measurement.components:
                 raise reject(f"TrueSensor.bias.{name}", f"0, as no {name} is measured", getattr(self.bias, name))
 

@@ -17,7 +17,7 @@ from vedette.kernels.gaussian.components import make_components
 from vedette.kernels.gaussian.intensities import predicted_intensity
 
 # Standard deviations of a birth's position that stand for "anywhere" about a measurement: wide beside the noise.
-_WIDE = 3.0
+WIDE = 3.0
 
 
 class Cells(NamedTuple):
@@ -176,7 +176,7 @@ def intensity_at_places(undetected: Undetected) -> Mixture:
     """(num_measurements,) Gaussians of the targets in the cells about each measurement; none without tables."""
     num, dim = len(undetected.places) if len(undetected.tables) > 0 else 0, len(undetected.std)
     out, std = make_components(num, dim), undetected.std.copy()
-    std[:2] *= _WIDE
+    std[:2] *= WIDE
     for j in range(num):
         density = _density_at(undetected.places[j], undetected.cells, undetected.tables[0])
         log_area = math.log(2.0 * math.pi * std[0] * std[1])

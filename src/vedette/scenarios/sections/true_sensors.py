@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from pydantic import Field
 
 from vedette.plausible import told_elsewhere
-from vedette.quantities import COMPONENTS, PLACED, QUANTITIES, in_file
+from vedette.quantities import COMPONENTS, ONLY_MEASURED, PLACED, in_file
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import Section
 from vedette.scenarios.sections.sensing import (
@@ -62,7 +62,7 @@ class BiasSection(Section):
     def findings_beside(self, measurement: Measurement) -> Iterator[Finding]:
         """What is wrong with it where a sensor measures so."""
         measured = COMPONENTS.get(measurement.kind, ())
-        for component in (name for name in QUANTITIES if name not in ("x", "y", *measured)):
+        for component in (name for name in ONLY_MEASURED if name not in measured):
             if value := getattr(self, name := in_file(component)):
                 words = component.replace("_", " ")
                 yield (name,), f"0, as no {words} is measured ({measurement.kind})", describe(value)
