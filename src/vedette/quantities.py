@@ -67,10 +67,6 @@ COMPONENTS = {
 PLACED = tuple(kind for kind, names in COMPONENTS.items() if names[:2] in (("bearing", "range"), ("x", "y")))
 
 
-# Components of a sensor's pose: its velocity, m/s, where it measures range rates; after those of a camera and a budget.
-OWN_VELOCITY = 6
-
-
 def is_doppler(kind: str) -> bool:
     """Whether measurements of a kind have a range rate, which is relative to the velocity of the sensor."""
     return "range_rate" in COMPONENTS.get(kind, ())

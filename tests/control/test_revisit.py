@@ -20,7 +20,7 @@ TIMES = np.arange(1.0, 13.0)
 
 
 def pose(x: float, y: float, *since: float) -> Any:
-    return np.array([x, y, 0.0, 0.0, 0.0, 0.0, *since])
+    return np.array([x, y, *(0.0,) * (CLOCKS - 2), *since])
 
 
 def test_the_seconds_since_a_visit_are_those_of_a_dense_walk() -> None:
@@ -52,7 +52,9 @@ def situation(*since: float) -> Situation:
     poses = np.array([pose(100.0, 0.0, *since), pose(-200.0, 0.0, 50.0)])
     ways = np.array([[-10.0, 0.0], [10.0, 0.0], [0.0, 5.0]])
     times = np.arange(1.0, 6.0)
-    courses = [own + np.pad(ways[:, np.newaxis] * times[:, np.newaxis], ((0, 0), (0, 0), (0, 5))) for own in poses]
+    moves = np.zeros((3, 5, len(poses[0])))
+    moves[..., :2] = ways[:, np.newaxis] * times[:, np.newaxis]
+    courses = [own + moves for own in poses]
     return Situation(tuple(courses), times, poses=poses)
 
 
@@ -99,10 +101,10 @@ def test_mistakes_are_named() -> None:
         Patrolling(Still(), [], 3.0)
     with pytest.raises(InputError, match="every"):
         Revisit(PLACES, 3.0, 0.0)
-    with pytest.raises(InputError, match=r"expected poses of 8 components.*see Patrolling.*got 3"):
+    with pytest.raises(InputError, match=r"expected poses of 12 components.*see Patrolling.*got 3"):
         Revisit(PLACES, 3.0, 9.0).courses(Situation((np.zeros((2, 5, 3)),), TIMES[:5], poses=np.zeros((1, 3))))
-    with pytest.raises(InputError, match="pose: expected 8 components"):
-        options_at("platform", Patrolling(Still(), PLACES, 3.0), np.zeros(6), TIMES)
+    with pytest.raises(InputError, match="pose: expected 12 components"):
+        options_at("platform", Patrolling(Still(), PLACES, 3.0), np.zeros(CLOCKS), TIMES)
     twice = [{"kind": "revisit", "places": [[0.0, 0.0]], "radius": 3.0, "every": 9.0}] * 2
     with pytest.raises(ScenarioError, match="one constraint revisit with all places"):
         visited({"control.constraints": twice})

@@ -305,8 +305,9 @@ def test_plots_are_tracked(tmp_path: Path) -> None:
         "utf-8",
     )
     made = scenario_of_recording(tmp_path / "radar.yaml", tmp_path / "radar.ast")
-    assert {len(scan) for scans in made.recording.scans for scan in scans if scan is not None} == {3}
-    last = run_scenario(made.scenario, "still", seed=0).estimates[-1]
+    assert made.assumed["turn"].startswith("1/2 once in 4 s, clockwise")
+    assert [len(scan) for scans in made.recording.scans for scan in scans if scan is not None][1:-1] == [3] * 24
+    last = run_scenario(made.scenario, "still", seed=0).estimates[-2]
     truth = SHIPS[:, :2] + SHIPS[:, 2:] * 98.0
     assert last.num_targets == 3
     assert max(min(np.hypot(*(mean[:2] - ship)) for ship in truth) for mean in last.means) < 60.0

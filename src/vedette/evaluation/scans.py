@@ -9,9 +9,10 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
+from vedette.kernels.gaussian.beam import OWN_VELOCITY
 from vedette.models.arguments import reject
 from vedette.platforms.compass import course_deg
-from vedette.quantities import COMPONENTS, OWN_VELOCITY, PLACED, QUANTITIES, is_doppler, si_column
+from vedette.quantities import COMPONENTS, PLACED, QUANTITIES, is_doppler, si_column
 from vedette.recorded.conventions import OWN_SPEEDS
 from vedette.recorded.extents import places_of
 from vedette.scenarios import Scenario

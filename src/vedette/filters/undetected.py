@@ -19,6 +19,7 @@ from vedette.kernels.gaussian.components import stacked_mixtures
 from vedette.kernels.steps.undetected import Arrivals, Left, Undetected
 from vedette.models import BirthModel, SensorModel
 from vedette.models.arguments import reject, step_number
+from vedette.models.turns import is_turn, longest_lag
 from vedette.probabilities import expit
 
 # Existence of a birth from which on it is a label from the start: as Poisson, its number would be wrong by 2 r^2.
@@ -110,7 +111,10 @@ def before_scan(
     before = before._replace(tables=tables_of(undetected), cells=found.cells, birth_rate=rate)
     if measured is None or not len(scan):
         return before
-    return before._replace(places=sensor.measurement.positions(scan, pose), std=measured.std)
+    std = measured.std
+    if is_turn(pose) and len(std) >= 4:  # until the beam passes it a target moves as far as its velocity lets it
+        std = np.concatenate([np.hypot(std[:2], longest_lag(pose) * std[2:4]), std[2:]])
+    return before._replace(places=sensor.measurement.positions(scan, pose), std=std)
 
 
 def after_scan(before: UndetectedTargets, missed: Mixture, left: Left, num_measurements: int) -> UndetectedTargets:

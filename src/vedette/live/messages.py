@@ -7,18 +7,24 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from vedette.errors import InputError
+from vedette.kernels.base.types import Floats
+from vedette.kernels.gaussian.beam import BEAM, OWN_VELOCITY
 from vedette.models.arguments import reject
+from vedette.models.turns import Turn, with_beam
 from vedette.quantities import COMPONENTS, is_doppler
 from vedette.reading import parse_json, said
 from vedette.recorded import Conventions, Origin, Site, parse_scans
-from vedette.recorded.tables import Table, is_number
-from vedette.text import shown
+from vedette.recorded.tables import Table, is_number, seconds
+from vedette.recorded.turns import bearings_of
+from vedette.text import counted, shown
 from vedette.tracking import SensorScan
 
 MOST_BYTES = 1_000_000  # of a line
 MOST_MEASUREMENTS = 2000  # of a scan
-_KEYS = ("sensor", "time", "measurements", "pose", "velocity")
+_KEYS = ("sensor", "time", "measurements", "pose", "velocity", "times")
 
 
 def is_message(line: bytes) -> bool:
@@ -47,7 +53,9 @@ def read_message(
     `conventions.units` says another; angles count as `conventions.bearings` says, else as the sensor tells them. The
     pose, which may be left out, is `[x, y, heading_rad, ...]`, or `{"lon": , "lat": , "course_deg": }`, where the
     course, clockwise from true north as in plans, may be left out; or with `heading_deg`, which counts as bearings do
-    and needs `bearings` or a compass. Of a sensor that measures range rates `"velocity": [vx, vy]` is its own, m/s.
+    and needs `bearings` or a compass. Of a sensor that measures range rates or turns `"velocity": [vx, vy]` is its own,
+    m/s. Of one that turns `"times"` has the time of each measurement, and `time` is the middle of the turn; without
+    them all are of one time.
 
     Args:
         line: of UTF-8 text.
@@ -80,7 +88,7 @@ def read_message(
     }
     named = {_OF_POSE[name]: name for name in pose}
     # The loop leaves out what lies beyond the reach, and counts it.
-    everywhere = replace(site, reach=math.inf)
+    everywhere = replace(site, reach=math.inf, turn="none")
     read = parse_scans(
         Table(columns, range(1, num + 1), place), [everywhere], replace(conventions, columns=named, units=units), origin
     )
@@ -88,7 +96,34 @@ def read_message(
     at[3 : 3 + len(more)] = more
     if course is not None and origin is not None:  # with a place in degrees an origin was needed
         at[2] = origin.angle(math.radians(course), at)
-    return Message(SensorScan(number, read.start, read.scans[0][0], at), read.is_utc)
+    scan = read.scans[0][0]
+    if "times" in data and scan is not None:
+        lags = _lags(data["times"], f"{place}, times", len(rows), read.start, read.is_utc)
+        at = _with_beam(at, scan, lags, site, f"{place}, times")
+    return Message(SensorScan(number, read.start, scan, at), read.is_utc)
+
+
+def _lags(given: Any, place: str, num: int, time: float, is_utc: bool) -> Floats:
+    """(num,) s after the time of the scan."""
+    wanted = f"a list of {counted(num, 'time')}, one for each measurement, of the form of `time`"
+    if not isinstance(given, list) or len(given) != num or any(isinstance(each, str) != is_utc for each in given):
+        raise reject(place, wanted, given)
+    try:
+        return np.array([seconds(each) for each in given]) - time
+    except (TypeError, ValueError, OverflowError):
+        raise reject(place, wanted, given) from None
+
+
+def _with_beam(pose: Floats, scan: Floats, lags: Floats, site: Site, place: str) -> Floats:
+    """The pose with the beam, where the measurements and their times say that it was in the middle of the turn."""
+    if not isinstance(site.turn, Turn):
+        raise reject(place, f"none, as the sensors file gives no `turn` of {site.name}", "some")
+    if len(lags) and np.abs(lags).max() > site.turn.period:
+        raise reject(place, f"times within a turn ({site.turn.period:g} s) of `time`", f"{lags.tolist()} s")
+    bearings = bearings_of(scan, pose, site.kind)
+    middle = float(np.angle(np.exp(1j * (bearings - site.turn.rate * lags)).sum())) if len(lags) else 0.0
+    velocity = pose[OWN_VELOCITY:BEAM] if len(pose) >= BEAM else np.zeros(2)
+    return with_beam(pose, velocity, middle, site.turn.rate)
 
 
 _OF_POSE = {

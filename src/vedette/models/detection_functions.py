@@ -6,6 +6,7 @@ import math
 
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats
+from vedette.kernels.gaussian.beam import offset_at_beam
 from vedette.kernels.gaussian.position_integrals import gaussian_mean, share_in_sector
 from vedette.kernels.gaussian.scratch import wrap_angle
 from vedette.models.functions import model_function
@@ -33,27 +34,29 @@ def mean_constant(mean: Floats, cov: Floats, pose: Floats, params: Floats) -> fl
 @model_function("prob_detection")
 def gaussian(state: Floats, pose: Floats, params: Floats) -> float:
     """params: sigma."""
-    dx, dy = state[0] - pose[0], state[1] - pose[1]
+    dx, dy = offset_at_beam(state, pose)
     return min(math.exp(-0.5 * (dx * dx + dy * dy) / (params[0] * params[0])), MAX_PROB_DETECTION)
 
 
 @model_function("mean_prob_detection")
 def mean_gaussian(mean: Floats, cov: Floats, pose: Floats, params: Floats) -> float:
     """As `gaussian`; the cap is that of the mean."""
-    return min(gaussian_mean(mean[0] - pose[0], mean[1] - pose[1], cov, params[0] * params[0]), MAX_PROB_DETECTION)
+    dx, dy = offset_at_beam(mean, pose)
+    return min(gaussian_mean(dx, dy, cov, params[0] * params[0]), MAX_PROB_DETECTION)
 
 
 @model_function("prob_detection")
 def limited_range(state: Floats, pose: Floats, params: Floats) -> float:
     """params: probability, max_range, outside."""
-    dx, dy = state[0] - pose[0], state[1] - pose[1]
+    dx, dy = offset_at_beam(state, pose)
     return params[0] if dx * dx + dy * dy <= params[1] * params[1] else params[2]  # type: ignore[no-any-return]
 
 
 @model_function("mean_prob_detection")
 def mean_limited_range(mean: Floats, cov: Floats, pose: Floats, params: Floats) -> float:
     """As `limited_range`."""
-    share = share_in_sector(mean[0] - pose[0], mean[1] - pose[1], cov, params[1], 0.0, math.pi)
+    dx, dy = offset_at_beam(mean, pose)
+    share = share_in_sector(dx, dy, cov, params[1], 0.0, math.pi)
     return params[2] + (params[0] - params[2]) * share  # type: ignore[no-any-return]
 
 
@@ -69,14 +72,16 @@ def _in_sector(dx: float, dy: float, max_range: float, middle: float, half_width
 @model_function("prob_detection")
 def limited_sector(state: Floats, pose: Floats, params: Floats) -> float:
     """params: probability, max_range, half_width_rad, outside."""
-    seen = _in_sector(state[0] - pose[0], state[1] - pose[1], params[1], pose[2], params[2])
+    dx, dy = offset_at_beam(state, pose)
+    seen = _in_sector(dx, dy, params[1], pose[2], params[2])
     return params[0] if seen else params[3]  # type: ignore[no-any-return]
 
 
 @model_function("mean_prob_detection")
 def mean_limited_sector(mean: Floats, cov: Floats, pose: Floats, params: Floats) -> float:
     """As `limited_sector`."""
-    share = share_in_sector(mean[0] - pose[0], mean[1] - pose[1], cov, params[1], pose[2], params[2])
+    dx, dy = offset_at_beam(mean, pose)
+    share = share_in_sector(dx, dy, cov, params[1], pose[2], params[2])
     return params[3] + (params[0] - params[3]) * share  # type: ignore[no-any-return]
 
 
@@ -88,7 +93,7 @@ def _logistic(exponent: float) -> float:
 @model_function("prob_detection")
 def soft_sector(state: Floats, pose: Floats, params: Floats) -> float:
     """params: probability, max_range, half_width_rad, range_slope, angle_slope (0: a sharp edge), cut (1 or 0)."""
-    dx, dy = state[0] - pose[0], state[1] - pose[1]
+    dx, dy = offset_at_beam(state, pose)
     distance = math.sqrt(dx * dx + dy * dy)
     if params[5] > 0.0 and distance > params[1]:
         return 0.0
@@ -115,7 +120,8 @@ def _reach(pose: Floats, params: Floats) -> float:
 def camera(state: Floats, pose: Floats, params: Floats) -> float:
     """params: probability, max_range, reference half width (0: none)."""
     reach = _reach(pose, params)
-    seen = _in_sector(state[0] - pose[0], state[1] - pose[1], reach, pose[3], pose[4])
+    dx, dy = offset_at_beam(state, pose)
+    seen = _in_sector(dx, dy, reach, pose[3], pose[4])
     return params[0] if seen else 0.0
 
 
@@ -125,4 +131,5 @@ def mean_camera(mean: Floats, cov: Floats, pose: Floats, params: Floats) -> floa
     reach = _reach(pose, params)
     if not pose[4] > 0.0:
         return 0.0
-    return params[0] * share_in_sector(mean[0] - pose[0], mean[1] - pose[1], cov, reach, pose[3], pose[4])  # type: ignore[no-any-return]
+    dx, dy = offset_at_beam(mean, pose)
+    return params[0] * share_in_sector(dx, dy, cov, reach, pose[3], pose[4])  # type: ignore[no-any-return]

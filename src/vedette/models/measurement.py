@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from vedette.errors import ModelError
 from vedette.kernels.base.types import Bools, Floats
+from vedette.kernels.gaussian.beam import passage, to_scan_time, turns
 from vedette.kernels.gaussian.scans import put_on_circle
 from vedette.models.arguments import dimension, float_array, params_vector, pose_vector, reject, state_table
 from vedette.models.fields import part
@@ -20,8 +21,10 @@ from vedette.quantities import QUANTITIES
 
 @model_function("measurement")
 def _position(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
-    out[0] = state[0]
-    out[1] = state[1]
+    out[0], out[1] = state[0], state[1]
+    if turns(pose) and state.shape[0] >= 4:
+        at = passage(state, pose)
+        out[0], out[1] = state[0] + state[2] * at.lag, state[1] + state[3] * at.lag
 
 
 @model_function("measurement_jacobian")
@@ -29,6 +32,8 @@ def _position_jacobian(state: Floats, pose: Floats, params: Floats, out: Floats)
     for i in range(2):
         for j in range(out.shape[1]):
             out[i, j] = 1.0 if i == j else 0.0
+    if turns(pose) and state.shape[0] >= 4:
+        to_scan_time(passage(state, pose), pose, True, out)
 
 
 def _places(measurements: Floats, pose: Floats) -> Floats:

@@ -7,6 +7,7 @@ import numpy as np
 from vedette.errors import InputError
 from vedette.kernels.base.compile import inlined
 from vedette.kernels.base.types import Floats
+from vedette.kernels.gaussian.beam import offset_at_beam, passage
 from vedette.models.arguments import float_array, non_negative, positive, reject
 from vedette.models.fields import NonNegativePair, PositivePair, Positives, part
 from vedette.models.functions import model_function
@@ -22,7 +23,7 @@ def _constant(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
 
 @inlined
 def _write_polar(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
-    dx, dy = state[0] - pose[0], state[1] - pose[1]
+    dx, dy = offset_at_beam(state, pose)
     square = dx * dx + dy * dy
     sigma_range = params[0] + params[1] * square
     sigma_bearing = params[2] + params[3] * np.sqrt(square)
@@ -48,22 +49,23 @@ def _bearing_range_rate(state: Floats, pose: Floats, params: Floats, out: Floats
 
 @model_function("measurement_noise_cov")
 def _bearing(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
-    dx, dy = state[0] - pose[0], state[1] - pose[1]
+    dx, dy = offset_at_beam(state, pose)
     sigma_bearing = params[0] + params[1] * np.sqrt(dx * dx + dy * dy)
     out[0, 0] = sigma_bearing * sigma_bearing
 
 
 @model_function("measurement_noise_cov")
 def _range(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
-    dx, dy = state[0] - pose[0], state[1] - pose[1]
+    dx, dy = offset_at_beam(state, pose)
     sigma_range = params[0] + params[1] * (dx * dx + dy * dy)
     out[0, 0] = sigma_range * sigma_range
 
 
 @model_function("measurement_noise_cov")
 def _by_axis(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
+    at = passage(state, pose)
     for i in range(2):
-        offset = state[i] - pose[i]
+        offset = at.dx if i == 0 else at.dy
         std = params[i] + params[2 + i] * offset * offset
         out[i, i] = std * std
         out[i, 1 - i] = 0.0

@@ -15,15 +15,15 @@ import numpy as np
 
 from vedette.kernels.base.compile import inlined
 from vedette.kernels.base.types import Floats
+from vedette.kernels.gaussian.beam import OWN_VELOCITY, offset_at_beam, passage, to_scan_time
 from vedette.models.fields import part
 from vedette.models.functions import model_function
 from vedette.models.measurement import MeasurementModel
-from vedette.quantities import OWN_VELOCITY
+from vedette.models.turns import own_places
 
 
 @inlined
-def _bearing_row(state: Floats, pose: Floats, out: Floats, row: int) -> None:
-    dx, dy = state[0] - pose[0], state[1] - pose[1]
+def _bearing_row(dx: float, dy: float, out: Floats, row: int) -> None:
     square = dx * dx + dy * dy
     for j in range(out.shape[1]):
         out[row, j] = 0.0
@@ -33,8 +33,7 @@ def _bearing_row(state: Floats, pose: Floats, out: Floats, row: int) -> None:
 
 
 @inlined
-def _range_row(state: Floats, pose: Floats, out: Floats, row: int) -> None:
-    dx, dy = state[0] - pose[0], state[1] - pose[1]
+def _range_row(dx: float, dy: float, out: Floats, row: int) -> None:
     distance = math.sqrt(dx * dx + dy * dy)
     for j in range(out.shape[1]):
         out[row, j] = 0.0
@@ -45,15 +44,17 @@ def _range_row(state: Floats, pose: Floats, out: Floats, row: int) -> None:
 
 @model_function("measurement")
 def _bearing_range(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
-    dx, dy = state[0] - pose[0], state[1] - pose[1]
+    dx, dy = offset_at_beam(state, pose)
     out[0] = math.atan2(dy, dx)
     out[1] = math.sqrt(dx * dx + dy * dy)
 
 
 @model_function("measurement_jacobian")
 def _bearing_range_jacobian(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
-    _bearing_row(state, pose, out, 0)
-    _range_row(state, pose, out, 1)
+    at = passage(state, pose)
+    _bearing_row(at.dx, at.dy, out, 0)
+    _range_row(at.dx, at.dy, out, 1)
+    to_scan_time(at, pose, False, out)
 
 
 @inlined
@@ -65,7 +66,7 @@ def _relative_velocity(state: Floats, pose: Floats) -> tuple[float, float]:
 
 @model_function("measurement")
 def _bearing_range_rate(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
-    dx, dy = state[0] - pose[0], state[1] - pose[1]
+    dx, dy = offset_at_beam(state, pose)
     vx, vy = _relative_velocity(state, pose)
     distance = math.sqrt(dx * dx + dy * dy)
     out[0] = math.atan2(dy, dx)
@@ -75,9 +76,10 @@ def _bearing_range_rate(state: Floats, pose: Floats, params: Floats, out: Floats
 
 @model_function("measurement_jacobian")
 def _bearing_range_rate_jacobian(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
-    _bearing_row(state, pose, out, 0)
-    _range_row(state, pose, out, 1)
-    dx, dy = state[0] - pose[0], state[1] - pose[1]
+    at = passage(state, pose)
+    dx, dy = at.dx, at.dy
+    _bearing_row(dx, dy, out, 0)
+    _range_row(dx, dy, out, 1)
     vx, vy = _relative_velocity(state, pose)
     square = dx * dx + dy * dy
     # The velocity across the line of sight over the distance, at which the line turns.
@@ -86,32 +88,39 @@ def _bearing_range_rate_jacobian(state: Floats, pose: Floats, params: Floats, ou
         out[2, j] = 0.0
     out[2, 0], out[2, 1] = -turning * out[1, 1], turning * out[1, 0]
     out[2, 2], out[2, 3] = out[1, 0], out[1, 1]
+    to_scan_time(at, pose, False, out)
 
 
 @model_function("measurement")
 def _bearing(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
-    out[0] = math.atan2(state[1] - pose[1], state[0] - pose[0])
+    dx, dy = offset_at_beam(state, pose)
+    out[0] = math.atan2(dy, dx)
 
 
 @model_function("measurement_jacobian")
 def _bearing_jacobian(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
-    _bearing_row(state, pose, out, 0)
+    at = passage(state, pose)
+    _bearing_row(at.dx, at.dy, out, 0)
+    to_scan_time(at, pose, False, out)
 
 
 @model_function("measurement")
 def _range(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
-    dx, dy = state[0] - pose[0], state[1] - pose[1]
+    dx, dy = offset_at_beam(state, pose)
     out[0] = math.sqrt(dx * dx + dy * dy)
 
 
 @model_function("measurement_jacobian")
 def _range_jacobian(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
-    _range_row(state, pose, out, 0)
+    at = passage(state, pose)
+    _range_row(at.dx, at.dy, out, 0)
+    to_scan_time(at, pose, False, out)
 
 
 def _places(measurements: Floats, pose: Floats) -> Floats:
     bearings, ranges = measurements[:, 0], measurements[:, 1]
-    return np.stack([pose[0] + ranges * np.cos(bearings), pose[1] + ranges * np.sin(bearings)], axis=1)
+    x, y = own_places(bearings, pose).T
+    return np.stack([x + ranges * np.cos(bearings), y + ranges * np.sin(bearings)], axis=1)
 
 
 @part("bearing_range", "measurement")

@@ -13,6 +13,7 @@ import numpy as np
 
 from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import Floats
+from vedette.kernels.gaussian.beam import own_place
 from vedette.models.arguments import non_negative, one_of, reject
 from vedette.models.clutter import (
     ClutterModel,
@@ -63,8 +64,9 @@ def _position(measurement: Floats, pose: Floats, params: Floats) -> float:
 @inlined
 def _at_range(measurement: Floats, pose: Floats, params: Floats) -> float:
     bearing, distance = measurement[0] + params[6], measurement[1] + params[7]
-    x = pose[0] + params[9] + distance * math.cos(bearing)
-    y = pose[1] + params[10] + distance * math.sin(bearing)
+    own_x, own_y = own_place(bearing, pose)
+    x = own_x + params[9] + distance * math.cos(bearing)
+    y = own_y + params[10] + distance * math.sin(bearing)
     if not (distance > 0.0 and _inside(x, y, params)):
         return -math.inf
     return params[0] + math.log(distance)  # type: ignore[no-any-return]
@@ -82,7 +84,9 @@ def _bearing_range_rate(measurement: Floats, pose: Floats, params: Floats) -> fl
 
 @model_function("log_clutter_intensity")
 def _bearing(measurement: Floats, pose: Floats, params: Floats) -> float:
-    bearing, x, y = measurement[0] + params[6], pose[0] + params[9], pose[1] + params[10]
+    bearing = measurement[0] + params[6]
+    own_x, own_y = own_place(bearing, pose)
+    x, y = own_x + params[9], own_y + params[10]
     near, far = _clip_ray(x, math.cos(bearing), params[1], params[2], 0.0, math.inf)
     near, far = _clip_ray(y, math.sin(bearing), params[3], params[4], near, far)
     if not near < far:

@@ -10,18 +10,18 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Floats
+from vedette.kernels.gaussian.beam import BEAM
 from vedette.models.arguments import float_array, positive
 from vedette.platforms.base import Platform, check_platform, courses_of, prices_of, scans_of
-from vedette.platforms.operated import LEFT
 
 # Component of a pose: seconds since the platform was last at the first place; those of the other places follow.
-CLOCKS = LEFT + 1
+CLOCKS = BEAM + 2
 _PARTS = 16  # straight segments that approximate a course, up to the last requested time
 
 
 @dataclass(frozen=True, slots=True)
 class Patrolling:
-    """A platform whose pose has the seconds since it was last within a radius of each place, from component 6 on.
+    """A platform whose pose has the seconds since it was last within a radius of each place, from component 10 on.
 
     Between the places that it is asked about and sixteen more, a course is taken as straight.
 

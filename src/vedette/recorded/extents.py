@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.kernels.base.types import Bools, Floats
+from vedette.models.turns import own_places
 from vedette.quantities import PLACED
 
 MARGIN = 0.05  # of the longer side of an extent, around it
@@ -22,7 +23,9 @@ def places_of(scan: Floats, pose: Floats, kind: str) -> Floats:
         return np.empty((0, 2))
     if kind == "position":
         return scan
-    return np.asarray(pose[:2] + scan[:, 1:2] * np.column_stack([np.cos(scan[:, 0]), np.sin(scan[:, 0])]))
+    return np.asarray(
+        own_places(scan[:, 0], pose) + scan[:, 1:2] * np.column_stack([np.cos(scan[:, 0]), np.sin(scan[:, 0])])
+    )
 
 
 def box_of(places: Floats, share: float = MARGIN) -> Floats:

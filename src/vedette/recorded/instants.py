@@ -11,11 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.kernels.base.types import Floats
+from vedette.kernels.gaussian.beam import BEAM
 from vedette.models import Bias
 from vedette.models.arguments import float_array
 from vedette.models.bias import NO_BIAS, with_offsets
+from vedette.models.turns import is_turn
 from vedette.platforms.compass import Compass, PlaneCompass, course_deg, wrapped
 from vedette.quantities import COMPONENTS, angles
+from vedette.recorded.turns import Turning
 from vedette.simulation.records import ScansFile
 from vedette.speaking import Speaking
 from vedette.text import counted
@@ -50,6 +53,7 @@ class Site:
         compass: whether it tells bearings in degrees clockwise from true north, where the rows say nothing else.
         reach: m, beyond which it measures nothing; inf: not known.
         north: where true north is; an `Origin` knows it at every place, without one it is along y.
+        turn: how its beam turns, where its scans are turns; "found": as its rows show, if they do; "none": it does not.
     """
 
     name: str
@@ -59,6 +63,7 @@ class Site:
     compass: bool = False
     reach: float = math.inf
     north: Compass = field(default_factory=PlaneCompass)
+    turn: Turning = "found"
 
     def measured(self, told: ArrayLike, pose: ArrayLike | None = None) -> Floats:
         """(num, meas_dim) measurements as filters take them but for the bias, of the same as the sensor tells them.
@@ -217,4 +222,6 @@ def without_bias(look: Look, site: Site, bearings: Bearings | None) -> Look:
     measured, place = bias_of(site, bearings)
     scan, pose = with_offsets(look.scan, -measured, COMPONENTS[site.kind]), look.pose.copy()
     pose[:2] -= place
+    if is_turn(pose) and "bearing" in COMPONENTS[site.kind]:
+        pose[BEAM] -= measured[0]
     return Look(look.time - site.bias.clock, look.sensor, scan, pose)

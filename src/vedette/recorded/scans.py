@@ -11,8 +11,10 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
+from vedette.kernels.gaussian.beam import OWN_VELOCITY
 from vedette.models.bias import NO_BIAS
-from vedette.quantities import ANGLES, COMPONENTS, OWN_VELOCITY, PLACED, QUANTITIES, is_doppler
+from vedette.models.turns import Turn
+from vedette.quantities import ANGLES, COMPONENTS, PLACED, QUANTITIES, is_doppler
 from vedette.recorded.columns import ScanColumns
 from vedette.recorded.conventions import MOST, ONE_PLACE, ONE_PLACE_SHARE, OVER_A_TURN, OWN_SPEEDS, UNITS, Conventions
 from vedette.recorded.extents import places_of, wild
@@ -34,6 +36,7 @@ from vedette.recorded.tables import (
     number,
     seconds,
 )
+from vedette.recorded.turns import bearings_of, found_turn, swept
 from vedette.simulation.records import ScansFile
 from vedette.text import shown
 
@@ -228,13 +231,30 @@ def _at_instants(rows: list[_Row], how: _Rows, skipped: tuple[str, ...]) -> Reco
     looks, sites, gather = [], how.sites, how.conventions.gather
     for s, site in enumerate(sites):
         own = sorted((row for row in rows if row.sensor == s), key=lambda row: row.time)
+        turning = _looks_of_turns(own, s, site)
+        if turning is not None:
+            looks += turning
+            continue
         for group in _groups(own, gather):
             time = math.fsum(row.time for row in group) / len(group) if gather > 0.0 else group[0].time
             looks.append(Look(time, s, _scan(group, site), np.array(group[-1].pose)))
-    first = np.zeros((len(sites), max(len(site.pose) for site in sites)))
+    first = np.zeros((len(sites), max([*map(len, (site.pose for site in sites)), *(len(look.pose) for look in looks)])))
     for s, site in enumerate(sites):
         first[s, : len(site.pose)] = site.pose
     return in_order(looks, first, 0.0, how.is_utc, skipped, how.bearings)
+
+
+def _looks_of_turns(rows: list[_Row], sensor: int, site: Site) -> list[Look] | None:
+    """The scans of a turning radar; None: it does not turn, or nobody knows how."""
+    own = [row for row in rows if row.measured is not None]
+    if site.turn == "none" or not own:
+        return None
+    times, poses, scan = np.array([row.time for row in own]), np.array([row.pose for row in own]), _scan(own, site)
+    bearings = bearings_of(scan, poses, site.kind)
+    turn = found_turn(times, bearings) if site.turn == "found" and len(bearings) else site.turn
+    if not isinstance(turn, Turn):
+        return None
+    return [Look(each.time, sensor, scan[each.rows], each.pose) for each in swept(times, bearings, poses, turn)]
 
 
 def _groups(rows: list[_Row], gather: float) -> list[list[_Row]]:

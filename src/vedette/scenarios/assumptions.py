@@ -10,6 +10,8 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
+from vedette.kernels.gaussian.beam import BEAM
+from vedette.models.turns import is_turn
 from vedette.recorded import RecordedScans
 from vedette.scenarios.assumed_clutter import assumed_clutter, place_stds
 from vedette.scenarios.extents import measured_region, region_in_words
@@ -40,7 +42,22 @@ def assumed_sections(
             for s in range(len(model.sensors))
         ]
         found |= assumed_birth(model, measured, folder, speed, words)
+    if turns := _turns(model, recording):
+        words["turn"] = turns
     return found | assumed_clutter(given, model, recording, folder, speed, words)
+
+
+def _turns(model: ScenarioModel, recording: RecordedScans) -> str:
+    """How the radars turn of which the rows say so alone, in words; empty: none does."""
+    texts = []
+    for s, (name, sensor) in enumerate(zip(model.sensor_names, model.sensors, strict=True)):
+        own = [poses[s] for scans, poses in zip(recording.scans, recording.poses, strict=True) if scans[s] is not None]
+        rates = [pose[BEAM + 1] for pose in own if is_turn(pose)]
+        if sensor.turn is None and rates:
+            rate = float(np.median(rates))
+            way = "clockwise" if rate < 0.0 else "counter-clockwise"
+            texts.append(f"{name} once in {2.0 * np.pi / abs(rate):.4g} s, {way}")
+    return f"{'; '.join(texts)} (found from bearings and times; a scan is one turn)" if texts else ""
 
 
 def assumed_motion(given: Mapping[str, Any], speed: float, words: dict[str, str]) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""What measurements with range rates say of the velocities of targets that are born of them."""
+"""What range rates say of the velocities of births, and where births are at the time of a turning radar's scan."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from vedette.kernels.base.types import Floats
 from vedette.models import SensorModel
 from vedette.models.arguments import pose_vector
 from vedette.models.functions import write_rows
+from vedette.models.turns import is_turn, lags
 
 
 def with_velocities(born: LMB, std: Floats, sensors: Sequence[SensorModel], scans: Sequence[Any], poses: Any) -> LMB:
@@ -40,6 +41,31 @@ def with_velocities(born: LMB, std: Floats, sensors: Sequence[SensorModel], scan
     for own in said:
         _condition(means, covs, std, *own)
     moved = components._replace(means=means, covs=covs)
+    return LMB.from_kernel(lmb._replace(tracks=lmb.tracks._replace(components=moved)))
+
+
+def at_scan_time(born: LMB, poses: Sequence[Floats]) -> LMB:
+    """Take births from where beams passed them to where they are at the time of the scan: x -> x - lag v.
+
+    Args:
+        born: births of one component each.
+        poses: of the sensors that scanned; of several turning ones, the mean of their lags counts, as a birth's place
+            is the mean of theirs.
+    """
+    turning = [pose for pose in poses if is_turn(pose)]
+    if not turning or not born.tracks.num_tracks:
+        return born
+    lmb = born.to_kernel()
+    components = lmb.tracks.components
+    num, dim = components.means.shape
+    if dim < 4:
+        return born
+    off = [components.means[:, :2] - pose[:2] for pose in turning]
+    lag = sum(lags(np.arctan2(at[:, 1], at[:, 0]), pose) for at, pose in zip(off, turning, strict=True)) / len(poses)
+    back = np.tile(np.eye(dim), (num, 1, 1))
+    back[:, 0, 2] = back[:, 1, 3] = -lag
+    means = (back @ components.means[:, :, np.newaxis])[..., 0]
+    moved = components._replace(means=means, covs=back @ components.covs @ back.swapaxes(1, 2))
     return LMB.from_kernel(lmb._replace(tracks=lmb.tracks._replace(components=moved)))
 
 

@@ -25,7 +25,7 @@ from vedette.kernels.labelled.births import BirthsOfMeasurements, births_of_meas
 from vedette.kernels.steps.explained import births_unexplained, prob_explained
 from vedette.models import BirthModel, MeasurementBirth, SensorModel
 from vedette.models.arguments import pose_vector, reject
-from vedette.tracking.birth_velocities import with_velocities
+from vedette.tracking.birth_velocities import at_scan_time, with_velocities
 
 # What a track explains surer than this is no birth: each costs a track until the next scan.
 LEAST_UNEXPLAINED = 0.01
@@ -114,7 +114,8 @@ def births_from_scans(
         made = _born_of_one(belief, sensors[scanned[0]], scans[scanned[0]], poses[scanned[0]], begin)
     else:
         made = _born(unexplained(model, belief, sensors, scans, poses), begin)
-    return with_velocities(made, model.std, sensors, scans, poses)
+    made = with_velocities(made, model.std, sensors, scans, poses)
+    return at_scan_time(made, [pose_vector("pose", poses[s]) for s in scanned])
 
 
 def births_waiting(birth: BirthModel, before: LMB | None, found: LMB | None) -> LMB | None:

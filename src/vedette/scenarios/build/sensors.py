@@ -13,12 +13,12 @@ import numpy as np
 from vedette.control import MobileSensor
 from vedette.filters import Filter, TwoStepFilter
 from vedette.kernels.base.types import Bools, Floats
+from vedette.kernels.gaussian.beam import OWN_VELOCITY
 from vedette.models import SensorModel, TargetModel
 from vedette.platforms import Actions, ByCompass, Operated, Patrolling, Platform
 from vedette.platforms.base import SWITCH, actions_at
 from vedette.platforms.patrolling import CLOCKS
 from vedette.platforms.velocity import WithVelocity
-from vedette.quantities import OWN_VELOCITY, is_doppler
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections.control import revisited
 from vedette.scenarios.sections.custom import Custom, NotGiven
@@ -60,7 +60,7 @@ def _platform(model: ScenarioModel, sensor: Sensor, folder: Path) -> Platform:
     platform: Platform = section.build(folder)
     if model.by_compass and platform.columns:
         platform = ByCompass(platform, model.north())
-    if is_doppler(sensor.measurement.kind) and platform.columns and len(section.components()) + 3 <= OWN_VELOCITY:
+    if sensor.needs_velocity and platform.columns and len(section.components()) + 3 <= OWN_VELOCITY:
         platform = WithVelocity(platform)
     if isinstance(section, CustomPlatform) and isinstance(price, str) and price not in platform.columns:
         wanted = f"{section.function} to have a column {price}, as its price"
@@ -128,7 +128,7 @@ def build_scan_times(scenario: Scenario) -> Bools:
 def build_poses(scenario: Scenario) -> Floats:
     """(num_sensors, pose_dim) where they start, all as long as the longest; what is not a sensor's own is 0."""
     sensors, visits = scenario.model.sensors, revisited(scenario.model)
-    poses = [sensor.pose for sensor in sensors]
+    poses = [sensor.pose if scenario.model.recording else sensor.turning_pose for sensor in sensors]
     longest = max(map(len, poses)) if visits is None else CLOCKS
     found = np.array([(*pose, *(0.0,) * (longest - len(pose))) for pose in poses])
     if visits is None:

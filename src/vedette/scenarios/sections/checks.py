@@ -225,6 +225,10 @@ def _first_scan(path: Path, sensor: Sensor, model: ScenarioModel) -> Iterator[Fi
     scans, period = sensor.scans, model.time.step_period
     for inside, wanted, got in scans.findings_beside(period):
         yield (*path, *inside), wanted, got
+    interval = scans.steps(period)[0] * period
+    if sensor.turn is not None and model.recording is None and sensor.turn.period > interval * (1.0 + 1e-9):
+        wanted = f"at most the time from one scan to the next, {interval:g} s"
+        yield (*path[:-1], "turn", "period"), wanted, describe(sensor.turn.period)
     name = "first" if scans.period is None else "offset"
     yield from _up_to_last((*path, name), scans.steps(period)[1], model.time.num_steps)
 

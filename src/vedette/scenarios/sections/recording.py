@@ -52,6 +52,11 @@ class RecordingSection(Section):
     gather: NonNegative = Field(
         default=0.0, description="Rows of a sensor within this time after its first are one scan [s]."
     )
+    turns: Literal["found", "none"] = Field(
+        default="found",
+        description="Whether a sensor without `turn` is taken for a turning radar where the bearings and times of its "
+        "rows show that it is one; a scan is then one turn, whatever `gather` says [-].",
+    )
     merge: NonNegative = Field(
         default=0.0,
         description="Measurements of a scan within this number of noise standard deviations of each other, directly or "
@@ -113,8 +118,18 @@ def sites_of(world: ScenarioModel) -> list[Site]:
     from vedette.recorded import Site
 
     north = world.north()
+    shown_by_rows = "none" if world.recording is None else world.recording.turns
     return [
-        Site(name, sensor.measurement.kind, sensor.pose, sensor.bias.build(), sensor.compass, reach_of(sensor), north)
+        Site(
+            name,
+            sensor.measurement.kind,
+            sensor.pose,
+            sensor.bias.build(),
+            sensor.compass,
+            reach_of(sensor),
+            north,
+            shown_by_rows if sensor.turn is None else sensor.turn.build(),
+        )
         for name, sensor in zip(world.sensor_names, world.sensors, strict=True)
     ]
 

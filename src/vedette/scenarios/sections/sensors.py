@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from pydantic import Field, create_model
 
+from vedette.kernels.gaussian.beam import BEAM
 from vedette.plausible import told_elsewhere
-from vedette.quantities import OWN_VELOCITY, is_doppler
+from vedette.quantities import is_doppler
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import (
     DetectionAt,
@@ -43,6 +44,7 @@ from vedette.scenarios.sections.true_sensors import BiasSection, TrueSensor, bui
 if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
     from vedette.kernels.base.types import Bools
     from vedette.models import Region, SensorModel
+    from vedette.models.turns import Turn
     from vedette.scenarios.sections.world import Time
     from vedette.simulation import TrueSensor as TrueSensorModel
     from vedette.tracking import Delay
@@ -123,6 +125,23 @@ class ScanTimes(Section):
         return np.asarray((np.arange(1, time.num_steps + 1) - first) % every == 0)
 
 
+class TurnSection(Section):
+    """How a radar's beam turns: a scan is one turn, and a target is measured when the beam passes it.
+
+    In a simulation the time of a scan is the middle of the turn, when the beam points east; targets and radar move
+    straight on in half a turn. In a recording the beam is where the rows say.
+    """
+
+    period: Positive = Field(description="Of one turn [s].")
+    clockwise: bool = Field(default=True, description="Seen from above, as most radars turn [-].")
+
+    def build(self) -> Turn:
+        """As recordings and poses take it."""
+        from vedette.models.turns import Turn
+
+        return Turn(self.period, self.clockwise)
+
+
 class Budget(Section):
     """Scanning time of a sensor. Once none is left, the sensor does not scan before its next decision.
 
@@ -175,6 +194,11 @@ class Sensor(Section):
         "and lines that say nothing else, and where scans are written; else in radians from the east. Plans and tables "
         "of the scenario then have courses [-].",
     )
+    turn: TurnSection | None = Field(
+        default=None,
+        description="How its beam turns; none: its measurements are of one time, in a recording unless their bearings "
+        "and times show a turn [-].",
+    )
     noise: Noise = Field(default=of_kind("range_dependent"), description="Measurement noise [-].")
     detection: Detection = Field(default=of_kind("gaussian"), description="Probability of detection [-].")
     clutter: Clutter = Field(default=of_kind("region"), description="False measurements [-].")
@@ -212,6 +236,12 @@ class Sensor(Section):
             yield ("compass",), "false, as nobody knows which component of a custom measurement is a bearing", "true"
 
     @check
+    def _a_turn_passes_bearings(self) -> Iterator[Finding]:
+        kind = self.measurement.kind
+        if self.turn is not None and kind in ("custom", "range_only"):
+            yield ("turn",), "none, as its measurements do not say in which direction they were taken", kind
+
+    @check
     def _noise_fits(self) -> Iterator[Finding]:
         yield from noise_findings(self.measurement, self.noise, ("noise",))
 
@@ -240,7 +270,17 @@ class Sensor(Section):
         if self.budget is not None:
             pose = (*pose, *(0.0,) * (5 - len(pose)), self.budget.seconds)
         # A custom platform may have a velocity at the start.
-        return (*pose, *(0.0,) * (OWN_VELOCITY + 2 - len(pose))) if is_doppler(self.measurement.kind) else pose
+        return (*pose, *(0.0,) * (BEAM - len(pose))) if self.needs_velocity else pose
+
+    @property
+    def needs_velocity(self) -> bool:
+        """Whether its measurements go by its own velocity, which its poses then have."""
+        return is_doppler(self.measurement.kind) or self.turn is not None
+
+    @property
+    def turning_pose(self) -> tuple[float, ...]:
+        """Where it starts, with its beam in the middle of a turn."""
+        return self.pose if self.turn is None else (*self.pose[:BEAM], 0.0, self.turn.build().rate)
 
     def build(
         self, region: Region, method: GaussianMethod, folder: Path, detection_at: DetectionAt = "centre"
