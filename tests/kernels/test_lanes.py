@@ -75,6 +75,12 @@ def side_by_side(values: Any) -> Any:
     return out
 
 
+def test_a_turning_radar_has_no_known_form() -> None:
+    moves = models.kernel_motion(models.constant_velocity(2.0), models.constant_survival(1.0))
+    forms = forms_of(moves, sensor_of(next(iter(SENSORS))).to_kernel(), DT, 4, turns=True)
+    assert (forms.measurement, forms.noise, forms.detection) == (ANY, ANY, ANY)
+
+
 @pytest.mark.parametrize("name", SENSORS)
 @pytest.mark.parametrize("motion", [models.constant_velocity(2.0), models.coordinated_turn(2.0, 0.02)])
 def test_steps_are_those_of_one_gaussian_at_a_time(name: str, motion: models.MotionModel) -> None:

@@ -13,6 +13,7 @@ from turning_radars import STD, Flights, track, write
 
 from vedette.errors import InputError, ScenarioError
 from vedette.evaluation import run_scenario, track_recording
+from vedette.evaluation.scans import scan_table, scans_of_record
 from vedette.kernels.base.types import Floats
 from vedette.live.messages import read_message
 from vedette.models.turns import Turn, is_turn, lags
@@ -21,6 +22,7 @@ from vedette.recorded.tables import Table
 from vedette.recorded.turns import found_turn, swept
 from vedette.scenarios import load_scenario
 from vedette.scenarios.of_recording import scenario_of_recording
+from vedette.scenarios.sections.recording import sites_of
 
 
 @pytest.mark.parametrize(("period", "clockwise", "num_radars"), [(2.5, True, 1), (4.0, False, 2), (12.0, True, 2)])
@@ -59,6 +61,8 @@ def test_no_turn_is_found_where_nothing_turns(seed: int) -> None:
     times = np.sort(rng.uniform(0.0, 300.0, 200))
     assert found_turn(times, rng.uniform(-math.pi, math.pi, 200)) is None
     assert found_turn(times, rng.normal(0.5, 0.01, 200)) is None  # a camera that stares
+    drifting = 0.01 * at_once[:, 0] + np.where(np.arange(len(at_once)) % 2, 0.2, -0.2)
+    assert found_turn(at_once[:, 0], drifting) is None  # two targets that pass by together
     assert found_turn(times[:10], rng.uniform(-math.pi, math.pi, 10)) is None
 
 
@@ -182,6 +186,23 @@ def test_a_simulated_radar_turns_and_decides(tmp_path: Path) -> None:
         ]
         errors.append(np.mean([np.hypot(*own.transpose(2, 0, 1)).min(axis=1).mean() for own in off]))
     assert errors[0] < 1.5 * errors[1]
+
+
+def test_scans_of_a_simulated_radar_are_written_with_the_times_of_the_beam(tmp_path: Path) -> None:
+    (tmp_path / "s.yaml").write_text(SIMULATED, "utf-8")
+    scenario = load_scenario(tmp_path / "s.yaml")
+    record = run_scenario(scenario, "p", seed=3)
+    columns = scan_table(record, scenario)
+    order = np.argsort(columns["time"])
+    table = Table({name: [column[i] for i in order] for name, column in columns.items()}, range(len(order)), "scans")
+    read = parse_scans(table, sites_of(scenario.model), Conventions({}, {}, "east"))
+    drawn = [scan for (scan,) in scans_of_record(record, scenario) if scan is not None and len(scan.measurements)]
+    assert sum(len(scan.measurements) for scan in drawn) == read.num_measurements
+    for time, (scan,), poses in zip(read.start + read.times, read.scans, read.poses, strict=True):
+        k = int(np.abs(record.times - time).argmin())
+        assert scan is not None
+        off = lags(scan[:, 0], poses[0]) + time - record.times[k] - lags(scan[:, 0], record.poses[k, 0])
+        assert np.abs(np.remainder(off + 2.5, 5.0) - 2.5).max(initial=0.0) < 0.01
 
 
 @pytest.mark.parametrize(

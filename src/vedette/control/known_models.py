@@ -25,6 +25,7 @@ from vedette.models import (
 )
 from vedette.models.detection_functions import MAX_PROB_DETECTION
 from vedette.models.functions import ModelFunction
+from vedette.models.turns import is_turn
 
 # By the functions themselves: a model of a user's own is none of these.
 _LINEAR = {
@@ -67,15 +68,18 @@ def decision_of(
         nobody(targets.state_dim),
         motion,
         sees,
-        forms_of(motion, sees, horizon.dt, targets.state_dim),
+        forms_of(motion, sees, horizon.dt, targets.state_dim, any(map(is_turn, courses[:, 0]))),
         horizon,
         futures,
         settings.limits.truncation(own.meas_dim),
     )
 
 
-def forms_of(motion: Motion, sensor: Sensor, dt: float, state_dim: int) -> Forms:
-    """The forms of models as kernels take them, over steps of `dt` seconds."""
+def forms_of(motion: Motion, sensor: Sensor, dt: float, state_dim: int, turns: bool = False) -> Forms:
+    """The forms of models as kernels take them, over steps of `dt` seconds.
+
+    turns: whether the sensor is a turning radar, whose measurements have none of the forms.
+    """
     is_linear = motion.method == LINEARISED and (motion.transition, motion.process_noise_cov) in _LINEAR
     if is_linear:
         functions = motion.transition_jacobian, motion.process_noise_cov
@@ -88,9 +92,9 @@ def forms_of(motion: Motion, sensor: Sensor, dt: float, state_dim: int) -> Forms
         int(is_linear),
         step[0],
         step[1],
-        _MEASUREMENTS.get(sensor.measurement, ANY),
-        _NOISES.get(sensor.measurement_noise_cov, ANY),
-        _DETECTIONS.get(sensor.prob_detection, ANY),
+        ANY if turns else _MEASUREMENTS.get(sensor.measurement, ANY),
+        ANY if turns else _NOISES.get(sensor.measurement_noise_cov, ANY),
+        ANY if turns else _DETECTIONS.get(sensor.prob_detection, ANY),
         MAX_PROB_DETECTION,
     )
 

@@ -9,12 +9,14 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
-from vedette.kernels.gaussian.beam import OWN_VELOCITY
+from vedette.kernels.gaussian.beam import BEAM, OWN_VELOCITY
 from vedette.models.arguments import reject
+from vedette.models.turns import is_turn, lags
 from vedette.platforms.compass import course_deg
 from vedette.quantities import COMPONENTS, PLACED, QUANTITIES, is_doppler, si_column
 from vedette.recorded.conventions import OWN_SPEEDS
 from vedette.recorded.extents import places_of
+from vedette.recorded.turns import bearings_of
 from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_scan_times, build_true_sensors, drop_outs
 from vedette.scenarios.sections.recording import RecordingSection, sites_of
@@ -81,8 +83,9 @@ def _recorded(record: RunRecord, section: RecordingSection, scenario: Scenario) 
 def scan_table(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
     """The scans of a run by columns, a row a measurement, as `vedette.recorded.parse_scans` reads them.
 
-    `time`, `sensor`, what the sensors measure (`bearing_deg`, `range_m`, `range_rate_mps`, `x_m`, `y_m`), and where
-    they were (`own_x_m`, `own_y_m`, `own_heading_deg`; where range rates are measured `own_vx_mps`, `own_vy_mps`).
+    `time` (for a turning radar, the time at which its beam passed), `sensor`, the measured quantities (`bearing_deg`,
+    `range_m`, `range_rate_mps`, `x_m`, `y_m`), and where the sensors were (`own_x_m`, `own_y_m`, `own_heading_deg`;
+    with range rates also `own_vx_mps`, `own_vy_mps`).
     Angles are degrees clockwise from true north where every sensor with a bearing has a compass; else they are
     `bearing_rad` and `own_heading_rad` from the east, which a reader must be told (`bearings: east`). What biases the
     scenario knows of are taken off.
@@ -108,11 +111,19 @@ def scan_table(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
             if scan is None:
                 continue
             heading = float(course_deg(site.north, pose[2], pose)) if compass else float(pose[2])
-            placed = zip(own, (*pose[:2], heading, *pose[OWN_VELOCITY:]), strict=False)
-            of_all = {"time": time, "sensor": site.name, **dict(placed)}
             columns = [names[name] for name in COMPONENTS[site.kind]]
-            for row in (site.told(scan.measurements, pose) if compass else scan.measurements).tolist() or [()]:
-                cells = {**of_all, **dict(zip(columns, row, strict=False))}
+            rows = (site.told(scan.measurements, pose) if compass else scan.measurements).tolist() or [()]
+            bearings = bearings_of(scan.measurements, pose, site.kind)
+            after = lags(bearings, pose).tolist() if is_turn(pose) and len(bearings) else [0.0] * len(rows)
+            for row, lag in zip(rows, after, strict=True):
+                place = pose[:2] + lag * pose[OWN_VELOCITY:BEAM] if lag else pose[:2]
+                placed = zip(own, (*place, heading, *pose[OWN_VELOCITY:]), strict=False)
+                cells = {
+                    "time": time + lag,
+                    "sensor": site.name,
+                    **dict(placed),
+                    **dict(zip(columns, row, strict=False)),
+                }
                 for name, column in table.items():
                     column.append(cells.get(name))
     return table

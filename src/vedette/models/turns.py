@@ -1,4 +1,4 @@
-"""Turns of a radar's beam: how a pose tells them, and when the beam points where."""
+"""Turning radars: poses with a beam, and the time at which the beam points in a direction."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from vedette.models.arguments import float_array, pose_vector, positive
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """How a radar turns.
+    """Rotation of a radar.
 
     Attributes:
-        period: s, of one turn.
-        clockwise: seen from above, as most radars do.
+        period: time of one turn, s.
+        clockwise: direction seen from above.
 
     Raises:
-        InputError: a period that is not above 0.
+        InputError: the period is not above 0.
     """
 
     period: float
@@ -33,21 +33,21 @@ class Turn:
 
     @property
     def rate(self) -> float:
-        """rad/s, counter-clockwise positive."""
+        """Turn rate, rad/s, counter-clockwise positive."""
         return (-2.0 if self.clockwise else 2.0) * math.pi / self.period
 
 
 def with_beam(pose: ArrayLike, velocity: ArrayLike, bearing: float, rate: float) -> Floats:
-    """Return the pose of a scan that is a turn of the beam; see `vedette.kernels.gaussian.beam`.
+    """Return the pose of a scan that is one turn of the beam; see `vedette.kernels.gaussian.beam`.
 
     Args:
         pose: (3 or more,) of the sensor at the time of the scan, the middle of the turn.
         velocity: (2,) of the sensor, m/s.
-        bearing: of the beam then, rad from east.
-        rate: rad/s, counter-clockwise positive; 0: nothing turns.
+        bearing: of the beam at that time, rad from east.
+        rate: turn rate, rad/s, counter-clockwise positive; 0: the sensor does not turn.
 
     Raises:
-        InputError: arrays of other shapes, or with numbers that are not finite.
+        InputError: an array has another shape or a number that is not finite.
     """
     own = pose_vector("pose", pose)
     found = np.zeros(max(len(own), BEAM + 2))
@@ -58,12 +58,12 @@ def with_beam(pose: ArrayLike, velocity: ArrayLike, bearing: float, rate: float)
 
 
 def is_turn(pose: Floats) -> bool:
-    """Whether the pose is of a scan that is a turn of the beam."""
+    """Return True if the pose belongs to a scan that is one turn of the beam."""
     return len(pose) > BEAM + 1 and bool(pose[BEAM + 1] != 0.0)
 
 
 def lags(bearings: Floats, pose: Floats) -> Floats:
-    """(num,) s after the time of the scan at which the beam points in directions (rad); 0 of a scan at one time."""
+    """Return when the beam points in each direction, shape (num,), s after the scan time; 0 without a turn."""
     if not is_turn(pose):
         return np.zeros(len(bearings))
     off = np.remainder(bearings - pose[BEAM] + math.pi, 2.0 * math.pi) - math.pi
@@ -71,12 +71,12 @@ def lags(bearings: Floats, pose: Floats) -> Floats:
 
 
 def longest_lag(pose: Floats) -> float:
-    """s, half a turn; 0 of a scan at one time."""
+    """Return half the time of a turn, s; 0 without a turn."""
     return math.pi / abs(float(pose[BEAM + 1])) if is_turn(pose) else 0.0
 
 
 def own_places(bearings: Floats, pose: Floats) -> Floats:
-    """(num, 2) where the sensor is when it measures in directions (rad), m."""
+    """Return the sensor's position when its beam points in each direction (rad), shape (num, 2), m."""
     if not is_turn(pose):
         return np.broadcast_to(pose[:2], (len(bearings), 2))
     return np.asarray(pose[:2] + lags(bearings, pose)[:, np.newaxis] * pose[OWN_VELOCITY:BEAM])

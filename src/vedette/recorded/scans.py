@@ -13,7 +13,6 @@ from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.kernels.gaussian.beam import OWN_VELOCITY
 from vedette.models.bias import NO_BIAS
-from vedette.models.turns import Turn
 from vedette.quantities import ANGLES, COMPONENTS, PLACED, QUANTITIES, is_doppler
 from vedette.recorded.columns import ScanColumns
 from vedette.recorded.conventions import MOST, ONE_PLACE, ONE_PLACE_SHARE, OVER_A_TURN, OWN_SPEEDS, UNITS, Conventions
@@ -36,7 +35,7 @@ from vedette.recorded.tables import (
     number,
     seconds,
 )
-from vedette.recorded.turns import bearings_of, found_turn, swept
+from vedette.recorded.turns import bearings_of, scans_of_turns
 from vedette.simulation.records import ScansFile
 from vedette.text import shown
 
@@ -245,16 +244,15 @@ def _at_instants(rows: list[_Row], how: _Rows, skipped: tuple[str, ...]) -> Reco
 
 
 def _looks_of_turns(rows: list[_Row], sensor: int, site: Site) -> list[Look] | None:
-    """The scans of a turning radar; None: it does not turn, or nobody knows how."""
+    """Return the scans of a turning radar; None without a turn."""
     own = [row for row in rows if row.measured is not None]
-    if site.turn == "none" or not own:
+    if not own:
         return None
     times, poses, scan = np.array([row.time for row in own]), np.array([row.pose for row in own]), _scan(own, site)
-    bearings = bearings_of(scan, poses, site.kind)
-    turn = found_turn(times, bearings) if site.turn == "found" and len(bearings) else site.turn
-    if not isinstance(turn, Turn):
+    scans = scans_of_turns(times, bearings_of(scan, poses, site.kind), poses, site.turn)
+    if scans is None:
         return None
-    return [Look(each.time, sensor, scan[each.rows], each.pose) for each in swept(times, bearings, poses, turn)]
+    return [Look(each.time, sensor, scan[each.rows], each.pose) for each in scans]
 
 
 def _groups(rows: list[_Row], gather: float) -> list[list[_Row]]:

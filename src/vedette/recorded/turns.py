@@ -1,4 +1,4 @@
-"""Turns of a radar in the rows of a recording: found from bearings and times, and rows put into scans of one turn."""
+"""Turning radars in recordings: find the turn in bearings and times, and group rows into scans of one turn each."""
 
 from __future__ import annotations
 
@@ -11,16 +11,17 @@ from vedette.kernels.base.types import Floats, Ints
 from vedette.models.turns import Turn, with_beam
 from vedette.quantities import COMPONENTS
 
-# What a sensor's scans are: turns as given; as its rows show, if they do; or rows of one time.
+# The scans of a sensor: turns as given ("found": as found in its rows, if any), or rows with one time ("none").
 Turning = Turn | Literal["found", "none"]
 
 _FEWEST_ROWS, _FEWEST_TURNS = 16, 3.0  # of which a turn is found
-_PERIODS = 0.5, 60.0  # s, least and largest of turns that are found
-_SEARCHED_ROWS, _SEARCHED_TIME = 300, 300.0  # rows and seconds by which the period is found; all rows refine it
-_STEPS = 8.0  # frequencies tried in the width of a peak
-# Mean of the unit vectors at what is left of bearings without the turn: 1 of an exact beam, e^(-s^2 / 2) with noise s.
+_PERIODS = 0.5, 60.0  # s, shortest and longest turn that is found
+_SEARCHED_ROWS, _SEARCHED_TIME = 300, 300.0  # number of rows and seconds that the search for a period uses
+_STEPS = 8.0  # frequencies tried within the width of a peak
+# Length of the mean unit vector of bearing minus beam: 1 without noise, exp(-s^2 / 2) with noise of s radians. The
+# first threshold is for trial frequencies, the second for the refined rate.
 _ALIKE, _FOUND = 0.95, 0.98
-_ANYWHERE = 0.98  # the same of the bearings themselves, above which they are nearly one and show no turn
+_ANYWHERE = 0.98  # the same for the bearings alone: above it they are nearly equal and show no turn
 _FEWEST_PLACES = 4  # of rows that tell how a sensor moves
 _SECTORS, _NEAR = 72, 12  # directions in which rows are counted, and how many on a side count as near
 
@@ -34,7 +35,7 @@ def bearings_of(scan: Floats, poses: Floats, kind: str) -> Floats:
 
 
 class Swept(NamedTuple):
-    """A scan of one turn: its time, the rows that are in it, and the pose with the beam."""
+    """A scan of one turn: its time (s), the indices of its rows, and the pose with the beam."""
 
     time: float
     rows: Ints
@@ -42,16 +43,19 @@ class Swept(NamedTuple):
 
 
 def found_turn(times: Floats, bearings: Floats) -> Turn | None:
-    """Return how a radar turns by its rows; None where they show no turn.
+    """Return the turn that the rows of a radar show; None without one.
 
-    The slowest turn that leaves bearings nearly alike is taken: a faster one that passes the same directions at the
-    same times says less.
+    This is the slowest turn that explains the bearings by the times. A faster one may pass the same directions at the
+    same times. Rows with equal times and different bearings rule a turn out.
 
     Args:
         times: (num_rows,) s, increasing.
         bearings: (num_rows,) rad from east.
     """
     if len(times) < _FEWEST_ROWS or abs(np.exp(1j * bearings).mean()) > _ANYWHERE:
+        return None
+    at_once = np.flatnonzero(np.diff(times) == 0.0)
+    if len(at_once) and np.cos(bearings[at_once + 1] - bearings[at_once]).mean() < _FOUND:
         return None
     some = np.flatnonzero(times <= times[0] + _SEARCHED_TIME)[:_SEARCHED_ROWS]
     near, beams, span = times[some] - times[0], np.exp(1j * bearings[some]), float(times[some[-1]] - times[0])
@@ -70,7 +74,7 @@ def found_turn(times: Floats, bearings: Floats) -> Turn | None:
 
 
 def _refined(times: Floats, bearings: Floats, rate: float) -> float:
-    """The rate with the line through what it leaves of the bearings added, twice."""
+    """Return the rate after two linear fits of the residual bearings."""
     for _ in range(2):
         left = np.exp(1j * (bearings - rate * times))
         middle = left.mean()
@@ -79,7 +83,7 @@ def _refined(times: Floats, bearings: Floats, rate: float) -> float:
 
 
 class _Beam:
-    """Where a beam pointed at any time: a steady turn, and what the rows about a time say beyond it."""
+    """Bearing of the beam as a function of time: a steady turn plus the mean residual of the rows near that time."""
 
     def __init__(self, times: Floats, bearings: Floats, turn: Turn) -> None:
         self.rate, self._start = turn.rate, float(times[0])
@@ -97,27 +101,35 @@ class _Beam:
         self._at, self._phases = np.array(centres), np.array(phases)
 
     def at(self, times: Floats) -> Floats:
-        """(num,) the bearing at times, rad, not wrapped."""
+        """Bearing at each time, shape (num,), rad, not wrapped."""
         return np.asarray(self.rate * (times - self._start) + np.interp(times, self._at, self._phases))
 
     def when(self, bearing: float) -> float:
-        """s at which it has turned to a bearing that is not wrapped."""
+        """Time (s) at which the beam reaches a bearing that is not wrapped."""
         time = self._start + (bearing - self._phases[0]) / self.rate
         for _ in range(5):  # the phases change slowly
             time += (bearing - float(self.at(np.array([time]))[0])) / self.rate
         return float(time)
 
 
-def swept(times: Floats, bearings: Floats, poses: Floats, turn: Turn) -> list[Swept]:
-    """Return the scans of a turning radar, turns without rows too, from the first row to the last.
+def scans_of_turns(times: Floats, bearings: Floats, poses: Floats, turning: Turning) -> list[Swept] | None:
+    """Return the scans of a turning radar; None if it does not turn, or no turn is given or found. See `swept`."""
+    if turning == "none" or not len(bearings):
+        return None
+    turn = found_turn(times, bearings) if turning == "found" else turning
+    return None if turn is None else swept(times, bearings, poses, turn)
 
-    A turn begins in the direction in which the fewest rows lie, as a target there may be in either turn.
+
+def swept(times: Floats, bearings: Floats, poses: Floats, turn: Turn) -> list[Swept]:
+    """Return the scans of a turning radar from the first row to the last, including turns without rows.
+
+    Turns begin in the direction with the fewest rows, because a target there may be measured in either of two turns.
 
     Args:
         times: (num_rows,) s, increasing.
         bearings: (num_rows,) rad from east.
         poses: (num_rows, 3 or more) of the sensor at each row.
-        turn: how it turns, nearly.
+        turn: nominal turn; the rows refine it.
     """
     beam = _Beam(times, bearings, turn)
     sense, whole = math.copysign(1.0, beam.rate), 2.0 * math.pi
@@ -136,7 +148,7 @@ def swept(times: Floats, bearings: Floats, poses: Floats, turn: Turn) -> list[Sw
 
 
 def _emptiest(bearings: Floats) -> float:
-    """The direction near which the fewest rows lie, rad."""
+    """Direction with the fewest rows nearby, rad."""
     counts, _ = np.histogram(np.remainder(bearings, 2.0 * math.pi), _SECTORS, (0.0, 2.0 * math.pi))
     weights = 1.0 - np.abs(np.arange(-_NEAR, _NEAR + 1)) / (_NEAR + 1.0)
     near = np.convolve(np.concatenate([counts[-_NEAR:], counts, counts[:_NEAR]]), weights, "valid")
@@ -149,7 +161,7 @@ class _Moving(NamedTuple):
 
 
 def _moving(times: Floats, poses: Floats, time: float, period: float) -> _Moving:
-    """The pose at a time and the velocity, by a line through the places of the rows within a turn, or the nearest."""
+    """Return pose and velocity at a time, from a line through the sensor positions of the rows within a turn."""
     nearest = int(np.abs(times - time).argmin())
     pose, own = poses[nearest].copy(), np.flatnonzero(np.abs(times - time) <= period)
     if len(own) < _FEWEST_PLACES:

@@ -48,7 +48,7 @@ def assumed_sections(
 
 
 def _turns(model: ScenarioModel, recording: RecordedScans) -> str:
-    """How the radars turn of which the rows say so alone, in words; empty: none does."""
+    """Describe the turns that were found in the rows, not given; empty if there are none."""
     texts = []
     for s, (name, sensor) in enumerate(zip(model.sensor_names, model.sensors, strict=True)):
         own = [poses[s] for scans, poses in zip(recording.scans, recording.poses, strict=True) if scans[s] is not None]

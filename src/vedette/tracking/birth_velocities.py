@@ -45,12 +45,12 @@ def with_velocities(born: LMB, std: Floats, sensors: Sequence[SensorModel], scan
 
 
 def at_scan_time(born: LMB, poses: Sequence[Floats]) -> LMB:
-    """Take births from where beams passed them to where they are at the time of the scan: x -> x - lag v.
+    """Move births from the time when the beam passed them to the scan time: p -> p - lag v.
 
     Args:
         born: births of one component each.
-        poses: of the sensors that scanned; of several turning ones, the mean of their lags counts, as a birth's place
-            is the mean of theirs.
+        poses: poses of the sensors that scanned. Of several turning sensors the mean lag is used, because the position
+            of a birth is the mean of their measurements.
     """
     turning = [pose for pose in poses if is_turn(pose)]
     if not turning or not born.tracks.num_tracks:

@@ -1,9 +1,10 @@
-"""Where a target is when the turning beam of a radar passes it, and the slope of what is then measured.
+"""Position of a target when the turning beam of a radar passes it, and derivatives of the measurement at that time.
 
-A scan of a turning radar is one turn. Its time is the middle of the turn; a target is passed up to half a turn earlier
-or later, and until then both the target and the radar move straight on. The pose of such a scan has the radar's
-velocity in components 6 and 7, the bearing of the beam in the middle of the turn in component 8 (rad), and the turn
-rate in component 9 (rad/s, counter-clockwise positive). A shorter pose, or a turn rate of 0, is of a scan at one time.
+A scan of a turning radar is one turn, and its time is the middle of the turn. The beam passes a target up to half a
+turn earlier or later; target and radar have constant velocity in between. The pose of such a scan holds the velocity of
+the radar in components 6 and 7 (m/s), the bearing of the beam in the middle of the turn in component 8 (rad), and the
+turn rate in component 9 (rad/s, counter-clockwise positive). With a shorter pose or a turn rate of 0, all measurements
+of the scan have one time.
 """
 
 from __future__ import annotations
@@ -15,16 +16,16 @@ from vedette.kernels.base.compile import borrowing, inlined
 from vedette.kernels.base.types import Floats
 from vedette.kernels.gaussian.scratch import wrap_angle
 
-OWN_VELOCITY = 6  # first component of a pose that is of its velocity, m/s
-BEAM = 8  # bearing of the beam in the middle of the turn, rad; the turn rate follows, rad/s
+OWN_VELOCITY = 6  # index in a pose of the sensor's velocity (two components), m/s
+BEAM = 8  # index in a pose of the beam's bearing in the middle of the turn, rad; the turn rate follows, rad/s
 _NEWTON_STEPS = 3
 
 
 class Passage(NamedTuple):
-    """A target as the beam passes it.
+    """A target at the time when the beam passes it.
 
-    dx, dy: its offset from the sensor then, m. vx, vy: its velocity relative to the sensor, m/s. lag: when, s after the
-    time of the scan; 0 of a scan at one time.
+    dx, dy: offset from the sensor, m. vx, vy: velocity relative to the sensor, m/s. lag: that time, s after the time of
+    the scan; 0 if all measurements have one time.
     """
 
     dx: float
@@ -36,19 +37,19 @@ class Passage(NamedTuple):
 
 @inlined
 def turns(pose: Floats) -> bool:
-    """Whether the pose is of a scan by a turning beam."""
+    """Return True if the pose belongs to a scan of a turning beam."""
     return pose.shape[0] > BEAM + 1 and pose[BEAM + 1] != 0.0
 
 
 @inlined
 def own_lag(bearing: float, pose: Floats) -> float:
-    """Seconds from the time of a turn to when its beam points in a direction, in half a turn either way."""
+    """Return the time at which the beam points in a direction, s after the scan time, within half a turn."""
     return wrap_angle(bearing - pose[BEAM]) / pose[BEAM + 1]
 
 
 @borrowing
 def _passage(state: Floats, pose: Floats) -> Passage:
-    """Solves theta(lag) = bearing + rate * lag by Newton's method, from the direction at the time of the scan."""
+    """Solve theta(lag) = bearing + rate * lag by Newton's method, starting from the direction at the scan time."""
     x, y = state[0] - pose[0], state[1] - pose[1]
     moves = state.shape[0] >= 4
     vx = (state[2] if moves else 0.0) - pose[OWN_VELOCITY]
@@ -58,9 +59,9 @@ def _passage(state: Floats, pose: Floats) -> Passage:
     for _ in range(_NEWTON_STEPS):
         square = dx * dx + dy * dy
         turning = (dx * vy - dy * vx) / square if square > 0.0 else 0.0
-        if abs(turning) > 0.5 * abs(rate):  # so near that it outruns the beam: it is passed where it stood
+        if abs(turning) > 0.5 * abs(rate):  # a target this close may outrun the beam: use its position at the scan time
             return Passage(x, y, vx, vy, 0.0)
-        # The lag may leave half a turn by this, so the residual alone is wrapped.
+        # Only the residual is wrapped: the lag itself may exceed half a turn.
         lag += wrap_angle(math.atan2(dy, dx) - pose[BEAM] - rate * lag) / (rate - turning)
         dx, dy = x + vx * lag, y + vy * lag
     return Passage(dx, dy, vx, vy, lag)
@@ -68,7 +69,7 @@ def _passage(state: Floats, pose: Floats) -> Passage:
 
 @inlined
 def passage(state: Floats, pose: Floats) -> Passage:
-    """A target as the beam passes it; at the time of the scan where nothing turns, its velocity then not worked out."""
+    """Return the target at its passage; at the scan time, with velocity 0, if the sensor does not turn."""
     if turns(pose):
         return _passage(state, pose)
     return Passage(state[0] - pose[0], state[1] - pose[1], 0.0, 0.0, 0.0)
@@ -76,14 +77,14 @@ def passage(state: Floats, pose: Floats) -> Passage:
 
 @inlined
 def offset_at_beam(state: Floats, pose: Floats) -> tuple[float, float]:
-    """The target's offset from the sensor as the beam passes it, m."""
+    """Return the target's offset from the sensor when the beam passes it, m."""
     at = passage(state, pose)
     return at.dx, at.dy
 
 
 @inlined
 def own_place(bearing: float, pose: Floats) -> tuple[float, float]:
-    """Where the sensor is when it measures in a direction, m."""
+    """Return the sensor's position when the beam points in a direction, m."""
     if not turns(pose):
         return pose[0], pose[1]
     lag = own_lag(bearing, pose)
@@ -92,16 +93,16 @@ def own_place(bearing: float, pose: Floats) -> tuple[float, float]:
 
 @inlined
 def to_scan_time(at: Passage, pose: Floats, moves_with_target: bool, out: Floats) -> None:
-    """Make derivatives (meas_dim, state_dim) by the state at the passage those by the state at the time of the scan.
+    """Convert derivatives (meas_dim, state_dim) by the state at the passage into those by the state at the scan time.
 
-    With p the position, v the velocity and b the gradient of the bearing, lag changes by
+    With position p, velocity v and bearing gradient b, the lag changes by
 
         d lag = b' (dp + lag dv) / (rate - b' v),
 
     and the offset by dp + lag dv + v d lag.
 
-    at: the passage. moves_with_target: whether what is measured is a place, which moves with the target alone, and not
-    an offset from the sensor.
+    at: the passage. moves_with_target: True if the measurement is the target's position, False if it depends on the
+    offset from the sensor.
     """
     square = at.dx * at.dx + at.dy * at.dy
     if at.lag == 0.0 or square == 0.0:

@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-import numpy as np
 from pydantic import Field, create_model
 
 from vedette.kernels.gaussian.beam import BEAM
@@ -19,17 +18,14 @@ from vedette.scenarios.sections.base import (
     DetectionAt,
     GaussianMethod,
     Name,
-    NonNegative,
     Point,
     Positive,
-    Probability,
     Section,
-    Share,
-    Step,
     check,
 )
 from vedette.scenarios.sections.derived import of_kind
 from vedette.scenarios.sections.platforms import AnyPlatform
+from vedette.scenarios.sections.scan_times import ScanTimes
 from vedette.scenarios.sections.sensing import (
     Clutter,
     Detection,
@@ -42,87 +38,9 @@ from vedette.scenarios.sections.sensing import (
 from vedette.scenarios.sections.true_sensors import BiasSection, TrueSensor, built_parts
 
 if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
-    from vedette.kernels.base.types import Bools
     from vedette.models import Region, SensorModel
     from vedette.models.turns import Turn
-    from vedette.scenarios.sections.world import Time
     from vedette.simulation import TrueSensor as TrueSensorModel
-    from vedette.tracking import Delay
-
-
-class LateSection(Section):
-    """Scans that come late, and are put in their places when they do."""
-
-    share: Probability = Field(default=1.0, description="Probability that a scan is late [-].")
-    up_to: Positive = Field(description="By how much, uniform from 0 [s].")
-    start: float | None = Field(default=None, description="Scans taken before come at once; none: none does [s].")
-    end: float | None = Field(default=None, description="Scans taken after it come at once; none: none does [s].")
-    window: NonNegative | None = Field(
-        default=None, description="A scan that is later than this is lost; none: none is [s]."
-    )
-
-    @check
-    def _in_order(self) -> Iterator[Finding]:
-        if self.start is not None and self.end is not None and self.start > self.end:
-            yield ("end",), f"a time from start on, {self.start:g} s", describe(self.end)
-
-    def build(self) -> Delay:
-        """What a tracker delays its scans by."""
-        from vedette.tracking import Delay
-
-        given = {name: value for name, value in self.model_dump().items() if value is not None}
-        return Delay(**given)
-
-
-class ScanTimes(Section):
-    """When a sensor scans: at the first step and every so many after it, by steps or by seconds."""
-
-    every: Step = Field(default=1, description="Steps from one scan to the next [-].")
-    first: Step = Field(default=1, description="Step of the first scan [-].")
-    period: Positive | None = Field(
-        default=None, description="Time from one scan to the next, a whole number of steps, instead of every [s]."
-    )
-    offset: NonNegative | None = Field(
-        default=None, description="Time of the first scan after the first step, instead of first [s]."
-    )
-    drop_out: Share | None = Field(
-        default=None,
-        description="Probability that a scan does not take place, of which decisions know nothing; none: all do [-].",
-    )
-    late: LateSection | None = Field(default=None, description="How its scans come late; none: all at once [-].")
-
-    @check
-    def _within_the_first_round(self) -> Iterator[Finding]:
-        if self.first > self.every:
-            yield ("first",), f"a step up to every, {self.every}", describe(self.first)
-
-    @check
-    def _steps_or_seconds(self) -> Iterator[Finding]:
-        if self.period is not None and (self.every, self.first) != (1, 1):
-            yield ("period",), "either every and first, or period and offset", "both"
-        elif self.offset is not None and (self.period is None or self.offset >= self.period):
-            wanted = "a time below that of period, with it" if self.period else "a period with it"
-            yield ("offset",), wanted, describe(self.offset)
-
-    def findings_beside(self, step_period: float) -> Iterator[Finding]:
-        """What is wrong with it where steps are so many seconds apart."""
-        for name in ("period", "offset"):
-            value = getattr(self, name)
-            if value is not None and abs(value - round(value / step_period) * step_period) > 1e-6 * step_period:
-                yield (name,), f"a multiple of time.step_period, {step_period:g} s", describe(value)
-        if self.period is not None and self.period < 0.5 * step_period:
-            yield ("period",), f"at least time.step_period, {step_period:g} s", describe(self.period)
-
-    def steps(self, step_period: float) -> tuple[int, int]:
-        """Steps from one scan to the next, and the first of them."""
-        if self.period is None:
-            return self.every, self.first
-        return round(self.period / step_period), 1 + round((self.offset or 0.0) / step_period)
-
-    def build(self, time: Time) -> Bools:
-        """(num_steps,) whether it scans, but for drop-outs."""
-        every, first = self.steps(time.step_period)
-        return np.asarray((np.arange(1, time.num_steps + 1) - first) % every == 0)
 
 
 class TurnSection(Section):
