@@ -21,7 +21,7 @@ from vedette.recorded import Conventions, RecordedScans, Site, parse_scans
 from vedette.recorded.tables import Table
 from vedette.recorded.turns import found_turn, swept
 from vedette.scenarios import load_scenario
-from vedette.scenarios.of_recording import scenario_of_recording
+from vedette.scenarios.of_recording import scenario_of_recording, scenario_of_sensors
 from vedette.scenarios.sections.recording import sites_of
 
 
@@ -116,6 +116,15 @@ def test_a_line_tells_a_turn_by_the_times_of_its_measurements() -> None:
             read_message(json.dumps(line).encode(), "line", [site], how)
         with pytest.raises(InputError, match=r"times: expected none, as the sensors file gives no `turn`"):
             read_message(json.dumps({**line, "times": times}).encode(), "line", still, how)
+
+
+def test_a_sensors_file_gives_a_turn_of_any_period(tmp_path: Path) -> None:
+    write(tmp_path, {}, {"R": (0.0, 0.0)})
+    file = tmp_path / "radars.yaml"
+    text = file.read_text("utf-8").replace("name: R,", "name: R, turn: {period: 5.0},")
+    file.write_text(f"region: {{x_min: -60000, x_max: 60000, y_min: -60000, y_max: 60000}}\n{text}", "utf-8")
+    (site,) = sites_of(scenario_of_sensors(file, speed=250.0).scenario.model)
+    assert site.turn == Turn(5.0)
 
 
 def test_a_radar_that_moves_in_its_turn(tmp_path: Path) -> None:
