@@ -11,7 +11,7 @@ from scipy import stats
 from reference.differences import central_differences
 from vedette import models
 from vedette.errors import InputError
-from vedette.kernels.gaussian.beam import OWN_VELOCITY
+from vedette.kernels.base.types import OWN_VELOCITY
 from vedette.kernels.gaussian.innovation import expect_measurement, make_innovation
 from vedette.kernels.gaussian.scratch import make_scratch
 from vedette.models.clutter import at_raw_measurements

@@ -16,7 +16,7 @@ from vedette.calibration import calibrate
 from vedette.errors import InputError, ScenarioError
 from vedette.evaluation.metrics import ospa_of_run
 from vedette.evaluation.scans import scan_table
-from vedette.kernels.gaussian.beam import OWN_VELOCITY
+from vedette.kernels.base.types import OWN_VELOCITY
 from vedette.live import live_of
 from vedette.live.messages import read_message
 from vedette.recorded import Conventions, Site, parse_scans

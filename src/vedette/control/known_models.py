@@ -68,7 +68,7 @@ def decision_of(
         nobody(targets.state_dim),
         motion,
         sees,
-        forms_of(motion, sees, horizon.dt, targets.state_dim, any(map(is_turn, courses[:, 0]))),
+        forms_of(motion, sees, horizon.dt, targets.state_dim, is_turn(courses[:, 0])),
         horizon,
         futures,
         settings.limits.truncation(own.meas_dim),

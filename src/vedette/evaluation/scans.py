@@ -8,8 +8,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.kernels.base.types import Floats
-from vedette.kernels.gaussian.beam import BEAM, OWN_VELOCITY
+from vedette.kernels.base.types import BEAM, OWN_VELOCITY, Floats
 from vedette.models.arguments import reject
 from vedette.models.turns import is_turn, lags
 from vedette.platforms.compass import course_deg

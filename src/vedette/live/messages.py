@@ -10,8 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.kernels.base.types import Floats
-from vedette.kernels.gaussian.beam import BEAM, OWN_VELOCITY
+from vedette.kernels.base.types import BEAM, OWN_VELOCITY, Floats
 from vedette.models.arguments import reject
 from vedette.models.turns import Turn, with_beam
 from vedette.quantities import COMPONENTS, is_doppler

@@ -14,8 +14,8 @@ import math
 import numpy as np
 
 from vedette.kernels.base.compile import inlined
-from vedette.kernels.base.types import Floats
-from vedette.kernels.gaussian.beam import OWN_VELOCITY, offset_at_beam, passage, to_scan_time
+from vedette.kernels.base.types import OWN_VELOCITY, Floats
+from vedette.kernels.gaussian.beam import offset_at_beam, passage, to_scan_time
 from vedette.models.fields import part
 from vedette.models.functions import model_function
 from vedette.models.measurement import MeasurementModel

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vedette.kernels.base.types import Floats
-from vedette.kernels.gaussian.beam import BEAM, OWN_VELOCITY
+from vedette.kernels.base.types import BEAM, OWN_VELOCITY, Floats
 from vedette.models.arguments import float_array, pose_vector, positive
 
 
@@ -57,9 +56,9 @@ def with_beam(pose: ArrayLike, velocity: ArrayLike, bearing: float, rate: float)
     return found
 
 
-def is_turn(pose: Floats) -> bool:
-    """Return True if the pose belongs to a scan that is one turn of the beam."""
-    return len(pose) > BEAM + 1 and bool(pose[BEAM + 1] != 0.0)
+def is_turn(poses: Floats) -> bool:
+    """Return True if a pose, or any of several, shape (..., pose_dim), is that of a scan of one turn of the beam."""
+    return poses.shape[-1] > BEAM + 1 and bool(np.any(poses[..., BEAM + 1]))
 
 
 def lags(bearings: Floats, pose: Floats) -> Floats:

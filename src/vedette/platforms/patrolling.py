@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.kernels.base.types import Bools, Floats
-from vedette.kernels.gaussian.beam import BEAM
+from vedette.kernels.base.types import BEAM, Bools, Floats
 from vedette.models.arguments import float_array, positive
 from vedette.platforms.base import Platform, check_platform, courses_of, prices_of, scans_of
 

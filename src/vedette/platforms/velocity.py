@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vedette.kernels.base.types import Bools, Floats
-from vedette.kernels.gaussian.beam import OWN_VELOCITY
+from vedette.kernels.base.types import OWN_VELOCITY, Bools, Floats
 from vedette.platforms.base import Platform, check_platform, courses_of, prices_of, scans_of
 
 _STEP = 1e-3  # s, of the differences that velocities are taken from

@@ -10,8 +10,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vedette.kernels.base.types import Floats
-from vedette.kernels.gaussian.beam import BEAM
+from vedette.kernels.base.types import BEAM, Floats
 from vedette.models import Bias
 from vedette.models.arguments import float_array
 from vedette.models.bias import NO_BIAS, with_offsets

@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.kernels.base.types import Floats
-from vedette.kernels.gaussian.beam import OWN_VELOCITY
+from vedette.kernels.base.types import OWN_VELOCITY, Floats
 from vedette.models.bias import NO_BIAS
 from vedette.quantities import ANGLES, COMPONENTS, PLACED, QUANTITIES, is_doppler
 from vedette.recorded.columns import ScanColumns

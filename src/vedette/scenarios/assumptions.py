@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.kernels.base.types import Floats
-from vedette.kernels.gaussian.beam import BEAM
+from vedette.kernels.base.types import BEAM, Floats
 from vedette.models.turns import is_turn
 from vedette.recorded import RecordedScans
 from vedette.scenarios.assumed_clutter import assumed_clutter, place_stds

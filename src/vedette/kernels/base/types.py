@@ -14,6 +14,9 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
+OWN_VELOCITY = 6  # index in a pose of the sensor's velocity (two components), m/s
+BEAM = 8  # index in a pose of the beam's bearing in the middle of a turn, rad; the turn rate follows, rad/s
+
 
 class Mixture(NamedTuple):
     """Gaussian components: one mixture of any total weight, or several that offsets tell apart.

@@ -13,11 +13,9 @@ import math
 from typing import NamedTuple
 
 from vedette.kernels.base.compile import borrowing, inlined
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import BEAM, OWN_VELOCITY, Floats
 from vedette.kernels.gaussian.scratch import wrap_angle
 
-OWN_VELOCITY = 6  # index in a pose of the sensor's velocity (two components), m/s
-BEAM = 8  # index in a pose of the beam's bearing in the middle of the turn, rad; the turn rate follows, rad/s
 _NEWTON_STEPS = 3
 
 

@@ -12,8 +12,7 @@ import numpy as np
 
 from vedette.control import MobileSensor
 from vedette.filters import Filter, TwoStepFilter
-from vedette.kernels.base.types import Bools, Floats
-from vedette.kernels.gaussian.beam import OWN_VELOCITY
+from vedette.kernels.base.types import OWN_VELOCITY, Bools, Floats
 from vedette.models import SensorModel, TargetModel
 from vedette.platforms import Actions, ByCompass, Operated, Patrolling, Platform
 from vedette.platforms.base import SWITCH, actions_at

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field, create_model
 
-from vedette.kernels.gaussian.beam import BEAM
+from vedette.kernels.base.types import BEAM
 from vedette.plausible import told_elsewhere
 from vedette.quantities import is_doppler
 from vedette.scenarios.faults import Finding, describe
