@@ -18,8 +18,8 @@ from scenes import Scene
 from vedette.densities import Labelled, cardinality_distribution
 from vedette.errors import ScenarioError
 from vedette.evaluation import ospa_of_run
+from vedette.internal.unit_warnings import suppress_unit_warnings
 from vedette.models import CellGrid
-from vedette.plausible import told_elsewhere
 from vedette.scenarios import Scenario, with_fields
 from vedette.scenarios.build import build_experiment
 from vedette.simulation import World
@@ -235,7 +235,7 @@ class _Scores:
         names = Names(world.experiment.tracker.targets.birth)
         labels, places = np.zeros((len(EXISTENCES) - 1, 3)), np.zeros((len(NUMBERS) - 1, 3))
         numbers, estimates = np.zeros((truth.num_scans, 4)), []
-        with told_elsewhere():
+        with suppress_unit_warnings():
             while not world.is_over:
                 moment = world.step()
                 ids, states = truth.at(moment.step - 1)

@@ -29,8 +29,8 @@ from timing import Measure, Once
 from vedette.densities import Estimate
 from vedette.evaluation import ospa
 from vedette.filters import TwoStepFilter
+from vedette.internal.processes import end_with_parent
 from vedette.models import SensorModel, TargetModel
-from vedette.processes import end_with_parent
 from vedette.scenarios import GeneratedCrowd, Scenario, crowd_text, parse_scenario, with_fields
 from vedette.scenarios.build import build_experiment
 from vedette.simulation import Experiment, Truth, simulate_scan

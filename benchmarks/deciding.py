@@ -37,8 +37,8 @@ from timed_planner import Timed
 from vedette.evaluation.metrics import match_run, ospa_of_run
 from vedette.evaluation.statistics import paired_difference, summarise
 from vedette.evaluation.tails import tail, tail_header
+from vedette.internal.processes import end_with_parent
 from vedette.kernels.base.types import Floats
-from vedette.processes import end_with_parent
 from vedette.scenarios import Scenario, with_fields
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.simulation import simulate

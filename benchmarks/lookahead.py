@@ -40,8 +40,8 @@ from timed_planner import Timed
 from vedette.evaluation.metrics import ospa_of_run
 from vedette.evaluation.runs import measure_run
 from vedette.evaluation.tails import tail, tail_header
+from vedette.internal.processes import end_with_parent
 from vedette.kernels.base.types import Floats
-from vedette.processes import end_with_parent
 from vedette.scenarios import Scenario, load_scenario, with_fields
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.scenarios.sections.deciding import Lookahead

@@ -22,7 +22,7 @@ import numpy as np
 from vedette.campaigns import CampaignResults, load_spec
 from vedette.campaigns.results import GroupComparison
 from vedette.evaluation.tails import tails
-from vedette.text import named_in
+from vedette.internal.text import named_in
 
 CAMPAIGNS = Path(__file__).parents[1] / "examples/campaigns"
 STAGES = ("filter", "fusion")

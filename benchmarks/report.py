@@ -30,7 +30,7 @@ from vedette.campaigns.spec import spec_from_data
 from vedette.campaigns.store import Store
 from vedette.evaluation.metrics import encode_metrics
 from vedette.evaluation.runs import measure_run, run_scenario
-from vedette.reading import read_members
+from vedette.internal.reading import read_members
 from vedette.simulation.kept import encode_timings
 
 PLANNERS = ("jdm", "idm", "assigned", "random")

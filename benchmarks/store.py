@@ -36,7 +36,7 @@ from vedette.campaigns.spec import spec_from_data
 from vedette.campaigns.store import Store
 from vedette.evaluation.metrics import RunMetrics, decode_metrics, encode_metrics, measure
 from vedette.evaluation.runs import run_scenario
-from vedette.files import sync_folder
+from vedette.internal.files import sync_folder
 from vedette.scenarios import load_scenario
 from vedette.simulation.arrow import read_table, to_arrow
 from vedette.simulation.kept import encode_timings

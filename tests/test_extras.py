@@ -17,7 +17,7 @@ import typer
 
 from recordings import write_recording
 from vedette.cli import app
-from vedette.extras import EXTRA_OF
+from vedette.internal.extras import EXTRA_OF
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]

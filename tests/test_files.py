@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from vedette.files import write_whole
+from vedette.internal.files import write_whole
 
 
 def test_a_file_appears_whole_and_readable_by_others(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import special
 
-from vedette.probabilities import chi_squared_quantile, expit, log_expit, logit
+from vedette.internal.probabilities import chi_squared_quantile, expit, log_expit, logit
 
 ODDS = np.concatenate([np.linspace(-745.0, 745.0, 2001), np.linspace(-3.0, 3.0, 1001), [0.0, -np.inf, np.inf]])
 

@@ -11,13 +11,13 @@ from pathlib import Path
 
 import pytest
 
-from vedette.processes import as_children
+from vedette.internal.processes import as_children
 from waiting import PATIENCE, wait_until
 
 PARENT = """
 import os, sys, time
 from concurrent.futures import ProcessPoolExecutor
-from vedette import processes
+from vedette.internal import processes
 
 if __name__ == "__main__":
     processes._METHOD = sys.argv[1]

@@ -18,7 +18,7 @@ from vedette.cli.running import Approval
 from vedette.errors import InputError
 from vedette.evaluation.runs import run_scenario
 from vedette.evaluation.scans import scans_of_record
-from vedette.programs import MOST_BYTES, Program
+from vedette.internal.programs import MOST_BYTES, Program
 from vedette.scenarios import Scenario, load_scenario
 from vedette.scenarios.build import build_sensors
 from vedette.scenarios.overrides import with_fields
@@ -275,7 +275,7 @@ def test_bad_estimates_are_named(answer: str, tmp_path: Path) -> None:
 def test_a_program_ends_with_the_process_that_asks_it(tmp_path: Path) -> None:
     (tmp_path / "program.py").write_text(ANSWERS.replace("ANSWER", "pass"))
     code = (
-        "import os, sys; from pathlib import Path; from vedette.programs import Program\n"
+        "import os, sys; from pathlib import Path; from vedette.internal.programs import Program\n"
         f"program = Program([sys.executable, {str(tmp_path / 'program.py')!r}], Path())\n"
         "program.ask({'role': 'planner'}, 20.0); print(program._child.pid, flush=True); os._exit(1)"
     )
@@ -301,7 +301,7 @@ def test_what_a_program_started_ends_with_it_though_it_has_ended(tmp_path: Path)
 PARENT = """
 import sys
 from pathlib import Path
-from vedette.programs import Program
+from vedette.internal.programs import Program
 
 program = Program([sys.executable, "-c", "import time; time.sleep(3600)"], Path())
 print(program._child.pid, flush=True)

@@ -10,8 +10,8 @@ import pytest
 
 from vedette import models
 from vedette.errors import InputError
+from vedette.internal.quantities import COMPONENTS, PLACED, QUANTITIES, in_file, si_column
 from vedette.models.bias import with_offsets
-from vedette.quantities import COMPONENTS, PLACED, QUANTITIES, in_file, si_column
 from vedette.recorded.conventions import UNITS
 from vedette.scenarios.sections.true_sensors import BiasSection
 from vedette.simulation import TrueSensor, simulate_scan

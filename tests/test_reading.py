@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from vedette.reading import parse_json, read_file
+from vedette.internal.reading import parse_json, read_file
 
 
 def test_a_file_takes_the_memory_of_what_is_in_it(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.cells import cell_len
 
-from vedette.text import elided, elided_apart
+from vedette.internal.text import elided, elided_apart
 
 
 def test_the_middle_is_left_out() -> None:

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from vedette.internal.threads import run_chunks
 from vedette.kernels.base.compile import JIT_ENABLED
-from vedette.threads import run_chunks
 from waiting import PATIENCE
 
 each_number_of_threads = pytest.mark.parametrize("num_threads", [1, 2, 5])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from vedette.text import listed
+from vedette.internal.text import listed
 
 
 class VedetteError(Exception):

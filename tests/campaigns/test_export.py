@@ -16,7 +16,7 @@ from vedette.campaigns.export import FORMATS, export_csv, export_netcdf, export_
 from vedette.campaigns.results import open_results
 from vedette.campaigns.tables import in_schema, joined_tables, schema_of, tables_of_runs
 from vedette.errors import InputError
-from vedette.text import spreadsheet_text
+from vedette.internal.text import spreadsheet_text
 
 KEYS = ["cell", "scenario", "planner", "sensors.*.clutter.rate", "run"]
 TABLES = ["runs", "scans", "truth", "tracks", "sensors", "decisions", "actions", "rewards", "timings"]

@@ -202,7 +202,7 @@ def test_a_manifest_that_cannot_be_written_is_named(filled, campaign, monkeypatc
     def fail(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("vedette.files.write_whole", fail)
+    monkeypatch.setattr("vedette.internal.files.write_whole", fail)
     with pytest.raises(InputError, match=r"manifest\.json: expected a file that can be written; .*No space"):
         Store.open(filled, campaign)
     monkeypatch.undo()

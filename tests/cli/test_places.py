@@ -14,7 +14,7 @@ from vedette.campaigns.database import LOCK, lock_of
 from vedette.cli import app
 from vedette.cli.output import trouble_of_system
 from vedette.errors import InputError
-from vedette.files import unwritable, write_file, write_whole
+from vedette.internal.files import unwritable, write_file, write_whole
 from vedette.simulation.storage import check_free
 
 posix = pytest.mark.skipif(os.name == "nt", reason="of POSIX systems")

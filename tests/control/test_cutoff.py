@@ -12,7 +12,7 @@ from control.examples import KNOWN, Situation, decided, situation
 from vedette.control import ExpectedLossReward, HorizonPlanner, IndependentPlanner, JointPlanner, KullbackLeiblerReward
 from vedette.control.prediction import predicted
 from vedette.densities import LMB, at_peaks
-from vedette.probabilities import expit
+from vedette.internal.probabilities import expit
 
 PLANNERS = (JointPlanner, IndependentPlanner, HorizonPlanner)
 

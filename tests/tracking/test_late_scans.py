@@ -296,7 +296,7 @@ def test_what_is_no_snapshot_is_refused(tmp_path: Path) -> None:
 
 def test_no_class_but_the_librarys_data_is_made_of_a_file(tmp_path: Path) -> None:
     path = tmp_path / "some.npz"
-    for module, name in (("os", "system"), ("vedette.files", "write_whole"), ("subprocess", "Popen")):
+    for module, name in (("os", "system"), ("vedette.internal.files", "write_whole"), ("subprocess", "Popen")):
         text = (
             '{"format": "vedette-snapshot", "version": 1, "root": 1, "nodes": '
             f'[["plain", 1], ["object", "{module}", "{name}", {{"a": 0}}]]}}'

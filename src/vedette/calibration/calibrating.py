@@ -13,8 +13,8 @@ import numpy as np
 from vedette.calibration.maximum import Maximum, Terms, covariance, holding, maximise
 from vedette.calibration.parameters import Parameter, Problem
 from vedette.calibration.registration import BIASES, Pairs, linked, matched, register
+from vedette.internal.quantities import COMPONENTS, QUANTITIES
 from vedette.kernels.base.types import Floats
-from vedette.quantities import COMPONENTS, QUANTITIES
 
 _NEARER = 3.0  # times the noise that was found, in the second round
 _QUANTILE = 1.959964  # of the normal distribution, 97.5 %

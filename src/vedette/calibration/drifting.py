@@ -12,9 +12,9 @@ import numpy as np
 
 from vedette.calibration.calibrating import Calibration, calibrate
 from vedette.calibration.parameters import Parameter, Problem
+from vedette.internal.quantities import COMPONENTS
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import float_array, instance, positive
-from vedette.quantities import COMPONENTS
 from vedette.recorded.instants import Look, in_order, without_bias
 from vedette.tracking import SensorScan
 from vedette.tracking.late import name_of, own_scan

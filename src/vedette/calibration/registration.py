@@ -14,8 +14,8 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from vedette.densities import as_lmb, track_moments
+from vedette.internal.quantities import COMPONENTS
 from vedette.kernels.base.types import Bools, Floats, Ints
-from vedette.quantities import COMPONENTS
 from vedette.recorded import RecordedScans, Site
 from vedette.recorded.instants import with_wrapped_angles
 from vedette.tracking import Tracker

@@ -1,8 +1,8 @@
 """Monte Carlo campaigns: many runs of many settings, on one machine or many, kept in a folder that nothing tears."""
 
-from vedette.extras import need
+from vedette.internal.extras import require_packages
 
-need("a campaign", "pyarrow")
+require_packages("a campaign", "pyarrow")
 
 from vedette.campaigns.cells import Campaign, Cell, resolve
 from vedette.campaigns.merging import Merged, merge

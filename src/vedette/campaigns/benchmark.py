@@ -22,7 +22,7 @@ from vedette.campaigns.manifest import MANIFEST, read_manifest
 from vedette.campaigns.results import open_results
 from vedette.campaigns.spec import CampaignSpec
 from vedette.errors import InputError, VedetteError
-from vedette.programs import greeted
+from vedette.internal.programs import start_program
 from vedette.scenarios import GeneratedCrowd
 from vedette.scenarios.build import build_experiment, build_planner, told_of
 from vedette.scenarios.generated import GeneratedScene, scene_text
@@ -164,7 +164,7 @@ def try_entrant(own: Entrant, campaign: Campaign) -> None:
             if isinstance(section, ProgramSection):
                 asked = section.asked(scenario.folder)
                 scene, seconds = told_of(scenario), asked["start_seconds"]
-                greeted(asked["command"], asked["folder"], own.role, scene, rng, seconds)
+                start_program(asked["command"], asked["folder"], own.role, scene, rng, seconds)
     except VedetteError as error:
         raise InputError(f"{own.role} {own.name}: expected one that can be started; {error}") from None
 

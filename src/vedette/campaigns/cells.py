@@ -13,14 +13,14 @@ from typing import Any
 from vedette.campaigns.shards import WHOLE, Shard
 from vedette.campaigns.spec import CampaignSpec, spec_from_data
 from vedette.errors import InputError, ScenarioError
+from vedette.internal.representation import SummaryRepr
+from vedette.internal.text import listed, pluralise, unique_name
 from vedette.scenarios import Scenario, list_builtin, load_scenario
 from vedette.scenarios.build import build_planner
 from vedette.scenarios.dumping import dump_scenario, files_of
 from vedette.scenarios.overrides import with_fields
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.planners import strategy_words
-from vedette.speaking import Speaking
-from vedette.text import counted, listed, unused
 
 _LONGEST_NAME = 120
 _SECTIONS = {"filter": "filter.kind", "fusion": "fusion.kind"}
@@ -49,7 +49,7 @@ class Cell:
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Campaign(Speaking):
+class Campaign(SummaryRepr):
     """A specification with its cells made.
 
     Attributes:
@@ -71,7 +71,7 @@ class Campaign(Speaking):
     shard: Shard = WHOLE
 
     def _summary(self) -> str:
-        return f"{self.name}: {counted(len(self.cells), 'cell')}, {counted(self.total, 'run')}"
+        return f"{self.name}: {pluralise(len(self.cells), 'cell')}, {pluralise(self.total, 'run')}"
 
     def _detail(self) -> str:
         return "; ".join(f"{axis}: {', '.join(map(str, values))}" for axis, values in self.axes.items())
@@ -165,7 +165,7 @@ def resolve(
     varying = [axis for axis, values in axes.items() if len(values) > 1 or axis == "planner"]
     cells: list[Cell] = []
     for settings in spec.settings():
-        name = unused(_name({axis: settings[axis] for axis in varying}, axes), {cell.name for cell in cells})
+        name = unique_name(_name({axis: settings[axis] for axis in varying}, axes), {cell.name for cell in cells})
         cells.append(_cell(name, settings, loaded[settings["scenario"]], spec, changed, approve))
     # Never the scenario unless asked for: runs of different scenarios are not paired.
     candidates = ("planner", *(axis for axis in axes if axis != "scenario"))

@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING
 
 from vedette.campaigns.tasks import Outcome, Task, WorkerDied, perform
 from vedette.errors import InputError, VedetteError
-from vedette.reading import said
-from vedette.text import counted, shown
+from vedette.internal.reading import error_summary
+from vedette.internal.text import pluralise, shown
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -92,7 +92,7 @@ class RemoteWorkers:
         """Return when so many workers are there."""
         self._look()
         if len(self._there) < quorum:
-            self._tell(f"waiting: {len(self._there)} of {counted(quorum, 'worker')} there")
+            self._tell(f"waiting: {len(self._there)} of {pluralise(quorum, 'worker')} there")
         while len(self._there) < quorum:
             time.sleep(_POLL_SECONDS)
             self._look()
@@ -133,10 +133,10 @@ class RemoteWorkers:
         self._num_threads = max(1, sum(threads.values()))
         before, self._there = self._there, frozenset(threads)
         if gone := len(before - self._there):
-            left = f"{counted(len(threads), 'worker')} left" if threads else "waiting: there is no worker"
-            self._tell(f"{counted(gone, 'worker')} gone, whose work is done again; {left}")
+            left = f"{pluralise(len(threads), 'worker')} left" if threads else "waiting: there is no worker"
+            self._tell(f"{pluralise(gone, 'worker')} gone, whose work is done again; {left}")
         elif len(threads) != len(before):
-            self._tell(f"{counted(len(threads), 'worker')}")
+            self._tell(f"{pluralise(len(threads), 'worker')}")
 
 
 def _address_in(file: Path) -> str:
@@ -151,7 +151,7 @@ def _address_in(file: Path) -> str:
         except FileNotFoundError:
             pass
         except (OSError, ValueError, LookupError, TypeError) as error:  # or it is being written
-            problem = said(error)
+            problem = error_summary(error)
         time.sleep(_POLL_SECONDS)
     raise InputError(f"scheduler: expected a file that a dask scheduler writes (--scheduler-file); {file}: {problem}")
 
@@ -184,6 +184,6 @@ def _check_scheduler(address: str, refusal: str) -> None:
     if isinstance(answer, TimeoutError):
         raise InputError(f"{refusal}: it is silent for {_CONNECT_SECONDS:g} s")
     if isinstance(answer, OSError):
-        raise InputError(f"{refusal}: {said(answer)}")
+        raise InputError(f"{refusal}: {error_summary(answer)}")
     if not isinstance(answer, dict) or answer.get("type") != "Scheduler":
         raise InputError(f"{refusal}, but something else does")

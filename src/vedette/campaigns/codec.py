@@ -13,7 +13,7 @@ from collections.abc import Container
 from typing import Any
 
 from vedette.errors import InputError
-from vedette.reading import parse_json, read_members, said
+from vedette.internal.reading import error_summary, parse_json, read_members
 from vedette.simulation import kept
 from vedette.simulation.records import Outline, RunRecord
 from vedette.simulation.tables import run_facts
@@ -69,6 +69,6 @@ def _members(payload: bytes, wanted: Container[str] | None = None) -> tuple[dict
             raise TypeError(f"{_RUN} does not name one")
     except Exception as error:  # bytes of no run can raise nearly anything on the way to one
         raise InputError(
-            f"run: expected the bytes of a run; got others: {type(error).__name__}: {said(error)}"
+            f"run: expected the bytes of a run; got others: {type(error).__name__}: {error_summary(error)}"
         ) from error
     return facts, members

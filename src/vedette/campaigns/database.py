@@ -14,8 +14,8 @@ from typing import Any
 
 from vedette.campaigns.rows import Entry, verified
 from vedette.errors import InputError
-from vedette.reading import said
-from vedette.text import printable, shown
+from vedette.internal.reading import error_summary
+from vedette.internal.text import printable, shown
 
 DATABASE, LOCK = "campaign.sqlite", "campaign.lock"
 
@@ -154,7 +154,7 @@ def lock_of(folder: Path) -> sqlite3.Connection:
             lock.close()
         if _code(error) == sqlite3.SQLITE_BUSY:
             raise InputError(f"{folder}: expected to write alone; another process is writing this campaign") from None
-        why = f"{path.name}: {printable(said(error))}"
+        why = f"{path.name}: {printable(error_summary(error))}"
         raise InputError(f"{folder}: expected a folder that can be written; {why}") from error
     return lock
 
@@ -179,7 +179,7 @@ def explained(path: Path, where: str = "") -> Iterator[None]:
     try:
         yield
     except (sqlite3.DatabaseError, UnicodeDecodeError) as error:  # the latter of words of the file in a message
-        raise InputError(f"{path}: {where}{_advice(path, error)} ({printable(said(error))})") from error
+        raise InputError(f"{path}: {where}{_advice(path, error)} ({printable(error_summary(error))})") from error
 
 
 def _advice(path: Path, error: Exception) -> str:

@@ -9,7 +9,7 @@ import pyarrow as pa
 
 from vedette.campaigns.cells import Campaign
 from vedette.campaigns.tables import setting_of, unit_of
-from vedette.extras import need
+from vedette.internal.extras import require_packages
 
 if TYPE_CHECKING:
     import xarray
@@ -24,7 +24,7 @@ def dataset_of_scans(campaign: Campaign, scans: pa.Table | None) -> xarray.Datas
 
     Raises `MissingPackageError` where xarray is not installed.
     """
-    need("a dataset", "xarray")
+    require_packages("a dataset", "xarray")
     import xarray
 
     table = scans

@@ -12,9 +12,9 @@ import pyarrow as pa
 from vedette.campaigns.results import CampaignResults
 from vedette.campaigns.tables import in_schema, schema_of, tables_of_record
 from vedette.errors import InputError
-from vedette.files import write_file
+from vedette.internal.files import write_file
+from vedette.internal.text import spreadsheet_text
 from vedette.simulation.records import RunRecord
-from vedette.text import spreadsheet_text
 
 NETCDF = "scans.nc"
 
@@ -41,7 +41,7 @@ def _write_parquet(tables: Iterator[pa.Table], schema: pa.Schema, file: BinaryIO
 def export_csv(results: CampaignResults | RunRecord, folder: Path | str) -> tuple[Path, ...]:
     """Write the same tables as `<name>.csv`; as `export_tables`.
 
-    A text that a spreadsheet would run as a formula has an apostrophe before it (`vedette.text.spreadsheet_text`).
+    Text that a spreadsheet would run as a formula gets a leading apostrophe (`spreadsheet_text`).
     """
     return _write_tables(results, Path(folder), ".csv", _write_csv)
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from vedette.errors import VedetteError
 from vedette.evaluation.ensembles import TOGETHER, Ensemble, ensemble_of, joined
-from vedette.processes import as_children, context, end_with_parent, let_go_of_results, load_ahead
-from vedette.threads import processors
+from vedette.internal.processes import as_children, context, end_with_parent, let_go_of_results, load_ahead
+from vedette.internal.threads import processors
 
 if TYPE_CHECKING:
     from vedette.campaigns.results import CampaignResults

@@ -15,8 +15,8 @@ from multiprocessing.process import BaseProcess
 
 from vedette.campaigns.tasks import Outcome, Task, WorkerDied, perform
 from vedette.errors import VedetteError
-from vedette.processes import as_children, context, end_with_parent, let_go_of_results, load_ahead
-from vedette.reading import said
+from vedette.internal.processes import as_children, context, end_with_parent, let_go_of_results, load_ahead
+from vedette.internal.reading import error_summary
 
 _TASKS_A_WORKER = 2  # one that waits, so that none idles while results travel
 _WAIT_SECONDS = 0.2  # without an end, it could not be interrupted everywhere
@@ -81,7 +81,8 @@ class _Worker:
                 begun = pool.submit(os.getpid)
         except OSError as error:
             raise VedetteError(
-                f"workers: expected that another process can be started; {said(error)} (--workers 1 needs none)"
+                f"workers: expected that another process can be started; "
+                f"{error_summary(error)} (--workers 1 needs none)"
             ) from error
         let_go_of_results(pool)
         return cls(pool, begun, set(active_children()) - others)

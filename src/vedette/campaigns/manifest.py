@@ -17,14 +17,14 @@ from vedette.campaigns.cells import Campaign, Cell, safe_name
 from vedette.campaigns.shards import WHOLE, parse_shard
 from vedette.campaigns.spec import CampaignSpec, spec_from_data
 from vedette.errors import InputError
-from vedette.files import write_file
-from vedette.reading import parse_json, read_file, said, unreadable
+from vedette.internal.files import write_file
+from vedette.internal.reading import error_summary, parse_json, read_file, unreadable
+from vedette.internal.text import shown
 from vedette.scenarios import Scenario
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.yaml_reader import read_yaml
 from vedette.simulation.kept import FORMAT_VERSION
 from vedette.simulation.storage import VersionCheck, check_version, versions
-from vedette.text import shown
 
 MANIFEST = "manifest.json"
 FORMAT = "vedette-campaign"
@@ -132,7 +132,7 @@ def read_manifest(folder: Path, check: VersionCheck = check_version) -> dict[str
         fault = error.errors(include_url=False)[0]
         place = ".".join(map(str, fault["loc"]))
         raise InputError(
-            f"{path}: expected a campaign; it is cut short or altered: {place}: {said(fault['msg'])}"
+            f"{path}: expected a campaign; it is cut short or altered: {place}: {error_summary(fault['msg'])}"
         ) from None
     return manifest
 
@@ -184,7 +184,7 @@ def campaign_of(folder: Path, manifest: Mapping[str, Any]) -> Campaign:
         )
     except (InputError, ValidationError) as error:
         raise InputError(
-            f"{folder / MANIFEST}: expected a campaign; it is cut short or altered: {said(error)}"
+            f"{folder / MANIFEST}: expected a campaign; it is cut short or altered: {error_summary(error)}"
         ) from error
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from vedette.campaigns.cells import Campaign
 from vedette.campaigns.running import Watch
 from vedette.campaigns.tasks import Failed, Landed
-from vedette.text import amount
+from vedette.internal.text import with_unit
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -106,5 +106,7 @@ class Progress(Watch):
         if rate:
             seconds = round((self._total - done) / rate)
             parts += [f"{rate:.1f}/s", f"{seconds // 60}:{seconds % 60:02d} left"]
-        parts += [f"{name} {amount(f'{total / num:.1f}', self._unit)}" for name, (num, total) in self._errors.items()]
+        parts += [
+            f"{name} {with_unit(f'{total / num:.1f}', self._unit)}" for name, (num, total) in self._errors.items()
+        ]
         return "  ".join(parts)

@@ -23,9 +23,9 @@ from vedette.evaluation.comparison import Comparison, scored
 from vedette.evaluation.ensembles import Ensemble
 from vedette.evaluation.metrics import Metric, RunMetrics, decode_metrics
 from vedette.evaluation.runs import measure_run
+from vedette.internal.representation import SummaryRepr
+from vedette.internal.text import elided, pluralise, shown
 from vedette.simulation.records import Outline, RunRecord
-from vedette.speaking import Speaking
-from vedette.text import counted, elided, shown
 
 if TYPE_CHECKING:
     import pyarrow
@@ -52,7 +52,7 @@ class GroupComparison:
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class CampaignResults(Speaking):
+class CampaignResults(SummaryRepr):
     """What is finished of a campaign. Runs are read when they are asked for, and their checksums verified each time.
 
     Every method that reads runs raises `InputError`, naming file, cell and run, for one that is damaged.
@@ -73,8 +73,8 @@ class CampaignResults(Speaking):
 
     def _summary(self) -> str:
         campaign = self.campaign
-        done = f"{len(self._finished())} of {counted(campaign.total, 'run')} finished"
-        return f"of {elided(campaign.name)}: {done}, {counted(len(campaign.cells), 'cell')}"
+        done = f"{len(self._finished())} of {pluralise(campaign.total, 'run')} finished"
+        return f"of {elided(campaign.name)}: {done}, {pluralise(len(campaign.cells), 'cell')}"
 
     def _detail(self) -> str:
         return str(self.folder)

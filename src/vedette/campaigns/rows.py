@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import pyarrow as pa
 
-from vedette.reading import MOST_BYTES, inflate, said
+from vedette.internal.reading import MOST_BYTES, error_summary, inflate
 
 _ZSTD = pa.Codec("zstd", compression_level=-1)  # to a third of the size; 4 % less takes a third longer
 # Bytes of a row are packed to a third; those that unpack to more than this are no row.
@@ -48,7 +48,7 @@ def unpack(packed: bytes, most: int = MOST_BYTES) -> bytes:
     try:
         content: bytes = _ZSTD.decompress(packed, decompressed_size=size, asbytes=True)
     except OSError as error:
-        raise ValueError(said(error)) from None
+        raise ValueError(error_summary(error)) from None
     return content
 
 

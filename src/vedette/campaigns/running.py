@@ -22,8 +22,8 @@ from vedette.campaigns.tasks import Outcome as Done
 from vedette.errors import InputError, VedetteError
 from vedette.evaluation.metrics import encode_metrics
 from vedette.evaluation.runs import own_metrics
-from vedette.extras import need
-from vedette.text import counted
+from vedette.internal.extras import require_packages
+from vedette.internal.text import pluralise
 
 TABLES = "tables"
 
@@ -102,7 +102,7 @@ def run_campaign(
             'a script that runs a campaign with workers needs `if __name__ == "__main__":` around the call'
         )
     if scheduler is not None:
-        need("a campaign on a cluster", "distributed")
+        require_packages("a campaign on a cluster", "distributed")
     watch = watch or Unwatched()
     failed, num_landed = [], 0
     database = Path(folder) / DATABASE
@@ -158,7 +158,7 @@ def _measure_anew(store: Store, campaign: Campaign, watch: Watch) -> None:
         for cell, run in lacking:
             there = results.run(cell, run)
             store.put_metrics(cell, run, encode_metrics(there.metrics.with_own(there.record, own[cell])))
-        watch.note(f"measured anew: {counted(len(lacking), 'run')}")
+        watch.note(f"measured anew: {pluralise(len(lacking), 'run')}")
 
 
 def _results(queue: TaskQueue, num_workers: int, scheduler: str | None, watch: Watch) -> Generator[Done]:

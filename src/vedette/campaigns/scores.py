@@ -8,7 +8,7 @@ import numpy as np
 
 from vedette.campaigns.results import GroupComparison
 from vedette.evaluation import Summary
-from vedette.text import markdown_table, named_in, with_error, with_minus
+from vedette.internal.text import markdown_table, named_in, with_error, with_minus
 
 TRACKED_OF_ALL = "tracked_of_all"  # as scenes and campaigns name the measure
 _UNKNOWN = ""

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from vedette.errors import InputError
+from vedette.internal.text import shown
 from vedette.kernels.base.types import Ints
-from vedette.text import shown
 
 _MOST_SHARDS = 1_000_000
 _Runs = TypeVar("_Runs", int, Ints)

@@ -13,12 +13,12 @@ from typing import Annotated, Any
 from pydantic import Field, JsonValue
 
 from vedette.errors import InputError
-from vedette.reading import read_text
+from vedette.internal.reading import read_text
+from vedette.internal.text import elided, listed, printable
 from vedette.scenarios.diagnostics import read_section
 from vedette.scenarios.faults import Finding, describe, named
 from vedette.scenarios.sections.base import Name, Section, Whole, check
 from vedette.scenarios.sections.planners import STRATEGIES
-from vedette.text import elided, listed, printable
 
 BUILTIN_FOLDER = Path(__file__).parent / "builtin"
 _MOST_BYTES = 2_000_000

@@ -17,10 +17,10 @@ from vedette.evaluation import Summary, paired_difference, summarise
 from vedette.evaluation.comparison import scored
 from vedette.evaluation.ensembles import Ensemble
 from vedette.evaluation.tails import Tail, lost_at_end, tail, tail_header
+from vedette.internal.text import markdown_table, named_in, with_minus
 from vedette.kernels.base.types import Floats
 from vedette.scenarios.dumping import dump_scenario
 from vedette.simulation.storage import versions
-from vedette.text import markdown_table, named_in, with_minus
 
 COUNTED = ("filter_steps", "fusions", "rewards")
 # Of fewer runs an interval says nothing.

@@ -18,7 +18,7 @@ from vedette.evaluation.actions import choice_words
 from vedette.evaluation.health import percent
 from vedette.evaluation.statistics import CONFIDENCE
 from vedette.evaluation.tails import tails
-from vedette.text import amount, with_minus
+from vedette.internal.text import with_minus, with_unit
 
 _PUBLISHED = Path(__file__).with_name("published.toml")
 
@@ -104,8 +104,8 @@ def _checked_orders(yardstick: Yardstick, comparison: Comparison) -> Iterator[Ch
             continue
         paired = comparison.difference(than, better)
         mean, low, high = (float(getattr(paired.summary, each)) for each in ("mean", "low", "high"))
-        shown = amount(with_minus(f"{mean:+.2f}"), comparison.unit)
-        interval = amount(with_minus(f"{low:+.2f} to {high:+.2f}"), comparison.unit)
+        shown = with_unit(with_minus(f"{mean:+.2f}"), comparison.unit)
+        interval = with_unit(with_minus(f"{low:+.2f} to {high:+.2f}"), comparison.unit)
         evidence = f"{than} minus {better}: {shown}, 95 % interval {interval}"
         known = paired.p_value <= 1.0 - CONFIDENCE
         yield CheckedClaim(

@@ -15,7 +15,7 @@ from vedette.cli.options import Seed, Trust, Workers
 from vedette.cli.output import note, print_names, publish, say
 from vedette.cli.running import Approval, interruptible
 from vedette.cli.scenario_files import write_text
-from vedette.extras import need
+from vedette.internal.extras import require_packages
 
 if TYPE_CHECKING:
     from vedette.campaigns.benchmark import Entrant, Scene
@@ -56,7 +56,7 @@ def benchmark(
 
     Runs that are already in the folder are skipped. Prints a table per scene and writes a page.
     """
-    need("vedette benchmark", "jinja2", "matplotlib", "pyarrow")
+    require_packages("vedette benchmark", "jinja2", "matplotlib", "pyarrow")
     if not list_:
         load_workers(workers)
     from vedette.campaigns.benchmark import OWN, campaign_of, entrant, make_way, scenes, try_entrant

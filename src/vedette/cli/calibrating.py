@@ -48,7 +48,7 @@ def calibrate(
     From recorded scans alone, by maximum likelihood, with 95 % intervals.
     """
     from vedette.calibration.drifting import calibrate_windows
-    from vedette.files import unwritable, write_file
+    from vedette.internal.files import unwritable, write_file
     from vedette.scenarios.calibrated import calibrated_text, problem_of
 
     check_ending(out, "--out", "yaml", "yml")

@@ -16,10 +16,10 @@ from vedette.cli.options import Trust, Workers
 from vedette.cli.output import complain, console, note, publish, say
 from vedette.cli.results import print_failures
 from vedette.cli.running import Approval, compile_if_cold, interruptible
-from vedette.extras import need
-from vedette.processes import load_ahead
-from vedette.text import counted
-from vedette.threads import processors
+from vedette.internal.extras import require_packages
+from vedette.internal.processes import load_ahead
+from vedette.internal.text import pluralise
+from vedette.internal.threads import processors
 
 if TYPE_CHECKING:
     from vedette.campaigns import Campaign, Failed, Outcome
@@ -72,7 +72,7 @@ def campaign(
 
     Runs that are already in the results folder are skipped.
     """
-    need("vedette campaign", "pyarrow")
+    require_packages("vedette campaign", "pyarrow")
     if (slurm is None) != (time is None):
         raise usage_error("expected both or neither", "--slurm and --time")
     if slurm is not None and shard is not None:
@@ -158,7 +158,7 @@ def report_failures(failed: tuple[Failed, ...]) -> None:
     """Name runs that could not be finished, and end with status 1 if there are any."""
     if not failed:
         return
-    complain(f"failed: {counted(len(failed), 'run')}; the same command tries again:")
+    complain(f"failed: {pluralise(len(failed), 'run')}; the same command tries again:")
     print_failures(failed, complain)
     raise typer.Exit(1)
 

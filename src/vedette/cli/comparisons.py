@@ -12,7 +12,7 @@ from rich.cells import cell_len
 
 from vedette.cli.output import console as new_console
 from vedette.cli.output import is_verbose, print_names
-from vedette.text import counted, elided_apart, named_in
+from vedette.internal.text import elided_apart, named_in, pluralise
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -64,7 +64,7 @@ def _print_decisions(console: Console, comparison: Comparison) -> None:
         for when, shares in decisions[:_MOST_DECISIONS]:
             console.print(f"{label} at {when}: {shares}")
         if len(decisions) > _MOST_DECISIONS:
-            console.print(f"{label}: and at {counted(len(decisions) - _MOST_DECISIONS, 'other time')}")
+            console.print(f"{label}: and at {pluralise(len(decisions) - _MOST_DECISIONS, 'other time')}")
 
 
 def print_scores(scores: Sequence[StrategyScore], comparison: Comparison) -> None:

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from vedette.cli.output import console
-from vedette.text import counted
+from vedette.internal.text import pluralise
 
 if TYPE_CHECKING:
     from vedette.kernels.base.watching import Compiling
@@ -51,7 +51,7 @@ class _CompileProgress:
             return
         self._line.stop()
         seconds = time.monotonic() - self._began
-        self._console.print(f"compiled {counted(self._kernels, 'kernel')} in {seconds:.0f} s", soft_wrap=True)
+        self._console.print(f"compiled {pluralise(self._kernels, 'kernel')} in {seconds:.0f} s", soft_wrap=True)
 
     def _begin(self) -> None:
         from rich.progress import Progress, TextColumn, TimeElapsedColumn
@@ -73,8 +73,8 @@ class _CompileProgress:
         self._line.start()
 
     def _text(self) -> str:
-        done = f"{counted(self._kernels, 'kernel')} done"
+        done = f"{pluralise(self._kernels, 'kernel')} done"
         if self._now is None:
             return done
-        far = f"{self._now.num_done} of {counted(self._now.num_functions, 'function')}"
+        far = f"{self._now.num_done} of {pluralise(self._now.num_functions, 'function')}"
         return f"{done}, {self._now.name}: {far}"

@@ -17,8 +17,8 @@ from vedette.cli.options import Seed, Trust, Workers
 from vedette.cli.output import console, publish, say
 from vedette.cli.reproducing import compared
 from vedette.cli.running import Approval, interruptible
-from vedette.extras import need
-from vedette.text import counted, named_in
+from vedette.internal.extras import require_packages
+from vedette.internal.text import named_in, pluralise
 
 if TYPE_CHECKING:
     from vedette.campaigns.results import GroupComparison
@@ -45,7 +45,7 @@ def demo(
 
     One run of each strategy, on the same targets and noise.
     """
-    need("vedette demo", "jinja2", "matplotlib", "pyarrow")
+    require_packages("vedette demo", "jinja2", "matplotlib", "pyarrow")
     load_workers(workers)
     from vedette.campaigns import open_results, resolve
     from vedette.reports import write_demo
@@ -71,7 +71,7 @@ def _print_errors(group: GroupComparison) -> None:
 
     model, comparison = group.cells[0].scenario.model, group.comparison
     times = comparison.times[comparison.counted]
-    sizes = f"{counted(len(model.sensors), 'sensor')}, {counted(len(comparison.times), 'scan')}"
+    sizes = f"{pluralise(len(model.sensors), 'sensor')}, {pluralise(len(comparison.times), 'scan')}"
     shown = console()
     shown.print(f"{model.name}: {sizes}. One run of each strategy, on the same targets and noise.\n", style="bold")
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))

@@ -16,7 +16,7 @@ from typer.core import TyperGroup
 
 from vedette.cli.output import accept_any_letter, complain, drop_output, trouble_of_system
 from vedette.errors import InputError, VedetteError
-from vedette.text import shown
+from vedette.internal.text import shown
 
 INTERRUPTED = 130
 

@@ -19,7 +19,7 @@ from vedette.cli.options import Seed, Speed, Trust
 from vedette.cli.output import note, publish, say
 from vedette.cli.running import Approval, check_planner, compile_if_cold, interruptible
 from vedette.cli.scenario_files import warn
-from vedette.extras import need
+from vedette.internal.extras import require_packages
 
 if TYPE_CHECKING:
     from vedette.live import Keeping
@@ -124,7 +124,7 @@ def live(
         if place.kind != "stdin":
             check_address(place.host, token)
     if any(place.kind == "ws" for place in places):
-        need("vedette live --listen ws://", "websockets", "jinja2", "matplotlib", "pyarrow")
+        require_packages("vedette live --listen ws://", "websockets", "jinja2", "matplotlib", "pyarrow")
     known = scenario_of_sensors(sensors, speed=speed, decide_every=decide_every, plan_within=planning_timeout)
     check_planner(known.scenario, planner, "--planner")
     Approval(trust)(known.scenario)

@@ -10,8 +10,8 @@ import typer
 
 from vedette.cli.output import complain, publish, say
 from vedette.cli.running import interruptible
-from vedette.extras import need
-from vedette.text import counted
+from vedette.internal.extras import require_packages
+from vedette.internal.text import pluralise
 
 if TYPE_CHECKING:
     from vedette.campaigns import Merged
@@ -31,7 +31,7 @@ def merge(
     ] = True,
 ) -> None:
     """Merge the results folders of shards into one, and name missing shards."""
-    need("vedette merge", "pyarrow")
+    require_packages("vedette merge", "pyarrow")
     from vedette.campaigns import merging
     from vedette.campaigns.shards import ranges
 
@@ -56,7 +56,7 @@ def merge(
         place = shlex.quote(str(results.folder))
         say(f"next: vedette results {place}; vedette report {place}")
         return
-    complain(f"missing: {counted(merged.num_missing, 'run')}, which these run (SPEC: the campaign's file):")
+    complain(f"missing: {pluralise(merged.num_missing, 'run')}, which these run (SPEC: the campaign's file):")
     for command in commands[:_SHOWN_COMMANDS]:
         complain(f"  {command}")
     if len(commands) > _SHOWN_COMMANDS:

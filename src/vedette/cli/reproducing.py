@@ -20,7 +20,7 @@ from vedette.cli.output import console, note, print_names, publish, say
 from vedette.cli.results import print_progress, print_results
 from vedette.cli.running import Approval, check_planner, interruptible
 from vedette.cli.scenario_files import write_text
-from vedette.extras import need
+from vedette.internal.extras import require_packages
 
 if TYPE_CHECKING:
     from vedette.campaigns import CampaignResults, CampaignSpec
@@ -65,7 +65,7 @@ def reproduce(
 
     A campaign with its report, tables and figures.
     """
-    need("vedette reproduce", "jinja2", "matplotlib", "pyarrow")
+    require_packages("vedette reproduce", "jinja2", "matplotlib", "pyarrow")
     if not list_:
         load_workers(workers)
     from vedette.campaigns import open_results, resolve

@@ -17,8 +17,8 @@ from vedette.cli.output import note, publish, say
 from vedette.cli.run_summary import print_run
 from vedette.cli.running import interruptible
 from vedette.errors import VedetteError
-from vedette.extras import need
-from vedette.text import counted
+from vedette.internal.extras import require_packages
+from vedette.internal.text import pluralise
 
 if TYPE_CHECKING:
     from vedette.campaigns import Failed
@@ -50,7 +50,7 @@ def report(
 ) -> None:
     """Report on a campaign or a run: one page that opens anywhere, with tables, figures and a replay of runs."""
     check_ending(out, "--out", "html")
-    need("vedette report", "jinja2", "matplotlib", "pyarrow")
+    require_packages("vedette report", "jinja2", "matplotlib", "pyarrow")
     from vedette.simulation.storage import holds_run
 
     replays = None if runs is None else [_cell_and_run(text) for text in runs.split(",")]
@@ -132,7 +132,7 @@ def upgrade(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Results folder of a campaign, or of a single run.")],
 ) -> None:
     """Bring a results folder of an earlier format to the one that this version reads, in place."""
-    need("vedette upgrade", "pyarrow")
+    require_packages("vedette upgrade", "pyarrow")
     with interruptible("nothing is lost; the same command goes on"):
         from vedette.campaigns.upgrading import upgrade_results
         from vedette.simulation.kept import FORMAT_VERSION
@@ -176,9 +176,9 @@ def results(
     if formats and export is None:
         raise usage_error("expected with --export, which names the folder", "--format")
     check_ending(tex, "--tex", "tex")
-    need("vedette results", "pyarrow")
+    require_packages("vedette results", "pyarrow")
     if "netcdf" in (formats or ()):
-        need("vedette results --format netcdf", "xarray")
+        require_packages("vedette results --format netcdf", "xarray")
     from vedette.campaigns.results import open_results
     from vedette.simulation.storage import holds_run, load_run
 
@@ -210,7 +210,7 @@ def results(
 
 def _write_tex(opened: CampaignResults, groups: Sequence[GroupComparison], path: Path) -> Path:
     from vedette.evaluation.tables import strategy_latex
-    from vedette.files import write_whole
+    from vedette.internal.files import write_whole
 
     session = opened.manifest["sessions"][-1]
     origin = f"seed {opened.campaign.seed}, vedette {session['versions']['vedette']}, {opened.manifest['digest'][:12]}"
@@ -273,8 +273,8 @@ def print_progress(opened: CampaignResults) -> None:
     say(f"{campaign.name}, seed {campaign.seed}: {finished} runs are finished{where}")
     for cell, number in missing.items():
         if number:
-            say(f"missing: {counted(number, 'run')} of {cell}")
+            say(f"missing: {pluralise(number, 'run')} of {cell}")
     failures = opened.failures()
     if failures:
-        say(f"failed: {counted(len(failures), 'run')}; the same command tries again:")
+        say(f"failed: {pluralise(len(failures), 'run')}; the same command tries again:")
         print_failures(failures)

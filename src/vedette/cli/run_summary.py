@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from vedette.cli.output import console as new_console
 from vedette.cli.output import is_verbose
-from vedette.text import amount, counted
+from vedette.internal.text import pluralise, with_unit
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -37,7 +37,7 @@ def _title(record: RunRecord, scenario: Scenario | None) -> str:
     """Scenario, planner with its description, seed, run and number of scans; of a recording scenario and scans."""
     from vedette.scenarios.sections.planners import strategy_words
 
-    scans = counted(record.num_scans, "scan")
+    scans = pluralise(record.num_scans, "scan")
     words = strategy_words(scenario.model, record.planner) if scenario else ""
     if record.recording is not None or (scenario is not None and scenario.model.recording is not None):
         return f"{record.scenario}: {scans}"
@@ -69,7 +69,7 @@ def _print_decisions(console: Console, record: RunRecord) -> None:
         )
     console.print(table)
     if left_out:
-        console.print(f"{counted(left_out, 'more decision')} before the last: --verbose prints all", style="dim")
+        console.print(f"{pluralise(left_out, 'more decision')} before the last: --verbose prints all", style="dim")
     for note in dict.fromkeys(note for decision in record.decisions for note in decision.plan.notes):
         console.print(f"note: {note}", soft_wrap=True)
 
@@ -85,7 +85,7 @@ def _print_facts(console: Console, record: RunRecord, scenario: Scenario | None)
     if not math.isnan(total):
         parts = f"localisation {localisation:.2f}, cardinality {cardinality:.2f}"
         window = f"mean over t = {times[0]:g} to {times[-1]:g} s"
-        console.print(f"mean OSPA   {amount(f'{total:.2f}', unit)} ({parts}; {window})", soft_wrap=True)
+        console.print(f"mean OSPA   {with_unit(f'{total:.2f}', unit)} ({parts}; {window})", soft_wrap=True)
     spent = {stage: float(seconds.sum()) for stage, seconds in record.timings.items()}
     stages = ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in spent.items() if seconds >= _SHOWN_SECONDS)
     console.print(f"run time    {sum(spent.values()):.2f} s{f' ({stages})' if stages else ''}", soft_wrap=True)

@@ -18,8 +18,8 @@ from vedette.cli.output import complain, note, publish, say
 from vedette.cli.run_summary import print_run
 from vedette.cli.scenario_files import warn
 from vedette.errors import InputError
-from vedette.extras import need
-from vedette.text import counted
+from vedette.internal.extras import require_packages
+from vedette.internal.text import pluralise
 
 if TYPE_CHECKING:
     from vedette.scenarios import Scenario
@@ -118,7 +118,7 @@ def run(
     Approval(trust)(loaded)
     warn(loaded)
     if out is not None:
-        need("vedette run --out", "matplotlib", "pyarrow")
+        require_packages("vedette run --out", "matplotlib", "pyarrow")
         with named_options({"directory": "--out"}):
             check_free(out, overwrite)
     stop: RunStopped | RunInterrupted | None = None
@@ -143,7 +143,7 @@ def run(
         with interruptible(f"wrote {out}, but not all of its figures"):
             _draw_run(record, loaded, out / "figures")
         if stop is not None:
-            end_stopped(stop, f"wrote {out}, with the {counted(record.num_scans, 'scan')} before")
+            end_stopped(stop, f"wrote {out}, with the {pluralise(record.num_scans, 'scan')} before")
         say(f"wrote {out}")
 
 

@@ -209,6 +209,6 @@ def _schema_text() -> str:
 
 def write_text(path: Path, text: str) -> None:
     """Write a file whole or not at all, making its folder. Raises `InputError` where that cannot be."""
-    from vedette.files import write_file
+    from vedette.internal.files import write_file
 
     write_file(path, lambda file: file.write(text.encode("utf-8")), make_folder=True)

@@ -13,7 +13,7 @@ from vedette.cli.options import ScenarioName, Trust
 from vedette.cli.output import console as new_console
 from vedette.cli.output import is_verbose, note, publish, say
 from vedette.cli.running import Approval
-from vedette.extras import need
+from vedette.internal.extras import require_packages
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -42,7 +42,7 @@ def show(
 
     check_ending(out, "--out", *PICTURE_FORMATS)
     if out is not None:
-        need("vedette show --out", "matplotlib")
+        require_packages("vedette show --out", "matplotlib")
     loaded = load_scenario(scenario)
     if not resolved or out is not None:  # the targets move by its motion model
         Approval(trust)(loaded)

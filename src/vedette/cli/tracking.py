@@ -24,8 +24,8 @@ from vedette.cli.running import (
     warn_of_recording,
 )
 from vedette.cli.scenario_files import warn
-from vedette.extras import without
-from vedette.text import counted
+from vedette.internal.extras import without
+from vedette.internal.text import pluralise
 
 if TYPE_CHECKING:
     from vedette.evaluation.joining import Join
@@ -92,12 +92,12 @@ def track(
         record = _tracked(scenario, recording)
         print_run(record, scenario)
         warned = warn_of_recording(record, scenario)
-        sizes = counted(record.num_scans, "scan"), counted(recording.num_measurements, "measurement")
-        say(f"{scans}: {', '.join(sizes)}, {counted(len(scenario.model.sensors), 'sensor')}")
+        sizes = pluralise(record.num_scans, "scan"), pluralise(recording.num_measurements, "measurement")
+        say(f"{scans}: {', '.join(sizes)}, {pluralise(len(scenario.model.sensors), 'sensor')}")
         joins = joins_of_run(record, scenario) if join else ()
         say(f"  tracks      {_tracks(with_joined_tracks(record, joins))}")
         if joins:
-            say(f"  joined      {counted(len(joins), 'gap')} between labels of one track (--no-join: none)")
+            say(f"  joined      {pluralise(len(joins), 'gap')} between labels of one track (--no-join: none)")
         if out is not None:
             written = _save(record, scenario, out, formats, joins, overwrite=overwrite)
     if out is not None:
@@ -185,7 +185,7 @@ def _contents(out: Path, written: list[Path]) -> list[str]:
     names = [file.relative_to(out).as_posix() for file in written]
     figures = ["figures/"] if (out / "figures").is_dir() else []
     tables = len(list(out.glob("*.arrow")))
-    return [*names, *figures, *([counted(tables, "table")] if tables else [])]
+    return [*names, *figures, *([pluralise(tables, "table")] if tables else [])]
 
 
 def _tracks(record: RunRecord) -> str:

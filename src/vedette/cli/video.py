@@ -12,8 +12,8 @@ from vedette.cli.output import note, publish, say
 from vedette.cli.progress import bar
 from vedette.cli.results import saved_run
 from vedette.cli.running import interruptible
-from vedette.extras import need
-from vedette.text import counted
+from vedette.internal.extras import require_packages
+from vedette.internal.text import pluralise
 
 
 def video(
@@ -41,7 +41,7 @@ def video(
     """Show a run as a video: targets, estimates, sensors and measurements, scan by scan."""
     if speed is not None and seconds is not None:
         raise usage_error("expected one of --speed and --seconds; got both", "--speed")
-    need("vedette video", "matplotlib", "pyarrow")
+    require_packages("vedette video", "matplotlib", "pyarrow")
     from vedette.evaluation.figures import write_video
     from vedette.evaluation.scans import code_of_sensors
 
@@ -54,5 +54,5 @@ def video(
     unmeasured = () if trust else code_of_sensors(scenario)
     if unmeasured:
         note(f"without measurements, as drawing them runs {', '.join(unmeasured)}: --trust allows it")
-    say(f"wrote {out}: {counted(number, 'frame')}, {number / fps:.1f} s")
+    say(f"wrote {out}: {pluralise(number, 'frame')}, {number / fps:.1f} s")
     publish({"video": out, "frames": number, "seconds": number / fps, "without_measurements_of": unmeasured})

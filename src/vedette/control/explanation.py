@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.errors import InputError
+from vedette.internal.text import pluralise
 from vedette.kernels.base.types import Floats, Ints
-from vedette.text import counted
 
 _WIDTH = 80
 _MOST_ROWS = 10
@@ -222,7 +222,7 @@ def _of_choice(found: Explanation) -> list[str]:
     start = "" if found.baseline is None else f"; {number_text(found.baseline, found.reward)} without any scan"
     lines = [f"{found.planner}: reward {with_error(found.reward, found.standard_error)}{start}"]
     bound = "" if found.bound is None else f"; {found.bound}"
-    lines.append(f"{counted(found.evaluations, 'choice')} evaluated{bound}")
+    lines.append(f"{pluralise(found.evaluations, 'choice')} evaluated{bound}")
     if found.runner_up is not None:
         lines.append(f"runner-up: {margin_text(found.runner_up, found.reward)}: {found.runner_up.text}")
     return lines

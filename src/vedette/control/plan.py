@@ -10,16 +10,16 @@ import numpy as np
 
 from vedette.control.explanation import Bound, Explanation
 from vedette.errors import InputError
+from vedette.internal.representation import SummaryRepr, TabularRepr
+from vedette.internal.text import elided, pluralise
 from vedette.kernels.base.types import Floats, Ints
 from vedette.platforms import Actions
-from vedette.speaking import Speaking, Tabled
-from vedette.text import counted, elided
 
 _MOST_TOLD = 4
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class RewardTable(Speaking):
+class RewardTable(SummaryRepr):
     """Expected reward of each action, or of each joint action, of some sensors (paper eq. 15 and 17).
 
     Attributes:
@@ -88,7 +88,7 @@ class SearchCurve(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Plan(Tabled):
+class Plan(TabularRepr):
     """One decision: the chosen action of each sensor, and what was evaluated to choose it.
 
     Attributes:
@@ -174,7 +174,7 @@ class Plan(Tabled):
     def _summary(self) -> str:
         rewards = self.expected_rewards
         worth = f", expected reward {rewards[0][0]:.4g} ± {rewards[0][1]:.2g}" if len(rewards) == 1 else ""
-        return f"of {elided(self.planner)} for {counted(self.num_sensors, 'sensor')}{worth}"
+        return f"of {elided(self.planner)} for {pluralise(self.num_sensors, 'sensor')}{worth}"
 
     def _detail(self) -> str:
         texts = [own.text(index) for own, index in zip(self.actions, self.chosen, strict=True)][:_MOST_TOLD]

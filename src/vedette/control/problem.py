@@ -16,13 +16,13 @@ from vedette.control.explanation import Bound
 from vedette.control.inputs import allowed_of, check_choice, single_mask, staying
 from vedette.control.search import JointProblem, JointSearch, all_joint_actions, first_best
 from vedette.densities.checks import offsets_of
+from vedette.internal.probabilities import expit
+from vedette.internal.threads import run_chunks
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.planning.bernoulli_rows import Table
 from vedette.kernels.planning.bounds import Choices, best_of_labels, losses_at_least
 from vedette.kernels.planning.joint_values import label_values
 from vedette.kernels.planning.label_values import EXPECTED_LOSS
-from vedette.probabilities import expit
-from vedette.threads import run_chunks
 
 
 def searched(

@@ -14,10 +14,10 @@ from vedette.control.inputs import check_poses, check_steering, mask_of_decision
 from vedette.control.plan import Plan
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import Estimate, Estimator, Labelled, best_estimate
+from vedette.internal.programs import Program, start_program
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import generator, instance
 from vedette.platforms import Options
-from vedette.programs import Program, greeted
 from vedette.tracking import State
 
 COUNTED = ("filter_steps", "fusions", "rewards")
@@ -73,7 +73,7 @@ class ProgramPlanner:
         options, at = options_of(self.sensors, poses, self.settings), check_poses(poses, len(self.sensors))
         mask = mask_of_decision(self.constraints, self.sensors, options, state.fused, at, self.settings)
         if self._program is None or state.step <= self._step:
-            self._program = greeted(self.command, self.folder, "planner", self.scene(), rng, self.start_seconds)
+            self._program = start_program(self.command, self.folder, "planner", self.scene(), rng, self.start_seconds)
         self._step = state.step
         question = {"step": state.step, "time": state.time, "sensors": _choices(options, mask)}
         if mask is not None and mask.together:

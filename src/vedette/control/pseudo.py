@@ -26,6 +26,7 @@ from vedette.densities.label_sets import label_sets, relinked, take_hypotheses
 from vedette.densities.tracks import single_gaussians
 from vedette.filters.inputs import model_errors
 from vedette.filters.lmb import association_of
+from vedette.internal.threads import run_chunks
 from vedette.kernels.association.marginals import Association
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.gaussian.linalg import log_sum
@@ -35,7 +36,6 @@ from vedette.kernels.planning.pseudo_glmb import GlmbResults, pseudo_update_glmb
 from vedette.kernels.planning.pseudo_lmb import LmbResults, pseudo_update_lmb
 from vedette.kernels.planning.reach import Belief as KnownBelief
 from vedette.kernels.planning.reach import label_radii, predict_paths
-from vedette.threads import run_chunks
 
 
 def draw_futures(

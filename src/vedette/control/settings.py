@@ -11,6 +11,7 @@ import numpy as np
 from vedette.densities import GLMB, LMB, Labelled
 from vedette.errors import InputError
 from vedette.filters import Filter, Limits
+from vedette.internal.threads import processors
 from vedette.kernels.base.types import Bools, Floats
 from vedette.kernels.planning.ideal import EXPECTED, IDEAL, SAMPLED
 from vedette.models.arguments import float_array, instance, reject
@@ -28,7 +29,6 @@ from vedette.models.fields import (
 )
 from vedette.platforms import Options, Platform
 from vedette.platforms.base import Abilities, check_platform
-from vedette.threads import processors
 
 Belief: TypeAlias = GLMB | LMB  # that is planned on
 IDEAL_MODES = {"ideal": IDEAL, "expected": EXPECTED, "sampled": SAMPLED}

@@ -14,11 +14,11 @@ from vedette.densities.glmb import GLMB
 from vedette.densities.label_sets import Label, LabelSet, label_sets, possible
 from vedette.densities.labelled import LMB, Labelled
 from vedette.densities.tracks import gaussian_tracks, single_gaussians
+from vedette.internal.probabilities import log_expit
+from vedette.internal.threads import run_chunks
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.labelled.case_conversions import LmbCases, glmb_cases_to_lmb
 from vedette.kernels.labelled.power_integrals import SensorCases
-from vedette.probabilities import log_expit
-from vedette.threads import run_chunks
 
 # A label set, and the factor that it belongs to: of an LMB the label, of a GLMB nothing.
 Place: TypeAlias = tuple[LabelSet, LabelSet]

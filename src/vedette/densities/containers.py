@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vedette.densities.telling import Targets
+from vedette.internal.representation import SummaryRepr, TabularRepr
 from vedette.kernels.base.types import Floats
-from vedette.speaking import Speaking, Tabled
 
-_Made = TypeVar("_Made", bound=Speaking)
+_Made = TypeVar("_Made", bound=SummaryRepr)
 
 
-class Container(Speaking):
+class Container(SummaryRepr):
     """A frozen dataclass of arrays and other containers.
 
     The arrays of its fields are read-only views of arrays that nobody else holds. Those are what kernels take (see
@@ -47,7 +47,7 @@ class Container(Speaking):
         return type(self), tuple(getattr(self, name) for name in self.__match_args__)  # type: ignore[attr-defined]
 
 
-class MultiTarget(Container, Tabled):
+class MultiTarget(Container, TabularRepr):
     """A density of a set of targets."""
 
     __slots__ = ()

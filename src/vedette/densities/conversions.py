@@ -16,12 +16,12 @@ from vedette.densities.label_sets import take_factors
 from vedette.densities.labelled import LMB, Labelled
 from vedette.densities.tracks import TrackTable, single_gaussians, take_tracks
 from vedette.errors import InputError
+from vedette.internal.probabilities import log_expit
 from vedette.kernels.association.names import settled_names
 from vedette.kernels.base.types import Lmb
 from vedette.kernels.gaussian.pooling import reduced_tracks
 from vedette.kernels.gaussian.reduction import MixtureCaps
 from vedette.kernels.labelled import conversions as kernels
-from vedette.probabilities import log_expit
 
 _Glmb = TypeVar("_Glmb", GLMB, FactoredGLMB)
 _Labelled = TypeVar("_Labelled", bound=Labelled)

@@ -20,12 +20,12 @@ from vedette.densities.telling import Target, Targets
 from vedette.densities.tracks import TrackTable, gaussian_tracks, heaviest_components
 from vedette.densities.unlabelled import IidCluster, Poisson
 from vedette.errors import InputError, NumericalError, VedetteError
+from vedette.internal.representation import TabularRepr
+from vedette.internal.text import pluralise
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.labelled.heaviest import map_tracks
 from vedette.kernels.labelled.least_ospa import least_ospa_tracks
 from vedette.models.arguments import no_gaussians
-from vedette.speaking import Tabled
-from vedette.text import counted
 
 _MARGINAL_COMPONENTS = 10
 # A component of weight 1.5 to 2 is more often one target that two measurements fit than two: docs/filters.md.
@@ -33,7 +33,7 @@ _RANK_OF_HALF_LEFT = 0.2
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Estimate(Tabled):
+class Estimate(TabularRepr):
     """Estimated targets at one moment, in increasing label order.
 
     Attributes:
@@ -76,7 +76,7 @@ class Estimate(Tabled):
         return Targets(self.labels, self.existence, self.means, self.covs)
 
     def _summary(self) -> str:
-        return f"of {counted(self.num_targets, 'target')}"
+        return f"of {pluralise(self.num_targets, 'target')}"
 
     def _detail(self) -> str:
         return self._targets().in_words()
@@ -232,7 +232,7 @@ def _by_units(weights: Floats, number: int) -> tuple[Ints, Floats]:
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class TrackHistory(Tabled):
+class TrackHistory(TabularRepr):
     """All estimates of one label, in order of time; scans at which it was not estimated are left out.
 
     Attributes:

@@ -15,13 +15,13 @@ from vedette.densities.labelled import LMB, Labelled
 from vedette.densities.tracks import TrackTable
 from vedette.densities.undetected import UndetectedTargets
 from vedette.errors import InputError, VedetteError
+from vedette.internal.text import pluralise
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.labelled.cardinality import convolved
 from vedette.kernels.labelled.labels import group_by_label_set
 from vedette.kernels.labelled.stacking import join_offsets, stack_glmbs
 from vedette.models.arguments import instance
-from vedette.text import counted
 
 _FACTORS = kernel_arrays("track_offsets", "hyp_offsets", "hyp_tracks", "hyp_log_weights", "factor_offsets")
 
@@ -65,7 +65,7 @@ class FactoredGLMB(Hypotheses):
 
     def _parts(self) -> str:
         rest = "" if self.undetected is None else f", undetected targets: {self.undetected.in_short()}"
-        return f"{Hypotheses._parts(self)}, {counted(self.num_factors, 'factor')}{rest}"
+        return f"{Hypotheses._parts(self)}, {pluralise(self.num_factors, 'factor')}{rest}"
 
     @property
     def is_bernoulli(self) -> Bools:

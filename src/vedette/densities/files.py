@@ -19,10 +19,10 @@ from vedette.densities.tracks import TrackTable
 from vedette.densities.undetected import LearntRate, UndetectedIntensity, UndetectedTargets
 from vedette.densities.unlabelled import IidCluster, Poisson
 from vedette.errors import InputError, VedetteError
-from vedette.files import write_file
+from vedette.internal.files import write_file
+from vedette.internal.reading import error_summary, read_arrays, read_file, unreadable
+from vedette.internal.text import shown
 from vedette.models import CellGrid, Region
-from vedette.reading import read_arrays, read_file, said, unreadable
-from vedette.text import shown
 
 FORMAT_NAME = "vedette-density"
 FORMAT_VERSION = 1
@@ -81,7 +81,9 @@ def _kind_of(source: Path, arrays: Mapping[str, Any]) -> str:
     if str(arrays.get("format")) != FORMAT_NAME:
         raise InputError(f"{source}: expected a file of format {FORMAT_NAME}; got one of another origin")
     if str(arrays.get("version")) != str(FORMAT_VERSION):
-        raise InputError(f"{source}: expected format version {FORMAT_VERSION}; got {said(arrays.get('version'))}")
+        raise InputError(
+            f"{source}: expected format version {FORMAT_VERSION}; got {error_summary(arrays.get('version'))}"
+        )
     kind = str(arrays.get("kind"))
     if kind not in _KINDS:
         raise InputError(f"{source}: expected a kind of density among {', '.join(_KINDS)}; got {shown(kind)}")

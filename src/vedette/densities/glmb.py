@@ -13,10 +13,10 @@ from vedette.densities.containers import kernel_arrays, unchecked
 from vedette.densities.labelled import Labelled
 from vedette.densities.tracks import TrackTable, log_weights
 from vedette.errors import InputError, VedetteError
+from vedette.internal.text import pluralise
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.labelled.labels import group_by_label_set
-from vedette.text import counted
 
 _HYPOTHESES = kernel_arrays("hyp_offsets", "hyp_tracks", "hyp_log_weights")
 
@@ -40,7 +40,7 @@ class Hypotheses(Labelled):
 
     def _parts(self) -> str:
         hyps = "1 hypothesis" if self.num_hyps == 1 else f"{self.num_hyps} hypotheses"
-        return f", {counted(self.tracks.num_tracks, 'track')}, {hyps}"
+        return f", {pluralise(self.tracks.num_tracks, 'track')}, {hyps}"
 
     @property
     def track_existence(self) -> Floats:

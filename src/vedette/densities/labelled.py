@@ -14,12 +14,12 @@ from vedette.densities.containers import MultiTarget, for_kernel, unchecked
 from vedette.densities.telling import Hypothesis, Target, Targets, indices_or_none
 from vedette.densities.tracks import TrackTable, run_moments, take_tracks, track_moments
 from vedette.errors import InputError, NumericalError, VedetteError
+from vedette.internal.probabilities import expit
+from vedette.internal.text import pluralise
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.labelled.cardinality import convolved
 from vedette.kernels.labelled.conversions import factored_to_glmb
-from vedette.probabilities import expit
-from vedette.text import counted
 
 LABELLED = "a GLMB, an LMB or a FactoredGLMB"  # how messages call one
 
@@ -136,7 +136,7 @@ class Labelled(MultiTarget):
 
     def _summary(self) -> str:
         labels, existence = self.label_existence()
-        return f"of {counted(len(labels), 'label')}{self._parts()}, {existence.sum():.4g} targets expected"
+        return f"of {pluralise(len(labels), 'label')}{self._parts()}, {existence.sum():.4g} targets expected"
 
     @abstractmethod
     def to_kernel(self) -> Any:

@@ -15,10 +15,10 @@ from vedette.densities.telling import Target, Targets
 from vedette.densities.tracks import run_moments
 from vedette.densities.unlabelled import Unlabelled
 from vedette.errors import NumericalError, VedetteError
+from vedette.internal.probabilities import expit
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import no_gaussians
-from vedette.probabilities import expit
 
 _ARRAYS = kernel_arrays("existence_logit", "offsets", *kt.Mixture._fields)
 

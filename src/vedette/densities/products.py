@@ -13,12 +13,12 @@ from vedette.densities.cases import LabelledCases
 from vedette.densities.checks import offsets_of
 from vedette.densities.label_sets import Label
 from vedette.errors import InputError
+from vedette.internal.text import shown
+from vedette.internal.threads import run_chunks
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.gaussian.information import row_size
 from vedette.kernels.gaussian.linalg import LOG_2PI
 from vedette.kernels.labelled.power_integrals import Laid, Places, SensorCases, Terms, power_table, write_rows
-from vedette.text import shown
-from vedette.threads import run_chunks
 
 
 class Share(NamedTuple):

@@ -14,16 +14,16 @@ from vedette.densities.labelled import LMB, Labelled
 from vedette.densities.multi_bernoulli import MultiBernoulli
 from vedette.densities.unlabelled import IidCluster, Poisson
 from vedette.errors import InputError, NumericalError, VedetteError
+from vedette.internal.representation import SummaryRepr
 from vedette.kernels.base.types import Floats, Ints, Lmb, Tracks
 from vedette.kernels.gaussian.components import components_of
 from vedette.models.arguments import generator
-from vedette.speaking import Speaking
 
 _MOST_TARGETS = 1e9
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class MultiTargetSamples(Speaking):
+class MultiTargetSamples(SummaryRepr):
     """Samples of a multi-target state.
 
     Attributes:

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vedette.errors import InputError
+from vedette.internal.text import pluralise
 from vedette.kernels.base.types import Floats, Ints
-from vedette.text import counted
 
 _MOST_TOLD = 3
 _LARGE = 1e7  # m, from which on a place is told in powers of ten
@@ -71,7 +71,7 @@ class Targets(NamedTuple):
         """Ellipses of two standard deviations of the places into axes of Matplotlib, the fainter the less is there."""
         if self.means.shape[1] < 2:
             raise InputError(
-                f"plot: expected states that begin with x and y; got {counted(self.means.shape[1], 'number')}"
+                f"plot: expected states that begin with x and y; got {pluralise(self.means.shape[1], 'number')}"
             )
         turn = np.linspace(0.0, 2.0 * np.pi, _CORNERS)
         circle = np.array([np.cos(turn), np.sin(turn)])

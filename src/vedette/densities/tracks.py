@@ -14,12 +14,12 @@ import numpy as np
 from vedette.densities import checks
 from vedette.densities.containers import Container, for_kernel, kernel_arrays, unchecked
 from vedette.errors import InputError, NumericalError, VedetteError
+from vedette.internal.text import pluralise
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.components import components_of, taken_components
 from vedette.kernels.gaussian.mixtures import heaviest_of_runs
 from vedette.models.arguments import no_gaussians
-from vedette.text import counted
 
 UNSCANNED = -2  # in the place of a measurement
 _ARRAYS = kernel_arrays("labels", "offsets", *kt.Mixture._fields)
@@ -63,8 +63,8 @@ class TrackTable(Container):
         return len(self.labels)
 
     def _summary(self) -> str:
-        components = counted(len(self.log_weights), "component")
-        return f"of {counted(self.num_tracks, 'track')} in {components}, of {self.state_dim} state components"
+        components = pluralise(len(self.log_weights), "component")
+        return f"of {pluralise(self.num_tracks, 'track')} in {components}, of {self.state_dim} state components"
 
     @property
     def state_dim(self) -> int:

@@ -9,14 +9,14 @@ import numpy as np
 from vedette.densities import checks
 from vedette.densities.unlabelled import Poisson, poisson_numbers
 from vedette.errors import InputError
+from vedette.internal.representation import SummaryRepr
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models import CellGrid, Region
 from vedette.models.arguments import instance, non_negative, reject
-from vedette.speaking import Speaking
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class UndetectedTargets(Speaking):
+class UndetectedTargets(SummaryRepr):
     """Poisson density of the targets that were never detected, and the label of the next first detection.
 
     Attributes:
@@ -67,7 +67,7 @@ class UndetectedTargets(Speaking):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class LearntRate(Speaking):
+class LearntRate(SummaryRepr):
     """Posterior of the rate of Poisson births, a gamma density, given the first detections of the targets.
 
     Of births at a rate of 1/s, scans are expected to have detected `exposure` targets; the number of first detections
@@ -110,7 +110,7 @@ class LearntRate(Speaking):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class UndetectedIntensity(Speaking):
+class UndetectedIntensity(SummaryRepr):
     """Poisson density of undetected targets: any number in each cell, independent of the others, and anywhere in it.
 
     Attributes:

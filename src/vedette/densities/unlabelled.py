@@ -14,10 +14,10 @@ from vedette.densities.containers import MultiTarget, kernel_arrays, unchecked
 from vedette.densities.telling import Targets
 from vedette.densities.tracks import log_weights as logs_of
 from vedette.errors import InputError, NumericalError, VedetteError
+from vedette.internal.text import pluralise
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import no_gaussians
-from vedette.text import counted
 
 _POISSON = kernel_arrays(*kt.Mixture._fields)
 _CLUSTER = kernel_arrays("log_cardinality", *kt.Mixture._fields)
@@ -42,7 +42,7 @@ class Unlabelled(MultiTarget):
 
     def _summary(self) -> str:
         what = "component" if self._weight == "expected_number" else "Bernoulli"
-        return f"of {counted(len(self), what)}, {self.expected_number:.4g} targets expected"
+        return f"of {pluralise(len(self), what)}, {self.expected_number:.4g} targets expected"
 
     @property
     def state_dim(self) -> int:

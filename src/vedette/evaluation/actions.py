@@ -7,10 +7,10 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from vedette.internal.text import with_minus
 from vedette.kernels.base.types import Floats
 from vedette.platforms import Actions
 from vedette.platforms.base import switch_words
-from vedette.text import with_minus
 
 # What one sensor was sent to do, rounded for counting: name and number of each column.
 Row: TypeAlias = tuple[tuple[str, float], ...]

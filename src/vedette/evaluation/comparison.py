@@ -12,17 +12,17 @@ from vedette.errors import InputError
 from vedette.evaluation.ensembles import PARTS, Choice, Ensemble, choice_of, ensemble_of
 from vedette.evaluation.metrics import RunMetrics
 from vedette.evaluation.statistics import PairedDifference, Summary, holm, paired_difference, summarise
+from vedette.internal.representation import SummaryRepr
+from vedette.internal.text import elided, pluralise
 from vedette.kernels.base.types import Bools, Floats
 from vedette.scenarios import Scenario
 from vedette.simulation.records import RunRecord
-from vedette.speaking import Speaking
-from vedette.text import counted, elided
 
 _MOST_TOLD = 4
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Comparison(Speaking):
+class Comparison(SummaryRepr):
     """OSPA and other measures of several strategies on one scenario, paired run by run.
 
     A `part` is "total", "localisation" or "cardinality", of OSPA, or the name of a measure.
@@ -41,7 +41,7 @@ class Comparison(Speaking):
     unit: str = "m"
 
     def _summary(self) -> str:
-        return f"of {counted(self.num_runs, 'run')} on {elided(self.scenario)}"
+        return f"of {pluralise(self.num_runs, 'run')} on {elided(self.scenario)}"
 
     def _detail(self) -> str:
         means = [f"{elided(name)} {float(self.summary(name).mean):.4g}" for name in self.strategies[:_MOST_TOLD]]

@@ -9,10 +9,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from vedette.evaluation.health import HealthSummary, health_sums, percent, summarise_health
+from vedette.internal.text import pluralise
 from vedette.kernels.base.types import Floats
 from vedette.kernels.labelled.set_fusion import LOST, SURE
 from vedette.simulation.health import Health
-from vedette.text import counted
 
 Level = Literal["ok", "note", "check"]
 _MUCH = 0.01  # share or number above which a truncation is to be checked
@@ -70,7 +70,7 @@ def _worst(shares: Floats, names: Sequence[str]) -> str:
 
 
 def _of_fusion(health: HealthSummary) -> Iterator[Diagnostic]:
-    most = f", up to {counted(health.worst_lost, 'target')}" if health.lost else ""
+    most = f", up to {pluralise(health.worst_lost, 'target')}" if health.lost else ""
     yield Diagnostic(
         "Targets lost by fusion",
         f"A label with an existence probability of {SURE:g} or more at one sensor has less than {LOST:g} after fusion, "

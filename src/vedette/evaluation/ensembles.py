@@ -15,10 +15,10 @@ from vedette.evaluation.actions import Row, rounded
 from vedette.evaluation.health import HealthSums, added, health_sums
 from vedette.evaluation.metrics import RunMetrics
 from vedette.evaluation.rewards import RewardSums
+from vedette.internal.representation import SummaryRepr
+from vedette.internal.text import elided, pluralise
 from vedette.kernels.base.types import Floats, Ints
 from vedette.simulation.records import Outline
-from vedette.speaking import Speaking
-from vedette.text import counted, elided
 
 PARTS = ("total", "localisation", "cardinality")
 # What was chosen at one decision, one row a sensor.
@@ -31,7 +31,7 @@ TOGETHER, _MOST_REWARDS = 256, 2**22
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Ensemble(Speaking):
+class Ensemble(SummaryRepr):
     """The runs of one strategy on one scenario, in a twentieth of the memory of their records.
 
     Attributes:
@@ -66,7 +66,10 @@ class Ensemble(Speaking):
     counts: Mapping[str, NDArray[Any]]
 
     def _summary(self) -> str:
-        return f"of {counted(self.num_runs, 'run')} on {elided(self.scenario)}, {counted(len(self.times), 'scan')} each"
+        return (
+            f"of {pluralise(self.num_runs, 'run')} on {elided(self.scenario)}, "
+            f"{pluralise(len(self.times), 'scan')} each"
+        )
 
     @property
     def num_runs(self) -> int:

@@ -12,7 +12,7 @@ import numpy as np
 from vedette.control import JointPlanner
 from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled
 from vedette.fusion import shares_prediction
-from vedette.processes import as_children, end_with_parent
+from vedette.internal.processes import as_children, end_with_parent
 from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.scenarios.sections.planners import Named

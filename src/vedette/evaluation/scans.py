@@ -8,11 +8,11 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from vedette.errors import InputError
+from vedette.internal.quantities import COMPONENTS, PLACED, QUANTITIES, is_doppler, si_column
 from vedette.kernels.base.types import BEAM, OWN_VELOCITY, Floats
 from vedette.models.arguments import reject
 from vedette.models.turns import is_turn, lags
 from vedette.platforms.compass import course_deg
-from vedette.quantities import COMPONENTS, PLACED, QUANTITIES, is_doppler, si_column
 from vedette.recorded.conventions import OWN_SPEEDS
 from vedette.recorded.extents import places_of
 from vedette.recorded.turns import bearings_of

@@ -15,7 +15,7 @@ from vedette.evaluation.comparison import Comparison
 from vedette.evaluation.ensembles import PARTS
 from vedette.evaluation.statistics import CONFIDENCE, PairedDifference, Summary, summarise
 from vedette.evaluation.tails import tail_of, tails
-from vedette.text import markdown_table, named_in, spreadsheet_text, with_error
+from vedette.internal.text import markdown_table, named_in, spreadsheet_text, with_error
 
 _ESCAPED = str.maketrans(
     {

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.evaluation.comparison import Comparison
+from vedette.internal.text import named_in
 from vedette.kernels.base.types import Floats
-from vedette.text import named_in
 
 
 class Tail(NamedTuple):

@@ -16,13 +16,13 @@ from vedette.evaluation.joining import Join, track_names
 from vedette.evaluation.metrics.matching import match_run
 from vedette.evaluation.told import told_by
 from vedette.evaluation.track_formats import czml, geojson, mcap, utc_text
-from vedette.extras import need
-from vedette.files import write_file
+from vedette.internal.extras import require_packages
+from vedette.internal.files import write_file
+from vedette.internal.text import spreadsheet_text
 from vedette.platforms.compass import Compass, courses_of
 from vedette.recorded import Origin
 from vedette.scenarios import Scenario
 from vedette.simulation.records import RunRecord
-from vedette.text import spreadsheet_text
 
 
 def track_table(
@@ -124,7 +124,7 @@ def check_format(path: Path) -> None:
     if ending not in ENDINGS:
         raise InputError(f"{path}: expected a file that ends with {', '.join(ENDINGS)}; got {ending or 'none'}")
     if package := _PACKAGES.get(ending):
-        need(f"writing {ending} files", package)
+        require_packages(f"writing {ending} files", package)
 
 
 def _label(label: tuple[int, ...]) -> str:

@@ -10,11 +10,11 @@ import numpy as np
 
 from vedette.evaluation.agreement import measured_by, noise_stds
 from vedette.evaluation.scans import LIE, scans_of_record
+from vedette.internal.text import pluralise
 from vedette.kernels.base.types import Bools, Floats
 from vedette.recorded.extents import places_of
 from vedette.scenarios import Scenario
 from vedette.simulation.records import RunRecord
-from vedette.text import counted
 
 _GATE = 4.0  # standard deviations of what a course of two measurements predicts of the third
 _FASTEST = 1500.0  # m/s
@@ -69,7 +69,7 @@ def _told(found: list[_Course], name: str, place: Floats, assumed: float) -> str
     speeds, first = [each.speed for each in found], min(found, key=lambda each: each.begin)
     away = float(np.hypot(*(first.first - place)))
     where = f"from {first.begin:g} to {max(each.end for each in found):g} s, the first {away:.0f} m away"
-    number = counted(sum(each.number for each in found), "measurement")
+    number = pluralise(sum(each.number for each in found), "measurement")
     fast = f"{min(speeds):.0f} to {max(speeds):.0f} m/s"
     step = 10.0 ** math.floor(math.log10(max(speeds)))
     advice = f"`--max-target-speed {0.5 * step * math.ceil(2.2 * max(speeds) / step):g}`, or `birth` and `motion`"

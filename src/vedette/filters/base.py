@@ -15,6 +15,7 @@ from vedette.errors import InputError
 from vedette.filters.inputs import births_for, blame_model, check_belief, check_scan, no_time, nobody
 from vedette.filters.limits import Limits
 from vedette.filters.protocols import FilterInfo
+from vedette.internal.representation import SummaryRepr
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.types import Floats, Ints, Lmb, Motion, ScanInput, Sensor
 from vedette.models import (
@@ -27,7 +28,6 @@ from vedette.models import (
     position,
 )
 from vedette.models.arguments import generator, pose_vector, positive, step_number
-from vedette.speaking import Speaking
 
 BeliefT = TypeVar("BeliefT", bound=Labelled)
 
@@ -65,7 +65,7 @@ NO_SCAN = np.empty((0, 2))
 NO_POSE = np.zeros(3)
 
 
-class WithBirths(Speaking):
+class WithBirths(SummaryRepr):
     """A filter whose labels may begin at birth sites."""
 
     __slots__ = ()

@@ -17,13 +17,13 @@ from vedette.densities import GLMB, LMB, FactoredGLMB, IidCluster, Labelled, Mul
 from vedette.densities.containers import unchecked
 from vedette.densities.tracks import gaussian_tracks, relabelled_tracks
 from vedette.errors import InputError, ModelError, VedetteError
+from vedette.internal.unit_warnings import warn_implausible
 from vedette.kernels.base.types import Bools, Floats, Ints, Lmb
 from vedette.kernels.gaussian.scans import examined_scan
 from vedette.kernels.labelled import births as kernels
 from vedette.models import BirthModel, SensorModel
 from vedette.models.arguments import as_array, reject, step_number
 from vedette.models.measurement import MeasurementModel, wrap_angular
-from vedette.plausible import implausible
 
 _MOST_STDS = 10.0  # of noise below the least that a measurement is without it
 _NO_ROWS = np.empty(0, np.int64)
@@ -72,7 +72,7 @@ def _tell_negative(scan: Floats, measurement: MeasurementModel, stds: Floats | N
     for row, component in np.argwhere(below)[:1].tolist():
         got = f"{scan[row, component]:g} in row {row}, component {component}"
         least = f"at least {measurement.least[component]:g}, but for noise"
-        implausible("scan", least, got, "a sign, or components exchanged")
+        warn_implausible("scan", least, got, "a sign, or components exchanged")
 
 
 def _in_one_turn(scan: Floats, angular: Bools) -> Floats:

@@ -11,6 +11,7 @@ import numpy as np
 
 from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled, as_lmb, existence_probabilities, track_moments
 from vedette.densities.label_sets import without_labels
+from vedette.internal.probabilities import chi_squared_quantile, logit
 from vedette.kernels.association.search import SearchCaps
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.types import Bools, Ints
@@ -27,7 +28,6 @@ from vedette.models.fields import (
     Share,
     check_fields,
 )
-from vedette.probabilities import chi_squared_quantile, logit
 
 _Labelled = TypeVar("_Labelled", GLMB, LMB, FactoredGLMB)
 

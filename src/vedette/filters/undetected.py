@@ -14,13 +14,13 @@ from vedette.densities.label_sets import without_labels
 from vedette.filters.appearing import appearing, no_cells, rate_after, tables_of, without_change
 from vedette.filters.inputs import births_of, births_within
 from vedette.filters.limits import Limits
+from vedette.internal.probabilities import expit
 from vedette.kernels.base.types import Floats, Lmb, Mixture
 from vedette.kernels.gaussian.components import stacked_mixtures
 from vedette.kernels.steps.undetected import Arrivals, Left, Undetected
 from vedette.models import BirthModel, SensorModel
 from vedette.models.arguments import reject, step_number
 from vedette.models.turns import is_turn, longest_lag
-from vedette.probabilities import expit
 
 # Existence of a birth from which on it is a label from the start: as Poisson, its number would be wrong by 2 r^2.
 FROM_THE_START = 0.15

@@ -12,11 +12,11 @@ import numpy as np
 from vedette.densities import Labelled
 from vedette.errors import InputError
 from vedette.fusion.views import Views
+from vedette.internal.text import join_alternatives
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.labelled.set_fusion import LOST, SURE
 from vedette.kernels.labelled.validity import is_valid_lmb
 from vedette.models.arguments import real, reject, sequence
-from vedette.text import either
 
 # Type and number of dimensions of the arrays of an LMB: labels, offsets, log weights, means, covariances, logits.
 _INT, _FLOAT = np.dtype(np.int64), np.dtype(np.float64)
@@ -164,7 +164,7 @@ def check_kinds(given: Sequence[type], kinds: tuple[type, ...], num_sensors: int
     """Raise `InputError` unless one belief a sensor is given, all of the kinds expected."""
     if len(given) != num_sensors:
         raise InputError(f"beliefs: expected {num_sensors}, one for each fusion weight; got {len(given)}")
-    expected = either([kind.__name__ for kind in kinds])
+    expected = join_alternatives([kind.__name__ for kind in kinds])
     for i, kind in enumerate(given):
         if not issubclass(kind, kinds):
             raise InputError(f"beliefs[{i}]: expected {expected}; got {kind.__name__}")

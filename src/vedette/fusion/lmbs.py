@@ -31,12 +31,12 @@ from vedette.fusion.powers import (
     told_of_tracks,
 )
 from vedette.fusion.views import AlignedLmbs, Views, align_lmbs, require_views, sum_over_sensors, weights_by_view
+from vedette.internal.probabilities import expit, log_expit, logit
 from vedette.kernels.base.types import Bools, Floats, Ints, Lmb
 from vedette.kernels.gaussian.pooling import pooled_tracks, reduced_tracks
 from vedette.kernels.gaussian.reduction import MixtureCaps
 from vedette.kernels.labelled.gci import fused_tracks
 from vedette.models.arguments import chance, flag
-from vedette.probabilities import expit, log_expit, logit
 
 
 @dataclass(frozen=True, slots=True)

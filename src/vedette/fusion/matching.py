@@ -14,10 +14,10 @@ from vedette.densities.conversions import names_settled
 from vedette.densities.label_sets import Label
 from vedette.fusion.base import Fusion, FusionInfo, ValidBeliefs, check_beliefs
 from vedette.fusion.views import Views
+from vedette.internal.probabilities import chi_squared_quantile
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.distances import near_pairs
 from vedette.models.arguments import chance, instance, sequence
-from vedette.probabilities import chi_squared_quantile
 
 GATE_PROBABILITY = 0.999  # that two estimates of one target are within the gate
 LIKELY = 0.5  # existence from which a label is matched before the others

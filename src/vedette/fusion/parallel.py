@@ -29,13 +29,13 @@ from vedette.fusion.parallel_sets import (
 )
 from vedette.fusion.powers import ONE, FusionLimits, check_limits
 from vedette.fusion.views import Views
+from vedette.internal.probabilities import expit, log_expit
 from vedette.kernels.base.types import Floats, Ints, Tracks
 from vedette.kernels.gaussian.components import components_of
 from vedette.kernels.gaussian.pooling import reduced_tracks
 from vedette.kernels.labelled.parallel import update_in_parallel
 from vedette.kernels.labelled.stacking import stack_tracks
 from vedette.models.arguments import chance, non_negative, sequence
-from vedette.probabilities import expit, log_expit
 
 _Density = TypeVar("_Density", LMB, FactoredGLMB)
 

@@ -18,12 +18,12 @@ from vedette.errors import InputError, NumericalError
 from vedette.fusion.base import count_lost
 from vedette.fusion.powers import ONE
 from vedette.fusion.views import sum_over_sensors
+from vedette.internal.probabilities import log_expit, logit
 from vedette.kernels.base.types import Bools, Floats, Ints, Tracks
 from vedette.kernels.gaussian.components import components_of
 from vedette.kernels.gaussian.pooling import pooled_tracks
 from vedette.kernels.labelled.groups import group_log_sums
 from vedette.kernels.labelled.stacking import stack_tracks
-from vedette.probabilities import log_expit, logit
 
 
 class Posteriors(NamedTuple):

@@ -3,9 +3,9 @@
 Importing this registers the environment `vedette/Scenario-v0` with Gymnasium, whose argument is a `scenario`.
 """
 
-from vedette.extras import need
+from vedette.internal.extras import require_packages
 
-need("an environment", "gymnasium", "pettingzoo")
+require_packages("an environment", "gymnasium", "pettingzoo")
 
 import gymnasium
 

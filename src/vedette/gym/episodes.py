@@ -13,11 +13,11 @@ from vedette.control import Plan
 from vedette.densities import Labelled
 from vedette.errors import InputError
 from vedette.evaluation.runs import score_of
-from vedette.extras import need
 from vedette.gym.observing import Observer, Outlook, deciding_of
 from vedette.gym.windows import Window
+from vedette.internal.extras import require_packages
+from vedette.internal.unit_warnings import suppress_unit_warnings
 from vedette.models.arguments import count, reject
-from vedette.plausible import told_elsewhere
 from vedette.scenarios import Scenario, load_scenario
 from vedette.scenarios.build import build_experiment, build_parts, build_sensors
 from vedette.scenarios.sections.strategies import Strategy
@@ -88,7 +88,7 @@ class Episodes:
         if render_mode not in (None, *RENDER_MODES):
             raise reject("render_mode", f"{' or '.join(RENDER_MODES)} or None", render_mode)
         if render_mode is not None:
-            need("a picture of an environment", "matplotlib")
+            require_packages("a picture of an environment", "matplotlib")
         if not callable(reward) and reward not in ("ospa", "expected_loss"):
             raise reject("reward", "ospa, expected_loss or a function of moments and truth", reward)
         self._num_labels, self._reward, self.render_mode = num_labels, reward, render_mode
@@ -124,14 +124,14 @@ class Episodes:
                 f"step: expected a reset first, as {'there is no run' if self._seed is None else 'the run is over'}"
             )
         chosen, self.num_moved = self.built.observer.chosen(self.outlook, actions)
-        with told_elsewhere():
+        with suppress_unit_warnings():
             plan = plan_of("policy", self.outlook, chosen)
             self._journal.decide(plan, explain=self.built.experiment.explain)
             self.world.follow(plan.chosen_actions)
             self._advance()
 
     def _advance(self) -> None:
-        with told_elsewhere():
+        with suppress_unit_warnings():
             self._moments = advance(self.world, self._journal)
             last = self._moments[-1]
             self.outlook: Outlook = self.built.observer.outlook(last.state, last.poses)

@@ -6,9 +6,9 @@ from typing import Any
 
 from vedette.control import KnowsTruth, WatchedPlanner
 from vedette.errors import InputError
+from vedette.internal.quantities import COMPONENTS
 from vedette.live.loop import Live
 from vedette.models.arguments import reject
-from vedette.quantities import COMPONENTS
 from vedette.recorded.extents import box_of
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.scenarios.of_recording import OfSensors

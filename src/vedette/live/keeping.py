@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from vedette.errors import InputError
-from vedette.files import lock_beside
+from vedette.internal.files import lock_beside
 from vedette.live.lines import CHUNK, LineSplitter
 from vedette.live.loop import Answer, Live, LiveState
 from vedette.live.messages import MOST_BYTES, is_message

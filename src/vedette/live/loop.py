@@ -14,11 +14,11 @@ from vedette.control import Planner
 from vedette.densities import Estimator
 from vedette.errors import VedetteError
 from vedette.evaluation.track_formats import utc_text
+from vedette.internal.quantities import COMPONENTS, PLACED
 from vedette.kernels.base.types import Floats
 from vedette.live.messages import Message, read_message
 from vedette.models.arguments import reject
 from vedette.platforms.compass import Compass, PlaneCompass, courses_of
-from vedette.quantities import COMPONENTS, PLACED
 from vedette.recorded import Conventions, Origin, Site
 from vedette.recorded.extents import beyond_reach, is_within, places_of
 from vedette.simulation.journal import cause_of

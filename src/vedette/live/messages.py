@@ -10,15 +10,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vedette.errors import InputError
+from vedette.internal.quantities import COMPONENTS, is_doppler
+from vedette.internal.reading import error_summary, parse_json
+from vedette.internal.text import pluralise, shown
 from vedette.kernels.base.types import BEAM, OWN_VELOCITY, Floats
 from vedette.models.arguments import reject
 from vedette.models.turns import Turn, with_beam
-from vedette.quantities import COMPONENTS, is_doppler
-from vedette.reading import parse_json, said
 from vedette.recorded import Conventions, Origin, Site, parse_scans
 from vedette.recorded.tables import Table, is_number, seconds
 from vedette.recorded.turns import bearings_of
-from vedette.text import counted, shown
 from vedette.tracking import SensorScan
 
 MOST_BYTES = 1_000_000  # of a line
@@ -48,7 +48,7 @@ def read_message(
     """The scan that a line tells of.
 
     `{"sensor": name or number from 1, "time": s or ISO 8601, "measurements": [[...], ...], "pose": ...}`: measurements
-    as `vedette.quantities.COMPONENTS` has them, in rad (of a sensor with a compass in degrees) and m unless
+    as `vedette.internal.quantities.COMPONENTS` has them, in rad (of a sensor with a compass in degrees) and m unless
     `conventions.units` says another; angles count as `conventions.bearings` says, else as the sensor tells them. The
     pose, which may be left out, is `[x, y, heading_rad, ...]`, or `{"lon": , "lat": , "course_deg": }`, where the
     course, clockwise from true north as in plans, may be left out; or with `heading_deg`, which counts as bearings do
@@ -104,7 +104,7 @@ def read_message(
 
 def _lags(given: Any, place: str, num: int, time: float, is_utc: bool) -> Floats:
     """(num,) s after the time of the scan."""
-    wanted = f"a list of {counted(num, 'time')}, one for each measurement, of the form of `time`"
+    wanted = f"a list of {pluralise(num, 'time')}, one for each measurement, of the form of `time`"
     if not isinstance(given, list) or len(given) != num or any(isinstance(each, str) != is_utc for each in given):
         raise reject(place, wanted, given)
     try:
@@ -143,7 +143,7 @@ def _object(line: bytes, place: str) -> Mapping[str, Any]:
     try:
         data = parse_json(line)
     except ValueError as fault:
-        raise InputError(f"{place}: expected a JSON object; it is damaged: {said(fault)}") from None
+        raise InputError(f"{place}: expected a JSON object; it is damaged: {error_summary(fault)}") from None
     if not isinstance(data, dict):
         raise reject(place, "a JSON object", data)
     for key in data:

@@ -13,11 +13,11 @@ from typing import Any, Protocol, TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
-from vedette.covariances import covariance_fault
 from vedette.errors import InputError
+from vedette.internal.covariances import covariance_fault
+from vedette.internal.text import plain, printable
+from vedette.internal.unit_warnings import warn_implausible
 from vedette.kernels.base.types import Floats
-from vedette.plausible import implausible
-from vedette.text import plain, printable
 
 _MAX_COUNT = 2**62
 _MOST_STATE_DIMENSIONS = 10_000
@@ -242,7 +242,7 @@ def tell_degrees(field: str, heading: float) -> None:
     """Warn of a heading of a pose that is rather in degrees: a whole number from 10 to two turns of these."""
     if 10.0 <= abs(heading) <= 720.0 and heading == round(heading):
         degrees = f"{heading:g} degrees are {math.radians(heading):.4f} rad"
-        implausible(field, "a heading in radians", f"{heading:g}, a whole number", degrees)
+        warn_implausible(field, "a heading in radians", f"{heading:g}, a whole number", degrees)
 
 
 def state_table(field: str, values: Any, state_dim: int | None = None) -> Floats:

@@ -8,10 +8,10 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from vedette.internal.quantities import QUANTITIES
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import reject
 from vedette.models.measurement import wrap_angles
-from vedette.quantities import QUANTITIES
 
 LEAST_RANGE = 1.0  # m; what is left of a range where a bias is taken off or added
 
@@ -55,7 +55,7 @@ NO_BIAS = Bias()
 def with_offsets(measured: Floats, offsets: Floats, components: Sequence[str]) -> Floats:
     """(num, meas_dim) measurements plus (meas_dim,) offsets, angles in (-pi, pi], ranges at least `LEAST_RANGE`.
 
-    components: the quantities that are measured, of `vedette.quantities.QUANTITIES`.
+    components: the quantities that are measured, of `vedette.internal.quantities.QUANTITIES`.
     """
     found = measured + offsets
     for i, name in enumerate(components):

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.errors import InputError, ModelError
+from vedette.internal.quantities import COMPONENTS, QUANTITIES, is_doppler
 from vedette.kernels.base.compile import inlined
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models.arguments import (
@@ -27,7 +28,6 @@ from vedette.models.fields import NonNegative, Reals, part
 from vedette.models.functions import ModelFunction, describe, model_function, numbers_at, require_kind
 from vedette.models.measurement import MeasurementModel, angular_flags, wrap_angular
 from vedette.models.probe import probe_log_intensity
-from vedette.quantities import COMPONENTS, QUANTITIES, is_doppler
 
 # Scans of clutter that a check draws and looks up in the intensity.
 _NUM_TRIAL_SCANS = 8

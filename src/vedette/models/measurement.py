@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.errors import ModelError
+from vedette.internal.quantities import QUANTITIES
 from vedette.kernels.base.types import Bools, Floats
 from vedette.kernels.gaussian.beam import passage, to_scan_time, turns
 from vedette.kernels.gaussian.scans import put_on_circle
@@ -16,7 +17,6 @@ from vedette.models.arguments import dimension, float_array, params_vector, pose
 from vedette.models.fields import part
 from vedette.models.functions import ModelFunction, model_function, require_kind, write_rows
 from vedette.models.probe import probe_array, probe_covariance, probe_jacobian
-from vedette.quantities import QUANTITIES
 
 
 @model_function("measurement")
@@ -86,7 +86,7 @@ class MeasurementModel:
             target; None where a measurement does not say where. Births from measurements need it.
         is_linear: whether measurements are linear in the state: a Jacobian then serves however wide a Gaussian is.
         components: the quantity that each component is: "bearing", "range", "range_rate", "x" or "y" (the names of
-            `vedette.quantities.QUANTITIES`, which a `Bias` has too); () where they are others.
+            `vedette.internal.quantities.QUANTITIES`, which a `Bias` has too); () where they are others.
 
     Raises:
         InputError: a function of another kind, a bad dimension or parameter, a wrong number of angular flags, an

@@ -7,18 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vedette.internal.unit_warnings import look_like_degrees, warn_implausible
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models.arguments import as_array, generator, real, reject
 from vedette.models.fields import Real
-from vedette.plausible import implausible, seem_degrees
 
 
 def tell_degrees(field: str, corners: Floats) -> None:
     """Warn of an area whose corners are rather longitudes and latitudes."""
-    if seem_degrees(corners):
+    if look_like_degrees(corners):
         width, height = np.ptp(corners, axis=0)
         got = f"an area of {width:.3g} by {height:.3g} m at {tuple(corners[0].tolist())}"
-        implausible(field, "metres from the origin", got, "are these longitudes and latitudes")
+        warn_implausible(field, "metres from the origin", got, "are these longitudes and latitudes")
 
 
 @dataclass(frozen=True, slots=True)

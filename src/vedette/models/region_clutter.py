@@ -148,8 +148,8 @@ def region_clutter(
     Args:
         rate: expected number a scan (paper: 25).
         region: the surveillance region.
-        kind: a key of `vedette.quantities.COMPONENTS`, what the sensor measures. Clutter of another measurement is a
-            `ClutterModel` with a log intensity and sampler of one's own.
+        kind: kind of measurement, a key of `vedette.internal.quantities.COMPONENTS`. For other measurements, use a
+            `ClutterModel` with a custom log intensity and sampler.
         max_range_rate: largest range rate of a false measurement, either way, where range rates are measured; none: 300
             [m/s].
     """

@@ -9,6 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vedette.internal.unit_warnings import LARGE_ANGLE, warn_implausible
 from vedette.kernels.base.types import Floats, Sensor
 from vedette.kernels.gaussian.detection import AT_CENTRE, AT_EDGES, BY_NODES, CLOSED_FORM, detection_probabilities
 from vedette.kernels.gaussian.position_integrals import spread_nodes
@@ -18,7 +19,6 @@ from vedette.models.detection import DetectionModel
 from vedette.models.functions import model_function
 from vedette.models.measurement import MeasurementModel, NoiseModel
 from vedette.models.motion import resolve_method
-from vedette.plausible import LARGE_ANGLE, implausible
 
 
 @model_function("measurement_jacobian")
@@ -99,7 +99,7 @@ class SensorModel:
             got, meant = f"{stds[component]:g}", "is it in degrees, or are components exchanged"
             if stds[component] > math.pi:
                 raise reject(field, f"{expected}, up to pi", f"{got} ({meant}?)")
-            implausible(field, expected, got, meant)
+            warn_implausible(field, expected, got, meant)
 
     def to_kernel(self, detection_at: str | None = None) -> Sensor:
         """The bundle of functions and parameters that kernels take.

@@ -12,10 +12,10 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 
 from vedette.errors import InputError
+from vedette.internal.representation import SummaryRepr
+from vedette.internal.text import pluralise
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models.arguments import as_array, float_array, provides, reject, sequence
-from vedette.speaking import Speaking
-from vedette.text import counted
 
 # Poses nearer than this, relative to their size, are one: rounding of degrees to radians and back stays below.
 _SAME_POSE = 1e-9
@@ -99,7 +99,7 @@ def _same(courses: Floats) -> Bools:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Actions(Speaking):
+class Actions(SummaryRepr):
     """What one sensor may do, one action a row.
 
     Attributes:
@@ -130,7 +130,7 @@ class Actions(Speaking):
         return len(self.values)
 
     def _summary(self) -> str:
-        return f"of {counted(len(self), 'choice')}: {', '.join(self.columns)}"
+        return f"of {pluralise(len(self), 'choice')}: {', '.join(self.columns)}"
 
     def text(self, index: int) -> str:
         """One action in words: `heading_deg 30, speed 5`; a switch is `on` or `off`, in sequences at which decision."""

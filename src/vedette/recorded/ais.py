@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from vedette.errors import InputError
-from vedette.extras import need
-from vedette.text import counted
+from vedette.internal.extras import require_packages
+from vedette.internal.text import pluralise
 
 AIS_ENDINGS = (".nmea", ".ais")
 _FIRST_TIME = 3e8  # s; numbers below are no times since 1970 of an AIS message
@@ -32,7 +32,7 @@ def read_ais(file: Path) -> tuple[dict[str, list[Any]], list[int], tuple[str, ..
         MissingPackageError: pyais is not installed.
         InputError: no position with a time in it.
     """
-    need(f"{file}, which is a file of AIS messages,", "pyais")
+    require_packages(f"{file}, which is a file of AIS messages,", "pyais")
     rows, lines, lost, open_ones = list[tuple[Any, ...]](), list[int](), dict[str, list[int]](), _Open({}, [])
     with file.open("rb") as source:
         for number, line in enumerate(source, start=1):
@@ -58,7 +58,7 @@ def read_ais(file: Path) -> tuple[dict[str, list[Any]], list[int], tuple[str, ..
 
 
 def _lost_in_words(lost: dict[str, list[int]]) -> str:
-    return ", ".join(f"{counted(len(at), 'line')} {what} (first: row {at[0]})" for what, at in lost.items())
+    return ", ".join(f"{pluralise(len(at), 'line')} {what} (first: row {at[0]})" for what, at in lost.items())
 
 
 def _sentence(line: bytes) -> tuple[bytes, float | None]:

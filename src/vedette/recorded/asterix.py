@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from vedette.errors import InputError
-from vedette.extras import need
-from vedette.text import counted, shown
+from vedette.internal.extras import require_packages
+from vedette.internal.text import pluralise, shown
 
 ASTERIX_ENDINGS = (".ast", ".asterix", ".raw")
 CAPTURE_ENDINGS = (".pcap", ".pcapng")
@@ -35,7 +35,7 @@ def read_asterix(file: Path, *, reports: bool = False) -> tuple[dict[str, list[A
         MissingPackageError: libasterix is not installed.
         InputError: bytes that are no ASTERIX, or no plots and tracks in them.
     """
-    need(f"{file}, which is an ASTERIX file,", "asterix")
+    require_packages(f"{file}, which is an ASTERIX file,", "asterix")
     found: dict[int, tuple[list[dict[str, Any]], list[int]]] = {_PLOTS: ([], []), _TRACKS: ([], [])}
     days, without = dict.fromkeys(found, 0.0), list[int]()
     for number, (category, record) in enumerate(_records(file), start=1):
@@ -58,7 +58,7 @@ def read_asterix(file: Path, *, reports: bool = False) -> tuple[dict[str, list[A
     slant = sum(columns.pop("is_slant", []))
     notes = () if not slant else (_of_slant_ranges(slant, len(numbers)),)
     if left := without.count(read):
-        notes = (*notes, f"left out: {counted(left, 'record')} of category {read:03} without a time or place")
+        notes = (*notes, f"left out: {pluralise(left, 'record')} of category {read:03} without a time or place")
     if set(columns.get("range_rate_mps", ())) == {None}:
         del columns["range_rate_mps"]
     kept = {name: cells for name, cells in columns.items() if name not in ("vx", "vy") or None not in cells}

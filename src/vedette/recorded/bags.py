@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from vedette.errors import InputError
-from vedette.extras import need
-from vedette.text import elided, printable
+from vedette.internal.extras import require_packages
+from vedette.internal.text import elided, printable
 
 BAG_ENDINGS = (".db3", ".mcap")
 _POSES, _POINT, _FIX = "geometry_msgs/msg/PoseArray", "geometry_msgs/msg/PointStamped", "sensor_msgs/msg/NavSatFix"
@@ -27,7 +27,7 @@ def read_bag(file: Path, *, reports: bool) -> tuple[dict[str, list[Any]], list[i
         MissingPackageError: rosbags is not installed.
         InputError: no bag, a damaged one, or no such messages in it.
     """
-    need(f"{file}, which is a ROS 2 bag,", "rosbags")
+    require_packages(f"{file}, which is a ROS 2 bag,", "rosbags")
     kinds = (_FIX,) if reports else (_POSES, _POINT)
     rows = list[tuple[int, float, str, Any]]()
     try:

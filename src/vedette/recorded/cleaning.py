@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vedette.internal.text import pluralise
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models import Region
 from vedette.models.arguments import reject
 from vedette.models.fields import NonNegative, Positive, check_fields
 from vedette.recorded.reports import Reports
-from vedette.text import counted
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,7 +52,7 @@ class CleaningCounts:
             "slow tracks": self.slow_tracks,
         }
         found = ", ".join(f"{number} {what}" for what, number in removed.items() if number)
-        return f"{counted(self.reports, 'report')} ({found or 'none removed'})"
+        return f"{pluralise(self.reports, 'report')} ({found or 'none removed'})"
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,15 +7,15 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from vedette.errors import InputError
+from vedette.internal.quantities import ANGLES, COMPONENTS, is_doppler
+from vedette.internal.text import shown
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import reject
 from vedette.platforms.compass import PlaneCompass
-from vedette.quantities import ANGLES, COMPONENTS, is_doppler
 from vedette.recorded.conventions import OTHER_NAMES, OWN_SPEEDS, UNITS, Conventions
 from vedette.recorded.geography import Origin
 from vedette.recorded.instants import Site
 from vedette.recorded.tables import Table, are_dates, column_names
-from vedette.text import shown
 
 
 class ScanColumns:

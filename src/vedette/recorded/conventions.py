@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from vedette.internal.quantities import ANGLES, LENGTHS, QUANTITIES, SPEEDS
 from vedette.models.arguments import reject
-from vedette.quantities import ANGLES, LENGTHS, QUANTITIES, SPEEDS
 from vedette.recorded.instants import Bearings
 
 # What a row may say: the quantity, and the units that the end of a column's name may give it.

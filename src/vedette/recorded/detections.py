@@ -9,10 +9,10 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from vedette.errors import InputError
+from vedette.internal.quantities import QUANTITIES, si_column
+from vedette.internal.text import shown
 from vedette.models.arguments import reject
-from vedette.quantities import QUANTITIES, si_column
 from vedette.recorded.tables import Table
-from vedette.text import shown
 
 _COLUMNS = {**{name: si_column(name) for name in QUANTITIES}, "lon": "lon_deg", "lat": "lat_deg"}
 Place: TypeAlias = tuple[float, float]

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vedette.internal.quantities import PLACED
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models.turns import own_places
-from vedette.quantities import PLACED
 
 MARGIN = 0.05  # of the longer side of an extent, around it
 _LONELY = 0.9  # a value is far from all others where the third on its side is nearer than this share of its distance

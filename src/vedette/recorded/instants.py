@@ -10,17 +10,17 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vedette.internal.quantities import COMPONENTS, angles
+from vedette.internal.representation import SummaryRepr
+from vedette.internal.text import pluralise
 from vedette.kernels.base.types import BEAM, Floats
 from vedette.models import Bias
 from vedette.models.arguments import float_array
 from vedette.models.bias import NO_BIAS, with_offsets
 from vedette.models.turns import is_turn
 from vedette.platforms.compass import Compass, PlaneCompass, course_deg, wrapped
-from vedette.quantities import COMPONENTS, angles
 from vedette.recorded.turns import Turning
 from vedette.simulation.records import ScansFile
-from vedette.speaking import Speaking
-from vedette.text import counted
 from vedette.tracking import SensorScan
 
 Bearings = Literal["east", "north"]
@@ -45,7 +45,7 @@ class Site:
 
     Attributes:
         name: as the rows name it; its number, from 1, will do too.
-        kind: of its measurements, a key of `vedette.quantities.COMPONENTS`.
+        kind: of its measurements, a key of `vedette.internal.quantities.COMPONENTS`.
         pose: [px, py, heading_rad, ...] where the rows do not say.
         bias: what the rows say too much, which is taken off as they are read; ranges that would be below 1 m without it
             are taken as 1 m.
@@ -91,7 +91,7 @@ class Site:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class RecordedScans(Speaking):
+class RecordedScans(SummaryRepr):
     """Scans at the instants at which any sensor scanned.
 
     Attributes:
@@ -121,9 +121,10 @@ class RecordedScans(Speaking):
     file: ScansFile = field(default_factory=ScansFile)
 
     def _summary(self) -> str:
-        sizes = f"{counted(len(self.times), 'instant')}, {counted(self.poses.shape[1], 'sensor')}"
+        sizes = f"{pluralise(len(self.times), 'instant')}, {pluralise(self.poses.shape[1], 'sensor')}"
         return (
-            f"of {sizes}, {counted(self.num_measurements, 'measurement')}, {counted(len(self.skipped), 'row')} skipped"
+            f"of {sizes}, {pluralise(self.num_measurements, 'measurement')}, "
+            f"{pluralise(len(self.skipped), 'row')} skipped"
         )
 
     def between(self, begin: float, end: float) -> RecordedScans:

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from vedette.errors import InputError
+from vedette.internal.quantities import COMPONENTS, QUANTITIES
+from vedette.internal.text import pluralise, shown
 from vedette.kernels.base.types import Bools, Floats, Ints
-from vedette.quantities import COMPONENTS, QUANTITIES
 from vedette.recorded.instants import RecordedScans, Site, with_wrapped_angles
-from vedette.text import counted, shown
 
 _CLOSE = 3.0  # noise standard deviations between two measurements of one target
 _FEWEST = 10  # scans that tell something
@@ -60,7 +60,7 @@ def _told(site: Site, before: int, after: int, offsets: Floats) -> str:
         for name, (unit, word), value in zip(COMPONENTS[site.kind], units, spread.tolist(), strict=True)
     ]
     spread_of = f"spread {', '.join(parts)}; its noise should cover that"
-    return f"{site.name}: {counted(before, 'measurement')} merged into {after}, {spread_of}"
+    return f"{site.name}: {pluralise(before, 'measurement')} merged into {after}, {spread_of}"
 
 
 def _means(scan: Floats, kind: str, stds: Floats, distance: float) -> tuple[Floats, Floats]:

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from vedette.internal.text import pluralise
 from vedette.recorded.tables import FARTHEST, Table, is_empty
-from vedette.text import counted
 
 _POSITION = ("icao24", "lat", "lon")
 _VELOCITY = ("velocity", "heading")
@@ -34,7 +34,7 @@ def of_opensky(table: Table) -> tuple[Table, dict[str, str]]:
     """
     kept = [i for i in range(len(table.rows)) if all(_is_there(table, name, i) for name in _POSITION)]
     without = len(table.rows) - len(kept)
-    notes = (f"left out: {counted(without, 'row')} without a position",) if without else ()
+    notes = (f"left out: {pluralise(without, 'row')} without a position",) if without else ()
     time = "lastposupdate" if _are_there(table, ("lastposupdate",), kept) else "time"
     first: dict[tuple[str, str], int] = {}
     for i in kept:

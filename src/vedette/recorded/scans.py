@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from vedette.errors import InputError
+from vedette.internal.quantities import ANGLES, COMPONENTS, PLACED, QUANTITIES, is_doppler
+from vedette.internal.text import shown
 from vedette.kernels.base.types import OWN_VELOCITY, Floats
 from vedette.models.bias import NO_BIAS
-from vedette.quantities import ANGLES, COMPONENTS, PLACED, QUANTITIES, is_doppler
 from vedette.recorded.columns import ScanColumns
 from vedette.recorded.conventions import MOST, ONE_PLACE, ONE_PLACE_SHARE, OVER_A_TURN, OWN_SPEEDS, UNITS, Conventions
 from vedette.recorded.extents import places_of, wild
@@ -36,7 +37,6 @@ from vedette.recorded.tables import (
 )
 from vedette.recorded.turns import bearings_of, scans_of_turns
 from vedette.simulation.records import ScansFile
-from vedette.text import shown
 
 
 def parse_scans(

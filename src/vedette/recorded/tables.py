@@ -17,12 +17,12 @@ from typing import Any, Literal
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.extras import need
+from vedette.internal.extras import require_packages
+from vedette.internal.text import elided, printable, shown
 from vedette.kernels.base.types import Floats
 from vedette.recorded.ais import AIS_ENDINGS, read_ais
 from vedette.recorded.asterix import ASTERIX_ENDINGS, CAPTURE_ENDINGS, read_asterix
 from vedette.recorded.bags import BAG_ENDINGS, read_bag
-from vedette.text import elided, printable, shown
 
 # Beyond these, differences and speeds of reports mean nothing.
 FARTHEST = 1e9  # m, m/s
@@ -259,7 +259,7 @@ def header_of(reader: Iterator[list[str]], file: Path) -> list[str]:
 
 
 def _parquet(file: Path, content: bytes) -> Table:
-    need(f"{file}, which is a Parquet file,", "pyarrow")
+    require_packages(f"{file}, which is a Parquet file,", "pyarrow")
     from pyarrow import ArrowException, parquet  # here, as most programs never need it
 
     try:

@@ -7,9 +7,9 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from vedette.internal.quantities import COMPONENTS
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.turns import Turn, with_beam
-from vedette.quantities import COMPONENTS
 
 # The scans of a sensor: turns as given ("found": as found in its rows, if any), or rows with one time ("none").
 Turning = Turn | Literal["found", "none"]

@@ -1,8 +1,8 @@
 """The results of a campaign or a single run as one page that opens anywhere, and as figures for a paper."""
 
-from vedette.extras import need
+from vedette.internal.extras import require_packages
 
-need("a report", "jinja2", "matplotlib", "pyarrow")
+require_packages("a report", "jinja2", "matplotlib", "pyarrow")
 
 from vedette.reports.saving import write_figures, write_run_figures, write_summary
 from vedette.reports.single import write_run_report

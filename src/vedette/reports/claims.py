@@ -12,7 +12,7 @@ from vedette.evaluation import Comparison, PairedDifference, holm
 from vedette.evaluation.figures.style import strategy_label
 from vedette.evaluation.health import percent
 from vedette.evaluation.statistics import CONFIDENCE
-from vedette.text import amount, with_minus
+from vedette.internal.text import with_minus, with_unit
 
 Verdict = Literal["better", "worse", "unclear", "unknown"]
 
@@ -90,7 +90,7 @@ def _verdict(paired: PairedDifference, p_value: float) -> Verdict:
 
 
 def _better(first: str, second: str, paired: PairedDifference, unit: str) -> str:
-    less = amount(f"{float(paired.summary.mean):.2f}", unit)
+    less = with_unit(f"{float(paired.summary.mean):.2f}", unit)
     interval = _range(float(paired.summary.low), float(paired.summary.high), unit)
     return (
         f"{first} has a smaller mean OSPA than {second}, by {less} (95 % interval {interval}, {_runs(paired)}). "
@@ -99,7 +99,7 @@ def _better(first: str, second: str, paired: PairedDifference, unit: str) -> str
 
 
 def _worse(first: str, second: str, paired: PairedDifference, unit: str) -> str:
-    more = amount(f"{-float(paired.summary.mean):.2f}", unit)
+    more = with_unit(f"{-float(paired.summary.mean):.2f}", unit)
     interval = _range(-float(paired.summary.high), -float(paired.summary.low), unit)
     return (
         f"{first} has a larger mean OSPA than {second}, by {more} (95 % interval {interval}, {_runs(paired)}). "
@@ -108,7 +108,7 @@ def _worse(first: str, second: str, paired: PairedDifference, unit: str) -> str:
 
 
 def _unclear(first: str, second: str, paired: PairedDifference, unit: str) -> str:
-    difference = amount(with_minus(f"{float(paired.summary.mean):.2f}"), unit)
+    difference = with_unit(with_minus(f"{float(paired.summary.mean):.2f}"), unit)
     interval = _range(float(paired.summary.low), float(paired.summary.high), unit)
     return (
         f"{first} and {second} do not differ significantly in mean OSPA. {second} minus {first}: {difference} "
@@ -117,7 +117,7 @@ def _unclear(first: str, second: str, paired: PairedDifference, unit: str) -> st
 
 
 def _unknown(first: str, second: str, paired: PairedDifference, unit: str) -> str:
-    difference = amount(with_minus(f"{float(paired.summary.mean):.2f}"), unit)
+    difference = with_unit(with_minus(f"{float(paired.summary.mean):.2f}"), unit)
     return f"One run proves nothing. {second} minus {first}: {difference} in mean OSPA."
 
 
@@ -125,7 +125,7 @@ _SENTENCES = {"better": _better, "worse": _worse, "unclear": _unclear, "unknown"
 
 
 def _range(low: float, high: float, unit: str) -> str:
-    return amount(with_minus(f"{low:.2f} to {high:.2f}"), unit)
+    return with_unit(with_minus(f"{low:.2f} to {high:.2f}"), unit)
 
 
 def _runs(paired: PairedDifference) -> str:

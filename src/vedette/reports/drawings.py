@@ -27,11 +27,11 @@ from vedette.evaluation.figures import (
 from vedette.evaluation.figures.cost import MIN_FOR_TAILS
 from vedette.evaluation.figures.distributions import MOST_DOTS
 from vedette.evaluation.figures.style import shown_decisions, strategy_label
+from vedette.internal.text import elided, pluralise
 from vedette.kernels.base.types import Floats
 from vedette.reports.groups import Group, Strategy, axis_label, axis_unit, describe_settings
 from vedette.reports.tables import nees_over_runs, stage_seconds
 from vedette.simulation.records import RunRecord
-from vedette.text import counted, elided
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,7 +143,7 @@ def _reward_drawings(group: Group) -> Iterator[Drawing]:
     for strategy in group.strategies:
         figure = _rewards(strategy)
         if figure is not None:
-            runs = counted(strategy.ensemble.num_runs, "run")
+            runs = pluralise(strategy.ensemble.num_runs, "run")
             caption = (
                 f"Rewards that {strategy.name} decided on, averaged over {runs}. The area of a mark is the share of "
                 "the runs that chose the action; joint rewards of more than two sensors are the largest over the "

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from matplotlib.ticker import MaxNLocator
 
 from vedette.evaluation.tables import heading, significance
+from vedette.internal.text import named_in, with_error, with_minus
 from vedette.reports.claims import claims
 from vedette.reports.groups import Group
-from vedette.text import named_in, with_error, with_minus
 
 _ROOM = 0.06  # of the axis, left free at each side
 # Verdicts are of the first strategy against another; the page shows that of the other.

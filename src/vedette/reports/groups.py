@@ -20,11 +20,11 @@ from vedette.evaluation.ensembles import Ensemble, ensemble_of
 from vedette.evaluation.figures.scene import Scene, scene_of
 from vedette.evaluation.figures.style import strategy_label
 from vedette.evaluation.runs import measure_run
+from vedette.internal.text import unique_name
 from vedette.kernels.base.types import Bools
 from vedette.scenarios import Scenario
 from vedette.scenarios.sections.tracking import UNLABELLED
 from vedette.simulation.records import RunRecord
-from vedette.text import unused
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +95,7 @@ def gather(results: CampaignResults) -> Iterator[Group]:
     taken: set[str] = set()
     for cells in campaign.groups():
         shared = {axis: value for axis, value in cells[0].settings.items() if axis != campaign.compare}
-        taken.add(name := unused(_slug(campaign, shared), taken))
+        taken.add(name := unique_name(_slug(campaign, shared), taken))
         yield _group(results, cells, name, _title(campaign, cells[0]))
 
 

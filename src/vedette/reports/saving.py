@@ -10,7 +10,7 @@ from vedette.campaigns.results import CampaignResults
 from vedette.errors import InputError
 from vedette.evaluation.figures import overview_figure, save_figure
 from vedette.evaluation.tables import decisions_markdown, strategy_csv, strategy_markdown
-from vedette.files import write_whole
+from vedette.internal.files import write_whole
 from vedette.kernels.base.types import Floats
 from vedette.reports.drawings import Drawing, group_drawings, sweep_drawings, typical_records
 from vedette.reports.groups import Group, gather, group_of_run

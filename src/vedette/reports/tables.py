@@ -17,9 +17,9 @@ from vedette.evaluation.health import percent
 from vedette.evaluation.metrics.run import COLUMNS
 from vedette.evaluation.tables import decision_rows, header, strategy_rows
 from vedette.evaluation.tails import tail_header, tail_of
+from vedette.internal.text import elided_apart, with_error, with_minus
 from vedette.kernels.base.types import Bools, Floats
 from vedette.reports.groups import Group, Strategy
-from vedette.text import elided_apart, with_error, with_minus
 
 _BY_CHANCE = 1e-3  # chance below which a largest value says that the filter is not consistent
 _DIFFERENCES = range(4, 7)  # columns of `strategy_rows` that compare with the first strategy

@@ -11,7 +11,7 @@ import numpy as np
 from vedette.control.explanation import Explanation, RunnerUp, TargetGains, number_text, with_error
 from vedette.control.plan import Plan
 from vedette.evaluation.actions import rounded, row_words
-from vedette.text import counted
+from vedette.internal.text import pluralise
 
 _MOST_TARGETS = 10
 _SAME = 1e-9
@@ -42,7 +42,7 @@ def _facts(plan: Plan, why: Explanation, reward: float, names: Sequence[str]) ->
     facts = [("Reward", f"{with_error(reward, why.standard_error, '±')}{start}")]
     if why.runner_up is not None:
         facts.append(("Second best", f"{_margin(why.runner_up, reward)}: {_others(plan, why.runner_up, names)}"))
-    facts.append(("Evaluated", counted(why.evaluations, "choice")))
+    facts.append(("Evaluated", pluralise(why.evaluations, "choice")))
     if why.bound is not None:
         facts.append(("Bound", str(why.bound)))
     reasons: dict[str, list[str]] = {}

@@ -21,7 +21,8 @@ from vedette.campaigns.yardsticks import CheckedClaim, checked_claims, yardstick
 from vedette.errors import InputError
 from vedette.evaluation.figures.labels import elided_names
 from vedette.evaluation.scans import code_of_sensors
-from vedette.files import write_whole
+from vedette.internal.files import write_whole
+from vedette.internal.text import named_in
 from vedette.kernels.base.types import Floats
 from vedette.reports.claims import Claim, all_pairs
 from vedette.reports.drawings import Drawing, error_drawings, group_drawings, paired_records, sweep_drawings
@@ -33,7 +34,6 @@ from vedette.reports.replay import replay_data
 from vedette.reports.saving import run_errors
 from vedette.reports.svg import inline_png, inline_svg
 from vedette.reports.tables import Table, cost_table, decision_table, error_table, measure_table
-from vedette.text import named_in
 
 # A page that a mail can carry: beyond these, groups show their errors alone, and typical runs are left out.
 MAX_FIGURE_BYTES, MAX_REPLAY_BYTES = 6_000_000, 4_000_000

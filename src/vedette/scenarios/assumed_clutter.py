@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vedette.internal.quantities import COMPONENTS, PLACED, is_doppler
 from vedette.kernels.base.types import Floats
-from vedette.quantities import COMPONENTS, PLACED, is_doppler
 from vedette.recorded import RecordedScans
 from vedette.recorded.extents import places_of
 from vedette.scenarios.sections import ScenarioModel

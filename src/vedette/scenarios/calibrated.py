@@ -11,12 +11,12 @@ import numpy as np
 from vedette.calibration import Calibration, Parameter, Problem
 from vedette.calibration.parameters import with_biases
 from vedette.filters import Limits, SequentialLmbFilter, shared_targets
+from vedette.internal.quantities import COMPONENTS, QUANTITIES, in_file
+from vedette.internal.reading import read_text
+from vedette.internal.unit_warnings import suppress_unit_warnings
 from vedette.kernels.base.types import Floats
 from vedette.models import Bias, Region, SensorModel, TargetModel
 from vedette.models.clutter import at_raw_measurements
-from vedette.plausible import told_elsewhere
-from vedette.quantities import COMPONENTS, QUANTITIES, in_file
-from vedette.reading import read_text
 from vedette.recorded import RecordedScans
 from vedette.recorded.instants import Bearings, bias_of
 from vedette.scenarios.build import build_sensors
@@ -68,7 +68,7 @@ def problem_of(scenario: Scenario, *, position: bool = False, bearings: Bearings
     def tracker(values: Floats) -> tuple[Tracker, Floats]:
         known, more = list[SensorModel](), np.zeros(len(model.sensors))
         biased = with_biases(sites, parameters, values)
-        with told_elsewhere():
+        with suppress_unit_warnings():
             for s, sensor in enumerate(_with_values(model.sensors, parameters, values.tolist())):
                 changes = _wider_clutter(sensor)
                 within = wide if sensor.clutter.kind == "region" else region

@@ -8,6 +8,7 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from vedette.errors import InputError
+from vedette.internal.text import pluralise
 from vedette.kernels.base.types import Floats
 from vedette.recorded import RecordedScans
 from vedette.recorded.extents import box_of, places_of
@@ -16,7 +17,6 @@ from vedette.scenarios.faults import Path
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.field_of_view import field_of_view
 from vedette.scenarios.sections.sensors import Sensor
-from vedette.text import counted
 
 _NAMED = 3  # measurements beyond the region, in a warning
 
@@ -69,7 +69,7 @@ def beyond_region(model: ScenarioModel, recording: RecordedScans) -> Iterator[tu
                 )
     if num:
         more = f" and {num - _NAMED} more" if num > _NAMED else ""
-        which = f"{num} of {counted(recording.num_measurements, 'measurement')}"
+        which = f"{num} of {pluralise(recording.num_measurements, 'measurement')}"
         what = f"{which} {'lies' if num == 1 else 'lie'} beyond the region, where no clutter and no births are expected"
         yield ("region",), f"{what}: {', '.join(named)}{more}"
 

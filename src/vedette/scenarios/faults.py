@@ -6,7 +6,7 @@ import json
 from datetime import date, time
 from typing import Any, NamedTuple
 
-from vedette.text import elided, plain, printable
+from vedette.internal.text import elided, plain, printable
 
 Path = tuple[str | int, ...]
 Place = tuple[int, int]  # line and column, from 1

@@ -15,12 +15,12 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from vedette.errors import InputError
+from vedette.internal.text import elided, printable
 from vedette.scenarios.faults import Finding, Path, describe, named
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.base import attempt, is_whole
 from vedette.scenarios.sections.custom import Custom, customs
 from vedette.scenarios.sections.targets import RecordedTargets
-from vedette.text import elided, printable
 
 BUILTIN_FOLDER = FilePath(__file__).parent / "builtin"
 _LONGEST_PATH = 200

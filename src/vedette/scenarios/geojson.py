@@ -8,7 +8,7 @@ from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
 from vedette.errors import InputError
-from vedette.reading import parse_json, read_text
+from vedette.internal.reading import parse_json, read_text
 from vedette.scenarios.faults import Path, Told, describe
 from vedette.scenarios.sections.places import OriginSection
 

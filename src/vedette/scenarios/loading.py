@@ -9,7 +9,9 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from vedette.errors import InputError, ScenarioError
-from vedette.reading import read_text
+from vedette.internal.reading import read_text
+from vedette.internal.representation import SummaryRepr
+from vedette.internal.text import elided, pluralise, printable
 from vedette.scenarios.coastline import coastline_findings
 from vedette.scenarios.diagnostics import UNKNOWN, read_section, suggestion
 from vedette.scenarios.faults import Fault, Path, Told, describe
@@ -20,14 +22,12 @@ from vedette.scenarios.sections.base import attempt
 from vedette.scenarios.sections.courses import as_written
 from vedette.scenarios.sections.recording import recording_findings
 from vedette.scenarios.yaml_reader import MOST_BYTES, Document, read_yaml
-from vedette.speaking import Speaking
-from vedette.text import counted, elided, printable
 
 _LONGEST_NAME = 200
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Scenario(Speaking):
+class Scenario(SummaryRepr):
     """A valid scenario.
 
     Attributes:
@@ -49,7 +49,7 @@ class Scenario(Speaking):
         return FilePath() if self.path is None else self.path.parent
 
     def _summary(self) -> str:
-        sizes = counted(self.model.time.num_steps, "scan"), counted(len(self.model.sensors), "sensor")
+        sizes = pluralise(self.model.time.num_steps, "scan"), pluralise(len(self.model.sensors), "sensor")
         return f"{self.name}: {', '.join(sizes)}, filter {self.model.filter.kind}, fusion {self.model.fusion.kind}"
 
     def _detail(self) -> str:

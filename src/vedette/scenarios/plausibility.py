@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from vedette.internal.unit_warnings import LARGE_ANGLE, look_like_degrees
 from vedette.kernels.base.types import Floats
-from vedette.plausible import LARGE_ANGLE, seem_degrees
 from vedette.scenarios.faults import Path, format_path
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.birth import BirthSite
@@ -76,7 +76,7 @@ def _degrees(angle: float) -> str:
 def _areas(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     """Areas that are too small, too far away, to be in metres."""
     for path, corners in _corners(model):
-        if seem_degrees(corners):
+        if look_like_degrees(corners):
             width, height = np.ptp(corners, axis=0)
             got = f"an area of {width:.3g} by {height:.3g} m"
             yield path, f"{format_path(path)}: expected metres from the origin; got {got} (are these degrees?)"

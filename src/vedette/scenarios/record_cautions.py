@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from vedette.internal.text import pluralise
 from vedette.recorded import RecordedScans
 from vedette.recorded import RecordedTargets as RecordedSource
 from vedette.recorded.merging import crowded
@@ -18,7 +19,6 @@ from vedette.scenarios.sections.recording import noise_stds, sites_of
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.targets import RecordedTargets
 from vedette.scenarios.sections.world import Time
-from vedette.text import counted
 
 _NEAR = 1000.0  # m; what is nearer than this to the targets is not called far
 
@@ -53,7 +53,7 @@ def _unused(path: Path, file: str, columns: tuple[str, ...]) -> Iterator[tuple[P
     """Columns that are there and not read."""
     if columns:
         names = column_names(columns)
-        yield path, f"{'.'.join(map(str, path))}: {file}: not used: {counted(len(columns), 'column')} ({names})"
+        yield path, f"{'.'.join(map(str, path))}: {file}: not used: {pluralise(len(columns), 'column')} ({names})"
 
 
 def _single_reports(section: RecordedTargets, source: RecordedSource) -> Iterator[tuple[Path, str]]:
@@ -61,7 +61,7 @@ def _single_reports(section: RecordedTargets, source: RecordedSource) -> Iterato
     numbers = np.bincount(source.reports.tracks, minlength=len(source.reports.names))
     single = [name for name, number in zip(source.reports.names, numbers.tolist(), strict=True) if number == 1]
     if single:
-        which = f"{counted(len(single), 'target')} with one report ({column_names(single)})"
+        which = f"{pluralise(len(single), 'target')} with one report ({column_names(single)})"
         yield ("targets", "path"), f"targets.path: {section.path}: {which} left out, as a course needs two"
 
 

@@ -8,8 +8,9 @@ from pathlib import Path as FilePath
 from typing import Any, NamedTuple
 
 from vedette.errors import InputError, ScenarioError
-from vedette.quantities import COMPONENTS
-from vedette.reading import read_text
+from vedette.internal.quantities import COMPONENTS
+from vedette.internal.reading import read_text
+from vedette.internal.text import pluralise
 from vedette.scenarios.diagnostics import read_section
 from vedette.scenarios.faults import Fault, describe
 from vedette.scenarios.loading import diagnose, place_fault
@@ -17,7 +18,6 @@ from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.recording import RecordingSection
 from vedette.scenarios.wording import in_words
 from vedette.scenarios.yaml_reader import MOST_BYTES, Document, read_yaml
-from vedette.text import counted
 
 # Sections of a scenario that a sensors file need not give.
 STAND_INS: dict[str, Any] = {
@@ -46,7 +46,7 @@ class SensorsFile(NamedTuple):
     def summary(self) -> str:
         """`2 sensors (Calshot, boat), bearing and range`."""
         named = ", ".join(self.names[:_NAMED]) + (", ..." if len(self.names) > _NAMED else "")
-        return f"{counted(len(self.names), 'sensor')} ({named}), {' and '.join(self.quantities)}"
+        return f"{pluralise(len(self.names), 'sensor')} ({named}), {' and '.join(self.quantities)}"
 
 
 def is_sensors_file(path: FilePath) -> bool:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from vedette.errors import InputError
+from vedette.internal.text import join_alternatives
 from vedette.scenarios.faults import Path
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections.planners import STRATEGIES
 from vedette.scenarios.trust import code_of, not_own
-from vedette.text import either
 
 
 def strategy_cautions(scenario: Scenario) -> Iterator[tuple[Path, str]]:
@@ -23,7 +23,7 @@ def strategy_cautions(scenario: Scenario) -> Iterator[tuple[Path, str]]:
         if wanted := strategy.misfit(scenario.model) or (makes and _fault_of_planner(scenario, name)):
             refused.setdefault(wanted, []).append(name)
     for wanted, names in refused.items():
-        yield ("control",), f"a run with --planner {either(names)} is refused: expected {wanted}"
+        yield ("control",), f"a run with --planner {join_alternatives(names)} is refused: expected {wanted}"
 
 
 def _fault_of_planner(scenario: Scenario, name: str) -> str:

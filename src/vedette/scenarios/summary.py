@@ -6,7 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
-from vedette.quantities import COMPONENTS, QUANTITIES
+from vedette.internal.quantities import COMPONENTS, QUANTITIES
+from vedette.internal.text import pluralise
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.base import Section
@@ -21,7 +22,6 @@ from vedette.scenarios.sections.true_sensors import BiasSection
 from vedette.scenarios.sections.undetected import UndetectedSection, searches
 from vedette.scenarios.sections.world import RegionSection
 from vedette.scenarios.wording import in_words, plain_values, scans_in_words, settings, short
-from vedette.text import counted
 
 if TYPE_CHECKING:
     from vedette.platforms import Compass
@@ -31,9 +31,9 @@ def one_line(scenario: Scenario) -> str:
     """The scenario on one line: `40 scans, 4 targets, 2 sensors; filter delta_glmb, fusion ...`."""
     model = scenario.model
     targets = model.targets
-    what = counted(len(targets.tracks), "target") if targets.kind == "scripted" else f"{targets.kind} targets"
-    decisions = counted(len(model.decision_steps), "decision")
-    sizes = f"{counted(model.time.num_steps, 'scan')}, {what}, {counted(len(model.sensors), 'sensor')}"
+    what = pluralise(len(targets.tracks), "target") if targets.kind == "scripted" else f"{targets.kind} targets"
+    decisions = pluralise(len(model.decision_steps), "decision")
+    sizes = f"{pluralise(model.time.num_steps, 'scan')}, {what}, {pluralise(len(model.sensors), 'sensor')}"
     return f"{sizes}; filter {model.filter.kind}, fusion {model.fusion.kind}, {decisions}"
 
 
@@ -58,7 +58,7 @@ def facts(model: ScenarioModel) -> list[tuple[str, str]]:
             "decisions",
             f"after {scans_in_words(model.decision_steps, time.num_steps)}" if model.decision_steps else "none",
         ),
-        ("horizon", f"{counted(model.horizon[0], 'step')} of {model.horizon[1]:g} s"),
+        ("horizon", f"{pluralise(model.horizon[0], 'step')} of {model.horizon[1]:g} s"),
         ("objective", _objective(control)),
         ("search", settings(control.search)),
         *(("constraint", _constraint(section)) for section in control.constraints),
@@ -93,7 +93,7 @@ def _samples(control: Control) -> str:
     if control.reward.kind == "expected_loss":
         return "no sampling"
     if control.confidence is None:
-        return counted(control.num_samples, "sample")
+        return pluralise(control.num_samples, "sample")
     near = f", to {100.0 * control.indifference:g} %" if control.indifference else ""
     time = "" if control.max_seconds is None else f" or {control.max_seconds:g} s"
     return f"samples until certain at {100.0 * control.confidence:g} %{near}, at most {control.max_samples}{time}"
@@ -109,7 +109,7 @@ def _constraint(section: Section) -> str:
     words = settings(section if polygon is None else section.model_copy(update={"polygon": (), "holes": ()}))
     if polygon is not None:
         words += f", polygon of {len(polygon)} corners"
-        words += f", {counted(len(holes), 'hole')}" if (holes := getattr(section, "holes", ())) else ""
+        words += f", {pluralise(len(holes), 'hole')}" if (holes := getattr(section, "holes", ())) else ""
     return words if area is None else f"{words}, {_bounds(area)}"
 
 
@@ -128,7 +128,7 @@ def _filter(section: AnyFilter) -> str:
 
 
 def _births(section: Birth) -> str:
-    sites = f"{counted(len(section.sites), 'site')}, {_steps(section.steps)}" if section.sites else "no site"
+    sites = f"{pluralise(len(section.sites), 'site')}, {_steps(section.steps)}" if section.sites else "no site"
     measured = section.from_measurements
     if measured is None:
         return sites

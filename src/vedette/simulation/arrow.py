@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vedette.errors import InputError
-from vedette.extras import need
+from vedette.internal.extras import require_packages
+from vedette.internal.reading import error_summary
+from vedette.internal.text import shown
 from vedette.kernels.base.types import Bools, Floats, Ints
-from vedette.reading import said
-from vedette.text import shown
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -124,7 +124,7 @@ def to_arrow(columns: Columns, layout: Layout, *, nan_is_null: bool = False) -> 
 
     Raises `InputError` for a column that the layout does not have, and for columns of unequal lengths.
     """
-    need("a run on disk", "pyarrow")
+    require_packages("a run on disk", "pyarrow")
     import pyarrow as pa
 
     arrays = []
@@ -192,7 +192,7 @@ def _truths(bits: Any) -> Bools:
 
 def write_table(columns: Columns, layout: Layout, metadata: Mapping[str, str] | None = None) -> bytes:
     """The bytes of an Arrow file, which `pandas.read_feather` and the like read. Raises `InputError` as `to_arrow`."""
-    need("a run on disk", "pyarrow")
+    require_packages("a run on disk", "pyarrow")
     import pyarrow as pa
 
     batch, out = to_arrow(columns, layout).replace_schema_metadata(metadata), pa.BufferOutputStream()
@@ -214,12 +214,14 @@ def read_table(content: bytes, layout: Layout, place: str) -> Columns:
     except InputError as error:
         raise InputError(f"{place}{error}") from error
     except Exception as error:  # damage can raise nearly anything in there
-        raise InputError(f"{place}: expected a table as an Arrow file; it is damaged: {said(error)}") from error
+        raise InputError(
+            f"{place}: expected a table as an Arrow file; it is damaged: {error_summary(error)}"
+        ) from error
 
 
 def read_metadata(content: bytes) -> dict[str, str]:
     """What was given to `write_table` beside the columns. Raises nearly anything for bytes that are no Arrow file."""
-    need("a run on disk", "pyarrow")
+    require_packages("a run on disk", "pyarrow")
     import pyarrow as pa
 
     metadata = pa.ipc.read_schema(_messages(content)[0]).metadata or {}
@@ -228,7 +230,7 @@ def read_metadata(content: bytes) -> dict[str, str]:
 
 def _messages(content: bytes) -> tuple[pa.Message, pa.Message]:
     """The schema and the one batch of a file. The index at its end, made for files of many batches, is not read."""
-    need("a run on disk", "pyarrow")
+    require_packages("a run on disk", "pyarrow")
     import pyarrow as pa
 
     if content[: len(_MAGIC)] != _MAGIC:

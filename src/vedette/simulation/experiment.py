@@ -8,17 +8,17 @@ import numpy as np
 
 from vedette.densities import Estimator
 from vedette.errors import InputError
+from vedette.internal.representation import SummaryRepr
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models.arguments import pose_vector, reject
 from vedette.platforms import Fleet, Platform
 from vedette.simulation.true_sensors import TrueSensor, scanning, true_sensors_of
 from vedette.simulation.truth import TargetSource
-from vedette.speaking import Speaking
 from vedette.tracking import Tracker
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Experiment(Speaking):
+class Experiment(SummaryRepr):
     """The parts of a run.
 
     Attributes:

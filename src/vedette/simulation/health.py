@@ -12,16 +12,16 @@ import numpy as np
 from vedette.errors import InputError
 from vedette.filters import FilterInfo
 from vedette.fusion.base import FusionInfo
+from vedette.internal.representation import SummaryRepr
+from vedette.internal.text import pluralise
 from vedette.kernels.base.types import Floats, Ints
 from vedette.simulation.arrow import Kind
-from vedette.speaking import Speaking
-from vedette.text import counted
 
 _FUSION = "fusion_"  # in front of the names that are of the fusion as a whole
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Health(Speaking):
+class Health(SummaryRepr):
     """The reports of all filters and fusions of a run; names and meaning as in `FilterInfo` and `FusionInfo`.
 
     Arrays are (num_scans, num_sensors), those of the fusion as a whole (`fusion_...`) (num_scans,). Truths are 0 or 1.
@@ -71,7 +71,7 @@ class Health(Speaking):
 
     def _summary(self) -> str:
         num_scans, num_sensors = self.num_tracks.shape
-        return f"of {counted(num_scans, 'scan')}, {counted(num_sensors, 'sensor')}"
+        return f"of {pluralise(num_scans, 'scan')}, {pluralise(num_sensors, 'sensor')}"
 
     @classmethod
     def unreported(cls, num_scans: int, num_sensors: int) -> Health:

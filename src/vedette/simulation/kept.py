@@ -8,8 +8,9 @@ from contextlib import contextmanager
 from typing import Any
 
 from vedette.errors import InputError
+from vedette.internal.reading import error_summary
+from vedette.internal.text import shown
 from vedette.kernels.base.types import Floats
-from vedette.reading import said
 from vedette.simulation.arrow import Columns, read_table, write_table
 from vedette.simulation.planned import PLANNED
 from vedette.simulation.records import Outline, RunRecord
@@ -25,7 +26,6 @@ from vedette.simulation.tables import (
     timing_table,
     timings_of,
 )
-from vedette.text import shown
 
 # Of saved runs and of campaigns; another wherever a table gains, loses or renames a column. A table that may be missing
 # needs none: programs of before it was there pass it over, and what they wrote reads as it did.
@@ -102,7 +102,9 @@ def _fitting_together(place: str) -> Iterator[None]:
     except InputError as error:
         raise InputError(f"{place}: {error}") from error
     except Exception as error:  # they can raise nearly anything on the way to a run
-        raise InputError(f"{place}: expected the files of a run; they do not fit together: {said(error)}") from error
+        raise InputError(
+            f"{place}: expected the files of a run; they do not fit together: {error_summary(error)}"
+        ) from error
 
 
 def encode_timings(record: RunRecord) -> bytes:

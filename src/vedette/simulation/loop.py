@@ -11,8 +11,8 @@ import numpy as np
 from vedette.control import KnowsTruth, Planner, RandomPlanner
 from vedette.densities import Estimate, Estimator
 from vedette.errors import InputError
+from vedette.internal.unit_warnings import suppress_unit_warnings
 from vedette.kernels.base.types import Bools, Floats
-from vedette.plausible import told_elsewhere
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.journal import Journal, Score
 from vedette.simulation.records import RunRecord
@@ -206,7 +206,7 @@ def simulate(
     name = "still" if planner is None else planner.name
     truth = truth_of_run(experiment, seed, run)
     journal = Journal(experiment.name, name, seed, run, truth, experiment.num_sensors)
-    with told_elsewhere():  # no warnings of implausible numbers in simulated scans
+    with suppress_unit_warnings():  # no warnings of implausible numbers in simulated scans
         return journal.filled(partial(_go, experiment, planner, journal, watch), score)
 
 

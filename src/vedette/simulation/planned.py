@@ -12,11 +12,11 @@ import numpy as np
 
 from vedette.control.plan import Plan, RewardTable
 from vedette.errors import InputError
+from vedette.internal.text import shown
 from vedette.kernels.base.types import Floats, Ints
 from vedette.platforms import Actions
 from vedette.simulation.arrow import RUN_COLUMNS, Columns, Kind, Layout, stacked
 from vedette.simulation.records import Decision
-from vedette.text import shown
 
 DECISION = {"decision": Kind.INTEGER, "step": Kind.INTEGER, "time_s": Kind.NUMBER}
 

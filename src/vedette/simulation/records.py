@@ -10,18 +10,18 @@ import numpy as np
 from vedette.control.plan import Plan
 from vedette.densities import Estimate, UndetectedIntensity
 from vedette.errors import InputError
+from vedette.internal.representation import SummaryRepr, TabularRepr
+from vedette.internal.text import elided, pluralise
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.simulation.arrow import Columns
 from vedette.simulation.health import FUSION_COLUMNS, Health
 from vedette.simulation.truth import Truth
-from vedette.speaking import Speaking, Tabled
-from vedette.text import counted, elided
 
 OSPA_COLUMNS = ("ospa_m", "localisation_m", "cardinality_m")
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Decision(Speaking):
+class Decision(SummaryRepr):
     """A plan and the moment it was made.
 
     Attributes:
@@ -87,7 +87,7 @@ class ScansFile(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class RunRecord(Tabled):
+class RunRecord(TabularRepr):
     """One run of one strategy on one scenario.
 
     Attributes:
@@ -166,8 +166,8 @@ class RunRecord(Tabled):
         error = f", mean OSPA {known.mean():.4g}" if len(known) else ""
         drawn = f"by {elided(self.planner)}, seed {self.seed}, run {self.run}"
         whose = f"of {elided(self.scenario)} {drawn if self.recording is None else f'from {elided(self.source)}'}"
-        sizes = f"{counted(self.num_scans, 'scan')}, {counted(self.num_sensors, 'sensor')}"
-        return f"{whose}: {sizes}, {counted(len(self.decisions), 'decision')}{error}"
+        sizes = f"{pluralise(self.num_scans, 'scan')}, {pluralise(self.num_sensors, 'sensor')}"
+        return f"{whose}: {sizes}, {pluralise(len(self.decisions), 'decision')}{error}"
 
     def _detail(self) -> str:
         return "" if self.stopped is None else f"stopped: {self.stopped}"

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.errors import ModelError
+from vedette.internal.representation import SummaryRepr
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.gaussian.scans import add_noise, mixed_scan, seen_with
 from vedette.models import SensorModel
@@ -17,12 +18,11 @@ from vedette.models.arguments import float_array, generator, pose_vector, reject
 from vedette.models.bias import NO_BIAS, with_offsets
 from vedette.models.functions import numbers_at, write_rows
 from vedette.simulation.true_sensors import TrueSensor
-from vedette.speaking import Speaking
 from vedette.tracking import Stages
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Scan(Speaking):
+class Scan(SummaryRepr):
     """One scan, in random order.
 
     Attributes:

@@ -20,12 +20,12 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from vedette.errors import InputError
-from vedette.files import unwritable
-from vedette.reading import parse_json, read_file, unreadable
+from vedette.internal.files import unwritable
+from vedette.internal.reading import parse_json, read_file, unreadable
+from vedette.internal.text import printable, shown
 from vedette.simulation.kept import FORMAT_VERSION, LACKING, decode_run, encode_run, encode_timings
 from vedette.simulation.records import RunRecord
 from vedette.simulation.tables import run_facts
-from vedette.text import printable, shown
 
 FORMAT = "vedette-run"
 MANIFEST, TIMINGS = "manifest.json", "timings.arrow"

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from vedette.errors import InputError
+from vedette.internal.quantities import ONLY_MEASURED
 from vedette.kernels.base.types import Bools
 from vedette.models import Bias, DetectionModel, SensorModel
 from vedette.models.arguments import one_of, reject
 from vedette.models.bias import NO_BIAS
-from vedette.quantities import ONLY_MEASURED
 
 
 @dataclass(frozen=True, slots=True, eq=False)

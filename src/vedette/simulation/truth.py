@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.errors import InputError, ModelError
+from vedette.internal.representation import SummaryRepr
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models import MotionModel
 from vedette.models.arguments import float_array, generator, reject
-from vedette.speaking import Speaking
 
 # Start times and scan times come from different sums; they count as equal within this share of a second.
 TIME_TOLERANCE = 1e-9
@@ -22,7 +22,7 @@ _PIVOT_TOLERANCE = 1e-12
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Truth(Speaking):
+class Truth(SummaryRepr):
     """The targets alive at each scan, scan after scan.
 
     Attributes:

@@ -1,8 +1,8 @@
 """A tracker and a sensor manager of Stone Soup's kinds on what is here; its models, scans and truth converted."""
 
-from vedette.extras import need
+from vedette.internal.extras import require_packages
 
-need("vedette.stonesoup", "stonesoup")
+require_packages("vedette.stonesoup", "stonesoup")
 
 from vedette.stonesoup.converting import Converted, convert
 from vedette.stonesoup.manager import PlanningSensorManager

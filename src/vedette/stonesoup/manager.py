@@ -18,9 +18,9 @@ from vedette.densities import LMB, TrackTable
 from vedette.errors import InputError
 from vedette.filters import LmbFilter
 from vedette.fusion import ParallelUpdate
+from vedette.internal.probabilities import logit
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import one_of, reject
-from vedette.probabilities import logit
 from vedette.stonesoup.converting import Converted
 from vedette.stonesoup.sensors import pose_of
 from vedette.tracking import State

@@ -21,6 +21,7 @@ from stonesoup.sensor.radar.radar import (
 )
 from stonesoup.simulator.simple import SimpleDetectionSimulator
 
+from vedette.internal.quantities import QUANTITIES
 from vedette.kernels.base.types import Floats
 from vedette.models import (
     ClutterModel,
@@ -40,7 +41,6 @@ from vedette.models import (
     region_clutter,
 )
 from vedette.models.arguments import float_array, positive_definite, reject
-from vedette.quantities import QUANTITIES
 from vedette.stonesoup.motions import Layout
 
 # What each measures, by the names of `vedette.recorded.table_of_detections`; how; and as which clutter knows it.

@@ -15,11 +15,11 @@ from vedette.densities import Labelled, UndetectedIntensity
 from vedette.densities.factored import bernoulli_factors
 from vedette.errors import InputError
 from vedette.filters import FilterInfo
+from vedette.internal.representation import SummaryRepr, in_short
+from vedette.internal.text import pluralise
 from vedette.kernels.base.types import Floats
 from vedette.models import SensorModel, TargetModel
 from vedette.models.arguments import float_array, one_a_sensor, real, reject
-from vedette.speaking import Speaking, in_short
-from vedette.text import counted
 
 # s. The belief before the first scan holds no target, so that the time before it changes nothing.
 FIRST_PERIOD = 1.0
@@ -28,7 +28,7 @@ _NOTE = "stage: "
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class State(Speaking):
+class State(SummaryRepr):
     """What is believed after a scan.
 
     Attributes:
@@ -51,18 +51,18 @@ class State(Speaking):
     def _summary(self) -> str:
         when = "before the first scan" if self.time is None else f"after scan {self.step}, at {self.time:g} s"
         unfound = "" if self.undetected is None else f", {self.undetected.total:.3g} not yet found"
-        return f"{when}, of {counted(len(self.local), 'sensor')}{unfound}"
+        return f"{when}, of {pluralise(len(self.local), 'sensor')}{unfound}"
 
     def _detail(self) -> str:
         return f"fused: {in_short(self.fused)}"
 
     def _repr_html_(self) -> str:
-        said: str = self.fused._repr_html_() if isinstance(self.fused, Speaking) else ""
+        said: str = self.fused._repr_html_() if isinstance(self.fused, SummaryRepr) else ""
         return f"<p><b>{escape(self.in_short())}</b></p>{said}"
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class TrackerInfo(Speaking):
+class TrackerInfo(SummaryRepr):
     """Report of one step of a tracker.
 
     Attributes:

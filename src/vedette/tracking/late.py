@@ -12,17 +12,17 @@ from typing import Any
 import numpy as np
 
 from vedette.errors import InputError
+from vedette.internal.representation import SummaryRepr, TabularRepr
+from vedette.internal.text import pluralise
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import as_array, count, dimension, instance, pose_vector, positive, real, reject
-from vedette.speaking import Speaking, Tabled
-from vedette.text import counted
 from vedette.tracking.base import State, Tracker, TrackerInfo
 
 _TIME = attrgetter("time")
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class SensorScan(Speaking):
+class SensorScan(SummaryRepr):
     """One scan of one sensor, as it arrives.
 
     Attributes:
@@ -39,7 +39,7 @@ class SensorScan(Speaking):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Instant(Speaking):
+class Instant(SummaryRepr):
     """A time at which sensors scanned, and what was believed after it.
 
     Attributes:
@@ -57,14 +57,14 @@ class Instant(Speaking):
     info: TrackerInfo
 
     def _summary(self) -> str:
-        return f"at {self.time:g} s, {counted(len(self.scans), 'scan')}"
+        return f"at {self.time:g} s, {pluralise(len(self.scans), 'scan')}"
 
     def _detail(self) -> str:
         return self.state.in_short()
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Timeline(Tabled):
+class Timeline(TabularRepr):
     """The instants that a late scan may still come before, and what was believed at the one before them.
 
     Attributes:
@@ -105,14 +105,14 @@ class Timeline(Tabled):
 
     def _summary(self) -> str:
         told = f"{self.num_late} late, {self.num_dropped} dropped, {self.num_repeated} repeated"
-        return f"of {counted(len(self.instants), 'instant')}, {counted(self.num_taken, 'scan')} taken, {told}"
+        return f"of {pluralise(len(self.instants), 'instant')}, {pluralise(self.num_taken, 'scan')} taken, {told}"
 
     def _detail(self) -> str:
         return self.state.in_short()
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class LateInfo(Speaking):
+class LateInfo(SummaryRepr):
     """What was done with scans that arrived.
 
     Attributes:

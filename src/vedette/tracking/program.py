@@ -13,9 +13,9 @@ import numpy as np
 from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.filters import FilterInfo
+from vedette.internal.programs import Program, start_program
 from vedette.kernels.base.types import Floats
 from vedette.models import SensorModel, TargetModel
-from vedette.programs import Program, greeted
 
 # m^2 and m^2/s^2: of what a program says nothing of.
 UNKNOWN_VARIANCE = 1e12
@@ -73,7 +73,7 @@ class ProgramFilter:
         """
         if step == 1:
             scene = self.scene()
-            self._program = greeted(self.command, self.folder, "tracker", scene, rng, self.start_seconds)
+            self._program = start_program(self.command, self.folder, "tracker", scene, rng, self.start_seconds)
             self._time, self._names = float(scene.get("time", {}).get("start", dt)) - dt, {}
         elif self._program is None or step != self._step + 1:
             raise InputError(f"step: expected {self._step + 1}, as a program goes through scans in order; got {step}")

@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 
 from vedette.errors import InputError, VedetteError
-from vedette.files import write_file
+from vedette.internal.files import write_file
+from vedette.internal.reading import error_summary, parse_json, read_arrays, read_file, unreadable
+from vedette.internal.text import shown
 from vedette.models.arguments import reject
-from vedette.reading import parse_json, read_arrays, read_file, said, unreadable
-from vedette.text import shown
 
 FORMAT_NAME = "vedette-snapshot"
 FORMAT_VERSION = 1
@@ -69,13 +69,15 @@ def load_snapshot(path: str | os.PathLike[str]) -> dict[str, Any]:
     if not isinstance(structure, dict) or structure.get("format") != FORMAT_NAME:
         raise InputError(f"{source}: expected a file of format {FORMAT_NAME}; got one of another origin")
     if structure.get("version") != FORMAT_VERSION:
-        raise InputError(f"{source}: expected format version {FORMAT_VERSION}; got {said(structure.get('version'))}")
+        raise InputError(
+            f"{source}: expected format version {FORMAT_VERSION}; got {error_summary(structure.get('version'))}"
+        )
     try:
         parts = _Reading(arrays, structure["nodes"]).value(structure["root"])
     except VedetteError as fault:
         raise InputError(f"{source}: expected valid parts; {fault}") from fault
     except (KeyError, IndexError, TypeError, ValueError, AttributeError, RecursionError) as fault:
-        raise InputError(f"{source}: expected a snapshot; it is damaged: {said(fault)}") from fault
+        raise InputError(f"{source}: expected a snapshot; it is damaged: {error_summary(fault)}") from fault
     if not isinstance(parts, dict):
         raise InputError(f"{source}: expected named parts; got {type(parts).__name__}")
     return parts

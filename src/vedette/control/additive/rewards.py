@@ -12,6 +12,8 @@ from vedette.control.rewards.base import LinearReward, PowerReward, combined, un
 from vedette.control.rewards.labels import cardinality_variance_of_label
 from vedette.control.rewards.power import ExpectedLossReward
 from vedette.densities import LMB
+from vedette.internal.probabilities import log_expit
+from vedette.internal.threads import run_chunks
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.linalg import LOG_2PI
 from vedette.kernels.planning.ascent import Allowed, Cells, Trace, ascend
@@ -19,8 +21,6 @@ from vedette.kernels.planning.bernoulli_rows import Table
 from vedette.kernels.planning.joint_values import alone_values, joint_values, line_values, start_totals
 from vedette.kernels.planning.label_values import EXPECTED_LOSS, FUNCTION, POWER_INTEGRALS, Valuation
 from vedette.models.arguments import provides
-from vedette.probabilities import log_expit
-from vedette.threads import run_chunks
 
 # Lines after which an ascent is stopped, a hundred sweeps of a hundred sensors.
 _MOST_LINES = 10_000

@@ -16,13 +16,13 @@ from vedette.densities import LMB
 from vedette.densities.checks import offsets_of
 from vedette.densities.containers import unchecked
 from vedette.densities.tracks import places_of, single_gaussians, take_tracks
+from vedette.internal.probabilities import logit
 from vedette.kernels.base.types import Bools, Floats, Ints, Lmb
 from vedette.kernels.planning.ideal import EXPECTED, IDEAL, Decision, Futures
 from vedette.kernels.planning.known import rows_without_scans
 from vedette.kernels.planning.reach import Belief, Paths, label_radii, predict_paths
 from vedette.models import SensorModel
 from vedette.platforms import Options
-from vedette.probabilities import logit
 from vedette.tracking import State
 
 

@@ -18,6 +18,7 @@ from vedette.densities.checks import offsets_of
 from vedette.errors import InputError
 from vedette.filters.inputs import model_errors
 from vedette.fusion import LinearRule
+from vedette.internal.threads import run_chunks
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.planning.ascent import Cells
 from vedette.kernels.planning.bernoulli_rows import Table
@@ -27,7 +28,6 @@ from vedette.kernels.planning.known import Entries, fill_changes
 from vedette.kernels.planning.reach import fill_reach, fill_within
 from vedette.models.arguments import provides
 from vedette.platforms import Options
-from vedette.threads import run_chunks
 from vedette.tracking import State
 
 # A label that no sample and no prediction gives a higher probability of detection is out of reach.

@@ -4,9 +4,9 @@ Every function returns a `matplotlib.figure.Figure`; `save_figure` writes it as 
 `write_video` shows a run scan by scan.
 """
 
-from vedette.extras import need
+from vedette.internal.extras import require_packages
 
-need("a figure", "matplotlib")
+require_packages("a figure", "matplotlib")
 
 from vedette.evaluation.figures.consistency import consistency_figure
 from vedette.evaluation.figures.cost import cost_figure

@@ -11,8 +11,8 @@ from vedette.evaluation.comparison import Comparison
 from vedette.evaluation.figures.labels import short_labels
 from vedette.evaluation.figures.style import GREY, INK, colour, new_figure, styled
 from vedette.evaluation.statistics import Summary, paired_difference
+from vedette.internal.text import named_in
 from vedette.kernels.base.types import Floats
-from vedette.text import named_in
 
 MOST_DOTS = 2000  # in a row: more are one blot
 _ROW = 0.36  # inches

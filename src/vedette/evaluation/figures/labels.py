@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from vedette.evaluation.figures.style import strategy_label
-from vedette.text import elided, elided_apart
+from vedette.internal.text import elided, elided_apart
 
 
 def short_labels(names: Sequence[str], most: int = 24) -> tuple[str, ...]:

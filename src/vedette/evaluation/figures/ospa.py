@@ -23,8 +23,8 @@ from vedette.evaluation.figures.style import (
     styled,
 )
 from vedette.evaluation.statistics import Summary, summarise
+from vedette.internal.text import named_in
 from vedette.kernels.base.types import Bools, Floats
-from vedette.text import named_in
 
 
 @dataclass(frozen=True, slots=True)

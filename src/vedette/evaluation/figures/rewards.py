@@ -24,9 +24,9 @@ from vedette.evaluation.figures.style import (
     sensor_looks,
     styled,
 )
+from vedette.internal.text import with_minus
 from vedette.kernels.base.types import Floats
 from vedette.platforms import Actions
-from vedette.text import with_minus
 
 _PANEL_WIDTH = 2.4  # inches, within the labels of a column
 

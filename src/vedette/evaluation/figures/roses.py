@@ -26,8 +26,8 @@ from vedette.evaluation.figures.style import (
     shown_decisions,
     styled,
 )
+from vedette.internal.text import with_minus
 from vedette.kernels.base.types import Floats, Ints
-from vedette.text import with_minus
 
 _SIZE = 1.5  # inches of a rose
 _MOST_BARS = 4  # of a sensor

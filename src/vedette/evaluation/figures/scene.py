@@ -16,13 +16,13 @@ from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
 from vedette.evaluation.figures.labels import drawn_text
 from vedette.evaluation.figures.style import GREY, INK
+from vedette.internal.text import elided
 from vedette.kernels.base.types import Floats
 from vedette.scenarios import Scenario
 from vedette.scenarios.sections.field_of_view import FieldOfView, field_of_view
 from vedette.scenarios.sections.planners import STRATEGIES, NamedIndependent, NamedJoint, NamedLookahead
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.views import COAST, HOLE, INSIDE, NO_GO, REGION, Zone, zones
-from vedette.text import elided
 
 if TYPE_CHECKING:
     from vedette.recorded import Origin

@@ -23,8 +23,8 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import text_to_path
 
 from vedette.errors import InputError
+from vedette.internal.text import with_minus
 from vedette.kernels.base.types import Floats
-from vedette.text import with_minus
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")

@@ -37,9 +37,9 @@ from vedette.evaluation.figures.style import (
     new_figure,
     styled,
 )
+from vedette.internal.text import named_in
 from vedette.kernels.base.types import Floats, Ints
 from vedette.simulation.records import Decision, RunRecord
-from vedette.text import named_in
 
 LARGE = 5000.0  # m, beyond which axes are in kilometres
 _MANY_SCANS = 200  # from which on estimates are drawn smaller

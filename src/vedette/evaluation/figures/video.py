@@ -33,13 +33,13 @@ from vedette.evaluation.figures.tracks import (
 from vedette.evaluation.scans import LIE, Scans, code_of_sensors, in_plane, scans_of_record
 from vedette.evaluation.told import told_by
 from vedette.evaluation.track_formats import utc_text
-from vedette.files import write_whole
+from vedette.internal.files import write_whole
+from vedette.internal.text import elided
 from vedette.kernels.base.types import Floats, Ints
 from vedette.scenarios import Scenario
 from vedette.simulation import CLUTTER
 from vedette.simulation.records import RunRecord
 from vedette.simulation.scans import Scan
-from vedette.text import elided
 
 if TYPE_CHECKING:
     from matplotlib.animation import AbstractMovieWriter

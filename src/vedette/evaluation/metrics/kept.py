@@ -8,8 +8,8 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.evaluation.metrics.run import COLUMNS, RunMetrics
+from vedette.internal.reading import error_summary
 from vedette.kernels.base.types import Floats
-from vedette.reading import said
 from vedette.simulation.arrow import Kind, Layout, read_metadata, read_table, write_table
 
 _VERSION = "1"  # another wherever a built-in measure is defined otherwise
@@ -42,7 +42,9 @@ def decode_metrics(content: bytes, num_scans: int) -> tuple[RunMetrics | None, d
     try:
         built_in = read_metadata(content)["built_in"]
     except Exception as error:  # damage can raise nearly anything in there
-        raise InputError(f"metrics: expected measures as an Arrow file; it is damaged: {said(error)}") from error
+        raise InputError(
+            f"metrics: expected measures as an Arrow file; it is damaged: {error_summary(error)}"
+        ) from error
     columns = {name: np.asarray(column) for name, column in read_table(content, _LAYOUT, "metrics").items()}
     if any(len(column) != num_scans for column in columns.values()):
         got = len(next(iter(columns.values())))

@@ -14,12 +14,12 @@ from vedette.evaluation.metrics.matching import match_run
 from vedette.evaluation.metrics.point_gospa import gospa_of_matching
 from vedette.evaluation.metrics.track_ospa import ospa2_of_run
 from vedette.evaluation.metrics.trajectories import continuity
+from vedette.internal.representation import SummaryRepr
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import as_array, reject
 from vedette.simulation.arrow import RUN_COLUMNS
 from vedette.simulation.records import Measure, RunRecord
 from vedette.simulation.tables import LAYOUTS
-from vedette.speaking import Speaking
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +66,7 @@ class Metric:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class RunMetrics(Speaking):
+class RunMetrics(SummaryRepr):
     """Measures of a run at each scan; every array is (num_scans,). OSPA is in the run's record.
 
     With c the cutoff and p the order that they were computed with, the three GOSPA costs add up to `gospa_m ** p`: for

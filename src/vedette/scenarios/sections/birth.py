@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from vedette.covariances import SMALLEST_VARIANCE
+from vedette.internal.covariances import SMALLEST_VARIANCE
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import Chance, Positive, Reals, Section, Steps, check
 from vedette.scenarios.sections.world import Motion, RegionSection, grouped_order

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vedette.covariances import covariance_fault
+from vedette.internal.covariances import covariance_fault
 from vedette.scenarios.faults import Finding, Path, describe
 from vedette.scenarios.sections.base import attempt
 from vedette.scenarios.sections.birth import BirthSite

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
-from vedette.quantities import is_doppler
+from vedette.internal.quantities import is_doppler
 from vedette.scenarios.faults import Finding, Path, describe
 from vedette.scenarios.sections.base import (
     Count,

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from vedette.errors import InputError
-from vedette.plausible import told_elsewhere
+from vedette.internal.unit_warnings import suppress_unit_warnings
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import Count, Point, Positive, Probability, Section, check
 from vedette.scenarios.sections.custom import Custom
@@ -92,7 +92,7 @@ class KeepOut(Section):
 
         if self.geojson is not None:
             raise InputError("geojson: expected its polygons, as load_scenario reads them; got the name of a file")
-        with told_elsewhere():
+        with suppress_unit_warnings():
             area = np.array(self.polygon) if self.region is None else self.region.build()
             return KeepOut(area, tuple(np.array(hole) for hole in self.holes))
 

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple,
 
 from pydantic import Field, create_model
 
-from vedette.plausible import told_elsewhere
+from vedette.internal.unit_warnings import suppress_unit_warnings
 from vedette.scenarios.sections import base
 from vedette.scenarios.sections.base import Section
 from vedette.scenarios.sections.custom import Custom, asked_for
@@ -71,7 +71,7 @@ class Part(Derived):
         """The part; of what is `given` it takes what it has parameters for."""
         module, _, name = self.of.partition(":")
         made = getattr(importlib.import_module(module), name)
-        with told_elsewhere():
+        with suppress_unit_warnings():
             return made(**self.given(), **asked_for(made, given))
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field
 
-from vedette.quantities import PLACED
+from vedette.internal.quantities import PLACED
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import Whole, check
 from vedette.scenarios.sections.derived import Part, derived

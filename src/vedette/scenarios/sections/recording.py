@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal
 from pydantic import Field
 
 from vedette.errors import InputError
-from vedette.quantities import COMPONENTS, QUANTITIES, in_file
+from vedette.internal.quantities import COMPONENTS, QUANTITIES, in_file
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import SHA256_FIELD, NonNegative, Section, Sha256, attempt, is_whole
 from vedette.scenarios.sections.field_of_view import reach_of

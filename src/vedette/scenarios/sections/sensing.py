@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field
 
-from vedette.quantities import COMPONENTS, PLACED, angles, is_doppler
+from vedette.internal.quantities import COMPONENTS, PLACED, angles, is_doppler
 from vedette.scenarios.faults import Finding, Path, describe
 from vedette.scenarios.sections.base import Positive, Section, check
 from vedette.scenarios.sections.derived import Part, derived, one_of

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field, create_model
 
+from vedette.internal.quantities import is_doppler
+from vedette.internal.unit_warnings import suppress_unit_warnings
 from vedette.kernels.base.types import BEAM
-from vedette.plausible import told_elsewhere
-from vedette.quantities import is_doppler
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import (
     DetectionAt,
@@ -211,7 +211,7 @@ class Sensor(Section):
         from vedette.models import SensorModel
 
         parts = built_parts(self, self.measurement, region, folder)
-        with told_elsewhere():
+        with suppress_unit_warnings():
             return SensorModel(**parts, method=method, detection_at=detection_at)
 
     def build_true(self, known: SensorModel, region: Region, folder: Path) -> TrueSensorModel:

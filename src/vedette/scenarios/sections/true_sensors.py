@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field
 
-from vedette.plausible import told_elsewhere
-from vedette.quantities import COMPONENTS, ONLY_MEASURED, PLACED, in_file
+from vedette.internal.quantities import COMPONENTS, ONLY_MEASURED, PLACED, in_file
+from vedette.internal.unit_warnings import suppress_unit_warnings
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import Section
 from vedette.scenarios.sections.sensing import (
@@ -127,7 +127,7 @@ class TrueSensor(Section):
 
         like = self._like(measurement)
         parts = built_parts(self, like, region, folder, known.measurement)
-        with told_elsewhere():
+        with suppress_unit_warnings():
             # The filters' method may need a Jacobian; nothing is filtered with this model.
             model = replace(known, method="auto", **parts)
         first = None if self.first_detection is None else self.first_detection.build(folder)

@@ -28,7 +28,7 @@ EXTRA_OF = {
 }
 
 
-def need(what: str, *packages: str) -> None:
+def require_packages(what: str, *packages: str) -> None:
     """Nothing where all the packages (of `EXTRA_OF`) are installed.
 
     Raises `MissingPackageError` otherwise: that `what` needs those that are missing, and how they are installed.

@@ -29,12 +29,12 @@ def listed(lines: Sequence[str]) -> str:
     return "\n".join([*shown, *([f"and {more} more"] if more else [])])
 
 
-def counted(number: int, thing: str) -> str:
+def pluralise(number: int, thing: str) -> str:
     """`1 sensor`, `2 sensors`."""
     return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
 
 
-def either(names: Sequence[str]) -> str:
+def join_alternatives(names: Sequence[str]) -> str:
     """Alternatives in words: "a", "a or b", "a, b or c"."""
     return " or ".join([", ".join(names[:-1]), names[-1]] if names[1:] else names)
 
@@ -44,12 +44,12 @@ def named_in(name: str, unit: str) -> str:
     return f"{name} ({unit})" if unit else name
 
 
-def amount(number: str, unit: str) -> str:
+def with_unit(number: str, unit: str) -> str:
     """`1.25 m`; of a quantity without a unit the number alone."""
     return f"{number} {unit}" if unit else number
 
 
-def unused(name: str, taken: Collection[str]) -> str:
+def unique_name(name: str, taken: Collection[str]) -> str:
     """The name, or where that is taken the first of `name-2`, `name-3` and so on that is not."""
     candidates = itertools.chain([name], (f"{name}-{number}" for number in itertools.count(2)))
     return next(candidate for candidate in candidates if candidate not in taken)

@@ -18,11 +18,11 @@ from vedette.densities import LMB, MultiTargetSamples, UndetectedIntensity, samp
 from vedette.densities.telling import Targets
 from vedette.errors import InputError
 from vedette.evaluation import compare, measure_run, run_scenario
+from vedette.internal.representation import SummaryRepr
 from vedette.models import CellGrid, Region
 from vedette.scenarios import load_scenario
 from vedette.scenarios.build import build_experiment
 from vedette.simulation import RunRecord, Scan
-from vedette.speaking import Speaking
 from vedette.tracking import LateScans, SensorScan, State, Timeline
 
 SCENARIO = load_scenario("paper-e")
@@ -54,7 +54,7 @@ def test_a_run_and_its_parts(record: RunRecord, timeline: Timeline) -> None:
     parts += [build_experiment(SCENARIO), measure_run(record, SCENARIO), compare({"idm": [record]})]
     parts += [Scan(np.zeros((900, 2)), np.zeros(900, np.int64))]
     for part in parts:
-        assert isinstance(part, Speaking)
+        assert isinstance(part, SummaryRepr)
         lines = repr(part).splitlines()
         assert len(lines) <= 2
         assert max(map(len, lines)) <= WIDEST
@@ -180,7 +180,7 @@ def test_the_package_offers_its_rooms_and_imports_none_before_it_is_asked_for() 
     ran = subprocess.run([sys.executable, "-W", "error", "-c", LAZY], capture_output=True, text=True, check=False)
     assert ran.returncode == 0, ran.stderr
     source = Path(vedette.__file__).parent
-    rooms = {path.parent.name for path in source.glob("*/__init__.py")} - {"cli", "kernels"}
+    rooms = {path.parent.name for path in source.glob("*/__init__.py")} - {"cli", "internal", "kernels"}
     assert ran.stdout.split() == sorted([*rooms, "errors", "__version__"])
     assert all(getattr(vedette, name).__name__ == f"vedette.{name}" for name in rooms)
 

@@ -18,7 +18,7 @@ from typing import Any
 _METHOD = "forkserver" if sys.platform == "linux" else "spawn"
 # What the workers of a campaign need, with Numba.
 _LOADED = ("vedette.campaigns.local", "vedette.kernels.base.dispatchers", "scipy.optimize")
-_SOURCE = Path(__file__).resolve().parents[1]
+_SOURCE = Path(__file__).resolve().parents[2]
 # One thread in each: as many processes as processors share the work already.
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 

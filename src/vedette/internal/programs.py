@@ -18,8 +18,8 @@ from typing import IO, Any, NoReturn, TypeAlias
 import numpy as np
 
 from vedette.errors import InputError, VedetteError
-from vedette.reading import parse_json
-from vedette.text import elided, printable
+from vedette.internal.reading import parse_json
+from vedette.internal.text import elided, printable
 
 PROTOCOL = "vedette 1"
 MOST_BYTES = 2**24  # of an answer
@@ -107,7 +107,7 @@ class Program:
             return "the end of its output"
 
 
-def greeted(
+def start_program(
     command: Sequence[str], folder: Path, role: str, scene: Mapping[str, Any], rng: np.random.Generator, seconds: float
 ) -> Program:
     """A program that has been told what it is to be and of which scene, and has answered that it is ready.

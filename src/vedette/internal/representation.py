@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from vedette.text import ELLIPSIS, elided, plain
+from vedette.internal.text import ELLIPSIS, elided, plain
 
 _MOST_FIELDS, _MOST_NUMBERS, _MOST_ROWS = 8, 4, 20
 _WIDEST = 160
 
 
-class Speaking:
+class SummaryRepr:
     """A frozen dataclass (of `repr=False`) that says in a line what it is, where its arrays would fill pages."""
 
     __slots__ = ()
@@ -42,7 +42,7 @@ class Speaking:
         return "<p>" + "<br>".join([f"<b>{escape(lines[0])}</b>", *map(escape, lines[1:])]) + "</p>"
 
 
-class Tabled(Speaking):
+class TabularRepr(SummaryRepr):
     """One that has a table, too."""
 
     __slots__ = ()
@@ -62,7 +62,7 @@ class Tabled(Speaking):
 
 def in_short(value: Any) -> str:
     """A container on one line; of anything else its kind alone."""
-    return value.in_short() if isinstance(value, Speaking) else type(value).__name__
+    return value.in_short() if isinstance(value, SummaryRepr) else type(value).__name__
 
 
 def _brief(value: Any) -> str:

@@ -8,9 +8,9 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vedette.errors import ImplausibleWarning
-from vedette.kernels.base.types import Floats
 
 LARGE_ANGLE = 0.5  # rad; a bearing with a larger standard deviation says little
 # An area of less than a metre, so many times as far from the origin as it is wide, where degrees may be.
@@ -21,7 +21,7 @@ _told = ContextVar("told", default=False)
 
 
 @contextmanager
-def told_elsewhere() -> Iterator[None]:
+def suppress_unit_warnings() -> Iterator[None]:
     """Without these warnings: of a scenario the check gives them, and of scans that are drawn nobody wants them."""
     before = _told.set(True)
     try:
@@ -30,13 +30,13 @@ def told_elsewhere() -> Iterator[None]:
         _told.reset(before)
 
 
-def implausible(field: str, expected: str, got: str, meant: str) -> None:
+def warn_implausible(field: str, expected: str, got: str, meant: str) -> None:
     """Warn of a value that is valid, and say what was probably meant."""
     if not _told.get():
         warnings.warn(f"{field}: expected {expected}; got {got} ({meant}?)", ImplausibleWarning, stacklevel=3)
 
 
-def seem_degrees(corners: Floats) -> bool:
+def look_like_degrees(corners: NDArray[np.float64]) -> bool:
     """Whether (n, 2) corners of an area are rather longitudes and latitudes than metres."""
     extent = float(np.ptp(corners, axis=0).max())
     could_be = bool((np.abs(corners) <= _MOST_DEGREES).all())

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.text import shown
+from vedette.internal.text import shown
 
 MOST_BYTES = 2**30  # of a file, or of what one unpacks to: a run of 10,000 scans of 100 targets has a fifth of it
 _LONGEST_NUMBER = 300  # digits
@@ -134,7 +134,7 @@ def read_members(archive: bytes, wanted: Container[str] | None = None) -> dict[s
             names = [info.filename for info in infos]
             members = {name: opened.read(name) for name in names if wanted is None or name in wanted}
     except Exception as error:  # damage can raise nearly anything in there
-        raise ValueError(said(error)) from error
+        raise ValueError(error_summary(error)) from error
     if len(set(names)) < len(names):
         raise ValueError("it has two members of one name")
     return members
@@ -158,7 +158,7 @@ def read_array(content: bytes) -> np.ndarray[Any, Any]:
         file.seek(0)
         array: np.ndarray[Any, Any] = np.lib.format.read_array(file, allow_pickle=False)
     except Exception as error:  # as above
-        raise ValueError(said(error)) from error
+        raise ValueError(error_summary(error)) from error
     return array
 
 
@@ -173,7 +173,7 @@ def read_arrays(archive: bytes) -> Mapping[str, np.ndarray[Any, Any]]:
     return arrays
 
 
-def said(error: object) -> str:
+def error_summary(error: object) -> str:
     """What an error of another library says, in a line of bounded length."""
     text = " ".join(str(error).split()) or type(error).__name__
     return text if len(text) <= _LONGEST_MESSAGE else f"{text[:_LONGEST_MESSAGE]} ..."

@@ -1,0 +1,1 @@
+"""Modules that several packages use and that are no part of the public API."""
