@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from vedette.internal.text import listed
+_MOST_LINES, _LONGEST_LINE = 50, 2000
 
 
 class VedetteError(Exception):
@@ -42,4 +42,13 @@ class ScenarioError(VedetteError):
 
     def __init__(self, faults: list[str]) -> None:
         self.faults = list(faults)
-        super().__init__(listed(self.faults))
+        super().__init__(_message(self.faults))
+
+
+def _message(faults: list[str]) -> str:
+    """Return the first faults, cut to a bearable length, and the number of the others."""
+    shown = [
+        fault if len(fault) <= _LONGEST_LINE else f"{fault[:_LONGEST_LINE]}\N{HORIZONTAL ELLIPSIS}" for fault in faults
+    ]
+    more = len(faults) - _MOST_LINES
+    return "\n".join([*shown[:_MOST_LINES], *([f"and {more} more"] if more > 0 else [])])

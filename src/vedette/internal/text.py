@@ -11,8 +11,6 @@ from typing import Any
 from rich.cells import cell_len, chop_cells
 
 ELLIPSIS = "\N{HORIZONTAL ELLIPSIS}"
-_MOST_LINES = 50
-_LONGEST_LINE = 2000
 
 
 def printable(text: str) -> str:
@@ -20,13 +18,6 @@ def printable(text: str) -> str:
     if text.isprintable():
         return text
     return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
-
-
-def listed(lines: Sequence[str]) -> str:
-    """Lines of a message; of very many the first, and how many more there are."""
-    shown = [line if len(line) <= _LONGEST_LINE else line[:_LONGEST_LINE] + ELLIPSIS for line in lines[:_MOST_LINES]]
-    more = len(lines) - len(shown)
-    return "\n".join([*shown, *([f"and {more} more"] if more else [])])
 
 
 def pluralise(number: int, thing: str) -> str:
