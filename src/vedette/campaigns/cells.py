@@ -14,7 +14,7 @@ from vedette.campaigns.shards import WHOLE, Shard
 from vedette.campaigns.spec import CampaignSpec, spec_from_data
 from vedette.errors import InputError, ScenarioError
 from vedette.internal.representation import SummaryRepr
-from vedette.internal.text import listed, pluralise, unique_name
+from vedette.internal.text import pluralise, unique_name
 from vedette.scenarios import Scenario, list_builtin, load_scenario
 from vedette.scenarios.build import build_planner
 from vedette.scenarios.dumping import dump_scenario, files_of
@@ -203,7 +203,8 @@ def _cell(
         approve(changed[key])
         build_planner(changed[key], planner)
     except ScenarioError as error:
-        raise InputError(listed(list(dict.fromkeys(f"cell {name}: {fault}" for fault in error.faults)))) from None
+        faults = list(dict.fromkeys(f"cell {name}: {fault}" for fault in error.faults))
+        raise InputError(str(ScenarioError(faults))) from None
     except InputError as error:
         raise InputError(f"cell {name}: {error}") from None
     return Cell(name, dict(settings), changed[key], planner)

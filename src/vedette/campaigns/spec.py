@@ -12,9 +12,9 @@ from typing import Annotated, Any
 
 from pydantic import Field, JsonValue
 
-from vedette.errors import InputError
+from vedette.errors import InputError, ScenarioError
 from vedette.internal.reading import read_text
-from vedette.internal.text import elided, listed, printable
+from vedette.internal.text import elided, printable
 from vedette.scenarios.diagnostics import read_section
 from vedette.scenarios.faults import Finding, describe, named
 from vedette.scenarios.sections.base import Name, Section, Whole, check
@@ -150,7 +150,7 @@ def spec_from_data(data: Any, place: str = "campaign") -> CampaignSpec:
         raise InputError(f"{place}: expected a mapping, got {describe(data)}")
     spec, faults = read_section(CampaignSpec, data)
     if faults:
-        raise InputError(listed(list(dict.fromkeys(f"{place}: {fault.message}" for fault in faults))))
+        raise InputError(str(ScenarioError(list(dict.fromkeys(f"{place}: {fault.message}" for fault in faults)))))
     return spec
 
 
