@@ -9,7 +9,7 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.internal.text import pluralise
-from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.base.types import HEIGHT, Floats, Ints
 
 _MOST_TOLD = 3
 _LARGE = 1e7  # m, from which on a place is told in powers of ten
@@ -97,12 +97,16 @@ def indices_or_none(measurements: Ints) -> list[int | None]:
     return [None if index < 0 else index for index in measurements.tolist()]
 
 
-def state_columns(means: Floats, covs: Floats) -> dict[str, list[float]]:
-    """`x_m`, `y_m`, `vx_mps`, `vy_mps` of states (num, state_dim), and `std_...`, their standard deviations.
+def state_columns(means: Floats, covs: Floats, *, has_height: bool = False) -> dict[str, list[float]]:
+    """Return the columns `x_m`, `y_m`, `vx_mps`, `vy_mps` of states and `std_...`, their standard deviations.
 
-    Velocities only where the state goes on with them: four components or more.
+    Args:
+        means: (num, state_dim). With four components or more the third and fourth are velocities.
+        covs: (num, state_dim, state_dim).
+        has_height: True if components 4 and 5 are height and vertical velocity: `z_m` and `vz_mps`.
     """
     names = _COLUMNS[: 4 if means.shape[1] >= 4 else min(2, means.shape[1])]
+    names = (*names, "z_m", "vz_mps") if has_height and means.shape[1] > HEIGHT + 1 else names
     with np.errstate(invalid="ignore"):
         stds = np.sqrt(np.diagonal(covs, axis1=1, axis2=2))
     return {name: means[:, j].tolist() for j, name in enumerate(names)} | {

@@ -9,7 +9,8 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from vedette.evaluation.scans import LIE, Scans, scans_of_record
+from vedette.evaluation.scans import Scans, scans_of_record
+from vedette.internal.quantities import PLACED, SOLID
 from vedette.kernels.base.types import Bools, Floats
 from vedette.scenarios import Scenario
 from vedette.scenarios.sections.field_of_view import field_of_view
@@ -48,7 +49,8 @@ def disagreements(record: RunRecord, scenario: Scenario) -> tuple[str, ...]:
     measure no places in the plane are left out. Raises `VedetteError` for a recording that cannot be read.
     """
     model = scenario.model
-    placed = [s for s, sensor in enumerate(model.sensors) if LIE.get(sensor.measurement.kind) in ("point", "position")]
+    kinds = [sensor.measurement.kind for sensor in model.sensors]
+    placed = [s for s, kind in enumerate(kinds) if kind in PLACED and kind not in SOLID]
     if model.recording is None or len(placed) < 2:
         return ()
     lives = _lives(record, scenario, scans_of_record(record, scenario), placed)

@@ -8,8 +8,8 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.internal.quantities import COMPONENTS, PLACED, QUANTITIES, is_doppler, si_column
-from vedette.kernels.base.types import BEAM, OWN_VELOCITY, Floats
+from vedette.internal.quantities import COMPONENTS, PLACED, QUANTITIES, SOLID, is_doppler, si_column
+from vedette.kernels.base.types import BEAM, OWN_HEIGHT, OWN_VELOCITY, Floats
 from vedette.models.arguments import reject
 from vedette.models.turns import is_turn, lags
 from vedette.platforms.compass import course_deg
@@ -31,6 +31,10 @@ UNKNOWN = -2  # origin of a measurement that was recorded
 LIE: dict[str, str] = {
     "bearing_range": "point",
     "bearing_range_rate": "point",
+    "bearing_slant_range": "point",
+    "bearing_range_elevation": "point",
+    "bearing_range_altitude": "point",
+    "position_altitude": "position",
     "position": "position",
     "bearing_only": "ray",
     "range_only": "circle",
@@ -99,12 +103,15 @@ def scan_table(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
     told = [site for site in sites if "bearing" in COMPONENTS[site.kind]]
     compass = bool(told) and all(site.compass for site in told)
     unit = "deg" if compass else "rad"
-    names = {name: si_column(name) for name in QUANTITIES} | {"bearing": f"bearing_{unit}"}
+    names = {name: si_column(name) for name in QUANTITIES} | {
+        name: f"{name}_{unit}" for name in ("bearing", "elevation")
+    }
     wanted = dict.fromkeys(names[name] for site in sites for name in COMPONENTS[site.kind])
     own = ["own_x_m", "own_y_m", f"own_heading_{unit}"]
     if any(is_doppler(site.kind) for site in sites):
         own += [f"{name}_mps" for name in OWN_SPEEDS]
-    table: dict[str, list[Any]] = {name: [] for name in ("time", "sensor", *wanted, *own)}
+    solid = ["own_height_m"] if any(site.kind in SOLID for site in sites) else []
+    table: dict[str, list[Any]] = {name: [] for name in ("time", "sensor", *wanted, *own, *solid)}
     for time, scans, poses in zip(record.times.tolist(), scans_of_record(record, scenario), record.poses, strict=True):
         for site, scan, pose in zip(sites, scans, poses, strict=True):
             if scan is None:
@@ -121,6 +128,7 @@ def scan_table(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
                     "time": time + lag,
                     "sensor": site.name,
                     **dict(placed),
+                    "own_height_m": float(pose[OWN_HEIGHT]) if len(pose) > OWN_HEIGHT else 0.0,
                     **dict(zip(columns, row, strict=False)),
                 }
                 for name, column in table.items():

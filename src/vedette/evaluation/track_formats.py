@@ -44,6 +44,8 @@ def geojson(table: Table) -> bytes:
     for track, rows in _tracks("GeoJSON", table).items():
         places = [[table["lon_deg"][row], table["lat_deg"][row]] for row in rows]
         places = [[round(degrees, _DIGITS) for degrees in place] for place in places]
+        if "z_m" in table:
+            places = [[*place, round(table["z_m"][row], 1)] for place, row in zip(places, rows, strict=True)]
         line = {"type": "LineString", "coordinates": places}
         geometry = line if len(places) > 1 else {"type": "Point", "coordinates": places[0]}
         told: dict[str, Any] = {"label": track, "target": _most_common([table["target"][row] for row in rows])}
@@ -56,7 +58,7 @@ def geojson(table: Table) -> bytes:
 
 
 def czml(table: Table) -> bytes:
-    """A packet a track, for a globe: a point with its path, at height 0, named by its target or else its first label.
+    """A packet a track, for a globe: a point with its path, at its height or 0, named by its target or first label.
 
     Times that are no dates are taken as seconds since 1970.
     """
@@ -66,7 +68,7 @@ def czml(table: Table) -> bytes:
         places: list[float] = []
         for row, time in zip(rows, times, strict=True):
             degrees = [round(table[name][row], _DIGITS) for name in ("lon_deg", "lat_deg")]
-            places += [round(time - times[0], 6), *degrees, 0.0]
+            places += [round(time - times[0], 6), *degrees, round(table["z_m"][row], 1) if "z_m" in table else 0.0]
         name = _most_common([table["target"][row] for row in rows]) or label
         packets.append(
             {
@@ -102,13 +104,14 @@ def mcap(table: Table) -> bytes:
         channel, label = channels[row]
         nanoseconds = max(0, round(time * 1e9))  # a log begins in 1970
         east, north = table["std_x_m"][row], table["std_y_m"][row]
+        up = table["std_z_m"][row] if "z_m" in table else 0.0
         message = {
             "timestamp": {"sec": nanoseconds // 10**9, "nsec": nanoseconds % 10**9},
             "frame_id": label,
             "latitude": table["lat_deg"][row],
             "longitude": table["lon_deg"][row],
-            "altitude": 0.0,
-            "position_covariance": [east * east, 0.0, 0.0, 0.0, north * north, 0.0, 0.0, 0.0, 0.0],
+            "altitude": table["z_m"][row] if "z_m" in table else 0.0,
+            "position_covariance": [east * east, 0.0, 0.0, 0.0, north * north, 0.0, 0.0, 0.0, up * up],
             "position_covariance_type": _DIAGONAL_KNOWN,
             "existence": table["existence"][row],
         }

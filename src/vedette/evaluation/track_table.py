@@ -35,15 +35,16 @@ def track_table(
     names: Sequence[str] = (),
     compass: Compass | None = None,
     joins: Sequence[Join] = (),
+    has_height: bool = False,
 ) -> dict[str, list[Any]]:
     """One row an estimate, by columns.
 
     `time_s` is that of the record plus `start`; `utc` where that is since 1970. `label` is `birth step.index`; `track`
     the first label of its track, another than `label` after a gap that `joins` close; `x_m`,
     `y_m`, `vx_mps`, `vy_mps` the estimate, `std_...` its standard deviations (velocities only where the state goes on
-    with them: four components or more), `existence` the probability that it is there. `lon_deg`, `lat_deg` with an
-    origin; with a compass `course_deg`, clockwise from true north, and `speed_mps`. `target` names the true target that
-    OSPA's assignment gives it, nearer than `cutoff` (m); None: none.
+    with them: four components or more; with `has_height` also `z_m`, `vz_mps`), `existence` the probability that it is
+    there. `lon_deg`, `lat_deg` with an origin; with a compass `course_deg`, clockwise from true north, and `speed_mps`.
+    `target` names the true target that OSPA's assignment gives it, nearer than `cutoff` (m); None: none.
 
     names: of the true targets, by their ids; else `id + 1`. joins: see `vedette.evaluation.joining`.
     """
@@ -71,7 +72,7 @@ def track_table(
     table["track"] = [_label(tracks.get(label, label)) for _, label, *_ in rows]
     dim = len(rows[0][2]) if rows else 4
     means, covs = (np.array([row[part] for row in rows]) for part in (2, 3))
-    table |= state_columns(means.reshape(-1, dim), covs.reshape(-1, dim, dim))
+    table |= state_columns(means.reshape(-1, dim), covs.reshape(-1, dim, dim), has_height=has_height)
     if origin is not None:
         places = origin.to_degrees(np.array([row[2][:2] for row in rows]).reshape(-1, 2))
         table["lon_deg"], table["lat_deg"] = places[:, 0].tolist(), places[:, 1].tolist()
@@ -97,6 +98,7 @@ def table_of_run(record: RunRecord, scenario: Scenario, joins: Sequence[Join] = 
         names=names,
         compass=model.north() if model.by_compass else None,
         joins=joins,
+        has_height=model.has_heights,
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from vedette.evaluation.agreement import measured_by, noise_stds
 from vedette.evaluation.scans import LIE, scans_of_record
+from vedette.internal.quantities import PLACED, SOLID
 from vedette.internal.text import pluralise
 from vedette.kernels.base.types import Bools, Floats
 from vedette.recorded.extents import places_of
@@ -53,7 +54,8 @@ def unexplained(record: RunRecord, scenario: Scenario) -> tuple[str, ...]:
     """
     model = scenario.model
     births = model.birth.from_measurements
-    placed = [s for s, sensor in enumerate(model.sensors) if LIE.get(sensor.measurement.kind) in ("point", "position")]
+    kinds = [sensor.measurement.kind for sensor in model.sensors]
+    placed = [s for s, kind in enumerate(kinds) if kind in PLACED and kind not in SOLID]
     if model.recording is None or births is None or not placed:
         return ()
     assumed, warnings, left = max(births.std[2:4]), list[str](), _left(record, scenario, placed)

@@ -9,16 +9,17 @@ from typing import NamedTuple
 # Units as they end the names of columns, and one of each in SI units; the first is the SI unit.
 LENGTHS = {"m": 1.0, "km": 1000.0, "nmi": 1852.0}
 ANGLES = {"rad": 1.0, "deg": math.pi / 180.0}
+HEIGHTS = LENGTHS | {"ft": 0.3048, "fl": 30.48}
 SPEEDS = {"mps": 1.0, "kmh": 1.0 / 3.6, "kn": 1852.0 / 3600.0}
 
 
 class Quantity(NamedTuple):
     """A quantity that sensors measure.
 
-    units: one of `LENGTHS`, `ANGLES`, `SPEEDS`. unit: in scenario files and messages, of which `per_si` make one SI
-    unit. least: least value without noise or bias, SI. most: largest size in a recording, SI; inf: as of places. far:
-    SI, of measurements whose bias is unknown, the standard deviation. unknown: standard deviation from which on nothing
-    is known of a bias, in `unit`.
+    units: one of `LENGTHS`, `HEIGHTS`, `ANGLES`, `SPEEDS`. unit: in scenario files and messages, of which `per_si` make
+    one SI unit. least: least value without noise or bias, SI. most: largest size in a recording, SI; inf: as of places.
+    far: SI, of measurements whose bias is unknown, the standard deviation. unknown: standard deviation from which on
+    nothing is known of a bias, in `unit`.
     """
 
     units: Mapping[str, float]
@@ -52,9 +53,11 @@ QUANTITIES = {
     "range_rate": Quantity(SPEEDS, "m/s", 1.0, -math.inf, 1e5, 10.0, 100.0),
     "x": _LENGTH,
     "y": _LENGTH,
+    "elevation": Quantity(ANGLES, "deg", 180.0 / math.pi, -math.inf, math.pi / 2.0, math.radians(3.0), 10.0),
+    "altitude": Quantity(HEIGHTS, "m", 1.0, -math.inf, 1e5, 300.0, 1000.0),
 }
 # Those that only a measurement can be biased in; a bias of x, y is also of the place of the sensor.
-ONLY_MEASURED = ("bearing", "range", "range_rate")
+ONLY_MEASURED = ("bearing", "range", "range_rate", "elevation", "altitude")
 # The components of each kind of measurement.
 COMPONENTS = {
     "bearing_range": ("bearing", "range"),
@@ -62,9 +65,20 @@ COMPONENTS = {
     "bearing_only": ("bearing",),
     "range_only": ("range",),
     "position": ("x", "y"),
+    "bearing_slant_range": ("bearing", "range"),
+    "bearing_range_elevation": ("bearing", "range", "elevation"),
+    "bearing_range_altitude": ("bearing", "range", "altitude"),
+    "position_altitude": ("x", "y", "altitude"),
 }
+# The kinds that depend on the height of a target; their ranges are slant ranges.
+SOLID = ("bearing_slant_range", "bearing_range_elevation", "bearing_range_altitude", "position_altitude")
 # The kinds that say where a target is.
 PLACED = tuple(kind for kind, names in COMPONENTS.items() if names[:2] in (("bearing", "range"), ("x", "y")))
+
+
+def is_position(kind: str) -> bool:
+    """Return True if measurements of a kind are positions, in metres or degrees."""
+    return COMPONENTS.get(kind, ())[:2] == ("x", "y")
 
 
 def is_doppler(kind: str) -> bool:

@@ -14,7 +14,7 @@ from vedette.control import Planner
 from vedette.densities import Estimator
 from vedette.errors import VedetteError
 from vedette.evaluation.track_formats import utc_text
-from vedette.internal.quantities import COMPONENTS, PLACED
+from vedette.internal.quantities import COMPONENTS, PLACED, SOLID
 from vedette.kernels.base.types import Floats
 from vedette.live.messages import Message, read_message
 from vedette.models.arguments import reject
@@ -179,6 +179,7 @@ class Live:
         assert belief.time is not None  # a scan was taken, or one before it
         found = self.estimate(belief.fused, belief.step)
         names = ("x", "y", "vx", "vy")[: 4 if found.means.shape[1] >= 4 else 2]
+        names = (*names, "z", "vz") if any(site.kind in SOLID for site in self.sites) else names
         stds = np.sqrt(np.diagonal(found.covs, axis1=1, axis2=2))[:, : len(names)]
         tracks: list[Answer] = []
         for label, mean, std, existence in zip(
@@ -190,7 +191,7 @@ class Live:
             for track, (lon, lat) in zip(tracks, self.origin.to_degrees(found.means[:, :2]).tolist(), strict=True):
                 track.update(lon=lon, lat=lat)
         compass = self.compass
-        if compass is not None and len(names) == 4:
+        if compass is not None and len(names) >= 4:
             for track, (course, speed) in zip(tracks, courses_of(compass, found.means).tolist(), strict=True):
                 track.update(course_deg=course, speed_mps=speed)
         counts = {"late": timeline.num_late, "dropped": timeline.num_dropped, "repeated": timeline.num_repeated}

@@ -81,8 +81,10 @@ def read_message(
     columns: dict[str, list[Any]] = {"time": [time] * num, "sensor": [site.name] * num}
     columns |= {name: [row[j] for row in rows] if rows else [None] for j, name in enumerate(names)}
     columns |= {name: [value] * num for name, value in pose.items()}
+    unit = "deg" if site.compass else "rad"
     units = {
-        "bearing": "deg" if site.compass else "rad",
+        "bearing": unit,
+        "elevation": unit,
         **{name: unit for name, unit in conventions.units.items() if name in names},
     }
     named = {_OF_POSE[name]: name for name in pose}

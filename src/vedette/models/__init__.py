@@ -15,7 +15,13 @@ from vedette.models.detection import (
 from vedette.models.detection_functions import MAX_PROB_DETECTION
 from vedette.models.functions import ModelFunction, model_function
 from vedette.models.grid import CellGrid
-from vedette.models.kinematics import constant_velocity, coordinated_turn
+from vedette.models.heights import (
+    bearing_range_altitude,
+    bearing_range_elevation,
+    bearing_slant_range,
+    position_altitude,
+)
+from vedette.models.kinematics import constant_velocity, constant_velocity_height, coordinated_turn
 from vedette.models.measurement import MeasurementModel, NoiseModel, position
 from vedette.models.motion import MotionModel, SurvivalModel, constant_survival, kernel_motion
 from vedette.models.noise import axis_noise, constant_noise, range_dependent_noise
@@ -49,12 +55,16 @@ __all__ = [
     "axis_noise",
     "bearing_only",
     "bearing_range",
+    "bearing_range_altitude",
+    "bearing_range_elevation",
     "bearing_range_rate",
+    "bearing_slant_range",
     "camera",
     "constant_detection",
     "constant_noise",
     "constant_survival",
     "constant_velocity",
+    "constant_velocity_height",
     "coordinated_turn",
     "gaussian_detection",
     "kernel_motion",
@@ -63,6 +73,7 @@ __all__ = [
     "measurement_space_clutter",
     "model_function",
     "position",
+    "position_altitude",
     "range_dependent_noise",
     "range_only",
     "region_clutter",

@@ -27,6 +27,8 @@ class Bias:
         clock: s; how far its times are ahead.
         x, y: m; of where the sensor is said to be, or of the positions that it measures.
         range_rate: m/s.
+        elevation: rad.
+        altitude: m.
 
     Raises:
         InputError: a number that is not finite.
@@ -38,6 +40,8 @@ class Bias:
     x: float = 0.0
     y: float = 0.0
     range_rate: float = 0.0
+    elevation: float = 0.0
+    altitude: float = 0.0
 
     def __post_init__(self) -> None:
         for each in fields(self):

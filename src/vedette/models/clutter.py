@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.errors import InputError, ModelError
-from vedette.internal.quantities import COMPONENTS, QUANTITIES, is_doppler
+from vedette.internal.quantities import COMPONENTS, QUANTITIES, SOLID, is_doppler
 from vedette.kernels.base.compile import inlined
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models.arguments import (
@@ -137,6 +137,7 @@ def _box(measurement: Floats, pose: Floats, params: Floats) -> float:
 
 
 _LARGEST_RATE = 300.0  # m/s, the default largest range rate of clutter
+_LARGEST_HEIGHT = 12_000.0  # m, the default largest height of clutter
 
 
 def at_raw_measurements(clutter: ClutterModel, bias: Floats, moved: Floats) -> ClutterModel:
@@ -172,14 +173,16 @@ class _BoxSampler:
         return wrap_angular(drawn, measurement.angular) if measurement.meas_dim == len(self.low) else drawn
 
 
-def plane_params(max_range_rate: float | None) -> Floats:
-    """(6,) the last params of clutter that is uniform in the plane; `InputError` for a rate that is not above 0.
+def plane_params(kind: str, max_range_rate: float | None, max_height: float | None = None) -> Floats:
+    """Return the last six params of clutter that is uniform in the plane.
 
-    The largest range rate (None: 300 m/s), and zeros for what is added to up to three components of a measurement and
-    to x, y of the sensor, see `at_raw_measurements`.
+    These are the largest range rate (None: 300 m/s) or, of a kind that depends on heights, the largest height (None: 12
+    km), and zeros for what is added to up to three components of a measurement and to x, y of the sensor, see
+    `at_raw_measurements`. Raises `InputError` for a largest value that is not above 0.
     """
-    largest = _LARGEST_RATE if max_range_rate is None else positive("max_range_rate", max_range_rate)
-    return np.array([largest, 0.0, 0.0, 0.0, 0.0, 0.0])
+    rate = _LARGEST_RATE if max_range_rate is None else positive("max_range_rate", max_range_rate)
+    height = _LARGEST_HEIGHT if max_height is None else positive("max_height", max_height)
+    return np.array([height if kind in SOLID else rate, 0.0, 0.0, 0.0, 0.0, 0.0])
 
 
 @inlined

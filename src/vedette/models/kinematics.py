@@ -1,7 +1,7 @@
-"""Built-in motions: nearly constant velocity and the coordinated turn, for any time step.
+"""Built-in motions: nearly constant velocity, also in height, and the coordinated turn, for any time step.
 
 States: [px, py, vx, vy] (the order of the paper's F and Q; paper-notes 1), with a turn rate in rad/s, positive to
-the left, appended for the coordinated turn.
+the left, appended for the coordinated turn, or height and vertical velocity.
 """
 
 from __future__ import annotations
@@ -98,6 +98,55 @@ def constant_velocity(
 
 
 _CV_NOISE = {"held": _cv_noise, "continuous": _cv_continuous_noise}
+
+
+@model_function("transition")
+def _cv_height_transition(state: Floats, dt: float, params: Floats, out: Floats) -> None:
+    for j in range(6):
+        out[j] = state[j]
+    out[0] += dt * state[2]
+    out[1] += dt * state[3]
+    out[4] += dt * state[5]
+
+
+@model_function("transition_jacobian")
+def _cv_height_jacobian(state: Floats, dt: float, params: Floats, out: Floats) -> None:
+    _identity(out)
+    out[0, 2] = dt
+    out[1, 3] = dt
+    out[4, 5] = dt
+
+
+@model_function("process_noise_cov")
+def _cv_height_noise(state: Floats, dt: float, params: Floats, out: Floats) -> None:
+    for i in range(6):
+        for j in range(6):
+            out[i, j] = 0.0
+    for axis in range(3):
+        p, v, sigma = (4, 5, params[1]) if axis == 2 else (axis, axis + 2, params[0])
+        out[p, p] = dt**3 / 3.0 * sigma * sigma
+        out[p, v] = 0.5 * dt**2 * sigma * sigma
+        out[v, p] = out[p, v]
+        out[v, v] = dt * sigma * sigma
+
+
+@part("constant_velocity_height", "motion")
+def constant_velocity_height(
+    sigma_v: NonNegative = 5.0, sigma_climb: NonNegative = 1.0, *, method: str = "auto"
+) -> MotionModel:
+    """Constant velocity in space with white acceleration noise in continuous time. State [px, py, vx, vy, pz, vz].
+
+    For measurements that depend on a height (`vedette.models.heights`). The noise of an axis is sigma^2 [[dt^3/3,
+    dt^2/2], [dt^2/2, dt]] (Bar-Shalom, Li and Kirubarajan 2001, section 6.2.2).
+
+    Args:
+        sigma_v: root of the spectral density of the horizontal acceleration, in m/s^1.5 [m/s^2].
+        sigma_climb: the same of the vertical acceleration [m/s^2].
+        method: Gaussian method, see `MotionModel`.
+    """
+    params = np.array([non_negative("sigma_v", sigma_v), non_negative("sigma_climb", sigma_climb)])
+    functions = _cv_height_transition, _cv_height_noise, np.empty(0), params, _cv_height_jacobian
+    return MotionModel(6, *functions, method)
 
 
 @kernel

@@ -33,7 +33,7 @@ def _position_jacobian(state: Floats, pose: Floats, params: Floats, out: Floats)
         for j in range(out.shape[1]):
             out[i, j] = 1.0 if i == j else 0.0
     if turns(pose) and state.shape[0] >= 4:
-        to_scan_time(passage(state, pose), pose, True, out)
+        to_scan_time(passage(state, pose), pose, True, 0.0, out)
 
 
 def _places(measurements: Floats, pose: Floats) -> Floats:
@@ -82,8 +82,9 @@ class MeasurementModel:
             none. Residuals of angles are wrapped to (-pi, pi].
         least: (meas_dim,) least value of each component without noise, such as 0 of a range; () means as `components`
             says, else none.
-        places: plain function of (n, meas_dim) measurements and a pose: the (n, 2) positions where they were taken of a
-            target; None where a measurement does not say where. Births from measurements need it.
+        places: plain function of (n, meas_dim) measurements and a pose: the (n, 2) positions of the targets in m, or
+            (n, 3) with heights for states [px, py, vx, vy, pz, vz]; None if a measurement determines no position.
+            Births from measurements need it.
         is_linear: whether measurements are linear in the state: a Jacobian then serves however wide a Gaussian is.
         components: the quantity that each component is: "bearing", "range", "range_rate", "x" or "y" (the names of
             `vedette.internal.quantities.QUANTITIES`, which a `Bias` has too); () where they are others.
@@ -132,7 +133,7 @@ class MeasurementModel:
         return out
 
     def positions(self, measurements: Floats, pose: ArrayLike) -> Floats:
-        """(n, 2) positions of (n, meas_dim) measurements, in m.
+        """Return the positions of (n, meas_dim) measurements in m, shape (n, 2), or (n, 3) with heights.
 
         Raises:
             InputError: a model that has no `places`.
@@ -142,7 +143,8 @@ class MeasurementModel:
             raise reject("MeasurementModel.places", "a function, as births from measurements need a position", None)
         at = pose_vector("pose", pose)
         try:
-            return float_array("places", self.places(measurements, at), (len(measurements), 2))
+            found = np.asarray(self.places(measurements, at), np.float64)
+            return float_array("places", found, (len(measurements), 3 if found.shape[1:] == (3,) else 2))
         except Exception as error:
             raise ModelError(f"places of measurements at pose {at}: {type(error).__name__}: {error}") from error
 

@@ -39,7 +39,7 @@ def _bearing_range(state: Floats, pose: Floats, params: Floats, out: Floats) -> 
 
 
 @model_function("measurement_noise_cov")
-def _bearing_range_rate(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
+def _with_third(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
     _write_polar(state, pose, params, out)
     for i in range(2):
         out[i, 2] = 0.0
@@ -106,12 +106,15 @@ def range_dependent_noise(
     sigma_bearing: float | None = None,
     eta_bearing: float = 0.0,
     sigma_range_rate: float | None = None,
+    sigma_elevation: float | None = None,
+    sigma_altitude: float | None = None,
 ) -> NoiseModel:
     """Noise that grows with the distance d of the target (paper section IV; paper-notes 3).
 
     Standard deviations sigma_range + eta_range d^2 and sigma_bearing + eta_bearing d. With only `sigma_bearing` given
-    it serves a bearing-only sensor, with only `sigma_range` a range-only one, with both [bearing, range]. With
-    `sigma_range_rate` beside these two it serves [bearing, range, range rate].
+    it serves a bearing-only sensor, with only `sigma_range` a range-only one, with both [bearing, range]. With one of
+    `sigma_range_rate`, `sigma_elevation` and `sigma_altitude` it serves measurements with this third component. The
+    distance is that in the plane.
 
     Args:
         sigma_range: m, above 0 (paper: 10).
@@ -119,15 +122,23 @@ def range_dependent_noise(
         sigma_bearing: rad, above 0 (paper: pi/180).
         eta_bearing: rad/m (paper: 5e-6).
         sigma_range_rate: m/s, above 0, at every distance.
+        sigma_elevation: rad, above 0, at every distance.
+        sigma_altitude: m, above 0, at every distance.
     """
     ranges = _growth("range", sigma_range, eta_range)
     bearings = _growth("bearing", sigma_bearing, eta_bearing)
-    if sigma_range_rate is not None:
+    thirds = {
+        "sigma_range_rate": sigma_range_rate,
+        "sigma_elevation": sigma_elevation,
+        "sigma_altitude": sigma_altitude,
+    }
+    for name, sigma in thirds.items():
+        if sigma is None:
+            continue
         if not (ranges and bearings):
-            raise reject("sigma_range_rate", "None where no sigma_range and sigma_bearing are given", sigma_range_rate)
-        rate = positive("sigma_range_rate", sigma_range_rate)
-        stds = np.array([bearings[0], ranges[0], rate])
-        return NoiseModel(_bearing_range_rate, np.array([*ranges, *bearings, rate]), 3, stds)
+            raise reject(name, "None where no sigma_range and sigma_bearing are given", sigma)
+        std = positive(name, sigma)
+        return NoiseModel(_with_third, np.array([*ranges, *bearings, std]), 3, np.array([bearings[0], ranges[0], std]))
     if ranges and bearings:
         return NoiseModel(_bearing_range, np.array(ranges + bearings), 2, np.array([bearings[0], ranges[0]]))
     if bearings:

@@ -54,7 +54,7 @@ def _bearing_range_jacobian(state: Floats, pose: Floats, params: Floats, out: Fl
     at = passage(state, pose)
     _bearing_row(at.dx, at.dy, out, 0)
     _range_row(at.dx, at.dy, out, 1)
-    to_scan_time(at, pose, False, out)
+    to_scan_time(at, pose, False, 0.0, out)
 
 
 @inlined
@@ -88,7 +88,7 @@ def _bearing_range_rate_jacobian(state: Floats, pose: Floats, params: Floats, ou
         out[2, j] = 0.0
     out[2, 0], out[2, 1] = -turning * out[1, 1], turning * out[1, 0]
     out[2, 2], out[2, 3] = out[1, 0], out[1, 1]
-    to_scan_time(at, pose, False, out)
+    to_scan_time(at, pose, False, 0.0, out)
 
 
 @model_function("measurement")
@@ -101,7 +101,7 @@ def _bearing(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
 def _bearing_jacobian(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
     at = passage(state, pose)
     _bearing_row(at.dx, at.dy, out, 0)
-    to_scan_time(at, pose, False, out)
+    to_scan_time(at, pose, False, 0.0, out)
 
 
 @model_function("measurement")
@@ -114,7 +114,7 @@ def _range(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
 def _range_jacobian(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
     at = passage(state, pose)
     _range_row(at.dx, at.dy, out, 0)
-    to_scan_time(at, pose, False, out)
+    to_scan_time(at, pose, False, 0.0, out)
 
 
 def _places(measurements: Floats, pose: Floats) -> Floats:

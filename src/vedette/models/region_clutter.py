@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vedette.internal.quantities import SOLID
 from vedette.kernels.base.compile import inlined, kernel
-from vedette.kernels.base.types import Floats
-from vedette.kernels.gaussian.beam import own_place
+from vedette.kernels.base.types import HEIGHT, Floats
+from vedette.kernels.gaussian.beam import own_height, own_place
 from vedette.models.arguments import non_negative, one_of, reject
 from vedette.models.clutter import (
     ClutterModel,
@@ -109,12 +110,74 @@ def _range(measurement: Floats, pose: Floats, params: Floats) -> float:
     return params[0] + math.log(distance * arc) if arc > 0.0 else -math.inf
 
 
+@inlined
+def _share_of_heights(least: float, most: float, sensor: float, highest: float) -> float:
+    """Return the share of heights from 0 to `highest` whose distance from the sensor's lies between two values."""
+    above = max(0.0, min(highest - sensor, most) - least) if highest > sensor else 0.0
+    return (above + max(0.0, min(sensor, most) - least)) / highest
+
+
+@model_function("log_clutter_intensity")
+def _bearing_slant_range(measurement: Floats, pose: Floats, params: Floats) -> float:
+    bearing, distance = measurement[0] + params[6], measurement[1] + params[7]
+    own_x, own_y = own_place(bearing, pose)
+    near, far = _clip_ray(own_x + params[9], math.cos(bearing), params[1], params[2], 0.0, math.inf)
+    near, far = _clip_ray(own_y + params[10], math.sin(bearing), params[3], params[4], near, far)
+    if not (near < far and distance > near):
+        return -math.inf
+    least = math.sqrt(max(0.0, distance * distance - far * far))
+    share = _share_of_heights(least, math.sqrt(distance * distance - near * near), own_height(pose), params[5])
+    return params[0] + math.log(distance * share) if share > 0.0 else -math.inf
+
+
+@inlined
+def _at_height(bearing: float, ground: float, height: float, pose: Floats, params: Floats) -> float:
+    """Log intensity per m^3 at a bearing, ground range and height."""
+    own_x, own_y = own_place(bearing, pose)
+    x = own_x + params[9] + ground * math.cos(bearing)
+    y = own_y + params[10] + ground * math.sin(bearing)
+    if not (0.0 <= height <= params[5] and _inside(x, y, params)):
+        return -math.inf
+    return params[0] - math.log(params[5])  # type: ignore[no-any-return]
+
+
+@model_function("log_clutter_intensity")
+def _bearing_range_elevation(measurement: Floats, pose: Floats, params: Floats) -> float:
+    distance, elevation = measurement[1] + params[7], measurement[2] + params[8]
+    ground = distance * math.cos(elevation)
+    if not (distance > 0.0 and ground > 0.0):
+        return -math.inf
+    height = own_height(pose) + distance * math.sin(elevation)
+    return _at_height(measurement[0] + params[6], ground, height, pose, params) + math.log(distance * ground)
+
+
+@model_function("log_clutter_intensity")
+def _bearing_range_altitude(measurement: Floats, pose: Floats, params: Floats) -> float:
+    distance, height = measurement[1] + params[7], measurement[2] + params[8]
+    square = distance * distance - (height - own_height(pose)) ** 2
+    if not (distance > 0.0 and square > 0.0):
+        return -math.inf
+    return _at_height(measurement[0] + params[6], math.sqrt(square), height, pose, params) + math.log(distance)
+
+
+@model_function("log_clutter_intensity")
+def _position_altitude(measurement: Floats, pose: Floats, params: Floats) -> float:
+    inside = _inside(measurement[0] + params[6], measurement[1] + params[7], params)
+    if not (inside and 0.0 <= measurement[2] + params[8] <= params[5]):
+        return -math.inf
+    return params[0] - math.log(params[5])  # type: ignore[no-any-return]
+
+
 _KINDS: dict[str, ModelFunction] = {
     "bearing_range": _bearing_range,
     "bearing_range_rate": _bearing_range_rate,
     "bearing_only": _bearing,
     "range_only": _range,
     "position": _position,
+    "bearing_slant_range": _bearing_slant_range,
+    "bearing_range_elevation": _bearing_range_elevation,
+    "bearing_range_altitude": _bearing_range_altitude,
+    "position_altitude": _position_altitude,
 }
 
 
@@ -123,7 +186,7 @@ class _RegionSampler:
     rate: float
     region: Region
     kind: str
-    max_range_rate: float
+    largest: float  # range rate or height
 
     def __call__(
         self, pose: Floats, measurement: MeasurementModel, *, state_dim: int, rng: np.random.Generator
@@ -131,19 +194,26 @@ class _RegionSampler:
         num = int(rng.poisson(self.rate))
         states = np.zeros((num, state_dim))
         states[:, :2] = self.region.sample(num, rng=rng)
+        if self.kind in SOLID:
+            states[:, HEIGHT] = rng.uniform(0.0, self.largest, num)
         drawn = np.empty((num, measurement.meas_dim))
         write_rows(measurement.function, states, pose, measurement.params, drawn)
-        return with_rates(drawn, self.kind, self.max_range_rate, rng)
+        return with_rates(drawn, self.kind, self.largest, rng)
 
 
 @part("region", "clutter")
 def region_clutter(
-    rate: NonNegative, region: Region, kind: str, *, max_range_rate: Positive | None = None
+    rate: NonNegative,
+    region: Region,
+    kind: str,
+    *,
+    max_range_rate: Positive | None = None,
+    max_height: Positive | None = None,
 ) -> ClutterModel:
     """Poisson clutter, uniform over the surveillance region (paper section IV; paper-notes 5).
 
     It is drawn by putting uniform positions, at rest, through the sensor's measurement function. Range rates are
-    uniform from -max_range_rate to max_range_rate.
+    uniform from -max_range_rate to max_range_rate, and heights from 0 to max_height.
 
     Args:
         rate: expected number a scan (paper: 25).
@@ -152,12 +222,13 @@ def region_clutter(
             `ClutterModel` with a custom log intensity and sampler.
         max_range_rate: largest range rate of a false measurement, either way, where range rates are measured; none: 300
             [m/s].
+        max_height: largest height of a false measurement, where heights play a part; none: 12 km [m].
     """
     one_of("kind", kind, _KINDS)
     if not isinstance(region, Region):
         raise reject("region", "a Region", region)
     rate = non_negative("rate", rate)
-    own = plane_params(max_range_rate)
+    own = plane_params(kind, max_range_rate, max_height)
     params = np.concatenate([[log_or_minus_infinity(rate / region.area)], region.bounds, own])
     sampler = _RegionSampler(rate, region, kind, float(own[0]))
     return ClutterModel(rate, _KINDS[kind], params, sampler, angular=angular_of(kind))

@@ -149,7 +149,7 @@ def around_sensor(
         raise reject("half_width_rad", "an angle in (0, pi]", half_width_rad)
     rate, is_square = non_negative("rate", rate), radius is None
     size = positive("half_side", half_side) if is_square else positive("radius", radius)
-    own = plane_params(max_range_rate)
+    own = plane_params(kind, max_range_rate)
     params = np.array([log_or_minus_infinity(rate), size, float(is_square), half_width_rad, *own])
     sampler = _AroundSampler(rate, size, is_square, half_width_rad, kind, float(own[0]))
     return ClutterModel(rate, _KINDS[kind], params, sampler, angular=angular_of(kind))

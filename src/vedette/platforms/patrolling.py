@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.kernels.base.types import BEAM, Bools, Floats
+from vedette.kernels.base.types import OWN_HEIGHT, Bools, Floats
 from vedette.models.arguments import float_array, positive
 from vedette.platforms.base import Platform, check_platform, courses_of, prices_of, scans_of
 
 # Component of a pose: seconds since the platform was last at the first place; those of the other places follow.
-CLOCKS = BEAM + 2
+CLOCKS = OWN_HEIGHT + 1
 _PARTS = 16  # straight segments that approximate a course, up to the last requested time
 
 

@@ -20,16 +20,17 @@ _DEGREE = "\N{DEGREE SIGN}"
 
 
 def read_asterix(file: Path, *, reports: bool = False) -> tuple[dict[str, list[Any]], list[int], tuple[str, ...]]:
-    """Plots of rotating radars, category 048, or tracks of a system, category 062; a sensor is "SAC/SIC".
+    """Read plots of rotating radars, category 048, or tracks of a system, category 062; a sensor is "SAC/SIC".
 
-    Of plots `time`, `sensor`, `range_nmi`, `bearing_deg` from the north, and where any plot has a valid Doppler speed
-    (I048/120, CAL) `range_rate_mps`, taken as positive where the range grows, as the standard gives no sign. Ranges are
-    along the ground where a plot has a valid flight level, which is taken as the height above the radar; others are
-    slant. Of tracks, where there are no plots or `reports` are asked for, `time`, `sensor`, `longitude`, `latitude`,
-    and what targets have: `id` (the number of the track), and `vx`, `vy` where every one says them. Times are seconds
-    from midnight UTC of the first one's day. Other categories are passed over, records without a time and place left
-    out. Returns the columns, the number of each record, and warnings of plots without a flight level and of what was
-    left out.
+    Columns of plots are `time`, `sensor`, `bearing_deg` from the north, `range_nmi` and `slant_range_nmi`; where any
+    plot has a valid flight level (I048/090), which is taken as the height above the radar, `altitude_m`; where any
+    has a valid Doppler speed (I048/120, CAL), `range_rate_mps`, positive where the range grows, as the standard gives
+    no sign. `range_nmi` is along the ground where a plot has a flight level, else it is the slant range. Columns of
+    tracks, which are read if there are no plots or `reports` are asked for, are `time`, `sensor`, `longitude`,
+    `latitude`, `id` (the number of the track), and `vx`, `vy` where every track has them. Times are seconds from
+    midnight UTC of the day of the first one. Other categories are passed over, and records without a time and place
+    are left out. Returns the columns, the number of each record, and warnings of plots without a flight level and of
+    what was left out.
 
     Raises:
         MissingPackageError: libasterix is not installed.
@@ -59,8 +60,9 @@ def read_asterix(file: Path, *, reports: bool = False) -> tuple[dict[str, list[A
     notes = () if not slant else (_of_slant_ranges(slant, len(numbers)),)
     if left := without.count(read):
         notes = (*notes, f"left out: {pluralise(left, 'record')} of category {read:03} without a time or place")
-    if set(columns.get("range_rate_mps", ())) == {None}:
-        del columns["range_rate_mps"]
+    for name in ("range_rate_mps", "altitude_m"):
+        if set(columns.get(name, ())) == {None}:
+            del columns[name]
     kept = {name: cells for name, cells in columns.items() if name not in ("vx", "vy") or None not in cells}
     return kept, numbers, notes
 
@@ -68,7 +70,8 @@ def read_asterix(file: Path, *, reports: bool = False) -> tuple[dict[str, list[A
 def _of_slant_ranges(number: int, total: int) -> str:
     return (
         f"{number} of {total} plots have no flight level: their slant ranges are taken for ranges along the ground, of "
-        "an aircraft 10 km high too long by 1.7 km at 30 km and by .5 km at 100 km"
+        "an aircraft 10 km high too long by 1.7 km at 30 km and by .5 km at 100 km (bearing_slant_range takes them as "
+        "they are)"
     )
 
 
@@ -96,10 +99,18 @@ def _plot(record: Any) -> dict[str, Any] | None:
     if source is None or time is None or polar is None:
         return None
     slant, azimuth = _quantity(polar, "RHO", "NM"), _quantity(polar, "THETA", _DEGREE)
-    ground = _ground_range(_MILE * slant, _height(record.get_item("090")))
+    height = _height(record.get_item("090"))
+    ground = _ground_range(_MILE * slant, height)
     reach = slant if ground is None else ground / _MILE
-    row = {**_source(source, time), "range_nmi": reach, "bearing_deg": azimuth, "is_slant": ground is None}
-    return {**row, "range_rate_mps": _range_rate(record.get_item("120"))}
+    return {
+        **_source(source, time),
+        "range_nmi": reach,
+        "slant_range_nmi": slant,
+        "bearing_deg": azimuth,
+        "altitude_m": height,
+        "range_rate_mps": _range_rate(record.get_item("120")),
+        "is_slant": ground is None,
+    }
 
 
 def _range_rate(doppler: Any) -> float | None:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.internal.quantities import ANGLES, COMPONENTS, is_doppler
+from vedette.internal.quantities import ANGLES, COMPONENTS, SOLID, is_doppler, is_position
 from vedette.internal.text import shown
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import reject
@@ -48,6 +48,7 @@ class ScanColumns:
         measured |= {"lon", "lat"} if "x" in measured else set()
         own = {"own_x", "own_y", "own_lon", "own_lat", "own_heading"}
         own |= {*OWN_SPEEDS} if any(is_doppler(site.kind) for site in self.sites) else set()
+        own |= {"own_height"} if any(site.kind in SOLID for site in self.sites) else set()
         used = {self._columns[name][0] for name in measured | own if name in self._columns} | {self._time, self._sensor}
         return tuple(name for name in self.table.columns if name not in used)
 
@@ -78,7 +79,8 @@ class ScanColumns:
         if (named := self.conventions.columns.get(quantity)) is not None:
             self.table.column(named)
             return named, self._unit(quantity, named, units)
-        for stem in (quantity, *OTHER_NAMES.get(quantity, ())):
+        slant = ("slant_range",) if quantity == "range" and all(site.kind in SOLID for site in self.sites) else ()
+        for stem in (*slant, quantity, *OTHER_NAMES.get(quantity, ())):
             for name in (stem, *(f"{stem}_{unit}" for unit in units)):
                 if name in self.table.columns:
                     return name, self._unit(quantity, name, units)
@@ -107,7 +109,7 @@ class ScanColumns:
             if site.kind not in COMPONENTS:
                 raise reject(f"sensor {site.name}", f"measurements of kind {', '.join(COMPONENTS)}", site.kind)
             for quantity in COMPONENTS[site.kind]:
-                if quantity not in self._columns and not (site.kind == "position" and geographic):
+                if quantity not in self._columns and not (quantity in ("x", "y") and geographic):
                     wanted = f"a column of {quantity}, as sensor {shown(site.name)} measures {site.kind}"
                     raise InputError(f"{self.table.source}: expected {wanted}; got columns {have}")
         angles = {"bearing", "own_heading"} & set(self._columns)
@@ -127,7 +129,7 @@ class ScanColumns:
     def _check_places(self) -> None:
         """That places have both of their numbers."""
         pairs = [("own_x", "own_y"), ("own_lon", "own_lat"), OWN_SPEEDS]
-        if any(site.kind == "position" for site in self.sites):
+        if any(is_position(site.kind) for site in self.sites):
             pairs += [("x", "y"), ("lon", "lat")]
         for pair in pairs:
             there = [name for name in pair if name in self._columns]

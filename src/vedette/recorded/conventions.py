@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from vedette.internal.quantities import ANGLES, LENGTHS, QUANTITIES, SPEEDS
+from vedette.internal.quantities import ANGLES, HEIGHTS, LENGTHS, QUANTITIES, SPEEDS
 from vedette.models.arguments import reject
 from vedette.recorded.instants import Bearings
 
@@ -23,6 +23,7 @@ UNITS: dict[str, Mapping[str, float]] = {
     "own_heading": ANGLES,
     "own_vx": SPEEDS,
     "own_vy": SPEEDS,
+    "own_height": HEIGHTS,
 }
 OWN_SPEEDS = ("own_vx", "own_vy")  # of a sensor, east and north, read where it measures range rates
 OTHER_NAMES = {
@@ -33,6 +34,7 @@ OTHER_NAMES = {
     "id": ("mmsi", "MMSI", "icao24", "track_id"),
     "time": ("time_s", "time_utc", "BaseDateTime"),
     "range": ("distance",),
+    "altitude": ("height", "flight_level"),
 }
 # m, and a share of the distance from the origin: places in metres and in degrees of one row are nearer than that.
 ONE_PLACE, ONE_PLACE_SHARE = 50.0, 0.001
@@ -40,6 +42,7 @@ MOST = {
     **dict.fromkeys(("lon", "own_lon"), 360.0),
     **dict.fromkeys(("lat", "own_lat"), 90.0),
     "own_heading": 2.0 * math.pi,
+    "own_height": QUANTITIES["altitude"].most,
     **dict.fromkeys(OWN_SPEEDS, QUANTITIES["range_rate"].most),
     **{name: each.most for name, each in QUANTITIES.items() if each.most < math.inf},
 }

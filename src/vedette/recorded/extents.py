@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vedette.internal.quantities import PLACED
-from vedette.kernels.base.types import Bools, Floats
+from vedette.internal.quantities import PLACED, is_position
+from vedette.kernels.base.types import OWN_HEIGHT, Bools, Floats
 from vedette.models.turns import own_places
 
 MARGIN = 0.05  # of the longer side of an extent, around it
@@ -18,14 +18,22 @@ _MOST_WILD = 50  # one row of so many may be wild on a side
 
 
 def places_of(scan: Floats, pose: Floats, kind: str) -> Floats:
-    """Return the (num, 2) places in m of a scan by a sensor at a pose; none of a kind that measures no places."""
+    """Return the (num, 2) places in m of a scan by a sensor at a pose; none of a kind that measures no places.
+
+    Slant ranges without a height count as ranges in the plane.
+    """
     if kind not in PLACED:
         return np.empty((0, 2))
-    if kind == "position":
-        return scan
-    return np.asarray(
-        own_places(scan[:, 0], pose) + scan[:, 1:2] * np.column_stack([np.cos(scan[:, 0]), np.sin(scan[:, 0])])
-    )
+    if is_position(kind):
+        return scan[:, :2]
+    ground = scan[:, 1]
+    if kind == "bearing_range_elevation":
+        ground = ground * np.cos(scan[:, 2])
+    elif kind == "bearing_range_altitude":
+        own_height = pose[..., OWN_HEIGHT] if pose.shape[-1] > OWN_HEIGHT else 0.0
+        ground = np.sqrt(np.maximum(ground**2 - (scan[:, 2] - own_height) ** 2, 0.0))
+    away = np.column_stack([ground * np.cos(scan[:, 0]), ground * np.sin(scan[:, 0])])
+    return np.asarray(own_places(scan[:, 0], pose) + away)
 
 
 def box_of(places: Floats, share: float = MARGIN) -> Floats:

@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vedette.internal.quantities import COMPONENTS, angles
+from vedette.internal.quantities import COMPONENTS, angles, is_position
 from vedette.internal.representation import SummaryRepr
 from vedette.internal.text import pluralise
 from vedette.kernels.base.types import BEAM, Floats
@@ -24,6 +24,7 @@ from vedette.simulation.records import ScansFile
 from vedette.tracking import SensorScan
 
 Bearings = Literal["east", "north"]
+_Change = Callable[[Floats], Floats]
 
 
 def turned(angles: ArrayLike, bearings: Bearings | None, compass: Compass, place: ArrayLike) -> Floats:
@@ -65,7 +66,7 @@ class Site:
     turn: Turning = "found"
 
     def measured(self, told: ArrayLike, pose: ArrayLike | None = None) -> Floats:
-        """(num, meas_dim) measurements as filters take them but for the bias, of the same as the sensor tells them.
+        """Return (num, meas_dim) measurements for filters, bias included, from those that the sensor gives.
 
         pose: of the sensor then; None: the site's own.
 
@@ -73,20 +74,21 @@ class Site:
             InputError: another shape, or numbers that are not finite.
         """
         found, at = float_array("told", told, (None, len(COMPONENTS[self.kind]))), self._place(pose)
-        return self._with_bearings(found, lambda angles: self.north.angle(np.radians(angles), at))
+        return self._with_angles(found, lambda angles: self.north.angle(np.radians(angles), at), np.radians)
 
     def told(self, measured: ArrayLike, pose: ArrayLike | None = None) -> Floats:
-        """The inverse of `measured`; degrees from 0 to 360."""
+        """Return the inverse of `measured`; bearings from 0 to 360 degrees."""
         found, at = float_array("measured", measured, (None, len(COMPONENTS[self.kind]))), self._place(pose)
-        return self._with_bearings(found, lambda angles: course_deg(self.north, angles, at))
+        return self._with_angles(found, lambda angles: course_deg(self.north, angles, at), np.degrees)
 
     def _place(self, pose: ArrayLike | None) -> Floats:
         return np.asarray(self.pose if pose is None else pose, np.float64)[:2]
 
-    def _with_bearings(self, measurements: Floats, change: Callable[[Floats], Floats]) -> Floats:
-        found = measurements.copy()
-        for place in angles(COMPONENTS[self.kind]) if self.compass else ():
-            found[:, place] = change(found[:, place])
+    def _with_angles(self, measurements: Floats, bearing: _Change, other: _Change) -> Floats:
+        """Return the measurements with bearings and other angles changed, of a sensor with a compass."""
+        found, names = measurements.copy(), COMPONENTS[self.kind]
+        for place in angles(names) if self.compass else ():
+            found[:, place] = (bearing if names[place] == "bearing" else other)(found[:, place])
         return found
 
 
@@ -107,6 +109,8 @@ class RecordedScans(SummaryRepr):
         unused: columns that were not read.
         notes: what may mislead: slant ranges; of a sensor whose measurements were merged, how many and how wide.
         file: that the rows came from.
+        gathered: for each sensor, the median time between the first and the last row of a gathered scan, s; () if none
+            were gathered.
     """
 
     times: Floats
@@ -119,6 +123,7 @@ class RecordedScans(SummaryRepr):
     unused: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     file: ScansFile = field(default_factory=ScansFile)
+    gathered: tuple[float, ...] = ()
 
     def _summary(self) -> str:
         sizes = f"{pluralise(len(self.times), 'instant')}, {pluralise(self.poses.shape[1], 'sensor')}"
@@ -208,10 +213,10 @@ def without_biases(recording: RecordedScans, sites: Sequence[Site]) -> RecordedS
 
 def bias_of(site: Site, bearings: Bearings | None) -> tuple[Floats, Floats]:
     """Return what the bias of a sensor adds to measurements, (meas_dim,) in rad and m, and to its place, (2,) in m."""
-    bias, is_place = site.bias, site.kind == "position"
+    bias, is_place = site.bias, is_position(site.kind)
     measured = np.array([getattr(bias, component) for component in COMPONENTS[site.kind]])
-    if bearings == "north":
-        measured[[*angles(COMPONENTS[site.kind])]] *= -1.0
+    if bearings == "north" and "bearing" in COMPONENTS[site.kind]:
+        measured[COMPONENTS[site.kind].index("bearing")] *= -1.0
     return measured, np.zeros(2) if is_place else np.array([bias.x, bias.y])
 
 

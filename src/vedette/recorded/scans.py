@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.internal.quantities import ANGLES, COMPONENTS, PLACED, QUANTITIES, is_doppler
+from vedette.internal.quantities import ANGLES, COMPONENTS, PLACED, QUANTITIES, SOLID, is_doppler, is_position
 from vedette.internal.text import shown
-from vedette.kernels.base.types import OWN_VELOCITY, Floats
+from vedette.kernels.base.types import OWN_HEIGHT, OWN_VELOCITY, Floats
 from vedette.models.bias import NO_BIAS
 from vedette.recorded.columns import ScanColumns
 from vedette.recorded.conventions import MOST, ONE_PLACE, ONE_PLACE_SHARE, OVER_A_TURN, OWN_SPEEDS, UNITS, Conventions
@@ -66,7 +66,7 @@ def parse_scans(
     if any(site.bias != NO_BIAS for site in sites):
         recording = without_biases(recording, sites)
     file = ScansFile(Path(table.source).name, table.sha256)
-    return replace(recording, unused=rows.unused, notes=notes, file=file)
+    return replace(recording, unused=rows.unused, notes=notes, file=file, gathered=_gathered(found, rows))
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,15 +149,16 @@ class _Rows(ScanColumns):
         """As filters take it; None of a scan that found nothing."""
         site = self.sites[s]
         quantities: tuple[str, ...] = COMPONENTS[site.kind]
-        if site.kind == "position" and "lon" in self._columns:
-            quantities = ("lon", "lat")
+        if is_position(site.kind) and "lon" in self._columns:
+            quantities = ("lon", "lat", *quantities[2:])
         cells = [self.table.columns[self._columns[quantity][0]][i] for quantity in quantities]
         if all(map(is_empty, cells)):
             return None
         if quantities[0] == "lon":
-            return self._agreed(i, self._plane(i, *quantities), "x", "y")
+            place = self._agreed(i, self._plane(i, "lon", "lat"), "x", "y")
+            return (*place, *(self._value(i, quantity) for quantity in quantities[2:]))
         return tuple(
-            self._angle(i, quantity, s, pose) if QUANTITIES[quantity].is_angle else self._value(i, quantity)
+            self._angle(i, quantity, s, pose) if quantity == "bearing" else self._value(i, quantity)
             for quantity in quantities
         )
 
@@ -175,6 +176,9 @@ class _Rows(ScanColumns):
         if is_doppler(site.kind) and {*OWN_SPEEDS} <= set(self._columns):
             velocity = tuple(self._value(i, quantity) for quantity in OWN_SPEEDS)
             rest = (*rest[: OWN_VELOCITY - 3], *velocity, *rest[OWN_VELOCITY - 1 :])
+        if site.kind in SOLID and "own_height" in self._columns:
+            rest = (*rest, *(0.0,) * (OWN_HEIGHT - 3 - len(rest)))
+            rest = (*rest[: OWN_HEIGHT - 3], self._value(i, "own_height"), *rest[OWN_HEIGHT - 2 :])
         return (*place, heading, *rest)
 
     def _agreed(self, i: int, place: tuple[float, ...], x: str, y: str) -> tuple[float, ...]:
@@ -252,6 +256,20 @@ def _looks_of_turns(rows: list[_Row], sensor: int, site: Site) -> list[Look] | N
     if scans is None:
         return None
     return [Look(each.time, sensor, scan[each.rows], each.pose) for each in scans]
+
+
+def _gathered(rows: list[_Row], how: _Rows) -> tuple[float, ...]:
+    """Return `RecordedScans.gathered`."""
+    if how.conventions.gather == 0.0:
+        return ()
+    spans = []
+    for s in range(len(how.sites)):
+        groups = _groups(
+            sorted((row for row in rows if row.sensor == s), key=lambda row: row.time), how.conventions.gather
+        )
+        several = [group[-1].time - group[0].time for group in groups if len(group) > 1]
+        spans.append(float(np.median(several)) if several else 0.0)
+    return tuple(spans)
 
 
 def _groups(rows: list[_Row], gather: float) -> list[list[_Row]]:

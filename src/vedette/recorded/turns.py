@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from vedette.internal.quantities import COMPONENTS
+from vedette.internal.quantities import COMPONENTS, is_position
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.turns import Turn, with_beam
 
@@ -28,8 +28,8 @@ _SECTORS, _NEAR = 72, 12  # directions in which rows are counted, and how many o
 
 def bearings_of(scan: Floats, poses: Floats, kind: str) -> Floats:
     """(num,) rad from east, of measurements from poses (num, 3 or more) or (3 or more,); (0,) of a kind without."""
-    if kind == "position":
-        off = scan - poses[..., :2]
+    if is_position(kind):
+        off = scan[:, :2] - poses[..., :2]
         return np.asarray(np.arctan2(off[:, 1], off[:, 0]))
     return scan[:, 0] if "bearing" in COMPONENTS.get(kind, ()) else np.empty(0)
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vedette.internal.quantities import COMPONENTS, PLACED, is_doppler
+from vedette.internal.quantities import COMPONENTS, PLACED, is_position
 from vedette.kernels.base.types import Floats
 from vedette.recorded import RecordedScans
 from vedette.recorded.extents import places_of
@@ -95,7 +95,9 @@ def place_stds(kind: str, stds: Floats, scan: Floats) -> Floats:
     """(num,) larger standard deviation of each place that a scan measured, m; none where it measures no places."""
     if kind not in PLACED:
         return np.empty(0)
-    return np.full(len(scan), stds.max()) if kind == "position" else np.maximum(stds[1], stds[0] * scan[:, 1])
+    if is_position(kind):
+        return np.full(len(scan), stds[:2].max())
+    return np.asarray(np.maximum(stds[1], stds[0] * scan[:, 1]))
 
 
 def assumed_clutter(
@@ -115,7 +117,7 @@ def assumed_clutter(
             sensors.append(sensor)
             continue
         rate, why = _rate(model, recording, s, folder, speed)
-        clutter = {"kind": "region", "rate": rate, **_range_rates(model.sensors[s].measurement.kind, recording, s)}
+        clutter = {"kind": "region", "rate": rate, **_largest(model.sensors[s].measurement.kind, recording, s)}
         sensors.append({**sensor, "clutter": clutter})
         rates.setdefault(why, []).append(f"{model.sensor_names[s]} {rate:g}")
     if rates:
@@ -123,13 +125,15 @@ def assumed_clutter(
     return {"sensors": sensors}
 
 
-def _range_rates(kind: str, recording: RecordedScans, s: int) -> dict[str, float]:
-    """Return the largest range rate of false measurements, a tenth above the largest of the recording."""
-    if not is_doppler(kind):
+def _largest(kind: str, recording: RecordedScans, s: int) -> dict[str, float]:
+    """Return the largest range rate or height of false measurements, a tenth above the largest of the recording."""
+    component = next((name for name in COMPONENTS[kind] if name in ("range_rate", "altitude")), None)
+    if component is None:
         return {}
-    place = COMPONENTS[kind].index("range_rate")
-    rates = [np.empty(0), *(scan[:, place] for scans in recording.scans if (scan := scans[s]) is not None)]
-    return {"max_range_rate": max(1.0, float(f"{1.1 * np.abs(np.concatenate(rates)).max(initial=0.0):.3g}"))}
+    place = COMPONENTS[kind].index(component)
+    values = [np.empty(0), *(scan[:, place] for scans in recording.scans if (scan := scans[s]) is not None)]
+    largest = float(f"{1.1 * np.abs(np.concatenate(values)).max(initial=0.0):.3g}")
+    return {"max_range_rate" if component == "range_rate" else "max_height": max(1.0, largest)}
 
 
 def _rate(model: ScenarioModel, recording: RecordedScans, s: int, folder: FilePath, speed: float) -> tuple[float, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path as FilePath
 from typing import Any
@@ -10,12 +11,13 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.kernels.base.types import BEAM, Floats
+from vedette.models.heights import ASSUMED_HEIGHT
 from vedette.models.turns import is_turn
 from vedette.recorded import RecordedScans
 from vedette.scenarios.assumed_clutter import assumed_clutter, place_stds
 from vedette.scenarios.extents import measured_region, region_in_words
 from vedette.scenarios.sections import ScenarioModel
-from vedette.scenarios.sensors_file import EXPECTED_BIRTHS, measured_birth
+from vedette.scenarios.sensors_file import EXPECTED_BIRTHS, HEIGHT_STD, measured_birth, measures_heights
 
 _LOST_PER_SECOND = 0.001
 _BIRTH_STDS = 2.0  # of the noise across, where most was measured
@@ -64,10 +66,14 @@ def assumed_motion(given: Mapping[str, Any], speed: float, words: dict[str, str]
     found: dict[str, Any] = {}
     if "motion" not in given:
         # Held over the times between scans of several sensors, it would be the less the more often some of them scans.
-        found["motion"] = {"kind": "constant_velocity", "sigma_v": speed / 20.0, "acceleration": "continuous"}
+        has_height = measures_heights(given)
+        kind = "constant_velocity_height" if has_height else "constant_velocity"
+        found["motion"] = {"kind": kind, "sigma_v": speed / 20.0}
+        if not has_height:
+            found["motion"]["acceleration"] = "continuous"
         words["motion"] = (
-            f"constant velocity, process noise {speed / 20.0:g} m/s^1.5 (for speeds up to {speed:g} m/s; "
-            "--max-target-speed)"
+            f"constant velocity{', also in height' if has_height else ''}, process noise {speed / 20.0:g} m/s^1.5 "
+            f"(for speeds up to {speed:g} m/s; --max-target-speed)"
         )
     if "survival" not in given:
         found["survival"] = {"kind": "constant", "probability": 1.0 - _LOST_PER_SECOND, "period": 1.0}
@@ -84,7 +90,7 @@ def assumed_birth(
         f"{EXPECTED_BIRTHS:g} new targets per scan, from measurements that no track explains "
         f"(std {std:.3g} m, {speed:g} m/s)"
     )
-    return {"birth": measured_birth(std, speed, model.motion.state_dim)}
+    return {"birth": measured_birth(std, speed, model.motion.state_dim, model.has_heights)}
 
 
 def _time(recording: RecordedScans) -> dict[str, Any]:
@@ -102,7 +108,12 @@ def _spread(model: ScenarioModel, measured: Sequence[Sequence[Floats]], folder: 
         stds = section.build(region, method, folder, model.filter.detection_taken_at).noise.least_stds
         if stds is None or not scans:
             continue
-        found.append(place_stds(section.measurement.kind, stds, np.concatenate(scans)))
+        kind, scan = section.measurement.kind, np.concatenate(scans)
+        own = place_stds(kind, stds, scan)
+        if kind == "bearing_slant_range":  # the ground range goes by the height
+            up = np.minimum(ASSUMED_HEIGHT, scan[:, 1] * math.sqrt(0.5))
+            own = np.hypot(own, 0.5 * HEIGHT_STD * up / np.sqrt(scan[:, 1] ** 2 - up**2))
+        found.append(own)
     if not sum(map(len, found)):
         raise InputError("birth: expected in the sensors file, as its sensors measure no positions; got none")
     return float(np.quantile(np.concatenate(found), 0.75))

@@ -11,11 +11,12 @@ import numpy as np
 from vedette.calibration import Calibration, Parameter, Problem
 from vedette.calibration.parameters import with_biases
 from vedette.filters import Limits, SequentialLmbFilter, shared_targets
-from vedette.internal.quantities import COMPONENTS, QUANTITIES, in_file
+from vedette.internal.quantities import COMPONENTS, QUANTITIES, SOLID, in_file
 from vedette.internal.reading import read_text
 from vedette.internal.unit_warnings import suppress_unit_warnings
 from vedette.kernels.base.types import Floats
 from vedette.models import Bias, Region, SensorModel, TargetModel
+from vedette.models.arguments import reject
 from vedette.models.clutter import at_raw_measurements
 from vedette.recorded import RecordedScans
 from vedette.recorded.instants import Bearings, bias_of
@@ -51,6 +52,10 @@ def problem_of(scenario: Scenario, *, position: bool = False, bearings: Bearings
     """
     model, folder = scenario.model, scenario.folder
     sites = tuple(sites_of(model))
+    for site in sites:
+        if site.kind in SOLID:
+            wanted = "measurements in the plane, as calibration knows no heights"
+            raise reject(f"sensor {site.name}", wanted, site.kind)
     recording = RecordedScans(np.empty(0), 0.0, False, (), np.empty((0, len(sites), 3)), (), (bearings,) * len(sites))
     if model.recording is not None:
         recording = model.recording.build(model, folder, as_told=True)

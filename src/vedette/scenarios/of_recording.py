@@ -16,11 +16,9 @@ from vedette.scenarios.extents import reached_region, region_in_words
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sensors_file import (
     ENDLESS,
-    STAND_INS,
-    given_state_dim,
-    measured_birth,
     model_of_sensors,
     read_sensors_file,
+    stand_ins,
 )
 
 _MOST_STEPS = 100  # of a horizon
@@ -75,7 +73,7 @@ def scenario_of_recording(
         said["targets"] = {**known, "kind": "recorded", "path": str(truth.resolve())}
     elif not _are_recorded(said.get("targets")):
         said["targets"] = {"kind": "unknown"}
-    first = {**STAND_INS, "birth": measured_birth(100.0, speed, given_state_dim(said)), **said}
+    first = {**stand_ins(said, speed), **said}
     first["targets"] = {"kind": "unknown"}
     model = model_of_sensors(document, first, sensors)
     assert model.recording is not None
@@ -126,13 +124,12 @@ def scenario_of_sensors(
         conventions = replace(conventions, units={"bearing": "rad", **conventions.units})
         said["sensors"] = _with_compass(said)
     words = dict[str, str]()
-    told = {**STAND_INS, "name": sensors.stem, **said, "targets": {"kind": "scripted", "tracks": []}}
+    told = {**stand_ins(said, speed), "name": sensors.stem, **said, "targets": {"kind": "scripted", "tracks": []}}
     told |= assumed_motion(said, speed, words)
     if decide_every is not None:
         told |= _endless(told, decide_every)
     if plan_within is not None:
         told["control"] = {**(told.get("control") or {}), "max_seconds": plan_within}
-    told.setdefault("birth", measured_birth(100.0, speed, given_state_dim(said)))  # until its deviations can be said
     model = model_of_sensors(document, told, sensors)
     if "region" not in said:
         told["region"] = region = reached_region(model, sensors)

@@ -8,7 +8,7 @@ from pathlib import Path as FilePath
 from typing import Any, NamedTuple
 
 from vedette.errors import InputError, ScenarioError
-from vedette.internal.quantities import COMPONENTS
+from vedette.internal.quantities import COMPONENTS, SOLID
 from vedette.internal.reading import read_text
 from vedette.internal.text import pluralise
 from vedette.scenarios.diagnostics import read_section
@@ -20,12 +20,13 @@ from vedette.scenarios.wording import in_words
 from vedette.scenarios.yaml_reader import MOST_BYTES, Document, read_yaml
 
 # Sections of a scenario that a sensors file need not give.
-STAND_INS: dict[str, Any] = {
+_STAND_INS: dict[str, Any] = {
     "time": {"num_steps": 1},
     "region": {"x_min": -1e6, "x_max": 1e6, "y_min": -1e6, "y_max": 1e6},
 }
 EXPECTED_BIRTHS = 0.5  # births from measurements, in the region between two scans
 _EXISTENCE = 0.03  # of a birth where something was measured
+HEIGHT_STD, _CLIMB_STD = 4000.0, 10.0  # m and m/s, of a birth
 ENDLESS = 1_000_000  # steps, the most of a scenario
 _NAMED = 5  # sensors, in a summary
 _ASSUMED = ("region", "motion", "survival", "birth")  # each is assumed from the scans unless it is given
@@ -66,7 +67,7 @@ def check_sensors_file(path: FilePath) -> SensorsFile:
     """
     document = read_sensors_file(path)
     given = {key: value for key, value in document.data.items() if key != "recording"}
-    data = {**STAND_INS, "name": path.stem, "birth": measured_birth(100.0, 10.0, given_state_dim(given)), **given}
+    data = {**stand_ins(given, 10.0), "name": path.stem, **given}
     data |= {"time": {"num_steps": ENDLESS}, "targets": {"kind": "scripted", "tracks": []}}
     model, faults = diagnose(replace(document, data=data), path.parent)
     if "recording" in document.data:
@@ -79,19 +80,36 @@ def check_sensors_file(path: FilePath) -> SensorsFile:
     return SensorsFile(model.sensor_names, _quantities(model), _not_given(document.data))
 
 
-def measured_birth(std: float, speed: float, state_dim: int) -> dict[str, Any]:
-    """Return a section `birth` with births from measurements; std: of positions, m. speed: std of velocities, m/s."""
-    rest = [0.1] * (state_dim - 4)  # a turn rate, rad/s
+def stand_ins(given: Mapping[str, Any], speed: float) -> dict[str, Any]:
+    """Return sections that a sensors file does not give, before scans tell more; speed: std of velocities, m/s."""
+    motion = given.get("motion")
+    kind, dim = (motion.get("kind"), motion.get("state_dim")) if isinstance(motion, Mapping) else (None, None)
+    has_height = measures_heights(given)
+    state_dim = {"coordinated_turn": 5, "constant_velocity_height": 6}.get(str(kind), 6 if has_height else 4)
+    birth = measured_birth(100.0, speed, dim if isinstance(dim, int) else state_dim, has_height)
+    return {**_STAND_INS, "birth": birth, **({"motion": {"kind": "constant_velocity_height"}} if has_height else {})}
+
+
+def measures_heights(given: Mapping[str, Any]) -> bool:
+    """Return True if a sensor of a file measures what depends on the height of a target."""
+    sensors, defaults = given.get("sensors"), given.get("sensor_defaults")
+    sections = [defaults, *(sensors if isinstance(sensors, list) else ())]
+    measured = [section.get("measurement") for section in sections if isinstance(section, Mapping)]
+    return any(isinstance(each, Mapping) and each.get("kind") in SOLID for each in measured)
+
+
+def measured_birth(std: float, speed: float, state_dim: int, has_height: bool = False) -> dict[str, Any]:
+    """Return a section `birth` with births from measurements.
+
+    Args:
+        std: of positions, m.
+        speed: standard deviation of velocities, m/s.
+        state_dim: of states.
+        has_height: True if height and vertical velocity follow in them; else a turn rate may.
+    """
+    rest = [HEIGHT_STD, _CLIMB_STD, *[1.0] * (state_dim - 6)] if has_height else [0.1] * (state_dim - 4)
     stds = [std, std, speed, speed, *rest]
     return {"sites": [], "from_measurements": {"expected": EXPECTED_BIRTHS, "max_existence": _EXISTENCE, "std": stds}}
-
-
-def given_state_dim(given: Mapping[str, Any]) -> int:
-    """Return the dimension of the state by a section `motion`, if it is given."""
-    motion = given.get("motion")
-    found = motion.get("state_dim") if isinstance(motion, Mapping) else None
-    turns = isinstance(motion, Mapping) and motion.get("kind") == "coordinated_turn"
-    return found if isinstance(found, int) else 4 + turns
 
 
 def _quantities(model: ScenarioModel) -> tuple[str, ...]:

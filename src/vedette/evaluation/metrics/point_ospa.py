@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,10 +24,12 @@ from vedette.evaluation.metrics.assignment import (
     point_sets,
     power_mean,
 )
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import HEIGHT, Floats
 from vedette.models.arguments import reject
 from vedette.simulation.truth import Truth
 
+# Components of states that count.
+_COUNTED: dict[str, Any] = {"position": slice(2), "position_and_height": [0, 1, HEIGHT], "state": slice(None)}
 _ALIKE = "position, as true states have {} components and estimated ones {}"
 
 
@@ -76,21 +79,25 @@ def ospa_of_run(
         estimates: one a scan.
         cutoff: c > 0, m; of whole states in no unit.
         order: p >= 1.
-        components: "position", in which estimates and targets are as far apart as their places; or "state": Euclidean
-            distance over all components, metres, m/s and rad/s taken as numbers of one kind.
+        components: "position", the distance in the plane; "position_and_height", that in space, of states [px, py, vx,
+            vy, pz, vz]; or "state": Euclidean distance over all components, metres, m/s and rad/s taken as numbers of
+            one kind.
 
     Returns (num_scans, 3): total, localisation and cardinality parts, m; of whole states in no unit.
     Raises `InputError` as `ospa` does, for other components, and if there is not one estimate a scan.
     """
     check_parameters(cutoff, order)
     check_scans(truth, estimates)
-    if components not in ("position", "state"):
-        raise reject("components", "position or state", components)
-    counted = 2 if components == "position" else None
+    if components not in _COUNTED:
+        raise reject("components", ", ".join(_COUNTED), components)
+    counted = _COUNTED[components]
     parts = np.empty((len(estimates), 3))
     for scan, estimate in enumerate(estimates):
         _, states = truth.at(scan)
-        found, true = estimate.means[:, :counted], states[:, :counted]
+        for given in (estimate.means, states):
+            if isinstance(counted, list) and given.shape[1] <= counted[-1]:
+                raise reject("components", f"position, as states have {given.shape[1]} components", components)
+        found, true = estimate.means[:, counted], states[:, counted]
         if len(found) and len(true) and found.shape[1] != true.shape[1]:
             raise reject("components", _ALIKE.format(true.shape[1], found.shape[1]), components)
         result = _ospa_of_points(

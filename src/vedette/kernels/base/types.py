@@ -16,6 +16,8 @@ Bools = NDArray[np.bool_]
 
 OWN_VELOCITY = 6  # index in a pose of the sensor's velocity (two components), m/s
 BEAM = 8  # index in a pose of the beam's bearing in the middle of a turn, rad; the turn rate follows, rad/s
+OWN_HEIGHT = 10  # index in a pose of the sensor's height, m; 0 in a shorter pose
+HEIGHT = 4  # index in a state [px, py, vx, vy, pz, vz] of the height, m, where a measurement depends on it
 
 
 class Mixture(NamedTuple):

@@ -13,7 +13,7 @@ import math
 from typing import NamedTuple
 
 from vedette.kernels.base.compile import borrowing, inlined
-from vedette.kernels.base.types import BEAM, OWN_VELOCITY, Floats
+from vedette.kernels.base.types import BEAM, HEIGHT, OWN_HEIGHT, OWN_VELOCITY, Floats
 from vedette.kernels.gaussian.scratch import wrap_angle
 
 _NEWTON_STEPS = 3
@@ -81,6 +81,12 @@ def offset_at_beam(state: Floats, pose: Floats) -> tuple[float, float]:
 
 
 @inlined
+def own_height(pose: Floats) -> float:
+    """Return the sensor's height, m."""
+    return pose[OWN_HEIGHT] if pose.shape[0] > OWN_HEIGHT else 0.0
+
+
+@inlined
 def own_place(bearing: float, pose: Floats) -> tuple[float, float]:
     """Return the sensor's position when the beam points in a direction, m."""
     if not turns(pose):
@@ -90,7 +96,7 @@ def own_place(bearing: float, pose: Floats) -> tuple[float, float]:
 
 
 @inlined
-def to_scan_time(at: Passage, pose: Floats, moves_with_target: bool, out: Floats) -> None:
+def to_scan_time(at: Passage, pose: Floats, moves_with_target: bool, climb: float, out: Floats) -> None:
     """Convert derivatives (meas_dim, state_dim) by the state at the passage into those by the state at the scan time.
 
     With position p, velocity v and bearing gradient b, the lag changes by
@@ -100,7 +106,7 @@ def to_scan_time(at: Passage, pose: Floats, moves_with_target: bool, out: Floats
     and the offset by dp + lag dv + v d lag.
 
     at: the passage. moves_with_target: True if the measurement is the target's position, False if it depends on the
-    offset from the sensor.
+    offset from the sensor. climb: vertical velocity where the measurement depends on a height, m/s; else 0.
     """
     square = at.dx * at.dx + at.dy * at.dy
     if at.lag == 0.0 or square == 0.0:
@@ -112,6 +118,9 @@ def to_scan_time(at: Passage, pose: Floats, moves_with_target: bool, out: Floats
         vx, vy = vx + pose[OWN_VELOCITY], vy + pose[OWN_VELOCITY + 1]
     for row in range(out.shape[0]):
         along = (out[row, 0] * vx + out[row, 1] * vy) / share
+        if out.shape[1] > HEIGHT + 1:
+            along += out[row, HEIGHT] * climb / share
+            out[row, HEIGHT + 1] += at.lag * out[row, HEIGHT]
         out[row, 0] += along * bx
         out[row, 1] += along * by
         if out.shape[1] >= 4:

@@ -8,7 +8,8 @@ import numpy as np
 
 from vedette.errors import ModelError
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import Bools, Floats, Sensor
+from vedette.kernels.base.types import HEIGHT, Bools, Floats, Sensor
+from vedette.kernels.gaussian.beam import own_height
 from vedette.kernels.gaussian.detection import detection_and_edge
 from vedette.kernels.gaussian.joseph import posterior_of_squares
 from vedette.kernels.gaussian.linalg import LOG_2PI, cholesky_of_size, log_det_from_factor
@@ -170,19 +171,37 @@ def condition(
 
 
 @inlined
+def _has_height(jacobian: Floats, n: int, m: int) -> bool:
+    """Return True if the measurement depends on component `HEIGHT` of a state with a vertical velocity behind it."""
+    if n > HEIGHT + 1:
+        for a in range(m):
+            if jacobian[a, HEIGHT] != 0.0:
+                return True
+    return False
+
+
+@inlined
 def bends_over(pose: Floats, mean: Floats, cov: Floats, jacobian: Floats, noise: Floats, n: int, m: int) -> bool:
     """Whether the second-order error of some component exceeds `LARGEST_BEND` standard deviations of its noise.
 
     A measurement of a position at distance d has second derivatives of about |H| / d. Over a position of variance V,
     both axes together, component a is then off by |H_a| V / (2 d), which is the sagitta V / (2 d) of a range; and by
-    |H_aj| sqrt(V P_jj) / d with another component j of the state.
+    |H_aj| sqrt(V P_jj) / d with another component j of the state. A height that is measured is part of the position.
     """
     dx, dy, variance = mean[0] - pose[0], mean[1] - pose[1], cov[0, 0] + cov[1, 1]
-    limit = 4.0 * LARGEST_BEND * LARGEST_BEND * (dx * dx + dy * dy)
+    square, solid = dx * dx + dy * dy, _has_height(jacobian, n, m)
+    if solid:
+        dz = mean[HEIGHT] - own_height(pose)
+        square, variance = square + dz * dz, variance + cov[HEIGHT, HEIGHT]
+    limit = 4.0 * LARGEST_BEND * LARGEST_BEND * square
     for a in range(m):
-        slope = (jacobian[a, 0] * jacobian[a, 0] + jacobian[a, 1] * jacobian[a, 1]) * variance
+        slope = jacobian[a, 0] * jacobian[a, 0] + jacobian[a, 1] * jacobian[a, 1]
+        if solid:
+            slope += jacobian[a, HEIGHT] * jacobian[a, HEIGHT]
+        slope *= variance
         for j in range(2, n):
-            slope += 4.0 * jacobian[a, j] * jacobian[a, j] * cov[j, j]
+            if not (solid and j == HEIGHT):
+                slope += 4.0 * jacobian[a, j] * jacobian[a, j] * cov[j, j]
         if variance * slope > limit * noise[a, a]:
             return True
     return False

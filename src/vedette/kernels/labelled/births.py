@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.kernels.base.compile import kernel
-from vedette.kernels.base.types import Floats, Lmb, Tracks
+from vedette.kernels.base.types import HEIGHT, Floats, Lmb, Tracks
 from vedette.kernels.gaussian.components import make_components, stacked_mixtures
 
 
@@ -27,7 +27,7 @@ def births_of_measurements(positions: Floats, unexplained: Floats, begin: Births
     """One target at rest for each measured position, in their order.
 
     Args:
-        positions: (num, 2) m.
+        positions: (num, 2) m; (num, 3) with heights, in states [px, py, vx, vy, pz, ...].
         unexplained: (num,) probabilities that no track explains the measurement, in proportion to which the expected
             number is shared.
         begin: the rest.
@@ -43,6 +43,8 @@ def births_of_measurements(positions: Floats, unexplained: Floats, begin: Births
             out.means[i, d] = positions[i, d] if d < 2 else 0.0
             for e in range(dim):
                 out.covs[i, d, e] = begin.std[d] ** 2 if d == e else 0.0
+        if positions.shape[1] > 2 and dim > HEIGHT:
+            out.means[i, HEIGHT] = positions[i, 2]
         existence = min(begin.max_existence, begin.expected * unexplained[i] / total)
         # A share may be too small for a number.
         logits[i] = math.log(existence) - math.log1p(-existence) if existence > 0.0 else -math.inf

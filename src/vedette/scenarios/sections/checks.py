@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vedette.internal.covariances import covariance_fault
+from vedette.internal.quantities import COMPONENTS, SOLID
+from vedette.kernels.base.types import HEIGHT
 from vedette.scenarios.faults import Finding, Path, describe
 from vedette.scenarios.sections.base import attempt
 from vedette.scenarios.sections.birth import BirthSite
@@ -131,6 +133,19 @@ def _combinations(model: ScenarioModel) -> Iterator[Finding]:
         yield ("fusion", "limits", "max_components"), wanted, describe(limits.max_components)
 
 
+def _heights(model: ScenarioModel) -> Iterator[Finding]:
+    """Measurements that depend on a height need states with one, in the filters and in the simulated truth."""
+    kinds = [(i, sensor.measurement.kind) for i, sensor in enumerate(model.sensors)]
+    for i, kind in ((i, kind) for i, kind in kinds if kind in SOLID):
+        path: Path = ("sensors", i, "measurement", "kind")
+        motion = model.motion.kind
+        if motion not in ("constant_velocity_height", "custom"):
+            wanted = f"one of {', '.join(k for k in COMPONENTS if k not in SOLID)}, or motion: constant_velocity_height"
+            yield path, f"{wanted} (as targets have no height)", describe(kind)
+        elif model.targets.kind == "recorded" and model.recording is None:
+            yield path, "a measurement in the plane, as recorded targets have no height", describe(kind)
+
+
 def _birth_steps(model: ScenarioModel) -> Iterator[Finding]:
     for i, step in enumerate(() if model.birth.steps == "every" else model.birth.steps):
         yield from _up_to_last(("birth", "steps", i), step, model.time.num_steps)
@@ -241,6 +256,10 @@ def _score(model: ScenarioModel) -> Iterator[Finding]:
     if model.ospa.components == "state" and model.targets.kind == "recorded" and model.motion.state_dim != RECORDED_DIM:
         wanted = f"position, as states have {model.motion.state_dim} components and recorded targets {RECORDED_DIM}"
         yield ("ospa", "components"), wanted, '"state"'
+    if model.ospa.components == "position_and_height" and (
+        model.targets.kind == "recorded" or (model.motion.state_dim <= HEIGHT + 1)
+    ):
+        yield ("ospa", "components"), "position, as targets have no height", '"position_and_height"'
 
 
 CHECKS = (
@@ -254,6 +273,7 @@ CHECKS = (
     _central,
     _estimator,
     _combinations,
+    _heights,
     _birth_steps,
     _birth_sites,
     births_cut,

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, field_validator
 
+from vedette.internal.quantities import SOLID
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import Name, Section, attempt, check
 from vedette.scenarios.sections.birth import Birth
@@ -173,6 +174,12 @@ class ScenarioModel(Section):
         if self.estimator is not None:
             return self.estimator
         return LeastOspaEstimator() if self.filter.kind == "factored_glmb" else MapEstimator()
+
+    @property
+    def has_heights(self) -> bool:
+        """Whether states are [px, py, vx, vy, pz, vz]."""
+        solid = any(sensor.measurement.kind in SOLID for sensor in self.sensors)
+        return solid or self.motion.kind == "constant_velocity_height"
 
     @property
     def decision_steps(self) -> tuple[int, ...]:

@@ -91,10 +91,11 @@ class Ospa(Section):
 
     cutoff: Positive = Field(default=100.0, description="Cost of a missed or false target, c [m].")
     order: float = Field(default=1.0, ge=1.0, description="Order p [-].")
-    components: Literal["position", "state"] = Field(
+    components: Literal["position", "position_and_height", "state"] = Field(
         default="position",
-        description="What OSPA compares: positions, in metres, or whole states, with metres, m/s and rad/s as numbers "
-        "of one kind, and the cutoff in no unit. Measures beside OSPA are of positions [-].",
+        description="What OSPA compares: positions in the plane, or with their heights, in metres; or whole states, "
+        "with metres, m/s and rad/s as numbers of one kind, and the cutoff in no unit. Measures beside OSPA are of "
+        "positions in the plane [-].",
     )
     window: Count = Field(default=10, description="Scans of the window of OSPA(2) [-].")
     from_step: Count | None = Field(
@@ -110,4 +111,4 @@ class Ospa(Section):
     @property
     def unit(self) -> str:
         """Of the score: that of a position, or none."""
-        return "m" if self.components == "position" else ""
+        return "" if self.components == "state" else "m"

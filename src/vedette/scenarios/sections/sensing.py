@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field
 
-from vedette.internal.quantities import COMPONENTS, PLACED, angles, is_doppler
+from vedette.internal.quantities import COMPONENTS, PLACED, SOLID, angles, in_file
 from vedette.scenarios.faults import Finding, Path, describe
 from vedette.scenarios.sections.base import Positive, Section, check
 from vedette.scenarios.sections.derived import Part, derived, one_of
@@ -27,7 +27,7 @@ def components(measurement: Measurement) -> tuple[int | None, tuple[int, ...]]:
 class RangeDependentNoise(Section):
     """Standard deviations that grow with the distance d (paper section IV), evaluated at the predicted state.
 
-    Range: sigma_range + eta_range d^2. Bearing: sigma_bearing + eta_bearing d. Range rate: sigma_range_rate.
+    Range: sigma_range + eta_range d^2. Bearing: sigma_bearing + eta_bearing d. The others are constant.
     """
 
     kind: Literal["range_dependent"] = Field(default="range_dependent", description="Kind of noise [-].")
@@ -38,6 +38,12 @@ class RangeDependentNoise(Section):
     sigma_range_rate: Positive | None = Field(
         default=None, description="Range rate, at every distance; needed where it is measured [m/s]."
     )
+    sigma_elevation_deg: Positive | None = Field(
+        default=None, description="Elevation, at every distance; needed where it is measured [deg]."
+    )
+    sigma_altitude: Positive | None = Field(
+        default=None, description="Altitude, at every distance; needed where it is measured [m]."
+    )
 
     def build(self, folder: FilePath, *, kind: str, **_: Any) -> NoiseModel:
         """Measurement noise: the parts that the kind of measurement has."""
@@ -47,6 +53,8 @@ class RangeDependentNoise(Section):
             "range": {"sigma_range": self.sigma_range, "eta_range": self.eta_range},
             "bearing": {"sigma_bearing": math.radians(self.sigma_bearing_deg), "eta_bearing": self.eta_bearing},
             "range_rate": {"sigma_range_rate": self.sigma_range_rate},
+            "elevation": {"sigma_elevation": math.radians(self.sigma_elevation_deg or 0.0)},
+            "altitude": {"sigma_altitude": self.sigma_altitude},
         }
         own: dict[str, Any] = {}
         for name in COMPONENTS[kind]:
@@ -92,14 +100,19 @@ else:
     Clutter = one_of("clutter", "models", "vedette.models:ClutterModel", own=(ClutterAroundSensor,), parent=_Clutter)
 
 
+_THIRDS = {"range_rate": "range rates", "elevation": "elevations", "altitude": "altitudes"}
+
+
 def noise_findings(measurement: Measurement, noise: Noise, path: Path) -> Iterator[Finding]:
     """Whether the noise at `path` is for what is measured."""
     kind, (dim, angular) = measurement.kind, components(measurement)
-    if noise.kind == "range_dependent" and kind in ("position", "custom"):
+    third = next((name for name in COMPONENTS.get(kind, ())[2:] if name in _THIRDS), None)
+    if noise.kind == "range_dependent" and kind in ("position", "position_altitude", "custom"):
         others = "constant, by_axis or custom" if kind == "position" else "constant or custom"
         yield path, f"{others} noise for a {kind} measurement", "range_dependent noise"
-    elif noise.kind == "range_dependent" and is_doppler(kind) and noise.sigma_range_rate is None:
-        yield (*path, "sigma_range_rate"), "a number above 0, as range rates are measured", "none"
+    elif noise.kind == "range_dependent" and third and getattr(noise, f"sigma_{in_file(third)}") is None:
+        wanted = f"a number above 0, as {_THIRDS[third]} are measured"
+        yield (*path, f"sigma_{in_file(third)}"), wanted, "none"
     elif noise.kind == "by_axis" and kind not in ("position", "custom"):
         yield path, f"range_dependent, constant or custom noise for a {kind} measurement", "by_axis noise"
     elif noise.kind == "constant" and dim is not None and len(noise.std) != dim:
@@ -120,7 +133,7 @@ def clutter_findings(measurement: Measurement, clutter: Clutter, path: Path) -> 
     kind = measurement.kind
     if clutter.kind == "region" and kind == "custom":
         yield path, "measurement_space or custom clutter for a custom measurement", "region clutter"
-    if clutter.kind == "around_sensor" and kind not in PLACED:
+    if clutter.kind == "around_sensor" and (kind not in PLACED or kind in SOLID):
         wanted = f"region, measurement_space or custom clutter for a {kind} measurement"
         yield path, wanted if kind != "custom" else wanted.replace("region, ", ""), "around_sensor clutter"
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field, create_model
 
-from vedette.internal.quantities import is_doppler
+from vedette.internal.quantities import SOLID, is_doppler
 from vedette.internal.unit_warnings import suppress_unit_warnings
-from vedette.kernels.base.types import BEAM
+from vedette.kernels.base.types import BEAM, OWN_HEIGHT
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import (
     DetectionAt,
@@ -84,6 +84,9 @@ class Sensor(Section):
         default=0.0,
         description="Heading at the start, counter-clockwise from east; with an origin or a compass `course_deg` may "
         "stand instead, clockwise from true north [deg].",
+    )
+    height: float = Field(
+        default=0.0, description="Above the plane, for measurements that depend on the heights of targets [m]."
     )
     platform: AnyPlatform = Field(default=of_kind("still"), description="What carries it: what it may do [-].")
     price: float | str | None = Field(
@@ -160,6 +163,12 @@ class Sensor(Section):
             yield ("turn",), "none, as its measurements do not say in which direction they were taken", kind
 
     @check
+    def _a_height_counts(self) -> Iterator[Finding]:
+        kind = self.measurement.kind
+        if self.height and kind not in (*SOLID, "custom"):
+            yield ("height",), f"0, as a {kind} measurement does not depend on heights", describe(self.height)
+
+    @check
     def _noise_fits(self) -> Iterator[Finding]:
         yield from noise_findings(self.measurement, self.noise, ("noise",))
 
@@ -188,7 +197,8 @@ class Sensor(Section):
         if self.budget is not None:
             pose = (*pose, *(0.0,) * (5 - len(pose)), self.budget.seconds)
         # A custom platform may have a velocity at the start.
-        return (*pose, *(0.0,) * (BEAM - len(pose))) if self.needs_velocity else pose
+        pose = (*pose, *(0.0,) * (BEAM - len(pose))) if self.needs_velocity else pose
+        return (*pose, *(0.0,) * (OWN_HEIGHT - len(pose)), self.height) if self.height else pose
 
     @property
     def needs_velocity(self) -> bool:
@@ -198,7 +208,9 @@ class Sensor(Section):
     @property
     def turning_pose(self) -> tuple[float, ...]:
         """Where it starts, with its beam in the middle of a turn."""
-        return self.pose if self.turn is None else (*self.pose[:BEAM], 0.0, self.turn.build().rate)
+        if self.turn is None:
+            return self.pose
+        return (*self.pose[:BEAM], 0.0, self.turn.build().rate, *self.pose[OWN_HEIGHT:])
 
     def build(
         self, region: Region, method: GaussianMethod, folder: Path, detection_at: DetectionAt = "centre"

@@ -58,6 +58,8 @@ class BiasSection(Section):
     x: float = Field(default=0.0, description="Of where it is said to be, or of positions that it measures, east [m].")
     y: float = Field(default=0.0, description="The same, north [m].")
     range_rate: float = Field(default=0.0, description="Of range rates [m/s].")
+    elevation_deg: float = Field(default=0.0, description="Of elevations [deg].")
+    altitude: float = Field(default=0.0, description="Of altitudes [m].")
 
     def findings_beside(self, measurement: Measurement) -> Iterator[Finding]:
         """What is wrong with it where a sensor measures so."""
@@ -71,7 +73,9 @@ class BiasSection(Section):
         """In SI units."""
         from vedette.models import Bias
 
-        return Bias(self.range, math.radians(self.bearing_deg), self.clock, self.x, self.y, self.range_rate)
+        angles = math.radians(self.bearing_deg), math.radians(self.elevation_deg)
+        plane = self.range, angles[0], self.clock, self.x, self.y
+        return Bias(*plane, self.range_rate, angles[1], self.altitude)
 
 
 class TrueSensor(Section):

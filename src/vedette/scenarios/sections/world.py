@@ -64,8 +64,8 @@ StateOrder = Annotated[
     Literal["grouped", "interleaved"],
     Field(
         description="Order in which this file writes states: grouped is [px, py, vx, vy] (the order of the paper's F "
-        "and Q), interleaved is [px, vx, py, vy] (the order of its text). A turn rate comes last. The library itself "
-        "always has them grouped [-]."
+        "and Q), interleaved is [px, vx, py, vy] (the order of its text). A turn rate, or height and vertical "
+        "velocity, come last. The library itself always has them grouped [-]."
     ),
 ]
 
@@ -81,7 +81,7 @@ class _Motion(Part):
         return _STATE_DIMS[self.kind]
 
 
-_STATE_DIMS = {"constant_velocity": 4, "coordinated_turn": 5}
+_STATE_DIMS = {"constant_velocity": 4, "coordinated_turn": 5, "constant_velocity_height": 6}
 
 
 class CustomMotion(Custom):
