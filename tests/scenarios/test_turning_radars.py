@@ -22,6 +22,7 @@ from vedette.recorded.tables import Table
 from vedette.recorded.turns import found_turn, swept
 from vedette.scenarios import load_scenario
 from vedette.scenarios.of_recording import scenario_of_recording, scenario_of_sensors
+from vedette.scenarios.record_cautions import record_cautions
 from vedette.scenarios.sections.recording import sites_of
 
 
@@ -64,6 +65,20 @@ def test_no_turn_is_found_where_nothing_turns(seed: int) -> None:
     drifting = 0.01 * at_once[:, 0] + np.where(np.arange(len(at_once)) % 2, 0.2, -0.2)
     assert found_turn(at_once[:, 0], drifting) is None  # two targets that pass by together
     assert found_turn(times[:10], rng.uniform(-math.pi, math.pi, 10)) is None
+
+
+@pytest.mark.parametrize(("gather", "warned"), [(4.0, True), (0.0, False), (0.1, False)])
+def test_rows_that_are_gathered_too_far_apart_are_warned_of(tmp_path: Path, gather: float, warned: bool) -> None:
+    flights = Flights(np.random.default_rng(4), 6, 0.0)
+    write(tmp_path, {"R": flights.rows((0.0, 0.0), Turn(4.0), 0.0, True)}, {"R": (0.0, 0.0)})
+    sensors = tmp_path / "radars.yaml"
+    text = sensors.read_text("utf-8").replace("east}", f"east, turns: none, gather: {gather}}}")
+    sensors.write_text(text, "utf-8")
+    found = scenario_of_recording(sensors, tmp_path / "scans.csv", speed=250.0)
+    told = [words for path, words in record_cautions(found.scenario) if path == ("recording", "gather")]
+    assert bool(told) is warned
+    if warned:
+        assert re.match(r"R: rows of one scan are [23]\.\d+ s apart \(median\), in which a target of 250 m/s", told[0])
 
 
 def test_every_row_is_in_one_turn_and_its_time_that_of_the_beam() -> None:

@@ -6,7 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from vedette.internal.quantities import PLACED
 from vedette.internal.text import pluralise
+from vedette.models.turns import is_turn
 from vedette.recorded import RecordedScans
 from vedette.recorded import RecordedTargets as RecordedSource
 from vedette.recorded.merging import crowded
@@ -32,6 +34,7 @@ def record_cautions(scenario: Scenario) -> Iterator[tuple[Path, str]]:
         yield from ((("recording", "path"), note) for note in recording.notes)
         yield from beyond_region(model, recording)
         yield from _several_a_target(model, recording)
+        yield from _far_apart(model, recording)
     if not isinstance(model.targets, RecordedTargets):
         return
     source = model.targets.source(model, folder)
@@ -74,6 +77,24 @@ def _several_a_target(model: ScenarioModel, recording: RecordedScans) -> Iterato
             f"{site.name}: {num} of {scans} scans have measurements within 3 standard deviations of each other; "
             "filters take targets for points with one measurement a scan: if several are of one target, give "
             "`recording: {merge: 4.0}`, which replaces such measurements by their mean",
+        )
+
+
+def _far_apart(model: ScenarioModel, recording: RecordedScans) -> Iterator[tuple[Path, str]]:
+    """Rows that are gathered into one scan although targets move by more than the noise between them."""
+    births = model.birth.from_measurements
+    if births is None or len(births.std) < 4:
+        return
+    speed = max(births.std[2:4])
+    for s, (sensor, apart) in enumerate(zip(model.sensors, recording.gathered, strict=False)):
+        stds, turns = noise_stds(sensor), any(is_turn(poses[s]) for poses in recording.poses)
+        if stds is None or turns or sensor.measurement.kind not in PLACED or speed * apart <= stds[1]:
+            continue
+        yield (
+            ("recording", "gather"),
+            f"{model.sensor_names[s]}: rows of one scan are {apart:.3g} s apart (median), in which a target of "
+            f"{speed:g} m/s moves {speed * apart:.3g} m, more than the noise ({stds[1]:.3g} m): if it is a turning "
+            "radar, give the sensor `turn: {period: ...}`; else use a smaller `gather`",
         )
 
 
