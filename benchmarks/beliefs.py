@@ -1,7 +1,7 @@
 """Whether the beliefs of filters are true, on scenes drawn at random.
 
     python benchmarks/beliefs.py [--scenes N] [--seeds S ...] [--runs N] [--filters NAME ...] [--workers N]
-    python benchmarks/beliefs.py --write docs/filters.md
+    python benchmarks/beliefs.py --write docs/evidence/existence-probabilities.md
     python benchmarks/beliefs.py --scene 3 --bins              # one scene, with a table of bins for each filter
     python benchmarks/beliefs.py --four-sites --filters all    # a fixed scene, and all filters and fusions
 

@@ -1,7 +1,7 @@
 """The default filter beside those that it could be, over scenes of many kinds (`benchmarks/scenes.py`).
 
     python benchmarks/defaults.py [--scenes WORD ...] [--filters NAME ...] [--errors E ...] [--runs N] [--out FILE]
-    python benchmarks/defaults.py --out FILE --write docs/filters.md
+    python benchmarks/defaults.py --out FILE --write docs/evidence/filter-default.md
 
 Compared are the filter that runs where nothing is said, the LMB filter, the delta-GLMB filter with 1,000 and with
 20,000 hypotheses, the M-delta-GLMB filter, and the factored filter with each of `--errors` as its split error. The runs

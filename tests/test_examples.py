@@ -55,6 +55,7 @@ SHOWN = {
     "README.md": ["jdm      mean OSPA ", "runner-up: less by"],
     "docs/calibration.md": ["biases are found from 60.0 s on"],
     "docs/campaigns.md": ["paper-a"],
+    "docs/central-filters.md": ["[[200.  50.]] "],
     "docs/choosing.md": ["expected_loss: assigned has +"],
     "docs/coming-from.md": ["N = 1"],
     "docs/control.md": [

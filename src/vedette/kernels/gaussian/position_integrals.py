@@ -10,7 +10,7 @@ from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats
 
 # At a straight edge, where detection falls from 1 to 0, 64 nodes are wrong by at most 0.05 (root mean square 0.012);
-# 7 x 7 Gauss-Hermite nodes by 0.22 (0.042). Where detection is smooth, both are far better (docs/filters.md).
+# 7 x 7 Gauss-Hermite nodes by 0.22 (0.042). Where detection is smooth, both are far better (docs/concepts/filters.md).
 NUM_NODES = 64
 
 # Deviations beyond which a Gaussian is taken as 0.
