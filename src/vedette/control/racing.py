@@ -32,7 +32,7 @@ from vedette.control.evidence import Evidence
 from vedette.control.search import first_best, tie_of
 from vedette.kernels.base.types import Bools, Floats, Ints
 
-# Samples of the first round, and by how much each round makes their number grow (docs/control.md has what it costs).
+# Samples of the first round, and the factor by which each round adds to them (costs: docs/evidence/planning.md).
 FIRST_ROUND = 8
 _GROWTH = 1.5
 
