@@ -1,6 +1,6 @@
-"""Where should the sensors go? Rewards, rules of thumb and true targets over scenes of many kinds (docs/deciding.md).
+"""Where should the sensors go? Rewards, rules of thumb and true targets on many scenes (docs/evidence/strategies.md).
 
-    python benchmarks/deciding.py --runs 5 --write docs/deciding.md
+    python benchmarks/deciding.py --runs 5 --write docs/evidence/strategies.md
     python benchmarks/deciding.py --strategies all --runs 100 --workers 2 --out benchmarks/results/deciding.csv
     python benchmarks/deciding.py --scenes paper-a --runs 100
 

@@ -2,7 +2,7 @@
 
     python benchmarks/shifts.py                                    # all scenes and shares, 5 runs
     python benchmarks/shifts.py six-cameras --shares 50 --runs 20
-    python benchmarks/shifts.py --out shifts.jsonl --write docs/deciding.md
+    python benchmarks/shifts.py --out shifts.jsonl --write docs/evidence/active-sensors.md
 
 All sensors can be switched off, decide after every scan, and move by the joint decision of the expected loss. The
 number of sensors that scan after a decision adds up to the share. `planner` decides which ones, with `MaxActive`; the

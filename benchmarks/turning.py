@@ -2,7 +2,7 @@
 
     python benchmarks/turning.py                       # 12 scenes, 8 runs
     python benchmarks/turning.py --scenes 3 --runs 2 --planners jdm sweep
-    python benchmarks/turning.py --write docs/deciding.md
+    python benchmarks/turning.py --write docs/evidence/turning-cameras.md
     python benchmarks/turning.py --blind               # no scan while the camera turns
 
 Each scene is drawn: one camera that turns at 10 to 20 degrees a second and sees 24 to 40 degrees; two to five slow
