@@ -2,7 +2,7 @@
 
     python benchmarks/calibrating.py [--scene ships|aircraft] [--redraws N] [--seconds S] [--assumed-motion]
     python benchmarks/calibrating.py --position
-    python benchmarks/calibrating.py --write docs/calibration.md
+    python benchmarks/calibrating.py --write docs/evidence/calibration.md
 
 Three radars of 5, 8 and 11 s, one of them on a boat, see six ships or aircraft for ten minutes; they have biases of up
 to 300 m, 2 degrees and 0.5 s, none of which anybody knows, and noise and clutter are told wrongly. Each redraw is a

@@ -1,7 +1,7 @@
 """How often the intervals of a calibration cover the truth, by where the radars stand.
 
     python benchmarks/calibration_geometries.py [--redraws N]
-    python benchmarks/calibration_geometries.py --write docs/calibration.md
+    python benchmarks/calibration_geometries.py --write docs/evidence/calibration.md
 
 Two or three radars in five arrangements see four to six ships of up to 8 m/s for five minutes. They have biases of up
 to 100 m and 1.5 degrees, and noise, detection and clutter are told wrongly. Each redraw is a recording of its own:

@@ -1,7 +1,7 @@
 """How well biases that drift are followed while scans come in.
 
     python benchmarks/drifting.py [--scene ships|aircraft] [--redraws N] [--first S] [--window S] [--every S]
-    python benchmarks/drifting.py --write docs/calibration.md
+    python benchmarks/drifting.py --write docs/evidence/drifting-biases.md
 
 The radars of benchmarks/calibrating.py, whose biases change by 0.5 m/s, and of two by 0.1 degrees a minute, too. They
 are calibrated by their first scans; the others come one by one to a `BiasFollower`, and without biases to a tracker

@@ -1,6 +1,6 @@
 """How well biases can be known at best: the Cramer-Rao bound of the recordings of benchmarks/calibrating.py.
 
-    python benchmarks/registration_bound.py [--redraws N] [--write docs/calibration.md]
+    python benchmarks/registration_bound.py [--redraws N] [--write docs/evidence/calibration.md]
 
 Of each measurement its target is known, noise and motion are known, and there is no clutter: a Kalman filter of all
 targets and biases together, linearised at the truth, has the inverse of the Fisher information as its covariance.
