@@ -2,7 +2,7 @@
 
     python benchmarks/joined_tracks.py                          # 100 runs of each kind, a table
     python benchmarks/joined_tracks.py --first 1000 --runs 200  # other scenes
-    python benchmarks/joined_tracks.py --write docs/recordings.md
+    python benchmarks/joined_tracks.py --write docs/evidence/joined-tracks.md
 
 Each run draws a scene: a radar or a sensor of positions (noise 5 to 20 m, P_D .7 to .98, clutter .1 to 20 a scan, a
 scan every 1, 2 or 4 s), and targets at 2 to 12 m/s. Half of them go straight on with small accelerations, the others

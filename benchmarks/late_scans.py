@@ -1,7 +1,7 @@
 """What late scans cost, and what it costs to drop them.
 
     python benchmarks/late_scans.py [--scenario NAME] [--runs N] [--delay S] [--window S]
-    python benchmarks/late_scans.py --scenario paper-a --write docs/recordings.md
+    python benchmarks/late_scans.py --scenario paper-a --write docs/evidence/late-scans.md
 
 The sensors of a scenario stand still and scan as it says; a share of their scans arrives late, uniformly by up to
 `--delay` seconds, each scan by itself. After every scan time the estimate is read off what has arrived by then,

@@ -2,7 +2,7 @@
 
     python benchmarks/turning_radars.py                    # 20 scenes of each kind
     python benchmarks/turning_radars.py --first 1000       # others
-    python benchmarks/turning_radars.py --write docs/recordings.md
+    python benchmarks/turning_radars.py --write docs/evidence/turning-radars.md
 
 A scene has six aircraft of 120 to 240 m/s, half of which turn for 40 s by 0.5 to 1.5 degrees a second, and one or two
 radars; those of two turn at different rates. Noise .002 rad and 40 m, P_D .95, one false plot a turn.

@@ -72,6 +72,7 @@ SHOWN = {
         "the same run: True",
     ],
     "docs/horizons.md": ["heading_deg 90 [", "joint sequences evaluated"],
+    "docs/late-scans.md": ["5 scans, 1 late, 0 dropped", "at 10.0 s"],
     "docs/live.md": ['"line": 12, "time": 5.0, "tracks": [{"label":'],
     "docs/loop.md": ["go to"],
     "docs/lost-tracks.md": [
@@ -85,7 +86,6 @@ SHOWN = {
     ],
     "docs/metrics.md": ["True"],
     "docs/platforms.md": ["('dx', 'dy', 'pointing_deg') 12"],
-    "docs/recordings.md": ["5 scans, 1 late, 0 dropped", "at 10.0 s"],
     "docs/report.md": [],
     "docs/results.md": ["gospa_m", "margin", "jdm-rate-5.0", "heading_deg", "farthest_m"],
     "docs/rewards.md": ["certainty_of_number is a function of two densities"],
