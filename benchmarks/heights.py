@@ -2,7 +2,7 @@
 
     python benchmarks/heights.py                    # 20 scenes of each kind
     python benchmarks/heights.py --first 1000       # others
-    python benchmarks/heights.py --write docs/recordings.md
+    python benchmarks/heights.py --write docs/evidence/heights.md
 
 A scene has five aircraft of 120 to 240 m/s at 3 to 9 km, half of them climbing or sinking, and two radars 20 km apart
 that scan every 4 s for 200 s. Noise .002 rad in bearing, 40 m in range, .005 rad in elevation, 30 m in altitude; P_D
