@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vedette.control import CauchySchwarzReward, RenyiReward
-from vedette.control.cases import PlainRewards, lay_out_rewards
+from vedette.control.pseudo_posterior_rewards import PlainRewards, lay_out_rewards
 from vedette.control.search import all_joint_actions
 from vedette.densities import GLMB, LMB, TrackTable, as_lmb
 from vedette.densities.cases import LabelledCases

@@ -33,7 +33,7 @@ from vedette.control import (
 from vedette.densities import LMB
 from vedette.filters import LmbFilter
 from vedette.fusion import ParallelUpdate
-from vedette.platforms import Courses
+from vedette.platforms import HeadingPlatform
 from vedette.tracking import State
 
 REWARDS = {"expected loss": ExpectedLossReward(100.0), "Cauchy-Schwarz": CauchySchwarzReward("reference")}
@@ -57,7 +57,9 @@ def decision(sensors: int, targets: int, actions: int, samples: int, steps: int,
         models.region_clutter(5.0, region, "bearing_range"),
     )
     known = models.TargetModel(models.constant_velocity(1.0), models.constant_survival(0.99), models.BirthModel.none(4))
-    own = MobileSensor(LmbFilter(known, model), Courses(20.0, np.linspace(-180.0, 180.0, actions, endpoint=False)))
+    own = MobileSensor(
+        LmbFilter(known, model), HeadingPlatform(20.0, np.linspace(-180.0, 180.0, actions, endpoint=False))
+    )
     means = np.column_stack([rng.uniform(-half, half, (targets, 2)), rng.normal(0.0, 5.0, (targets, 2))])
     covs = np.tile(np.diag([20.0, 20.0, 3.0, 3.0]) ** 2, (targets, 1, 1))
     belief = LMB.from_bernoullis([(1, i) for i in range(targets)], rng.uniform(0.5, 0.999, targets), means, covs)

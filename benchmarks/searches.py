@@ -40,11 +40,11 @@ from vedette.control.evidence import Evidence
 from vedette.control.preparation import Preparation
 from vedette.control.problem import joint_problem
 from vedette.control.search import all_joint_actions
-from vedette.control.search.problem import Known
+from vedette.control.search.problem import RewardCache
 from vedette.densities import LMB
 from vedette.filters import LmbFilter
 from vedette.fusion import ParallelUpdate
-from vedette.platforms import Courses
+from vedette.platforms import HeadingPlatform
 from vedette.tracking import State
 
 KINDS = ("spread", "sharp", "together", "near", "clash", "loss", "views")
@@ -97,7 +97,7 @@ def decision(kind: str, num_sensors: int, num_courses: int, rng: np.random.Gener
     means = np.concatenate([place[num_sensors:], rng.normal(0.0, 10.0, (2 * num_sensors, 2))], axis=1)
     covs = [np.diag([std, std, 5.0, 5.0]) ** 2 for std in rng.uniform(10.0, 40.0, len(means))]
     belief = LMB.from_bernoullis([(0, i) for i in range(len(means))], [0.95] * len(means), means, covs)
-    platform = Courses(50.0, tuple(360.0 * i / num_courses for i in range(num_courses)))
+    platform = HeadingPlatform(50.0, tuple(360.0 * i / num_courses for i in range(num_courses)))
     sensors = (MobileSensor(LmbFilter(targets, seen), platform),) * num_sensors
     fusion, settings = ParallelUpdate(), PlanningSettings(num_threads=1)
     state = State((belief,) * num_sensors, belief, 1, 1.0)
@@ -113,7 +113,7 @@ def decision(kind: str, num_sensors: int, num_courses: int, rng: np.random.Gener
 
 def annealed(problem: JointProblem, budget: int, rng: np.random.Generator) -> tuple[float, int]:
     """Reward that simulated annealing finds with so many evaluations, or until it finds nothing new."""
-    known = Known(problem)
+    known = RewardCache(problem)
     at = known.allowed(problem.independent())
     now = float(known.rewards([at])[0])
     scale = abs(now)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from vedette.control import Plan, Planner
-from vedette.simulation import KnowsTruth, Truth
+from vedette.simulation import RequiresTruth, Truth
 
 
 class Timed:
@@ -24,10 +24,10 @@ class Timed:
         """As of the planner."""
         return self.planner.name
 
-    def told(self, truth: Truth) -> Timed:
+    def with_truth(self, truth: Truth) -> Timed:
         """As of the planner."""
-        if isinstance(self.planner, KnowsTruth):
-            self.planner = self.planner.told(truth)
+        if isinstance(self.planner, RequiresTruth):
+            self.planner = self.planner.with_truth(truth)
         return self
 
     def plan(self, *situation: Any, rng: np.random.Generator) -> Plan:

@@ -21,13 +21,13 @@ from vedette.control import (
     planning_limits,
 )
 from vedette.control.additive.rewards import AdditiveRewards
-from vedette.control.cases import CaseRewards
 from vedette.control.inputs import options_of
+from vedette.control.pseudo_posterior_rewards import PseudoPosteriorRewards
 from vedette.control.search import all_joint_actions
 from vedette.densities import GLMB, LMB, TrackTable
 from vedette.filters import DeltaGlmbFilter, LmbFilter
 from vedette.fusion import Clmb, CmDeltaGlmb
-from vedette.platforms import Courses
+from vedette.platforms import HeadingPlatform
 from vedette.tracking import State
 
 Label = tuple[int, int]
@@ -78,7 +78,7 @@ def mobile_sensor(kind: str, platform: Any = None, dim: int = 4, **parts: Any) -
     """A sensor with a filter of a `kind`: lmb, or else delta-GLMB. dim: 4, or 5 with a turn rate."""
     build = LmbFilter if kind == "lmb" else DeltaGlmbFilter
     local = build(target_model(dim), sensor_model(**parts))
-    return MobileSensor(local, Courses(30.0, HEADINGS) if platform is None else platform)
+    return MobileSensor(local, HeadingPlatform(30.0, HEADINGS) if platform is None else platform)
 
 
 def mixture(label: Label, num_components: int, dim: int, rng: np.random.Generator) -> tuple[Any, Any, Any]:
@@ -182,7 +182,7 @@ def crowded(num_targets: int) -> Situation:
         for _ in range(2)
     )
     fusion = Clmb((0.5, 0.5))
-    sensors = tuple(mobile_sensor("lmb", platform=Courses(30.0, (-90.0, 30.0))) for _ in range(2))
+    sensors = tuple(mobile_sensor("lmb", platform=HeadingPlatform(30.0, (-90.0, 30.0))) for _ in range(2))
     settings = replace(SETTINGS, limits=planning_limits(), num_samples=4)
     return Situation(sensors, fusion, settings, beliefs, fusion.fuse(beliefs)[0], POSES[:2])
 
@@ -241,9 +241,9 @@ def sample_rewards(evaluator: Evaluator, which: Sequence[int], fusion: Any) -> A
     return cases_of(evaluator).rewards(which, fusion)(all_joint_actions(tuple(shape[s] for s in which)))
 
 
-def cases_of(evaluator: Evaluator) -> CaseRewards:
+def cases_of(evaluator: Evaluator) -> PseudoPosteriorRewards:
     """What an evaluator makes rewards of, case by case."""
-    assert isinstance(evaluator.source, CaseRewards)
+    assert isinstance(evaluator.source, PseudoPosteriorRewards)
     return evaluator.source
 
 

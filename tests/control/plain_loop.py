@@ -15,7 +15,7 @@ from vedette.control import MobileSensor, PlanningSettings
 from vedette.densities import GLMB, LMB, TrackTable, marginalise, sample_glmb, sample_lmb, track_moments
 from vedette.divergence import cauchy_schwarz, reference_unit_volume
 from vedette.filters import DeltaGlmbFilter, LmbFilter
-from vedette.platforms import Courses
+from vedette.platforms import HeadingPlatform
 
 _BLIND = models.SensorModel(
     models.position(),
@@ -84,7 +84,7 @@ def _draw(situation: Situation, rng: np.random.Generator) -> list[tuple[Any, Any
 
 def _path(sensor: MobileSensor, pose: Any, action: Any, settings: PlanningSettings) -> list[Any]:
     platform = sensor.platform
-    assert isinstance(platform, Courses)
+    assert isinstance(platform, HeadingPlatform)
     heading = math.radians(action[0])
     away = np.array([np.cos(heading), np.sin(heading)]) * platform.speed * settings.horizon_period
     return [np.array([*(pose[:2] + (h + 1) * away), heading]) for h in range(settings.horizon_steps)]

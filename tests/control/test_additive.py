@@ -31,7 +31,7 @@ from control.known_association import followed, updated
 from vedette import models
 from vedette.control import CauchySchwarzReward, Evaluator, RenyiReward
 from vedette.control.problem import best_values
-from vedette.control.pseudo import draw_futures
+from vedette.control.pseudo_updates import draw_futures
 from vedette.control.rewards import (
     CardinalityVarianceReward,
     ExpectedGospaReward,

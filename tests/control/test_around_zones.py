@@ -21,9 +21,9 @@ from vedette.control import (
     Plan,
     RulePlanner,
     StayInside,
-    WithZone,
+    ZoneConstraint,
 )
-from vedette.control.beyond import Beyond, drawing
+from vedette.control.beyond_horizon import BeyondHorizon, attracting_targets
 from vedette.control.constraints import visibility_graph
 from vedette.control.inputs import options_of
 from vedette.densities import LMB
@@ -31,7 +31,7 @@ from vedette.filters import LmbFilter
 from vedette.fusion import ParallelUpdate
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models import Region
-from vedette.platforms import Courses, Steps, Still
+from vedette.platforms import GridPlatform, HeadingPlatform, Stationary
 from vedette.scenarios import load_scenario, with_fields
 from vedette.scenarios.build import build_planner
 from vedette.tracking import State
@@ -43,7 +43,7 @@ ONCE = replace(KNOWN, horizon_steps=1, horizon_period=1.0)
 
 def searchers(num: int = 1, platform: Any = None) -> tuple[Any, ...]:
     """They see 60 m, and take steps of 20 m."""
-    standard = mobile_sensor("lmb", platform or Steps(STEP, STEP), detection=models.limited_range(0.9, SIGHT))
+    standard = mobile_sensor("lmb", platform or GridPlatform(STEP, STEP), detection=models.limited_range(0.9, SIGHT))
     return (replace(standard, filter=LmbFilter(CALM, standard.filter.sensor)),) * num
 
 
@@ -136,10 +136,10 @@ def test_plans_name_targets_that_no_path_brings_into_sight(kind: Any) -> None:
     assert not any("(0, 1)" in own or "(0, 2)" in own for own in told)
     assert note not in planned(kind, belief, [[-100.0, 0.0, 0.0]], ()).notes
     if kind is RulePlanner:  # a sensor that cannot move sees what it sees
-        mixed = (*searchers(1, Still()), *searchers(1))
+        mixed = (*searchers(1, Stationary()), *searchers(1))
         poses = [[300.0, 30.0, 0.0], [-100.0, 0.0, 0.0]]
         assert note not in planned(kind, belief, poses, (island,), mixed).notes
-        told = planned(kind, belief, [[-100.0, 0.0, 0.0]], (island,), searchers(1, Still())).notes
+        told = planned(kind, belief, [[-100.0, 0.0, 0.0]], (island,), searchers(1, Stationary())).notes
         assert [own for own in told if own.startswith("target (0, 1)")] != []
 
 
@@ -154,12 +154,17 @@ def test_continued_courses_stay_outside(scene: str) -> None:
     """At no more than their speed; what the course that approaches its target best makes of it, is the shortest."""
     start, goal, constraints, _ = SCENES[scene]
     belief, zones = targets(goal), [own.zone for own in constraints]
-    sensors, graph = searchers(1, Courses(STEP, tuple(np.arange(-180.0, 180.0, 15.0)))), visibility_graph(constraints)
+    sensors, graph = (
+        searchers(1, HeadingPlatform(STEP, tuple(np.arange(-180.0, 180.0, 15.0)))),
+        visibility_graph(constraints),
+    )
     assert graph is not None
     pose = np.array([*graph.outside(np.array([start]))[0], 0.0])
     options = options_of(sensors, pose[np.newaxis], ONCE)
     times = np.arange(1.0, 40.0)
-    [later] = Beyond.of(sensors, options, *drawing(belief), graph, None).continued(ONCE.horizon_times(), times)
+    [later] = BeyondHorizon.of(sensors, options, *attracting_targets(belief), graph, None).continued(
+        ONCE.horizon_times(), times
+    )
     allowed = ~graph.is_barred(pose[:2], options[0].courses[:, :, :2])
     distances = graph.to(np.array([goal]), pose[:2]).distances
     ends = [options[0].courses[c, -1, :2] for c in np.flatnonzero(allowed)]
@@ -183,7 +188,7 @@ def test_sensors_without_courses_have_none_beyond() -> None:
     sensors = searchers(2)
     first, second = options_of(sensors, poses, ONCE)
     options = first, second._replace(courses=second.courses[:0])
-    beyond = Beyond.of(sensors, options, *drawing(targets([85.0, 10.0])), graph, None)
+    beyond = BeyondHorizon.of(sensors, options, *attracting_targets(targets([85.0, 10.0])), graph, None)
     found = beyond.continued(ONCE.horizon_times(), np.arange(1.0, 9.0))
     assert [own.courses.shape for own in found] == [(9, 8, 3), (0, 8, 3)]
 
@@ -206,7 +211,7 @@ class Cable:
 def test_a_constraint_of_ones_own_may_have_a_zone() -> None:
     start, goal, _, most = SCENES["wall"]
     cable = Cable((WALL.zone[0],))
-    assert isinstance(cable, WithZone)
+    assert isinstance(cable, ZoneConstraint)
     track = walked(JointPlanner, targets(goal), start, (cable,), most)
     assert np.hypot(*(track[-1] - goal)) <= SIGHT
 
@@ -232,7 +237,7 @@ def test_boats_of_the_solent_keep_off_the_land() -> None:
     planner: Any = build_planner(load_scenario("solent-patrol"), "jdm", 1)
     graph = visibility_graph(planner.constraints)
     assert graph is not None
-    zones = [own.zone for own in planner.constraints if isinstance(own, WithZone)]
+    zones = [own.zone for own in planner.constraints if isinstance(own, ZoneConstraint)]
     places = np.random.default_rng(3).uniform(-2900.0, 2900.0, (12, 2))
     sea = places[~forbidden(places, zones, 0.0)]
     assert len(sea) >= 5

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vedette import models
-from vedette.control import Constraint, KeepOut, Mask, Separation, Situation, StayInside, mask_of
+from vedette.control import Constraint, ConstraintContext, KeepOut, Mask, Separation, StayInside, feasible_action_mask
 from vedette.control.search import all_joint_actions
 from vedette.densities import LMB
 from vedette.errors import InputError
@@ -21,17 +21,17 @@ from vedette.errors import InputError
 TIMES = np.array([2.0, 4.0, 6.0])
 
 
-def situation(seed: int, num_sensors: int = 4, spread: float = 150.0, *, start: bool = True) -> Situation:
+def situation(seed: int, num_sensors: int = 4, spread: float = 150.0, *, start: bool = True) -> ConstraintContext:
     """Sensors with a few courses each, straight and crooked."""
     draw = np.random.default_rng(seed)
     poses = np.concatenate([draw.uniform(-spread, spread, (num_sensors, 2)), np.zeros((num_sensors, 1))], axis=1)
     courses = tuple(
         pose + np.cumsum(draw.normal(0.0, 40.0, (draw.integers(1, 5), len(TIMES), 3)), axis=1) for pose in poses
     )
-    return Situation(courses, TIMES, (), poses if start else None)
+    return ConstraintContext(courses, TIMES, (), poses if start else None)
 
 
-def on_the_way(scene: Situation, sensor: int, course: int, num: int = 400) -> Any:
+def on_the_way(scene: ConstraintContext, sensor: int, course: int, num: int = 400) -> Any:
     """Many points of the way of a course, and whether each is later than the first leg."""
     corners = scene.courses[sensor][course, :, :2]
     if scene.poses is not None:
@@ -43,7 +43,7 @@ def on_the_way(scene: Situation, sensor: int, course: int, num: int = 400) -> An
 @given(st.integers(0, 2**32 - 1), st.booleans())
 def test_separation_is_the_least_distance_on_the_way(seed: int, start: bool) -> None:
     scene, distance = situation(seed, start=start), 60.0
-    mask = mask_of([Separation(distance)], scene)
+    mask = feasible_action_mask([Separation(distance)], scene)
     for (first, second), table in mask.together.items():
         apart = 0.0 if scene.poses is None else np.hypot(*(scene.poses[first, :2] - scene.poses[second, :2]))
         for i, j in np.ndindex(*table.shape):
@@ -62,7 +62,7 @@ def test_separation_is_the_least_distance_on_the_way(seed: int, start: bool) -> 
 
 def test_platforms_that_pass_through_each_other_come_too_near() -> None:
     there, back = np.array([[[0.0, 0.0], [100.0, 0.0]]]), np.array([[[100.0, 1.0], [0.0, 1.0]]])
-    scene = Situation((there, back), TIMES[:2])
+    scene = ConstraintContext((there, back), TIMES[:2])
     pairs = Separation(2.0).pairs(scene, 0, 1)
     assert pairs is not None
     assert not pairs.any()
@@ -71,7 +71,7 @@ def test_platforms_that_pass_through_each_other_come_too_near() -> None:
 
 def test_who_is_too_near_already_may_go_away() -> None:
     ways = tuple(np.array([[[side * 30.0, 0.0]], [[0.0, 0.0]]]) for side in (-1.0, 1.0))
-    scene = Situation(ways, TIMES[:1], (), np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]))
+    scene = ConstraintContext(ways, TIMES[:1], (), np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]))
     pairs = Separation(31.0).pairs(scene, 0, 1)
     assert pairs is not None
     assert pairs.tolist() == [[True, False], [False, False]]
@@ -80,13 +80,13 @@ def test_who_is_too_near_already_may_go_away() -> None:
 def test_sensors_far_from_each_other_are_not_asked_about(monkeypatch: pytest.MonkeyPatch) -> None:
     asked, pairs = [], Separation.pairs
 
-    def watch(self: Separation, scene: Situation, first: int, second: int) -> Any:
+    def watch(self: Separation, scene: ConstraintContext, first: int, second: int) -> Any:
         asked.append((first, second))
         return pairs(self, scene, first, second)
 
     monkeypatch.setattr(Separation, "pairs", watch)
     courses = tuple(np.array([[[x, 0.0, 0.0]], [[x + 10.0, 0.0, 0.0]]]) for x in (0.0, 30.0, 1000.0))
-    mask = mask_of([Separation(25.0)], Situation(courses, TIMES[:1]))
+    mask = feasible_action_mask([Separation(25.0)], ConstraintContext(courses, TIMES[:1]))
     assert asked == [(0, 1)]
     assert mask.together[0, 1].tolist() == [[True, True], [False, True]]
 
@@ -143,9 +143,9 @@ def test_keep_out_is_on_the_way_too(seed: int, start: bool, kind: str) -> None:
 def test_a_thin_area_is_not_jumped_over() -> None:
     over = np.array([[[-50.0, 0.0], [50.0, 0.0]], [[-50.0, 0.0], [-40.0, 0.0]]])
     wall = [[-1.0, -500.0], [1.0, -500.0], [1.0, 500.0], [-1.0, 500.0]]
-    (allowed,) = KeepOut(wall).courses(Situation((over,), TIMES[:2]))  # type: ignore[arg-type]
+    (allowed,) = KeepOut(wall).courses(ConstraintContext((over,), TIMES[:2]))  # type: ignore[arg-type]
     assert allowed.tolist() == [False, True]
-    first_leg = Situation((over[:, 1:] + [0.0, 0.0],), TIMES[:1], (), np.array([[-45.0, 0.0, 0.0]]))
+    first_leg = ConstraintContext((over[:, 1:] + [0.0, 0.0],), TIMES[:1], (), np.array([[-45.0, 0.0, 0.0]]))
     (allowed,) = KeepOut(wall).courses(first_leg)  # type: ignore[arg-type]
     assert allowed.tolist() == [False, True]
     inside_it = first_leg._replace(poses=np.array([[0.0, 0.0, 0.0]]))
@@ -160,17 +160,17 @@ def test_what_cannot_move_may_be_where_it_is(constraint: Constraint) -> None:
     still = np.tile(pose, (2, len(TIMES), 1))
     moving = still.copy()
     moving[1, -1, 0] += 1e-6
-    (radar, boat) = constraint.courses(Situation((still, moving), TIMES, poses=np.stack([pose, pose])))
+    (radar, boat) = constraint.courses(ConstraintContext((still, moving), TIMES, poses=np.stack([pose, pose])))
     assert radar.all()
     assert not boat.any()
-    scene = Situation((still,), TIMES, poses=pose[np.newaxis])
-    assert mask_of([constraint], scene).notes == ()
-    assert not constraint.courses(Situation((still,), TIMES))[0].any()  # nothing is known of where it is
+    scene = ConstraintContext((still,), TIMES, poses=pose[np.newaxis])
+    assert feasible_action_mask([constraint], scene).notes == ()
+    assert not constraint.courses(ConstraintContext((still,), TIMES))[0].any()  # nothing is known of where it is
 
 
 def test_one_time_is_one_place() -> None:
     places = np.array([[[0.0, 0.0]], [[500.0, 0.0]], [[90.0, 70.0]]])
-    (allowed,) = KeepOut(CORNERS).courses(Situation((places,), TIMES[:1]))
+    (allowed,) = KeepOut(CORNERS).courses(ConstraintContext((places,), TIMES[:1]))
     assert allowed.tolist() == [False, True, False]  # the last is on a corner
 
 
@@ -183,16 +183,16 @@ class Own:
     needs_beliefs: bool = False
     name: str = "own"
 
-    def courses(self, situation: Situation) -> Any:
+    def courses(self, situation: ConstraintContext) -> Any:
         return tuple(~np.isin(np.arange(len(own)), self.forbidden) for own in situation.courses)
 
-    def pairs(self, situation: Situation, first: int, second: int) -> Any:
+    def pairs(self, situation: ConstraintContext, first: int, second: int) -> Any:
         shape = (len(situation.courses[first]), len(situation.courses[second]))
         return ~np.eye(*shape, dtype=bool) if self.answer is None else self.answer
 
 
-def three(num_sensors: int = 3) -> Situation:
-    return Situation((np.zeros((3, 1, 3)),) * num_sensors, TIMES[:1])
+def three(num_sensors: int = 3) -> ConstraintContext:
+    return ConstraintContext((np.zeros((3, 1, 3)),) * num_sensors, TIMES[:1])
 
 
 def allowed(mask: Mask) -> Iterator[tuple[int, ...]]:
@@ -201,22 +201,27 @@ def allowed(mask: Mask) -> Iterator[tuple[int, ...]]:
 
 
 def test_constraints_of_the_users_own_are_asked_about_every_pair() -> None:
-    mask = mask_of([Own()], three())
+    mask = feasible_action_mask([Own()], three())
     assert sorted(allowed(mask)) == [(0, 1, 2), (0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0)]
     assert mask.notes == ()
 
 
 def test_all_constraints_hold_at_once() -> None:
-    scene = Situation(tuple(np.array([[[x + 5.0 * a, 0.0, 0.0]] for a in range(3)]) for x in (0.0, 3.0)), TIMES[:1])
-    one, other = mask_of([Own()], scene).together[0, 1], mask_of([Separation(6.0)], scene).together[0, 1]
-    both = mask_of([Own(), Separation(6.0), StayInside(models.Region(-1.0, 9.0, -1.0, 1.0))], scene)
+    scene = ConstraintContext(
+        tuple(np.array([[[x + 5.0 * a, 0.0, 0.0]] for a in range(3)]) for x in (0.0, 3.0)), TIMES[:1]
+    )
+    one, other = (
+        feasible_action_mask([Own()], scene).together[0, 1],
+        feasible_action_mask([Separation(6.0)], scene).together[0, 1],
+    )
+    both = feasible_action_mask([Own(), Separation(6.0), StayInside(models.Region(-1.0, 9.0, -1.0, 1.0))], scene)
     np.testing.assert_array_equal(both.together[0, 1], one & other)
     assert [own.tolist() for own in both.single] == [[True, True, False], [True, True, False]]
 
 
 def test_a_sensor_without_a_course_keeps_all_and_the_mask_says_so() -> None:
-    mask = mask_of(
-        [Own((0, 1, 2)), Separation(1.0)], Situation((np.zeros((3, 1, 3)), np.full((4, 1, 3), 9.0)), TIMES[:1])
+    mask = feasible_action_mask(
+        [Own((0, 1, 2)), Separation(1.0)], ConstraintContext((np.zeros((3, 1, 3)), np.full((4, 1, 3), 9.0)), TIMES[:1])
     )
     assert [own.tolist() for own in mask.single] == [[True] * 3, [False] * 3 + [True]]
     said = "sensor 1: no course meets its constraints (own, separation); it may take those that violate them least"
@@ -225,7 +230,7 @@ def test_a_sensor_without_a_course_keeps_all_and_the_mask_says_so() -> None:
 
 def test_sensors_that_cannot_all_have_their_way() -> None:
     """Four sensors of three courses each: two have to take the same."""
-    mask = mask_of([Own()], three(4))
+    mask = feasible_action_mask([Own()], three(4))
     assert len(mask.together) == 5
     assert len(mask.notes) == 1
     assert "no courses were found that go together; the constraint is given up" in mask.notes[0]
@@ -235,13 +240,13 @@ def test_sensors_that_cannot_all_have_their_way() -> None:
 
 
 def test_no_constraint_forbids_nothing() -> None:
-    mask = mask_of([], situation(1))
+    mask = feasible_action_mask([], situation(1))
     assert all(own.all() for own in mask.single)
     assert mask.together == {}
 
 
 def test_one_sensor_has_no_pairs() -> None:
-    assert mask_of([Separation(10.0), Own()], situation(1, 1)).together == {}
+    assert feasible_action_mask([Separation(10.0), Own()], situation(1, 1)).together == {}
 
 
 @pytest.mark.parametrize(
@@ -269,18 +274,18 @@ def test_they_meet_the_protocol(constraint: Constraint) -> None:
 )
 def test_answers_that_are_none(constraint: Constraint, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        mask_of([constraint], three())
+        feasible_action_mask([constraint], three())
 
 
 def test_courses_of_too_few_sensors() -> None:
     class Short(Own):
-        def courses(self, situation: Situation) -> Any:
+        def courses(self, situation: ConstraintContext) -> Any:
             return super().courses(situation)[1:]
 
     with pytest.raises(InputError, match="constraint own: expected courses of 3 sensors; got 2"):
-        mask_of([Short()], three())
+        feasible_action_mask([Short()], three())
 
 
 def test_beliefs_for_all_times_are_enough() -> None:
     beliefs = (LMB.empty(4),)
-    assert mask_of([Own(needs_beliefs=True)], three()._replace(beliefs=beliefs)).notes == ()
+    assert feasible_action_mask([Own(needs_beliefs=True)], three()._replace(beliefs=beliefs)).notes == ()

@@ -47,7 +47,7 @@ from vedette.densities.containers import unchecked
 from vedette.errors import InputError, ModelError, NumericalError
 from vedette.filters import CbMemberFilter, CphdFilter, PhdFilter
 from vedette.fusion import Clmb, CmDeltaGlmb
-from vedette.platforms import Actions, Courses
+from vedette.platforms import Actions, HeadingPlatform
 from vedette.tracking import State
 
 AHEAD = partial(HorizonPlanner, depth=2)  # which goes by sums over labels alone
@@ -111,7 +111,7 @@ class Gives:
         return self.given
 
     def course(self, pose: Any, action: Any, times: Any) -> Any:
-        poses = Courses(30.0).course(pose, action, times) if self.way is None else self.way
+        poses = HeadingPlatform(30.0).course(pose, action, times) if self.way is None else self.way
         if self.pushes:
             pose[:], action[:], times[:] = 1e6, 1e6, 1e6
         return poses
@@ -275,7 +275,7 @@ def test_an_ideal_scan_that_the_models_forbid(kind: str) -> None:
 def test_sensors() -> None:
     local = mobile_sensor("lmb").filter
     with pytest.raises(InputError, match="filter: expected a Filter, with targets, sensor"):
-        MobileSensor("filter", Courses(1.0))  # type: ignore[arg-type]
+        MobileSensor("filter", HeadingPlatform(1.0))  # type: ignore[arg-type]
     with pytest.raises(InputError, match="platform: expected a platform, with columns"):
         MobileSensor(local, (0.0, 90.0))  # type: ignore[arg-type]
 
@@ -285,7 +285,7 @@ def test_sensors() -> None:
 def test_filters_without_labels_cannot_be_planned_with(planner: Any, kind: Any) -> None:
     known = mobile_sensor("lmb").filter
     local = kind(known.targets, known.sensor)
-    sensors = (MobileSensor(local, Courses(1.0)),)
+    sensors = (MobileSensor(local, HeadingPlatform(1.0)),)
     belief = local.initial()
     with pytest.raises(InputError, match=rf"sensors\[0\].filter: expected one that labels its .*; got {kind.__name__}"):
         planner(sensors, Clmb((1.0,))).plan(State((belief,), belief), np.zeros((1, 3)), rng=np.random.default_rng(0))

@@ -34,6 +34,7 @@ from vedette.control import (
     RandomPlanner,
 )
 from vedette.control.additive.rewards import AdditiveRewards
+from vedette.control.contributions import contributions_of
 from vedette.control.rewards import (
     CardinalityVarianceReward,
     ExpectedGospaReward,
@@ -43,7 +44,6 @@ from vedette.control.rewards import (
     RenyiReward,
 )
 from vedette.control.search import all_joint_actions
-from vedette.control.shares import shares_of
 from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.kernels.planning.ascent import Cells
@@ -181,7 +181,7 @@ def test_targets_not_found_before_are_one_contribution() -> None:
     cells = Cells(offsets, np.tile(np.arange(4), 9), np.log(rng.uniform(0.2, 1.0, 36)), rng.uniform(1.0, 100.0, 4))
     searching = replace(additive, cells=cells)
     chosen = np.array([1, 2, 0])
-    shares = shares_of(searching, chosen, np.arange(3))
+    shares = contributions_of(searching, chosen, np.arange(3))
     reward, baseline = searching(np.array([chosen, [-1, -1, -1]]))[:, 0]
     assert shares.found > 1.0
     assert shares.existence is not None
@@ -201,16 +201,16 @@ def test_what_a_sensor_had_brought_is_the_line_through_the_choice() -> None:
     for s in range(3):
         line = additive.line(chosen, s)
         for action, heading in enumerate(plan.actions[s].values[:, 0].tolist()):
-            had, paired = why.had(s, action), line[action] - line[chosen[s]]
+            had, paired = why.counterfactual(s, action), line[action] - line[chosen[s]]
             near(had.reward, line[action].mean(), 1.0)
             near(had.difference, paired.mean(), 1.0)
             near(had.standard_error, paired.std(ddof=1) / np.sqrt(len(paired)), 1.0)
-            assert why.had(s, heading_deg=heading + 360.0) == had
+            assert why.counterfactual(s, heading_deg=heading + 360.0) == had
             assert f"sensor {s + 1} with heading_deg {heading:g}: reward" in str(had)
     with pytest.raises(
         InputError, match=r"expected something that sensor 2 could do \(heading_deg -90; heading_deg 0;"
     ):
-        why.had(1, heading_deg=17.0)
+        why.counterfactual(1, heading_deg=17.0)
     cases: list[tuple[Any, dict[str, Any], str]] = [
         ((3, 0), {}, "one of 3 sensors, from 0"),
         ((0, 3), {}, "one of 3 actions, from 0"),
@@ -219,7 +219,7 @@ def test_what_a_sensor_had_brought_is_the_line_through_the_choice() -> None:
     ]
     for arguments, columns, message in cases:
         with pytest.raises(InputError, match=message):
-            why.had(*arguments, **columns)
+            why.counterfactual(*arguments, **columns)
 
 
 def test_the_runner_up_is_the_second_of_all_joint_actions() -> None:
@@ -254,7 +254,7 @@ def test_an_independent_decision_is_the_sum_of_the_sensors_own() -> None:
     near(why.runner_up.margin, min(margins), 1.0)
     (changed,) = [s for s in range(3) if why.runner_up.actions[s] != plan.chosen[s]]
     assert changed == int(np.argmin(margins))
-    near(why.had(1, 0).difference, own[1][0] - own[1][plan.chosen[1]], 1.0)
+    near(why.counterfactual(1, 0).difference, own[1][0] - own[1][plan.chosen[1]], 1.0)
     text_fits(why)
 
 
@@ -267,7 +267,7 @@ def test_decisions_case_by_case_say_what_they_cannot_tell(kind: str, planner: An
     assert [why.of_targets, why.of_sensors, why.without, why.baseline] == [None] * 4
     assert "case by case" in why.missing["without"]
     assert why.runner_up is not None
-    had = why.had(0, why.runner_up.actions[0])
+    had = why.counterfactual(0, why.runner_up.actions[0])
     if planner is JointPlanner:
         choice = (why.runner_up.actions[0], plan.chosen[1])
         near(had.reward, plan.tables[0].mean[choice], 1.0)
@@ -279,7 +279,7 @@ def test_without_samples_there_are_no_standard_errors() -> None:
     assert why.standard_error is None
     assert why.runner_up is not None
     assert why.runner_up.standard_error is why.runner_up.in_standard_errors is None
-    assert why.had(0, 0).standard_error is None
+    assert why.counterfactual(0, 0).standard_error is None
 
 
 def test_plans_without_rewards_say_so() -> None:
@@ -291,19 +291,19 @@ def test_plans_without_rewards_say_so() -> None:
         assert why.runner_up is None
         assert "does not choose by rewards" in str(why)
         with pytest.raises(InputError, match="does not choose by rewards"):
-            why.had(0, 0)
+            why.counterfactual(0, 0)
 
 
 def test_what_is_kept_has_left_its_evidence_behind() -> None:
     plan, _ = planned(shared(2, 2), CauchySchwarzReward("reference"))
-    for again in (pickle.loads(pickle.dumps(plan)), copy.deepcopy(plan), plan.settled(explained=False)):
+    for again in (pickle.loads(pickle.dumps(plan)), copy.deepcopy(plan), plan.without_evidence(explained=False)):
         assert again.chosen == plan.chosen
         with pytest.raises(InputError, match="left its evidence behind"):
             again.explain()
-    kept = pickle.loads(pickle.dumps(plan.settled(explained=True)))
+    kept = pickle.loads(pickle.dumps(plan.without_evidence(explained=True)))
     assert str(kept.explain()) == str(plan.explain())
     with pytest.raises(InputError, match="left its evidence behind"):
-        kept.explain().had(0, 0)
+        kept.explain().counterfactual(0, 0)
 
 
 def test_threads_change_no_explanation() -> None:

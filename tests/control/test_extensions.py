@@ -11,7 +11,7 @@ import pytest
 
 from control.examples import ABSENT, SETTINGS, cases_of, decided, evaluator_of, sample_rewards, situation
 from vedette.control import CauchySchwarzReward, ExpectedLossReward, IndependentPlanner, JointPlanner, RenyiReward
-from vedette.control.cases import warn_slow
+from vedette.control.pseudo_posterior_rewards import warn_slow
 from vedette.densities import cardinality_distribution
 from vedette.divergence import cauchy_schwarz
 from vedette.errors import InputError, NumericalError, SlowRewardWarning

@@ -27,7 +27,7 @@ from vedette.control import (
 )
 from vedette.densities import LMB, UndetectedIntensity
 from vedette.fusion import Clmb, ParallelUpdate
-from vedette.platforms import Courses
+from vedette.platforms import HeadingPlatform
 from vedette.tracking import State
 
 
@@ -173,7 +173,9 @@ def test_sensors_keep_apart_and_inside() -> None:
 
 def test_targets_not_found_yet_are_looked_for() -> None:
     """With nobody known, sensors go where somebody may be; the reward is the cutoff times the number that they find."""
-    sensor = mobile_sensor("lmb", Courses(100.0, [0.0, 90.0, 180.0]), detection=models.limited_range(0.9, 100.0))
+    sensor = mobile_sensor(
+        "lmb", HeadingPlatform(100.0, [0.0, 90.0, 180.0]), detection=models.limited_range(0.9, 100.0)
+    )
     grid = models.CellGrid.covering(models.Region(-500.0, 500.0, -500.0, 500.0), 50.0)
     expected = np.where((grid.centres[:, 0] > 100.0) & (np.abs(grid.centres[:, 1]) < 100.0), 0.05, 0.0)
     empty = LMB.empty(4)

@@ -21,17 +21,17 @@ from vedette.control import (
     KullbackLeiblerReward,
     Plan,
 )
-from vedette.control.beyond import Beyond, drawing
-from vedette.control.continuing import continued
-from vedette.control.evaluator import at_all
+from vedette.control.beyond_horizon import BeyondHorizon, attracting_targets
+from vedette.control.evaluator import mean_over_horizons
 from vedette.control.evidence import Evidence
+from vedette.control.extrapolation import extrapolated
 from vedette.control.inputs import options_of
 from vedette.control.problem import best_values, bound_of
 from vedette.control.search import all_joint_actions
 from vedette.densities import LMB, UndetectedIntensity
 from vedette.filters import LmbFilter
 from vedette.fusion import ParallelUpdate
-from vedette.platforms import Carried, Courses, Pointing, Steps, Still
+from vedette.platforms import GridPlatform, HeadingPlatform, MountedPlatform, Pointing, Stationary
 from vedette.platforms.base import options_at
 
 HORIZON = KNOWN.horizon_times()
@@ -45,7 +45,7 @@ REWARD = ExpectedLossReward(60.0)
 def short_sighted(num: int = 2, platform: Any = None) -> tuple[Any, ...]:
     """They see 200 m, and go 240 m within the horizon."""
     detection = models.limited_range(0.9, SIGHT)
-    standard = mobile_sensor("lmb", platform or Courses(SPEED, HEADINGS), detection=detection)
+    standard = mobile_sensor("lmb", platform or HeadingPlatform(SPEED, HEADINGS), detection=detection)
     return (replace(standard, filter=LmbFilter(CALM, standard.filter.sensor)),) * num
 
 
@@ -73,8 +73,8 @@ def made_by(kind: Any, of: Situation, reward: Any = REWARD, **parts: Any) -> Pla
 
 
 def test_courses_go_straight_on() -> None:
-    platform, pose = Courses(SPEED, HEADINGS), np.array([10.0, -20.0, 0.3])
-    found = continued(options_at("platform", platform, pose, HORIZON), HORIZON, TIMES)
+    platform, pose = HeadingPlatform(SPEED, HEADINGS), np.array([10.0, -20.0, 0.3])
+    found = extrapolated(options_at("platform", platform, pose, HORIZON), HORIZON, TIMES)
     for heading, course in zip(HEADINGS, found.courses, strict=True):
         np.testing.assert_allclose(course, platform.course(pose, np.array([heading]), TIMES), rtol=1e-12)
     np.testing.assert_array_equal(found.pose, pose)
@@ -83,7 +83,7 @@ def test_courses_go_straight_on() -> None:
 def test_steps_are_made_again_and_again() -> None:
     """Of 100 m in 5 s, and 3 s of waiting: 80 m after 4 s, 100 m after 8 s, 90 m taken for between; then anew."""
     pose = np.array([10.0, -20.0, 0.3])
-    found = continued(options_at("platform", Steps(100.0, 20.0, (0.0, 90.0)), pose, HORIZON), HORIZON, TIMES)
+    found = extrapolated(options_at("platform", GridPlatform(100.0, 20.0, (0.0, 90.0)), pose, HORIZON), HORIZON, TIMES)
     gone = [40.0, 80.0, 85.0, 100.0, 140.0, 180.0, 200.0, 250.0, 300.0, 500.0]
     np.testing.assert_allclose(found.courses[0], np.column_stack([np.add(10.0, gone), [-20.0] * 10, [0.0] * 10]))
     north = np.column_stack([[10.0] * 10, np.add(-20.0, gone), [math.pi / 2] * 10])
@@ -95,8 +95,8 @@ def test_between_poses_sensors_go_straight_and_after_them_by_as_much_again() -> 
     """Any poses, none a multiple of another."""
     rng = np.random.default_rng(2)
     courses, pose, horizon = rng.normal(size=(3, 4, 3)), rng.normal(size=3), np.array([1.0, 2.5, 3.0, 7.0])
-    own = options_at("platform", Still(), pose, horizon)
-    found = continued(own._replace(courses=courses, scans=np.ones((3, 4), bool)), horizon, TIMES).courses
+    own = options_at("platform", Stationary(), pose, horizon)
+    found = extrapolated(own._replace(courses=courses, scans=np.ones((3, 4), bool)), horizon, TIMES).courses
     for course, poses in zip(courses, found, strict=True):
         for time, at in zip(TIMES, poses, strict=True):
             again = math.ceil(time / 7.0) - 1
@@ -107,10 +107,13 @@ def test_between_poses_sensors_go_straight_and_after_them_by_as_much_again() -> 
 
 def test_a_camera_that_still_turns_turns_on() -> None:
     """Until then it is as at the next pose that is known; one that has arrived stays, and what carries it goes on."""
-    platform, pose = Carried(Courses(SPEED, (0.0,)), Pointing((90.0, -40.0), turn_rate_deg=10.0)), np.zeros(5)
+    platform, pose = (
+        MountedPlatform(HeadingPlatform(SPEED, (0.0,)), Pointing((90.0, -40.0), turn_rate_deg=10.0)),
+        np.zeros(5),
+    )
     pose[4] = 0.5
     own = options_at("platform", platform, pose, HORIZON)
-    found = continued(own, HORIZON, TIMES).courses
+    found = extrapolated(own, HORIZON, TIMES).courses
     np.testing.assert_allclose(
         np.degrees(found[0, :, 3]), [40.0, 40.0, 80.0, 80.0, 100.0, 120.0, 160.0, -175.0, -120.0, 40.0]
     )
@@ -126,7 +129,7 @@ def test_a_camera_that_still_turns_turns_on() -> None:
 def looks(belief: LMB, poses: Any, sensors: Any = None) -> Any:
     of = placed(belief, poses, sensors)
     options = options_of(of.sensors, of.poses, of.settings)
-    return Beyond.of(of.sensors, options, *drawing(belief), None, None).horizons(of.settings)
+    return BeyondHorizon.of(of.sensors, options, *attracting_targets(belief), None, None).horizons(of.settings)
 
 
 EAST, WEST = [0.0, 0.0, 0.0], [-3000.0, 0.0, math.pi]
@@ -151,7 +154,7 @@ def test_looks_last_until_the_nearest_sensor_is_there_and_a_while_longer(distanc
         # All targets are in the first sensor's sight, and none in the second's.
         (bernoullis([[430.0, 0.0]]), [EAST, [430.0 + distance, 0.0, math.pi]]),
     ):
-        facing = (Courses(SPEED, (0.0, 180.0, 90.0)),) * len(poses)
+        facing = (HeadingPlatform(SPEED, (0.0, 180.0, 90.0)),) * len(poses)
         sensors = tuple(short_sighted(1, own)[0] for own in facing)
         half, whole = looks(belief, poses, sensors)
         seconds = (distance - 240.0 - SIGHT) / SPEED
@@ -179,7 +182,7 @@ def test_weak_labels_do_not_draw() -> None:
 
 
 def test_a_sensor_that_cannot_move_switches_it_off() -> None:
-    belief, moves, stays = bernoullis([[2000.0, 0.0]]), short_sighted(1), short_sighted(1, Still())
+    belief, moves, stays = bernoullis([[2000.0, 0.0]]), short_sighted(1), short_sighted(1, Stationary())
     assert len(looks(belief, [EAST, WEST], moves * 2)) == 2
     assert looks(belief, [EAST, WEST], moves + stays) == ()
 
@@ -188,7 +191,7 @@ def test_a_sensor_that_cannot_move_switches_it_off() -> None:
 def test_a_camera_sees_as_far_as_it_does_ahead(heading: float) -> None:
     """It is asked in eight directions, of which one is its own."""
     detection = models.limited_sector(0.9, SIGHT, 0.3)
-    sensors = (mobile_sensor("lmb", Courses(SPEED, (0.0,)), detection=detection),)
+    sensors = (mobile_sensor("lmb", HeadingPlatform(SPEED, (0.0,)), detection=detection),)
     assert looks(bernoullis([[415.0, 0.0]]), [[0.0, 0.0, heading]], sensors) == ()
     assert len(looks(bernoullis([[445.0, 0.0]]), [[0.0, 0.0, heading]], sensors)) == 2
 
@@ -196,7 +199,7 @@ def test_a_camera_sees_as_far_as_it_does_ahead(heading: float) -> None:
 @pytest.mark.parametrize("pointing", [0.0, 0.35, 2.0])
 def test_a_carried_camera_sees_as_far_as_it_does_where_it_points(pointing: float) -> None:
     """11 degrees wide, between the eight directions from its heading."""
-    camera = Carried(Courses(SPEED, (0.0,)), Pointing([0.0], relative=True))
+    camera = MountedPlatform(HeadingPlatform(SPEED, (0.0,)), Pointing([0.0], relative=True))
     sensors = (mobile_sensor("lmb", camera, detection=models.camera(0.9, SIGHT)),)
     pose = [0.0, 0.0, 0.0, pointing, 0.1]
     assert looks(bernoullis([[415.0, 0.0]]), [pose], sensors) == ()
@@ -218,7 +221,7 @@ def prepared(of: Situation, horizon: Any = None, later: Any = (), hidden: Any = 
     """By itself, with another horizon, or with later ones."""
     options, settings = options_of(of.sensors, of.poses, KNOWN), of.settings
     if horizon is not None:
-        settings, options = horizon, tuple(continued(own, HORIZON, horizon.horizon_times()) for own in options)
+        settings, options = horizon, tuple(extrapolated(own, HORIZON, horizon.horizon_times()) for own in options)
     return Evaluator.of_sums(
         of.sensors,
         options,
@@ -261,7 +264,7 @@ def test_at_all_is_the_mean_of_evaluators_that_are_prepared_one_by_one(hidden: b
         same(additive.line(np.array([1, 2, 0]), s), mean(lambda own, s=s: own.line(np.array([1, 2, 0]), s)))
     same(additive.lines(np.array([2, 0, 1])), mean(lambda own: own.lines(np.array([2, 0, 1]))))
     same(additive.each_alone(), mean(lambda own: own.each_alone()))
-    same(at_all([sums_of(own) for own in single])(actions), additive(actions))
+    same(mean_over_horizons([sums_of(own) for own in single])(actions), additive(actions))
     assert found.counts["filter_steps"] == sum(own.counts["filter_steps"] for own in single)
     assert (additive.num_horizons, found.horizons) == (3, later)
 
@@ -294,7 +297,7 @@ AWAY = [[-3.0 * 240.0 - SIGHT, 40.0]]  # three horizons to the west
 def test_a_sensor_goes_towards_a_target_three_horizons_away(kind: Any) -> None:
     """Where the horizon ends all courses are worth the same, and the first was taken."""
     compass = tuple(float(own) for own in range(-135, 181, 45))
-    of = placed(bernoullis(AWAY), [EAST], short_sighted(1, Courses(SPEED, compass)))
+    of = placed(bernoullis(AWAY), [EAST], short_sighted(1, HeadingPlatform(SPEED, compass)))
     made = made_by(kind, of)
     assert compass[made.chosen[0]] == 180.0
     assert np.ptp(prepared(of).joint()(all_joint_actions((8,)))) == 0.0
@@ -303,7 +306,10 @@ def test_a_sensor_goes_towards_a_target_three_horizons_away(kind: Any) -> None:
 
 
 def test_two_sensors_share_two_targets_far_off() -> None:
-    belief, sensors = bernoullis([[-900.0, 30.0], [900.0, -30.0]]), short_sighted(2, Courses(SPEED, (90.0, 0.0, 180.0)))
+    belief, sensors = (
+        bernoullis([[-900.0, 30.0], [900.0, -30.0]]),
+        short_sighted(2, HeadingPlatform(SPEED, (90.0, 0.0, 180.0))),
+    )
     assert sorted(made_by(JointPlanner, placed(belief, [EAST, EAST], sensors)).chosen) == [1, 2]
 
 

@@ -27,7 +27,7 @@ from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.evaluation import ospa_of_run
 from vedette.fusion import Clmb
-from vedette.platforms import Courses, Sequences, Steps
+from vedette.platforms import GridPlatform, HeadingPlatform, Sequences
 from vedette.scenarios import load_scenario, with_fields
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.simulation import simulate
@@ -146,7 +146,7 @@ def test_a_tree_that_is_known_whole_ends_the_search() -> None:
 def test_what_lies_beyond_the_next_decision_is_found(search: Any) -> None:
     """A target round a corner: east, then north, then north, where a single decision sees nothing."""
     detection = models.limited_range(0.95, 50.0)
-    sensor = mobile_sensor("lmb", Steps(100.0, 100.0, (0.0, 90.0, 180.0, 270.0)), detection=detection)
+    sensor = mobile_sensor("lmb", GridPlatform(100.0, 100.0, (0.0, 90.0, 180.0, 270.0)), detection=detection)
     belief = LMB.from_bernoullis([(0, 0)], [0.9], [[100.0, 200.0, 0.0, 0.0]], [np.diag([25.0, 25.0, 1.0, 1.0])])
     settings = replace(KNOWN, horizon_steps=1, horizon_period=1.0)
     given = Situation((sensor,), Clmb((1.0,)), settings, (belief,), belief, np.zeros((1, 3)))
@@ -168,8 +168,8 @@ def test_many_sensors_each_have_their_share_of_the_budget() -> None:
 
 def test_sensors_may_have_other_platforms() -> None:
     given = lmbs()
-    moving = MobileSensor(given.sensors[1].filter, Steps(60.0, 30.0, (0.0, 90.0)))
-    turning = MobileSensor(given.sensors[0].filter, Courses((10.0, 30.0), (-45.0, 45.0), relative=True))
+    moving = MobileSensor(given.sensors[1].filter, GridPlatform(60.0, 30.0, (0.0, 90.0)))
+    turning = MobileSensor(given.sensors[0].filter, HeadingPlatform((10.0, 30.0), (-45.0, 45.0), relative=True))
     mixed = replace(given, sensors=(turning, moving))
     plan = decide(planner(mixed, depth=3, budget=80), mixed)
     assert [rows.shape for rows in plan.sequence] == [(3, 2), (3, 2)]
@@ -234,7 +234,7 @@ def test_the_best_single_decision_stays_inside_the_search(search: Any, discount:
 
 def test_beams_find_the_best_of_all_from_there() -> None:
     """Of 28,561 joint sequences the best, within a budget of 2000."""
-    sensor = mobile_sensor("lmb", Courses(30.0, tuple(range(-180, 181, 30))))
+    sensor = mobile_sensor("lmb", HeadingPlatform(30.0, tuple(range(-180, 181, 30))))
     budgets: tuple[dict[str, Any], ...] = ({"budget": 28_561}, {})
     found = []
     for seed in range(6):

@@ -36,10 +36,10 @@ from vedette.control import (
 )
 from vedette.control.lookahead import courses as courses_module
 from vedette.control.lookahead import rules as rules_module
-from vedette.control.lookahead.ahead import Stages
+from vedette.control.lookahead.constraints import Stages
 from vedette.densities import LMB, track_moments
 from vedette.fusion import Clmb
-from vedette.platforms import Steps
+from vedette.platforms import GridPlatform
 
 BOX = (-480.0, -100.0, -200.0, 310.0)  # that is not entered
 INSIDE = (-900.0, 700.0, -700.0, 700.0)  # that is not left
@@ -239,7 +239,7 @@ def test_searches_evaluate_nothing_that_is_forbidden(search: Any, names: Any, nu
 def scene(poses: Any, targets: Any, directions: Any, **steps: Any) -> Situation:
     """Sensors that see 50 m and take steps of 100 m."""
     detection = models.limited_range(0.95, 50.0)
-    sensor = mobile_sensor("lmb", Steps(100.0, 100.0, directions, **steps), detection=detection)
+    sensor = mobile_sensor("lmb", GridPlatform(100.0, 100.0, directions, **steps), detection=detection)
     num = len(targets)
     means, cov = [[x, y, 0.0, 0.0] for x, y in targets], np.diag([25.0, 25.0, 1.0, 1.0])
     belief = LMB.from_bernoullis([(0, i) for i in range(num)], [0.9] * num, means, [cov] * num)

@@ -20,7 +20,7 @@ from vedette.control import (
 )
 from vedette.densities import LMB, UndetectedIntensity
 from vedette.fusion import ParallelUpdate
-from vedette.platforms import Courses
+from vedette.platforms import HeadingPlatform
 from vedette.tracking import State
 
 HEADINGS = (0.0, 90.0, 180.0)
@@ -32,7 +32,7 @@ ONE = replace(KNOWN, horizon_steps=1, horizon_period=PERIOD, undetected_worth=WO
 
 def sensors() -> Any:
     detection = models.limited_range(0.9, RANGE)
-    return (mobile_sensor("lmb", Courses(SPEED, HEADINGS), detection=detection),) * 2
+    return (mobile_sensor("lmb", HeadingPlatform(SPEED, HEADINGS), detection=detection),) * 2
 
 
 def state(expected: Any) -> State:

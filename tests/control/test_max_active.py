@@ -12,6 +12,7 @@ from control.examples import KNOWN, Situation, additive_of, decided, situation, 
 from control.test_additive import shared, single
 from control.test_switched import switchable
 from vedette.control import (
+    ConstraintReportingPlanner,
     CoordinateAscent,
     HorizonPlanner,
     IndependentPlanner,
@@ -19,10 +20,9 @@ from vedette.control import (
     MaxActive,
     RandomPlanner,
     Separation,
-    WatchedPlanner,
 )
 from vedette.control.baselines import FixedPlanner
-from vedette.control.constraints import Active, Mask, opened, repaired
+from vedette.control.constraints import Active, Mask, nearest_feasible, relaxed
 from vedette.control.inputs import mask_of_decision, options_of
 from vedette.control.rewards import CauchySchwarzReward, ExpectedLossReward
 from vedette.control.rules_of_thumb import RulePlanner
@@ -151,7 +151,7 @@ def test_what_is_repaired_is_allowed_and_keeps_its_courses(seed: int) -> None:
     rng = np.random.default_rng(seed)
     mask = Mask((np.ones(6, bool),) * 5, active=active(5, 3, 2))
     for start in rng.integers(6, size=(50, 5)).tolist():
-        found = repaired(mask, start)
+        found = nearest_feasible(mask, start)
         assert mask.allows(np.array([found]))[0]
         assert [course % 3 for course in found] == [course % 3 for course in start]
         assert sum(course < 3 for course in found) == min(2, sum(course < 3 for course in start))
@@ -163,11 +163,11 @@ def test_sensors_that_cannot_be_switched_off_stay_on_and_too_many_are_named() ->
     mask = mask_for(mixed, MaxActive(1))
     assert mask.active is not None
     assert [own.tolist() for own in mask.active.off] == [[0, 1, 2], [3, 4, 5] * 2, [3, 4, 5] * 2]
-    assert repaired(mask, (0, 0, 0)) == (0, 3, 3)
+    assert nearest_feasible(mask, (0, 0, 0)) == (0, 3, 3)
     never = mask_for(plain, MaxActive(2))
     assert never.active is None
     assert "no more than 2 sensors were to scan, and too few can be switched off" in never.notes[0]
-    assert opened(never)[0].allows(np.array([[0, 0, 0]]))[0]
+    assert relaxed(never)[0].allows(np.array([[0, 0, 0]]))[0]
 
 
 def vars_of(example: Situation) -> tuple[Any, ...]:
@@ -177,6 +177,6 @@ def vars_of(example: Situation) -> tuple[Any, ...]:
 def test_a_planner_that_keeps_to_no_constraints_is_watched() -> None:
     example = switchable(shared(3))
     fixed = FixedPlanner((Actions.of(heading_deg=0.0, on=1.0),) * 3)
-    watched = WatchedPlanner(fixed, example.sensors, example.settings, (MaxActive(2),))
+    watched = ConstraintReportingPlanner(fixed, example.sensors, example.settings, (MaxActive(2),))
     plan = watched.plan(*example.arguments, rng=np.random.default_rng(0))
     assert plan.notes == ("3 sensors scan; expected at most 2",)

@@ -27,11 +27,11 @@ from control.examples import (
 from control.plain_loop import plain_rewards
 from vedette import models
 from vedette.control import CauchySchwarzReward, RenyiReward
-from vedette.control.cases import PlainRewards
+from vedette.control.pseudo_posterior_rewards import PlainRewards
 from vedette.control.search import all_joint_actions
 from vedette.densities import GLMB, LMB
 from vedette.fusion import Clmb, CmDeltaGlmb, FusionLimits
-from vedette.platforms import Courses
+from vedette.platforms import HeadingPlatform
 
 SEED = 5
 
@@ -79,7 +79,7 @@ def test_sensors_of_other_kinds_speeds_and_actions(kind: str) -> None:
     sensors = (
         mobile_sensor(
             kind,
-            Courses(10.0, (20.0,)),
+            HeadingPlatform(10.0, (20.0,)),
             measurement=models.bearing_only(),
             noise=models.range_dependent_noise(sigma_bearing=0.01, eta_bearing=1e-5),
             clutter=models.measurement_space_clutter(2.0, [-np.pi], [np.pi]),
@@ -87,14 +87,14 @@ def test_sensors_of_other_kinds_speeds_and_actions(kind: str) -> None:
         ),
         mobile_sensor(
             kind,
-            Courses(60.0, (-30.0, 30.0, 90.0, 180.0), relative=True),
+            HeadingPlatform(60.0, (-30.0, 30.0, 90.0, 180.0), relative=True),
             measurement=models.position(),
             noise=models.constant_noise([10.0, 20.0]),
             detection=models.limited_range(0.9, 800.0),
             clutter=models.measurement_space_clutter(3.0, [-2000.0, -2000.0], [2000.0, 2000.0]),
             method="ckf",
         ),
-        mobile_sensor(kind, Courses(30.0, (0.0, 120.0))),
+        mobile_sensor(kind, HeadingPlatform(30.0, (0.0, 120.0))),
     )
     settings = replace(SETTINGS, ideal_measurements="sampled")
     joint = assert_equals_plain_loop(replace(situation(kind, 3, settings=settings), sensors=sensors), "reference")

@@ -33,10 +33,10 @@ from vedette.control import (
 )
 from vedette.densities import GLMB, LMB, TrackTable
 from vedette.fusion import Clmb, CmDeltaGlmb
-from vedette.platforms import PAPER_HEADINGS_DEG, Actions, Courses
+from vedette.platforms import PAPER_HEADINGS_DEG, Actions, HeadingPlatform
 
 KINDS = ["delta", "marginal", "lmb"]
-PAPER = Courses(30.0)
+PAPER = HeadingPlatform(30.0)
 
 
 def planners(example: Situation, reward: Any = None) -> tuple[JointPlanner, IndependentPlanner]:
@@ -114,7 +114,7 @@ def test_west_and_west_share_a_value_and_are_evaluated_once(kind: str) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_equal_rewards_go_to_the_first_in_printed_order(kind: str) -> None:
     # At no speed all headings are one place.
-    joint, independent = plans(situation(kind, platform=Courses(0.0, (120.0, -60.0, 0.0))))
+    joint, independent = plans(situation(kind, platform=HeadingPlatform(0.0, (120.0, -60.0, 0.0))))
     assert np.ptp(joint.tables[0].mean) == 0.0
     assert joint.chosen == independent.chosen == (0, 0)
 
@@ -122,7 +122,9 @@ def test_equal_rewards_go_to_the_first_in_printed_order(kind: str) -> None:
 def symmetric(kind: str, headings: tuple[float, ...]) -> Situation:
     """One target known to be straight ahead of both sensors, which stand behind each other on its course."""
     detection = models.constant_detection(0.95)
-    sensors = tuple(mobile_sensor(kind, platform=Courses(30.0, headings), detection=detection) for _ in range(2))
+    sensors = tuple(
+        mobile_sensor(kind, platform=HeadingPlatform(30.0, headings), detection=detection) for _ in range(2)
+    )
     known = [600.0, 0.0, 10.0, 0.0]
     cov = np.diag([900.0, 900.0, 25.0, 25.0])
     belief: Any = LMB.from_bernoullis([A], [0.99], [known], [cov])
@@ -216,7 +218,8 @@ def test_the_order_of_the_sensors_turns_the_table_and_nothing_else(kind: str) ->
 def test_an_action_has_the_same_reward_whatever_the_others_are() -> None:
     example = situation("marginal")
     fewer = replace(
-        example, sensors=tuple(replace(sensor, platform=Courses(30.0, HEADINGS[1:])) for sensor in example.sensors)
+        example,
+        sensors=tuple(replace(sensor, platform=HeadingPlatform(30.0, HEADINGS[1:])) for sensor in example.sensors),
     )
     for all_of_them, some in zip(plans(example), plans(fewer), strict=True):
         for large, small in zip(all_of_them.tables, some.tables, strict=True):
@@ -241,14 +244,15 @@ def test_changes_of_heading_are_headings_from_the_present_one() -> None:
         example,
         poses=poses,
         sensors=tuple(
-            replace(sensor, platform=Courses(30.0, (-30.0, 0.0, 30.0), relative=True)) for sensor in example.sensors
+            replace(sensor, platform=HeadingPlatform(30.0, (-30.0, 0.0, 30.0), relative=True))
+            for sensor in example.sensors
         ),
     )
     headings = ((140.0, 170.0, -160.0), (-60.0, -30.0, 0.0))
     absolute = replace(
         turns,
         sensors=tuple(
-            replace(sensor, platform=Courses(30.0, values))
+            replace(sensor, platform=HeadingPlatform(30.0, values))
             for sensor, values in zip(example.sensors, headings, strict=True)
         ),
     )
@@ -261,7 +265,7 @@ def test_changes_of_heading_are_headings_from_the_present_one() -> None:
 
 
 def test_one_sensor_with_one_action() -> None:
-    example = situation("marginal", 1, platform=Courses(30.0, (25.0,)))
+    example = situation("marginal", 1, platform=HeadingPlatform(30.0, (25.0,)))
     joint, independent = plans(example)
     assert joint.chosen == independent.chosen == (0,)
     assert joint.tables[0].mean.shape == (1,)
@@ -286,7 +290,7 @@ def test_the_default_settings_take_the_papers_number_of_steps() -> None:
 
 
 def test_random_control_takes_each_direction_equally_often() -> None:
-    sensors = (mobile_sensor("lmb", PAPER), mobile_sensor("lmb", Courses(30.0, (10.0,))))
+    sensors = (mobile_sensor("lmb", PAPER), mobile_sensor("lmb", HeadingPlatform(30.0, (10.0,))))
     planner, rng = RandomPlanner(sensors), np.random.default_rng(0)
     chosen = [planner.plan(None, np.zeros((2, 3)), rng=rng) for _ in range(1200)]  # type: ignore[arg-type]
     counts = np.bincount([plan.chosen[0] for plan in chosen], minlength=13)

@@ -20,8 +20,8 @@ from vedette.control import (
     SequentialGreedy,
 )
 from vedette.control.constraints import Mask
-from vedette.control.inputs import options_of, staying
-from vedette.platforms import Carried, Courses, Pointing, Steps, options_at
+from vedette.control.inputs import options_of, stationary_courses
+from vedette.platforms import GridPlatform, HeadingPlatform, MountedPlatform, Pointing, options_at
 
 LOSS = ExpectedLossReward(60.0)
 TIMES = np.array([1.0, 2.0])
@@ -35,7 +35,7 @@ def one_scan(example: Any) -> Any:
 
 
 def stay_of(example: Any) -> tuple[int, ...]:
-    return staying(options_of(example.sensors, example.poses, example.settings), None)
+    return stationary_courses(options_of(example.sensors, example.poses, example.settings), None)
 
 
 @pytest.mark.parametrize("seed", [1, 2])
@@ -115,7 +115,9 @@ def test_it_is_explained_by_what_each_sensor_adds_to_those_that_stay() -> None:
     np.testing.assert_allclose(why.of_sensors, with_it - without_it, atol=1e-9)
     assert why.of_targets is not None
     assert why.baseline + why.of_targets.total.sum() == pytest.approx(why.reward)
-    assert why.had(1, 0).difference == pytest.approx(plan.tables[1].mean[0] - plan.tables[1].mean[plan.chosen[1]])
+    assert why.counterfactual(1, 0).difference == pytest.approx(
+        plan.tables[1].mean[0] - plan.tables[1].mean[plan.chosen[1]]
+    )
 
 
 CAMERA = [0.0, 0.0, 0.5, np.radians(170.0), 0.3]
@@ -124,28 +126,28 @@ CAMERA = [0.0, 0.0, 0.5, np.radians(170.0), 0.3]
 @pytest.mark.parametrize(
     ("platform", "pose", "wanted"),
     [
-        (Courses(5.0), [3.0, 4.0, np.radians(61.0)], [60.0]),
-        (Courses(5.0), [0.0, 0.0, np.radians(-179.0)], [-180.0]),
-        (Courses((5.0, 8.0), (0.0, 90.0)), [0.0, 0.0, 1.5], [90.0, 5.0]),
-        (Courses(0.0, (-20.0, 0.0, 20.0), relative=True), [0.0, 0.0, np.pi / 2], [90.0]),
-        (Steps(10.0, 5.0), [0.0, 0.0, 0.0], [0.0, 0.0]),
-        (Steps(10.0, 5.0, stay=False), [0.0, 0.0, np.radians(50.0)], None),
+        (HeadingPlatform(5.0), [3.0, 4.0, np.radians(61.0)], [60.0]),
+        (HeadingPlatform(5.0), [0.0, 0.0, np.radians(-179.0)], [-180.0]),
+        (HeadingPlatform((5.0, 8.0), (0.0, 90.0)), [0.0, 0.0, 1.5], [90.0, 5.0]),
+        (HeadingPlatform(0.0, (-20.0, 0.0, 20.0), relative=True), [0.0, 0.0, np.pi / 2], [90.0]),
+        (GridPlatform(10.0, 5.0), [0.0, 0.0, 0.0], [0.0, 0.0]),
+        (GridPlatform(10.0, 5.0, stay=False), [0.0, 0.0, np.radians(50.0)], None),
         (Pointing((-170.0, 150.0)), CAMERA, [-170.0]),
-        (Carried(Steps(10.0, 5.0), Pointing((0.0, 160.0))), CAMERA, [0.0, 0.0, 160.0]),
+        (MountedPlatform(GridPlatform(10.0, 5.0), Pointing((0.0, 160.0))), CAMERA, [0.0, 0.0, 160.0]),
     ],
 )
 def test_a_sensor_that_stays_changes_its_pose_least(platform: Any, pose: list[float], wanted: Any) -> None:
     options = options_at("platform", platform, np.array(pose), TIMES)
-    (course,) = staying((options,), None)
+    (course,) = stationary_courses((options,), None)
     action = options.actions.values[options.first_action(course)]
     expected = 10.0 * np.sqrt([0.5, 0.5]) if wanted is None else wanted
     np.testing.assert_allclose(action, expected, atol=1e-9)
 
 
 def test_a_sensor_does_not_stay_on_a_course_that_is_forbidden() -> None:
-    options = options_at("platform", Courses(5.0, (0.0, 40.0, 180.0)), np.array([0.0, 0.0, 0.0]), TIMES)
-    assert staying((options,), Mask((np.array([False, True, True]),))) == (1,)
-    assert staying((options,), Mask((np.zeros(3, bool),))) == (0,)
+    options = options_at("platform", HeadingPlatform(5.0, (0.0, 40.0, 180.0)), np.array([0.0, 0.0, 0.0]), TIMES)
+    assert stationary_courses((options,), Mask((np.array([False, True, True]),))) == (1,)
+    assert stationary_courses((options,), Mask((np.zeros(3, bool),))) == (0,)
 
 
 def test_settings_of_the_presumption_are_checked() -> None:

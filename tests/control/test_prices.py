@@ -17,7 +17,7 @@ from vedette.control.rewards import CauchySchwarzReward, ExpectedLossReward, Pee
 from vedette.control.search import SequentialGreedy, all_joint_actions
 from vedette.errors import InputError
 from vedette.kernels.planning.ascent import Allowed
-from vedette.platforms import Courses, Operated, Still
+from vedette.platforms import HeadingPlatform, Operated, Stationary
 from vedette.platforms.base import options_at
 
 SHAPE = (6, 6, 6)
@@ -27,7 +27,7 @@ REWARDS: list[Any] = [CauchySchwarzReward("reference"), PeecsReward(0.3, 80.0), 
 
 def unpriced(seed: int = 0) -> Situation:
     """Three sensors that go in one of three directions at one of two speeds."""
-    return shared(3, seed, platform=Courses((20.0, 30.0), (-90.0, 0.0, 45.0)))
+    return shared(3, seed, platform=HeadingPlatform((20.0, 30.0), (-90.0, 0.0, 45.0)))
 
 
 def priced(example: Situation, scale: float = 0.02) -> Situation:
@@ -81,7 +81,7 @@ def test_prices_are_subtracted_case_by_case() -> None:
 
 def scaled(seed: int, scale: float) -> Situation:
     """Prices of the size of rewards: speeds in other units."""
-    example = shared(3, seed, platform=Courses((20.0 * scale, 30.0), (-90.0, 0.0, 45.0)))
+    example = shared(3, seed, platform=HeadingPlatform((20.0 * scale, 30.0), (-90.0, 0.0, 45.0)))
     return priced(replace(example, settings=replace(KNOWN, num_samples=5)), 0.7)
 
 
@@ -159,6 +159,6 @@ def test_prices_that_are_none_are_refused() -> None:
     with pytest.raises(InputError, match=r"price: expected a number or one of fee; got fees"):
         Operated(Hired(), "fees")
     with pytest.raises(InputError, match="price: expected a number or one of no columns; got fee"):
-        Operated(Still(), "fee")
+        Operated(Stationary(), "fee")
     with pytest.raises(InputError, match="price: expected a finite number"):
-        Operated(Still(), float("nan"))
+        Operated(Stationary(), float("nan"))

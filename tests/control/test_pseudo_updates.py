@@ -20,7 +20,7 @@ from control.examples import (
 )
 from control.test_plain_loop import assert_equals_plain_loop
 from vedette import models
-from vedette.control.pseudo import draw_futures, pseudo_posteriors
+from vedette.control.pseudo_updates import draw_futures, pseudo_posteriors
 from vedette.densities import GLMB, sample_glmb
 from vedette.densities.label_sets import label_sets
 from vedette.filters import DeltaGlmbFilter

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vedette.control.constraints import Revisit, Situation
+from vedette.control.constraints import ConstraintContext, Revisit
 from vedette.errors import InputError, ScenarioError
 from vedette.evaluation.runs import run_scenario
-from vedette.platforms import Courses, Patrolling, Still
+from vedette.platforms import HeadingPlatform, Patrolling, Stationary
 from vedette.platforms.base import options_at
 from vedette.platforms.patrolling import CLOCKS
 from vedette.scenarios import Scenario, load_scenario, with_fields
@@ -27,7 +27,7 @@ def test_the_seconds_since_a_visit_are_those_of_a_dense_walk() -> None:
     rng = np.random.default_rng(4)
     for _ in range(50):
         places = rng.uniform(-60.0, 60.0, (3, 2))
-        platform = Patrolling(Courses(10.0, (0.0, 60.0, 135.0)), [(x, y) for x, y in places.tolist()], 15.0)
+        platform = Patrolling(HeadingPlatform(10.0, (0.0, 60.0, 135.0)), [(x, y) for x, y in places.tolist()], 15.0)
         start = pose(*rng.uniform(-60.0, 60.0, 2), 20.0, 0.0, 7.5)
         found = options_at("platform", platform, start, TIMES).courses
         for course, heading in zip(found, np.radians([0.0, 60.0, 135.0]), strict=True):
@@ -42,12 +42,12 @@ def test_the_seconds_since_a_visit_are_those_of_a_dense_walk() -> None:
 
 
 def test_a_platform_that_stays_at_a_place_is_there_all_the_time() -> None:
-    found = options_at("platform", Patrolling(Still(), PLACES, RADIUS), pose(0.0, 240.0, 9.0, 9.0), TIMES).courses
+    found = options_at("platform", Patrolling(Stationary(), PLACES, RADIUS), pose(0.0, 240.0, 9.0, 9.0), TIMES).courses
     assert found[0, :, CLOCKS].tolist() == [0.0] * 12
     assert found[0, :, CLOCKS + 1].tolist() == (9.0 + TIMES).tolist()
 
 
-def situation(*since: float) -> Situation:
+def situation(*since: float) -> ConstraintContext:
     """Two sensors 100 and 200 m from a place, which go towards it, away from it, or stay beside."""
     poses = np.array([pose(100.0, 0.0, *since), pose(-200.0, 0.0, 50.0)])
     ways = np.array([[-10.0, 0.0], [10.0, 0.0], [0.0, 5.0]])
@@ -55,7 +55,7 @@ def situation(*since: float) -> Situation:
     moves = np.zeros((3, 5, len(poses[0])))
     moves[..., :2] = ways[:, np.newaxis] * times[:, np.newaxis]
     courses = [own + moves for own in poses]
-    return Situation(tuple(courses), times, poses=poses)
+    return ConstraintContext(tuple(courses), times, poses=poses)
 
 
 def test_the_nearest_sensor_goes_when_it_is_time() -> None:
@@ -98,13 +98,13 @@ def test_without_the_constraint_they_are_not_visited() -> None:
 
 def test_mistakes_are_named() -> None:
     with pytest.raises(InputError, match="places: expected an array of shape"):
-        Patrolling(Still(), [], 3.0)
+        Patrolling(Stationary(), [], 3.0)
     with pytest.raises(InputError, match="every"):
         Revisit(PLACES, 3.0, 0.0)
     with pytest.raises(InputError, match=r"expected poses of 12 components.*see Patrolling.*got 3"):
-        Revisit(PLACES, 3.0, 9.0).courses(Situation((np.zeros((2, 5, 3)),), TIMES[:5], poses=np.zeros((1, 3))))
+        Revisit(PLACES, 3.0, 9.0).courses(ConstraintContext((np.zeros((2, 5, 3)),), TIMES[:5], poses=np.zeros((1, 3))))
     with pytest.raises(InputError, match="pose: expected 12 components"):
-        options_at("platform", Patrolling(Still(), PLACES, 3.0), np.zeros(CLOCKS), TIMES)
+        options_at("platform", Patrolling(Stationary(), PLACES, 3.0), np.zeros(CLOCKS), TIMES)
     twice = [{"kind": "revisit", "places": [[0.0, 0.0]], "radius": 3.0, "every": 9.0}] * 2
     with pytest.raises(ScenarioError, match="one constraint revisit with all places"):
         visited({"control.constraints": twice})

@@ -12,12 +12,12 @@ from vedette.control import MobileSensor, RulePlanner, StayInside
 from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.models import Region
-from vedette.platforms import Courses, Pointing, Steps
+from vedette.platforms import GridPlatform, HeadingPlatform, Pointing
 from vedette.tracking import State
 
 PLACES = [[0.0, 500.0], [800.0, 0.0], [-300.0, -300.0]]
 POSES = np.array([[0.0, 0.0, 0.0], [-20.0, 100.0, 0.0], [100.0, -50.0, 0.0], [5.0, 5.0, 0.0]])
-PAPER = Courses(50.0)
+PAPER = HeadingPlatform(50.0)
 
 
 def belief(places: list[list[float]] = PLACES, existence: float = 0.99) -> State:
@@ -75,7 +75,7 @@ def test_with_nobody_there_the_first_course_is_taken() -> None:
 
 def test_a_sensor_that_may_stay_stays_over_its_target() -> None:
     state = belief([[0.0, 0.0]])
-    plan = RulePlanner((mobile_sensor("lmb", Steps(30.0, 30.0)),), "nearest")
+    plan = RulePlanner((mobile_sensor("lmb", GridPlatform(30.0, 30.0)),), "nearest")
     [row] = plan.plan(state, POSES[:1], rng=np.random.default_rng(0)).chosen_actions
     assert row.tolist() == [0.0, 0.0]
 
@@ -89,7 +89,7 @@ def test_a_camera_turns_to_its_target() -> None:
 
 
 def test_constraints_are_kept_to() -> None:
-    fence, platform = StayInside(Region(-110.0, 110.0, -110.0, 110.0)), Courses(10.0)
+    fence, platform = StayInside(Region(-110.0, 110.0, -110.0, 110.0)), HeadingPlatform(10.0)
     different = 0
     for rule in ("nearest", "assigned", "centroid"):
         free, held = headings(rule, belief(), platform), headings(rule, belief(), platform, constraints=(fence,))

@@ -29,7 +29,7 @@ from vedette.control import (
 )
 from vedette.control.search import all_joint_actions, first_best
 from vedette.errors import InputError
-from vedette.platforms import Courses
+from vedette.platforms import HeadingPlatform
 
 
 @dataclass
@@ -220,7 +220,7 @@ def joint_plan(example: Situation, search: JointSearch) -> Plan:
     return plan
 
 
-COURSES = Courses(30.0, (-180.0, -90.0, 0.0, 45.0, 90.0, 180.0))
+COURSES = HeadingPlatform(30.0, (-180.0, -90.0, 0.0, 45.0, 90.0, 180.0))
 
 
 @pytest.mark.parametrize("kind", ["delta", "marginal", "lmb"])
@@ -274,7 +274,9 @@ def test_many_sensors() -> None:
         fused=four.fused,
         poses=np.concatenate([four.poses + np.array([0.0, 40.0 * i, 0.0]) for i in range(4)]),
     )
-    example = replace(example, sensors=tuple(replace(sensor, platform=Courses(30.0)) for sensor in example.sensors))
+    example = replace(
+        example, sensors=tuple(replace(sensor, platform=HeadingPlatform(30.0)) for sensor in example.sensors)
+    )
     with pytest.raises(InputError, match="CoordinateAscent"):
         joint_plan(example, ExhaustiveSearch())
     plan = joint_plan(example, CoordinateAscent(0))

@@ -27,12 +27,12 @@ from vedette.control.inputs import options_of
 from vedette.control.rewards import CauchySchwarzReward, ExpectedLossReward, PeecsReward
 from vedette.control.search import SequentialGreedy, all_joint_actions
 from vedette.errors import InputError
-from vedette.platforms import Actions, Carried, Courses, Operated, Pointing, Sequences, Steps
+from vedette.platforms import Actions, GridPlatform, HeadingPlatform, MountedPlatform, Operated, Pointing, Sequences
 from vedette.platforms.base import options_at
 
 REWARDS: list[Any] = [CauchySchwarzReward("reference"), PeecsReward(0.3, 80.0), ExpectedLossReward(60.0)]
 POSE, TIMES = np.array([10.0, -5.0, 0.3]), np.array([0.0, 1.0, 2.0, 3.0])
-SWITCHED = Operated(Courses(30.0, (-90.0, 0.0)), 0.5, switchable=True)
+SWITCHED = Operated(HeadingPlatform(30.0, (-90.0, 0.0)), 0.5, switchable=True)
 
 
 def switchable(example: Situation, price: Any = 0.0) -> Situation:
@@ -61,7 +61,9 @@ def test_parts_of_platforms_are_off_and_have_their_prices() -> None:
     assert Actions.of(on_time=0.0).text(0) == "on_time 0"
     assert later.scans(POSE, row, TIMES).tolist() == [[False, False, False, True], [True] * 4]
     assert later.prices(row).tolist() == [0.5, 1.0]
-    carried = Carried(Operated(Steps(10.0, 5.0), 2.0), Operated(Pointing([-45.0, 45.0]), 0.25, switchable=True))
+    carried = MountedPlatform(
+        Operated(GridPlatform(10.0, 5.0), 2.0), Operated(Pointing([-45.0, 45.0]), 0.25, switchable=True)
+    )
     pose = np.array([0.0, 0.0, 0.0, 0.0, 0.5])
     options = options_at("platform", carried, pose, TIMES)
     is_on = options.actions.values[:, -1] == 1.0
@@ -124,7 +126,7 @@ def test_who_pays_too_much_is_off_and_who_pays_nothing_is_on(kind: Any) -> None:
 @pytest.mark.parametrize("reward", [REWARDS[0], REWARDS[2]])
 def test_looking_ahead_is_worth_what_sequences_are_as_joint_actions(reward: Any) -> None:
     """The best second action, on or off, after each first one; the second time off or on again."""
-    example = switchable(shared(2, platform=Courses(30.0, (-90.0, 45.0))), 0.05)
+    example = switchable(shared(2, platform=HeadingPlatform(30.0, (-90.0, 45.0))), 0.05)
     ahead = decided(example, partial(HorizonPlanner, depth=2, discount=None, budget=10_000), reward)
     sensors = tuple(replace(own, platform=Sequences(own.platform, 8.0, 2)) for own in example.sensors)
     longer = replace(example, sensors=sensors, settings=replace(KNOWN, horizon_steps=4))

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from vedette import models
-from vedette.control.turning import seconds_to_search, seconds_to_turn, turn_rate, turned_on, views_a_second
+from vedette.control.camera_turning import seconds_to_search, seconds_to_turn, turn_rate, turned_on, views_a_second
 from vedette.densities import UndetectedIntensity
 from vedette.evaluation.runs import run_scenario
-from vedette.platforms import Courses, Pointing
+from vedette.platforms import HeadingPlatform, Pointing
 from vedette.platforms.base import options_at
 from vedette.scenarios import Scenario, parse_scenario
 
@@ -22,7 +22,7 @@ HORIZON, RATE, HALF = np.array([1.0, 2.0]), 15.0, 20.0
 POSE = np.array([30.0, -20.0, 0.4, math.radians(10.0), math.radians(HALF)])
 CAMERA = Pointing(np.arange(-180.0, 180.0, 10.0).tolist(), turn_rate_deg=RATE)
 OWN = options_at("platform", CAMERA, POSE, HORIZON)
-OTHER = options_at("platform", Courses(5.0, (0.0, 90.0)), np.array([0.0, 0.0, 0.4]), HORIZON)
+OTHER = options_at("platform", HeadingPlatform(5.0, (0.0, 90.0)), np.array([0.0, 0.0, 0.4]), HORIZON)
 
 
 def test_how_fast_it_turns() -> None:

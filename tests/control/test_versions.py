@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from control.examples import SETTINGS, A, B, Situation, evaluator_of, glmb, sample_rewards, situation
-from vedette.control.pseudo import share_versions
+from vedette.control.pseudo_updates import share_versions
 from vedette.densities import GLMB, TrackTable, existence_probabilities
 
 SETS = [(A, B), (A, B), (A,), (B,), ()]

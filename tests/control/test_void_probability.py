@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.special import ndtr
 
 from control.examples import A, B, C, glmb, lmb
-from vedette.control import Situation, VoidProbability, mask_of, void_probability
+from vedette.control import ConstraintContext, VoidProbability, feasible_action_mask, void_probability
 from vedette.control.constraints.discs import disc_probabilities, near_pairs
 from vedette.densities import GLMB, LMB, FactoredGLMB, as_glmb
 from vedette.errors import InputError
@@ -176,14 +176,14 @@ def test_courses_keep_it_at_every_time() -> None:
         for x in (-100.0, 0.0, 100.0)
     )
     still, aside = np.zeros((3, 3)), np.array([[0.0, 20.0, 0.0], [0.0, 60.0, 0.0], [0.0, 60.0, 0.0]])
-    scene = Situation((np.array([still, aside]), np.array([still])), np.array([1.0, 2.0, 3.0]), beliefs)
+    scene = ConstraintContext((np.array([still, aside]), np.array([still])), np.array([1.0, 2.0, 3.0]), beliefs)
     constraint = VoidProbability(30.0, 0.5)
     assert [own.tolist() for own in constraint.courses(scene)] == [[False, True], [False]]
     assert VoidProbability(30.0, 0.19).courses(scene)[0].all()
-    mask = mask_of([constraint], scene)
+    mask = feasible_action_mask([constraint], scene)
     said = "sensor 2: no course meets its constraints (void_probability); it may take those that violate them least"
     assert mask.notes == (said,)
     with pytest.raises(
         InputError, match="constraint void_probability: expected 3 predicted beliefs, one a time; got 0"
     ):
-        mask_of([constraint], scene._replace(beliefs=()))
+        feasible_action_mask([constraint], scene._replace(beliefs=()))

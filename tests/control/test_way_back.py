@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from control.examples import A, B, C, Situation, decided, lmb, mobile_sensor, situation
+from vedette.control import ConstraintContext as Shown
 from vedette.control import (
     HorizonPlanner,
     IndependentPlanner,
@@ -18,13 +19,12 @@ from vedette.control import (
     RandomPlanner,
     StayInside,
     VoidProbability,
-    mask_of,
+    feasible_action_mask,
 )
-from vedette.control import Situation as Shown
 from vedette.errors import InputError
 from vedette.fusion import ParallelUpdate
 from vedette.models import Region
-from vedette.platforms import Courses
+from vedette.platforms import HeadingPlatform
 
 FENCE = StayInside(Region(-350.0, 350.0, -350.0, 350.0))
 # 160 m wide and 1000 m high: from its middle the way out is to the east or the west.
@@ -33,7 +33,7 @@ WALL = KeepOut(Region(-80.0, 80.0, -500.0, 500.0))
 
 def scene(poses: Any) -> Situation:
     """One belief of sensors that go 100 m within the horizon, in twelve directions; default settings."""
-    platform = Courses(10.0, np.arange(-150.0, 181.0, 30.0).tolist())
+    platform = HeadingPlatform(10.0, np.arange(-150.0, 181.0, 30.0).tolist())
     belief = lmb((A, B, C), np.random.default_rng(3))
     given = situation("lmb", len(poses), settings=PlanningSettings(num_threads=1))
     sensors = (mobile_sensor("lmb", platform),) * len(poses)
@@ -119,8 +119,8 @@ def test_violations_are_what_they_say() -> None:
 def test_violations_of_several_constraints_are_summed() -> None:
     shown = courses([[360.0, 0.0]], [[0.0, 353.0]], [[352.0, 0.0]])
     north = StayInside(Region(-1000.0, 1000.0, 50.0, 1000.0))
-    assert mask_of([FENCE, north], shown).single[0].tolist() == [False, True, False]
-    assert mask_of([FENCE], shown).single[0].tolist() == [False, False, True]
+    assert feasible_action_mask([FENCE, north], shown).single[0].tolist() == [False, True, False]
+    assert feasible_action_mask([FENCE], shown).single[0].tolist() == [False, False, True]
 
 
 class Own:
@@ -145,14 +145,17 @@ class Measured(Own):
 
 def test_constraints_of_ones_own_may_measure_too() -> None:
     shown = courses([[1.0, 0.0]], [[2.0, 0.0]])
-    assert mask_of([Own()], shown).single[0].tolist() == [True, True]
-    assert mask_of([Measured([[2.0, 1.0]])], shown).single[0].tolist() == [False, True]
+    assert feasible_action_mask([Own()], shown).single[0].tolist() == [True, True]
+    assert feasible_action_mask([Measured([[2.0, 1.0]])], shown).single[0].tolist() == [False, True]
     assert (
-        mask_of([VoidProbability(1.0, 0.5)], shown._replace(beliefs=(lmb((), np.random.default_rng(0)),))).notes == ()
+        feasible_action_mask(
+            [VoidProbability(1.0, 0.5)], shown._replace(beliefs=(lmb((), np.random.default_rng(0)),))
+        ).notes
+        == ()
     )
 
 
 @pytest.mark.parametrize("given", [[[2.0, 0.0]], [[2.0, -1.0]], [[1.0]], [[np.nan, 1.0]], []])
 def test_violations_must_fit_what_is_allowed(given: Any) -> None:
     with pytest.raises(InputError, match="constraint own: expected violations of 2 numbers of sensor 1"):
-        mask_of([Measured(given)], courses([[1.0, 0.0]], [[2.0, 0.0]]))
+        feasible_action_mask([Measured(given)], courses([[1.0, 0.0]], [[2.0, 0.0]]))

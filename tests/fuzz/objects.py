@@ -71,15 +71,15 @@ def _models() -> Iterator[tuple[str, Made]]:
         (models.BirthModel, {"existence": [0.1], "means": [STATE], "covs": [np.eye(4)], "steps": frozenset([1])}),
         (models.CellGrid.covering, {"region": region, "cell": 20.0}),
         (models.CellGrid, {"region": region, "columns": 3, "rows": 3}),
-        (platforms.Courses, {"speed": 5.0, "headings_deg": [0.0, 90.0], "relative": False}),
-        (platforms.Steps, {"length": 5.0, "speed": 5.0, "directions_deg": [0.0, 90.0], "stay": True}),
+        (platforms.HeadingPlatform, {"speed": 5.0, "headings_deg": [0.0, 90.0], "relative": False}),
+        (platforms.GridPlatform, {"length": 5.0, "speed": 5.0, "directions_deg": [0.0, 90.0], "stay": True}),
         (platforms.Waypoints, {"points": [[0.0, 0.0], [1.0, 1.0]], "speed": 5.0, "closed": False}),
         (
             platforms.Pointing,
             {"pointings_deg": [0.0], "relative": False, "half_widths_deg": [9.0], "turn_rate_deg": 3.0},
         ),
-        (platforms.Carried, {"carrier": platforms.Still(), "pointing": platforms.Pointing([0.0])}),
-        (platforms.Sequences, {"platform": platforms.Courses(5.0), "depth": 2, "period": 1.0}),
+        (platforms.MountedPlatform, {"carrier": platforms.Stationary(), "pointing": platforms.Pointing([0.0])}),
+        (platforms.Sequences, {"platform": platforms.HeadingPlatform(5.0), "depth": 2, "period": 1.0}),
         (platforms.Actions, {"columns": ("heading_deg",), "values": np.zeros((1, 1))}),
         (
             models.SensorModel,
@@ -196,7 +196,7 @@ def _trackers() -> Iterator[tuple[str, Made]]:
 
 
 def _control() -> Iterator[tuple[str, Made]]:
-    mobile = control.MobileSensor(filters.LmbFilter(targets(), sensor()), platforms.Courses(5.0, [0.0, 90.0]))
+    mobile = control.MobileSensor(filters.LmbFilter(targets(), sensor()), platforms.HeadingPlatform(5.0, [0.0, 90.0]))
     settings = control.PlanningSettings(horizon_steps=1, num_samples=2, num_threads=1)
     state = tracking.State((lmb(), lmb()), lmb(), 1, 1.0)
     region = models.Region(-100.0, 100.0, -100.0, 100.0)

@@ -118,7 +118,7 @@ def test_a_stamp_covers_every_kernel_file_that_is_reached() -> None:
 
 IMPORTS = """
 from vedette.kernels.gaussian.linalg import cholesky
-from vedette.kernels.planning.known import (  # a comment
+from vedette.kernels.planning.known_association import (  # a comment
     Entries,
     fill_changes,
 )
@@ -132,7 +132,7 @@ def late():
 def test_every_way_to_import_a_kernel_is_found(tmp_path: Path) -> None:
     (tmp_path / "own.py").write_text(IMPORTS, encoding="utf-8")
     found = {path.relative_to(KERNELS).as_posix() for path in sources._kernel_imports(tmp_path / "own.py")}
-    assert found == {"gaussian/linalg.py", "planning/known.py", "labelled/gci.py", "steps/lmb.py"}
+    assert found == {"gaussian/linalg.py", "planning/known_association.py", "labelled/gci.py", "steps/lmb.py"}
 
 
 def test_imports_are_found_as_a_parser_finds_them() -> None:

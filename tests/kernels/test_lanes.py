@@ -13,14 +13,14 @@ from vedette.kernels.gaussian.innovation import expect, make_innovation
 from vedette.kernels.gaussian.prediction import predict
 from vedette.kernels.gaussian.relinearisation import Pair, make_pair_work, relinearise
 from vedette.kernels.gaussian.scratch import make_scratch
-from vedette.kernels.planning.forms import ANY
-from vedette.kernels.planning.lanes import (
-    expect_lanes,
-    make_lane_work,
-    make_lanes,
-    predict_lanes,
-    relinearise_lanes,
+from vedette.kernels.planning.batched_ekf import (
+    expect_batch,
+    make_batch,
+    make_batch_work,
+    predict_batch,
+    relinearise_batch,
 )
+from vedette.kernels.planning.batched_models import ANY
 
 NUM, ROOM, DT = 11, 16, 1.5
 POSE = np.array([-300.0, 120.0, 0.4])
@@ -89,9 +89,9 @@ def test_steps_are_those_of_one_gaussian_at_a_time(name: str, motion: models.Mot
     forms = forms_of(moves, sees, DT, dim)
     assert forms.is_linear == (dim == 4)
     means, covs = gaussians(dim, 4.0 if "wide" in name else 1.0)
-    lanes, work = make_lanes(dim, sensor.meas_dim, ROOM), make_lane_work(dim, sensor.meas_dim, ROOM)
-    predict_lanes(moves, forms, DT, side_by_side(means), side_by_side(covs), NUM, lanes, work)
-    expect_lanes(sees, forms, POSE, NUM, lanes, work)
+    lanes, work = make_batch(dim, sensor.meas_dim, ROOM), make_batch_work(dim, sensor.meas_dim, ROOM)
+    predict_batch(moves, forms, DT, side_by_side(means), side_by_side(covs), NUM, lanes, work)
+    expect_batch(sees, forms, POSE, NUM, lanes, work)
     expected, scratch = make_innovation(1, dim, sensor.meas_dim), make_scratch(dim, sensor.meas_dim)
     mean, cov, lower, few = np.empty(dim), np.empty((dim, dim)), np.tril_indices(dim), np.tril_indices(sensor.meas_dim)
     for s in range(NUM):
@@ -113,13 +113,13 @@ def test_gaussians_that_bend_are_updated_as_one_at_a_time(name: str) -> None:
     sensor, rng = sensor_of(name), np.random.default_rng(3)
     sees, (means, covs) = sensor.to_kernel(), gaussians(4, 4.0)
     forms = forms_of(models.kernel_motion(models.constant_velocity(2.0), models.constant_survival(1.0)), sees, DT, 4)
-    lanes, work = make_lanes(4, sensor.meas_dim, ROOM), make_lane_work(4, sensor.meas_dim, ROOM)
+    lanes, work = make_batch(4, sensor.meas_dim, ROOM), make_batch_work(4, sensor.meas_dim, ROOM)
     lanes.means[:], lanes.covs[:] = side_by_side(means), side_by_side(covs)
-    expect_lanes(sees, forms, POSE, NUM, lanes, work)
+    expect_batch(sees, forms, POSE, NUM, lanes, work)
     is_seen, scans = np.arange(ROOM) % 3 > 0, sensor.measurement.measure(means + rng.normal(size=(NUM, 4)), POSE)
     assert (work.bends[:NUM] & is_seen[:NUM]).any()
     measurements, pair = side_by_side(scans), make_pair_work(4, sensor.meas_dim)
-    relinearise_lanes(sees, POSE, measurements, is_seen, NUM, lanes, work)
+    relinearise_batch(sees, POSE, measurements, is_seen, NUM, lanes, work)
     for s in np.flatnonzero(work.bends[:NUM] & is_seen[:NUM]):
         expect(sees, POSE, means[s], covs[s], 0, pair.innovation, pair.scratch)
         relinearise(sees, Pair(POSE, means[s], covs[s], scans[s]), pair)
@@ -145,6 +145,6 @@ def test_what_no_gaussian_has_is_told_as_of_one_alone() -> None:
     moves, sees = models.kernel_motion(motion, models.constant_survival(1.0)), sensor.to_kernel()
     forms, (means, covs) = forms_of(moves, sees, DT, 4), gaussians(4)
     means[3, 0] = np.inf
-    lanes, work = make_lanes(4, 2, ROOM), make_lane_work(4, 2, ROOM)
+    lanes, work = make_batch(4, 2, ROOM), make_batch_work(4, 2, ROOM)
     with pytest.raises(Exception, match="predicted mean or covariance is not"):
-        predict_lanes(moves, forms, DT, side_by_side(means), side_by_side(covs), NUM, lanes, work)
+        predict_batch(moves, forms, DT, side_by_side(means), side_by_side(covs), NUM, lanes, work)

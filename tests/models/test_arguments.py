@@ -11,10 +11,10 @@ import pytest
 from vedette.errors import InputError
 from vedette.filters import TwoStepFilter
 from vedette.models.arguments import instance, provides
-from vedette.platforms import Courses, Operated, Still
-from vedette.platforms.base import Platform, TakesManyActions, WithPrices, WithScans
+from vedette.platforms import HeadingPlatform, Operated, Stationary
+from vedette.platforms.base import HasPrices, HasScans, Platform, SupportsManyActions
 
-PROTOCOLS = (Platform, TakesManyActions, WithPrices, WithScans, TwoStepFilter)
+PROTOCOLS = (Platform, SupportsManyActions, HasPrices, HasScans, TwoStepFilter)
 
 
 class Loose:
@@ -26,13 +26,20 @@ class Loose:
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 def test_provides_is_isinstance_of_a_protocol(protocol: Any) -> None:
-    objects = [Courses(50.0), Still(), Operated(Courses(50.0), 1.0), np.zeros(3), SimpleNamespace(), None]
+    objects = [
+        HeadingPlatform(50.0),
+        Stationary(),
+        Operated(HeadingPlatform(50.0), 1.0),
+        np.zeros(3),
+        SimpleNamespace(),
+        None,
+    ]
     objects += [Loose(prices=len), Loose(), Loose(prices=None), SimpleNamespace(scans=len, courses=len)]
     for each in objects:
         assert provides(each, protocol) == isinstance(each, protocol), each
 
 
 def test_an_object_that_lacks_a_member_is_refused() -> None:
-    instance("platform", Courses(50.0), Platform)
+    instance("platform", HeadingPlatform(50.0), Platform)
     with pytest.raises(InputError, match="platform: expected a Platform; got Loose"):
         instance("platform", Loose(columns=()), Platform)

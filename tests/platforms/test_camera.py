@@ -9,7 +9,7 @@ import pytest
 
 from vedette.errors import InputError, ModelError
 from vedette.models import camera
-from vedette.platforms import Carried, Courses, Pointing, Steps, Still, options_at
+from vedette.platforms import GridPlatform, HeadingPlatform, MountedPlatform, Pointing, Stationary, options_at
 
 POSE = np.array([100.0, 50.0, 0.3, math.radians(170.0), math.radians(20.0)])
 TIMES = np.array([0.0, 1.0, 3.0, 20.0])
@@ -42,7 +42,7 @@ def test_it_may_be_blind_while_it_turns():
     np.testing.assert_array_equal(turning, [[False, False, True, True], [True] * 4])
     assert Pointing([80.0, 170.0], blind_while_turning=True).scans(POSE, actions, times).all()
     assert Pointing([80.0], turn_rate_deg=20.0).scans(POSE, actions, times).all()
-    carried = options_at("platform", Carried(Still(), slow), POSE, times[1:])
+    carried = options_at("platform", MountedPlatform(Stationary(), slow), POSE, times[1:])
     np.testing.assert_array_equal(carried.scans[:, 0], [False, True])
 
 
@@ -54,8 +54,8 @@ def test_it_zooms_in_every_direction():
 
 
 def test_a_carried_camera_has_every_action_of_both():
-    carrier, pointing = Courses((10.0, 20.0), (0.0, 90.0)), Pointing([0.0, 180.0, -180.0])
-    platform = Carried(carrier, pointing)
+    carrier, pointing = HeadingPlatform((10.0, 20.0), (0.0, 90.0)), Pointing([0.0, 180.0, -180.0])
+    platform = MountedPlatform(carrier, pointing)
     assert platform.columns == ("heading_deg", "speed", "pointing_deg")
     options = options_at("platform", platform, POSE, TIMES)
     assert options.actions.values.shape == (12, 3)
@@ -69,7 +69,7 @@ def test_a_carried_camera_has_every_action_of_both():
 
 def test_a_sensor_of_a_longer_pose_beside_one_of_a_shorter():
     longer = np.array([0.0, 0.0, 0.0, 0.0, 0.0])
-    for platform in (Courses(10.0), Steps(10.0, 1.0), Still()):
+    for platform in (HeadingPlatform(10.0), GridPlatform(10.0, 1.0), Stationary()):
         options = options_at("platform", platform, longer, TIMES)
         assert options.courses.shape[2] == 5
         assert (options.courses[..., 3:] == 0.0).all()

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from vedette.errors import InputError
-from vedette.platforms import Actions, Courses, Fleet, options_at
+from vedette.platforms import Actions, Fleet, HeadingPlatform, options_at
 
 POSES = np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 1.0]])
-PLATFORMS = (Courses(10.0), Courses(20.0))
+PLATFORMS = (HeadingPlatform(10.0), HeadingPlatform(20.0))
 
 
 def test_a_fleet_lies_still_until_it_is_told_to_go():
@@ -29,14 +29,14 @@ def test_a_fleet_wants_a_pose_and_an_action_of_each():
 
 
 def test_equal_courses_are_found_by_their_poses():
-    options = options_at("platform", Courses(10.0, (-180, 0, 180, 360, 0.001)), POSES[0], np.array([1.0, 2.0]))
+    options = options_at("platform", HeadingPlatform(10.0, (-180, 0, 180, 360, 0.001)), POSES[0], np.array([1.0, 2.0]))
     assert options.which.tolist() == [0, 1, 0, 1, 2]
     assert [options.first_action(course) for course in range(3)] == [0, 1, 4]
     np.testing.assert_allclose(options.courses[0, :, 0], [-10.0, -20.0])
 
 
 def test_equal_places_under_other_headings_are_two_courses():
-    options = options_at("platform", Courses(0.0, (0, 90)), POSES[0], np.array([1.0]))
+    options = options_at("platform", HeadingPlatform(0.0, (0, 90)), POSES[0], np.array([1.0]))
     assert len(options.courses) == 2
 
 

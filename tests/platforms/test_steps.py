@@ -8,21 +8,21 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from vedette.platforms import Options, Steps, Still, Waypoints, options_at
+from vedette.platforms import GridPlatform, Options, Stationary, Waypoints, options_at
 
 POSE = np.array([10.0, -5.0, 0.3, 0.7])
 TIMES = np.array([0.0, 1.0, 2.5, 4.0, 100.0])
 
 
 def test_what_is_still_has_one_action_without_numbers():
-    options: Options = options_at("platform", Still(), POSE, TIMES)
+    options: Options = options_at("platform", Stationary(), POSE, TIMES)
     assert options.actions.columns == ()
     assert options.actions.values.shape == (1, 0)
     np.testing.assert_array_equal(options.courses, np.tile(POSE, (1, 5, 1)))
 
 
 def test_a_step_is_made_at_the_speed_and_ends():
-    platform = Steps(100.0, 40.0, (0.0, 90.0, -150.0))
+    platform = GridPlatform(100.0, 40.0, (0.0, 90.0, -150.0))
     actions = platform.actions(POSE)
     expected = [[100.0, 0.0], [0.0, 100.0], [-50.0 * math.sqrt(3), -50.0], [0.0, 0.0]]
     np.testing.assert_allclose(actions, expected, atol=1e-12)
@@ -34,10 +34,10 @@ def test_a_step_is_made_at_the_speed_and_ends():
 
 
 def test_to_stay_is_an_action_that_keeps_the_heading():
-    platform = Steps(100.0, 40.0)
+    platform = GridPlatform(100.0, 40.0)
     assert platform.actions(POSE).shape == (9, 2)
     np.testing.assert_array_equal(platform.course(POSE, platform.actions(POSE)[-1], TIMES), np.tile(POSE, (5, 1)))
-    assert Steps(100.0, 40.0, (0.0,), stay=False).actions(POSE).tolist() == [[100.0, 0.0]]
+    assert GridPlatform(100.0, 40.0, (0.0,), stay=False).actions(POSE).tolist() == [[100.0, 0.0]]
 
 
 POINTS = [[10.0, 15.0], [40.0, 15.0], [40.0, 15.0], [40.0, -25.0]]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from scenarios.minimal import kinds
-from vedette.control import KeepOut, Situation
+from vedette.control import ConstraintContext, KeepOut
 from vedette.scenarios import list_builtin, load_scenario
 from vedette.scenarios.build import build_experiment, build_targets
 from vedette.scenarios.loading import Scenario
@@ -202,7 +202,7 @@ def test_the_land_of_the_patrol_has_no_ship_on_it_and_the_boats_off_it() -> None
     starts = np.array([sensor.position for sensor in scenario.model.sensors[1:]])
     for zone in zones:
         way = np.concatenate([places, starts])[:, np.newaxis]
-        assert zone.courses(Situation((way,), np.ones(1)))[0].all()
+        assert zone.courses(ConstraintContext((way,), np.ones(1)))[0].all()
     assert isinstance(build_experiment(scenario).tracker, Delayed)
 
 

@@ -20,7 +20,17 @@ from vedette.evaluation.rewards import mean_rewards
 from vedette.evaluation.runs import run_scenario
 from vedette.evaluation.track_table import table_of_run
 from vedette.live import live_of
-from vedette.platforms import Actions, ByCompass, Carried, Courses, PlaneCompass, Pointing, Steps, Still, Waypoints
+from vedette.platforms import (
+    Actions,
+    ByCompass,
+    GridPlatform,
+    HeadingPlatform,
+    MountedPlatform,
+    PlaneCompass,
+    Pointing,
+    Stationary,
+    Waypoints,
+)
 from vedette.platforms.base import options_at
 from vedette.recorded import Origin
 from vedette.scenarios import Scenario, load_scenario
@@ -33,10 +43,10 @@ from vedette.simulation.planned import planned_tables
 FAR = Origin(-1.05, 50.7)
 POSE = np.array([98900.0, 30.0, 0.3])
 PLATFORMS = [
-    Courses(8.0),
-    Courses((8.0, 0.0), (0.0, 90.0, 45.0)),
-    Courses(5.0, (-30.0, 0.0, 30.0), relative=True),
-    Steps(20.0, 50.0),
+    HeadingPlatform(8.0),
+    HeadingPlatform((8.0, 0.0), (0.0, 90.0, 45.0)),
+    HeadingPlatform(5.0, (-30.0, 0.0, 30.0), relative=True),
+    GridPlatform(20.0, 50.0),
     Waypoints([[98900.0, 900.0], [97000.0, 30.0]], 4.0),
 ]
 BOATS = """
@@ -81,9 +91,9 @@ def test_a_platform_goes_where_its_course_says(platform: Any, compass: Any) -> N
 
 
 def test_fixed_courses_are_whole_wherever_a_boat_is() -> None:
-    assert ByCompass(Courses(8.0), FAR).actions(POSE)[:4].tolist() == [[270, 8], [240, 8], [210, 8], [180, 8]]
-    assert ByCompass(Steps(20.0, 50.0), FAR).actions(POSE)[[1, -1]].tolist() == [[45, 50, 20], [0, 0, 0]]
-    camera = ByCompass(Carried(Courses(8.0, (0.0,)), Pointing((0.0, 90.0))), FAR)
+    assert ByCompass(HeadingPlatform(8.0), FAR).actions(POSE)[:4].tolist() == [[270, 8], [240, 8], [210, 8], [180, 8]]
+    assert ByCompass(GridPlatform(20.0, 50.0), FAR).actions(POSE)[[1, -1]].tolist() == [[45, 50, 20], [0, 0, 0]]
+    camera = ByCompass(MountedPlatform(HeadingPlatform(8.0, (0.0,)), Pointing((0.0, 90.0))), FAR)
     assert camera.columns == ("course_deg", "speed_mps", "azimuth_deg")
     pose = np.array([*POSE, 0.1, 0.5])
     assert camera.actions(pose).tolist() == [[90, 8, 90], [90, 8, 0]]
@@ -117,7 +127,7 @@ def test_a_custom_platform_gets_its_own_rows_and_tells_courses() -> None:
     with pytest.raises(InputError, match="platform: expected a platform"):
         ByCompass(3, FAR)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="compass: expected a Compass; got int"):
-        ByCompass(Still(), 3)  # type: ignore[arg-type]
+        ByCompass(Stationary(), 3)  # type: ignore[arg-type]
 
 
 def boats(folder: Path, text: str = BOATS) -> Any:

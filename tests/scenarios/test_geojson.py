@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from vedette.control import KeepOut
-from vedette.control.constraints.protocol import Situation
+from vedette.control.constraints.protocol import ConstraintContext
 from vedette.errors import InputError, ScenarioError
 from vedette.evaluation.runs import run_scenario
 from vedette.recorded import Origin
@@ -85,7 +85,7 @@ def test_a_hole_may_be_entered_and_its_edge_not_crossed() -> None:
         [[70.0, 0.0, 0.0], [80.0, 0.0, 0.0]],  # outside of all
         [[-70.0, 0.0, 0.0], [70.0, 0.0, 0.0]],  # across all
     ]
-    (allowed,) = zone.courses(Situation((np.array(ways),), np.arange(2.0)))
+    (allowed,) = zone.courses(ConstraintContext((np.array(ways),), np.arange(2.0)))
     assert allowed.tolist() == [True, False, False, True, False]
     with pytest.raises(InputError, match=r"holes\[0\]: expected a Region, or a polygon of at least 3 corners"):
         KeepOut(outer, (outer[:2],))

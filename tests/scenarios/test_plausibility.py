@@ -19,7 +19,7 @@ from vedette.control import JointPlanner, KeepOut, MobileSensor, StayInside
 from vedette.errors import ImplausibleWarning, InputError, ScenarioError
 from vedette.filters import LmbFilter, PhdFilter, SequentialLmbFilter
 from vedette.fusion import Clmb
-from vedette.platforms import Courses, Pointing
+from vedette.platforms import HeadingPlatform, Pointing
 from vedette.scenarios import Scenario, list_builtin, load_scenario, parse_scenario, with_fields
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.scenarios.plausibility import implausible
@@ -176,7 +176,7 @@ def test_a_heading_in_degrees_is_told(heading: float) -> None:
     pose = np.array([0.0, 0.0, heading])
     lmb, phd = LmbFilter(targets(), sensor(GOOD)), PhdFilter(targets(), sensor(GOOD))
     central = SequentialLmbFilter(targets(), (sensor(GOOD),))
-    mobile = MobileSensor(lmb, Courses(5.0, [0.0, 90.0]))
+    mobile = MobileSensor(lmb, HeadingPlatform(5.0, [0.0, 90.0]))
     state, rng = State((lmb.initial(),), lmb.initial(), 1, 1.0), np.random.default_rng(1)
     calls: list[Callable[[], Any]] = [
         lambda: lmb.step(lmb.initial(), np.empty((0, 2)), pose, 1.0, 1, rng=rng),

@@ -11,14 +11,14 @@ import pytest
 
 from control.examples import mobile_sensor
 from vedette.control import FixedPlanner, Plan, PlanningSettings, StayInside
-from vedette.control.baselines import WatchedPlanner
+from vedette.control.baselines import ConstraintReportingPlanner
 from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.models import Region
-from vedette.platforms import Actions, Courses, Operated
+from vedette.platforms import Actions, HeadingPlatform, Operated
 from vedette.scenarios import load_scenario, with_fields
 from vedette.scenarios.build import build_experiment, build_planner, build_sensors
-from vedette.simulation import KnowsTruth, OraclePlanner, Timetable, Truth, simulate
+from vedette.simulation import OraclePlanner, RequiresTruth, Timetable, Truth, simulate
 from vedette.simulation.cramer_rao import scan_information, transition_jacobians
 from vedette.tracking import State
 
@@ -28,7 +28,7 @@ POSES = np.array([[-500.0, 300.0, 0.2], [-450.0, -350.0, -0.4]])
 STARTS = np.array([[-60.0, 250.0, 8.0, -3.0], [180.0, -120.0, -4.0, 9.0], [-220.0, -300.0, 0.0, 5.0]])
 COVS = [np.diag([400.0, 900.0, 25.0, 9.0]) * (1.0 + 0.3 * i) for i in range(3)]
 SHORT = {"time.num_steps": 12, "control.decision_steps": [10], "ospa.to_step": 12}
-SENSORS = (mobile_sensor("lmb", Courses(30.0, HEADINGS)), mobile_sensor("lmb", Courses(45.0, HEADINGS)))
+SENSORS = (mobile_sensor("lmb", HeadingPlatform(30.0, HEADINGS)), mobile_sensor("lmb", HeadingPlatform(45.0, HEADINGS)))
 
 
 def moved(states: Any, dt: float) -> Any:
@@ -112,7 +112,7 @@ def test_it_takes_what_costs_least(one_belief: bool, depth: int, scans: int) -> 
         costs[joint], ends, then = cost(table, 1, 4, joint, POSES, covs, scans)
         if depth == 2:
             costs[joint] += min(cost(table, 4, 6, later, ends, then, scans)[0] for later in joints)
-    planner = OraclePlanner(SENSORS, table, depth=depth, beam_width=9).told(truth(scans))
+    planner = OraclePlanner(SENSORS, table, depth=depth, beam_width=9).with_truth(truth(scans))
     plan = planner.plan(state(), POSES, rng=np.random.default_rng(0))
     plan.validate()
     assert plan.chosen == min(joints, key=lambda joint: costs[joint])
@@ -199,7 +199,7 @@ def test_it_keeps_to_constraints_and_wants_its_truth() -> None:
     planner = OraclePlanner(SENSORS, timetable(), constraints=(StayInside(Region(-600.0, -100.0, -900.0, 900.0)),))
     with pytest.raises(InputError, match="truth: expected the targets of the run"):
         planner.plan(state(), POSES, rng=np.random.default_rng(0))
-    plan = planner.told(truth()).plan(state(), POSES, rng=np.random.default_rng(0))
+    plan = planner.with_truth(truth()).plan(state(), POSES, rng=np.random.default_rng(0))
     for s, (row, speed) in enumerate(zip(plan.chosen_actions, (30.0, 45.0), strict=True)):
         east = POSES[s, 0] + 10.0 * speed * np.cos(np.radians(row[0]))
         assert -600.0 <= east <= -100.0
@@ -219,7 +219,7 @@ def test_own_planners_may_be_told_it_too() -> None:
         name = "told"
         truth: Truth | None = None
 
-        def told(self, truth: Truth) -> Told:
+        def with_truth(self, truth: Truth) -> Told:
             self.truth = truth
             return self
 
@@ -228,9 +228,11 @@ def test_own_planners_may_be_told_it_too() -> None:
 
     scenario, plain, inside = with_fields(load_scenario("paper-a"), SHORT), Told(), Told()
     sensors = build_sensors(scenario)
-    watched = WatchedPlanner(inside, sensors, PlanningSettings(), (StayInside(Region(-9e3, 9e3, -9e3, 9e3)),))
+    watched = ConstraintReportingPlanner(
+        inside, sensors, PlanningSettings(), (StayInside(Region(-9e3, 9e3, -9e3, 9e3)),)
+    )
     for planner, own in ((plain, plain), (watched, inside)):
-        assert isinstance(planner, KnowsTruth)
+        assert isinstance(planner, RequiresTruth)
         record = simulate(build_experiment(scenario), planner, seed=1, run=0, score=no_score)
         assert own.truth is not None
         np.testing.assert_array_equal(own.truth.states, record.truth.states)

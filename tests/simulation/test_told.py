@@ -14,7 +14,7 @@ from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled, Poisson, Undete
 from vedette.errors import InputError
 from vedette.evaluation import run_scenario
 from vedette.models import BirthModel, CellGrid, MeasurementBirth, Region
-from vedette.platforms import Actions, Courses
+from vedette.platforms import Actions, HeadingPlatform
 from vedette.scenarios import load_scenario, with_fields
 from vedette.scenarios.build import build_planner
 from vedette.simulation import ToldPlanner, Truth
@@ -48,7 +48,7 @@ def truth() -> Truth:
 
 def sensors(kind: str, births: bool) -> Any:
     measured = MeasurementBirth(0.5, 0.03, np.array([20.0, 20.0, 5.0, 5.0])) if births else None
-    found: list[Any] = [mobile_sensor(kind, Courses(speed, (0.0, 90.0))) for speed in (30.0, 45.0)]
+    found: list[Any] = [mobile_sensor(kind, HeadingPlatform(speed, (0.0, 90.0))) for speed in (30.0, 45.0)]
     birth = replace(BirthModel.none(4), from_measurements=measured)
     targets = replace(found[0].filter.targets, birth=birth)
     return tuple(replace(own, filter=replace(own.filter, targets=targets)) for own in found)
@@ -72,7 +72,9 @@ def told_of(kind: str, births: bool) -> State:
     unfound = UndetectedIntensity(CELLS, np.ones(4))
     state = State((fused, local), fused, step=1, time=1.0, undetected=unfound)
     inner = Keeps()
-    plan = ToldPlanner(inner, sensors(kind, births)).told(truth()).plan(state, POSES, rng=np.random.default_rng(0))
+    plan = (
+        ToldPlanner(inner, sensors(kind, births)).with_truth(truth()).plan(state, POSES, rng=np.random.default_rng(0))
+    )
     assert plan.planner == "told"
     found: State = inner.state
     return found
@@ -110,9 +112,9 @@ def test_it_needs_its_truth_and_labels() -> None:
     with pytest.raises(InputError, match="truth: expected the targets of the run"):
         planner.plan(state, POSES, rng=rng)
     with pytest.raises(InputError, match=r"state\.fused: expected a Labelled"):
-        planner.told(truth()).plan(replace(state, fused=Poisson.empty(4)), POSES, rng=rng)
+        planner.with_truth(truth()).plan(replace(state, fused=Poisson.empty(4)), POSES, rng=rng)
     with pytest.raises(InputError, match="truth: expected states of at most 4 components"):
-        planner.told(replace(truth(), states=np.ones((6, 5))))
+        planner.with_truth(replace(truth(), states=np.ones((6, 5))))
 
 
 def test_where_nothing_is_in_sight_it_goes_to_the_targets() -> None:

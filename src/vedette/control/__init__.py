@@ -1,28 +1,28 @@
 """Where to send the sensors next: ideal measurements, rewards, joint action search, constraints, planners."""
 
-from vedette.control.baselines import FixedPlanner, KnowsTruth, Planner, RandomPlanner, WatchedPlanner
+from vedette.control.baselines import ConstraintReportingPlanner, FixedPlanner, Planner, RandomPlanner, RequiresTruth
 from vedette.control.constraints import (
+    ActivationConstraint,
     Constraint,
+    ConstraintContext,
     KeepOut,
     Mask,
     MaxActive,
+    QuantifiedConstraint,
+    RangeLimitedConstraint,
     Revisit,
     Separation,
-    Situation,
     StayInside,
-    Timeless,
+    TimeInvariantConstraint,
     VoidProbability,
-    WithMostActive,
-    WithReach,
-    WithViolations,
-    WithZone,
-    mask_of,
+    ZoneConstraint,
+    feasible_action_mask,
     void_probability,
 )
 from vedette.control.evaluator import Evaluator
-from vedette.control.explanation import Bound, Explanation, Had, RunnerUp, TargetGains
+from vedette.control.explanation import Bound, Counterfactual, Explanation, RunnerUp, TargetGains
 from vedette.control.lookahead import BeamSearch, HorizonPlanner, SequenceProblem, SequenceSearch, TreeSearch
-from vedette.control.plan import Certainty, Plan, RewardTable, SearchCurve
+from vedette.control.plan import Plan, RewardTable, SamplingOutcome, SearchCurve
 from vedette.control.planners import IndependentPlanner, JointPlanner
 from vedette.control.program import ProgramPlanner
 from vedette.control.rewards import (
@@ -30,6 +30,8 @@ from vedette.control.rewards import (
     CauchySchwarzReward,
     ExpectedGospaReward,
     ExpectedLossReward,
+    HasMissedCost,
+    HasUnitVolume,
     KullbackLeiblerReward,
     LabelReward,
     LinearReward,
@@ -37,8 +39,6 @@ from vedette.control.rewards import (
     PowerReward,
     RenyiReward,
     Reward,
-    WithMissedCost,
-    WithUnitVolume,
 )
 from vedette.control.rules_of_thumb import RulePlanner
 from vedette.control.search import (
@@ -53,14 +53,17 @@ from vedette.control.search import (
 from vedette.control.settings import MobileSensor, PlanningSettings, planning_limits
 
 __all__ = [
+    "ActivationConstraint",
     "AutomaticSearch",
     "BeamSearch",
     "Bound",
     "CardinalityVarianceReward",
     "CauchySchwarzReward",
-    "Certainty",
     "Constraint",
+    "ConstraintContext",
+    "ConstraintReportingPlanner",
     "CoordinateAscent",
+    "Counterfactual",
     "CrossEntropy",
     "Evaluator",
     "ExhaustiveSearch",
@@ -68,14 +71,14 @@ __all__ = [
     "ExpectedLossReward",
     "Explanation",
     "FixedPlanner",
-    "Had",
+    "HasMissedCost",
+    "HasUnitVolume",
     "HorizonPlanner",
     "IndependentPlanner",
     "JointPlanner",
     "JointProblem",
     "JointSearch",
     "KeepOut",
-    "KnowsTruth",
     "KullbackLeiblerReward",
     "LabelReward",
     "LinearReward",
@@ -88,32 +91,29 @@ __all__ = [
     "PlanningSettings",
     "PowerReward",
     "ProgramPlanner",
+    "QuantifiedConstraint",
     "RandomPlanner",
+    "RangeLimitedConstraint",
     "RenyiReward",
+    "RequiresTruth",
     "Revisit",
     "Reward",
     "RewardTable",
     "RulePlanner",
     "RunnerUp",
+    "SamplingOutcome",
     "SearchCurve",
     "Separation",
     "SequenceProblem",
     "SequenceSearch",
     "SequentialGreedy",
-    "Situation",
     "StayInside",
     "TargetGains",
-    "Timeless",
+    "TimeInvariantConstraint",
     "TreeSearch",
     "VoidProbability",
-    "WatchedPlanner",
-    "WithMissedCost",
-    "WithMostActive",
-    "WithReach",
-    "WithUnitVolume",
-    "WithViolations",
-    "WithZone",
-    "mask_of",
+    "ZoneConstraint",
+    "feasible_action_mask",
     "planning_limits",
     "void_probability",
 ]

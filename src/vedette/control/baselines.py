@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 
-from vedette.control.constraints import Constraint, Situation, repaired, violated
+from vedette.control.constraints import Constraint, ConstraintContext, nearest_feasible, violation_notes
 from vedette.control.inputs import beliefs_ahead, check_poses, check_steering, mask_of_decision, options_of
 from vedette.control.plan import Plan
 from vedette.control.settings import MobileSensor, PlanningSettings
@@ -33,10 +33,10 @@ class Planner(Protocol):
 
 
 @runtime_checkable
-class KnowsTruth(Protocol):
+class RequiresTruth(Protocol):
     """A planner that is told the true targets at the beginning of a run; `vedette.simulation.simulate` does."""
 
-    def told(self, truth: Any) -> Planner:
+    def with_truth(self, truth: Any) -> Planner:
         """The planner for these targets, a `vedette.simulation.Truth`."""
         ...
 
@@ -74,7 +74,7 @@ class RandomPlanner:
             fused = state.fused
         mask = mask_of_decision(self.constraints, self.sensors, options, fused, np.asarray(poses), self.settings)
         drawn = tuple(int(rng.integers(len(own.courses))) for own in options)
-        joint = drawn if mask is None else repaired(mask, drawn)
+        joint = drawn if mask is None else nearest_feasible(mask, drawn)
         chosen = tuple(own.first_action(course) for own, course in zip(options, joint, strict=True))
         return Plan(self.name, tuple(own.actions for own in options), chosen, (), {}, mask.notes if mask else ())
 
@@ -107,7 +107,7 @@ class FixedPlanner:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class WatchedPlanner:
+class ConstraintReportingPlanner:
     """A planner as it is; notes of its plans name the sensors whose courses violate constraints, and the constraints.
 
     Attributes:
@@ -133,13 +133,13 @@ class WatchedPlanner:
         """Of the planner."""
         return self.planner.name
 
-    def told(self, truth: Any) -> WatchedPlanner:
+    def with_truth(self, truth: Any) -> ConstraintReportingPlanner:
         """The same, where the planner is one that is told the targets of a run."""
         planner = self.planner
-        return replace(self, planner=planner.told(truth)) if isinstance(planner, KnowsTruth) else self
+        return replace(self, planner=planner.with_truth(truth)) if isinstance(planner, RequiresTruth) else self
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
-        """What the planner decides; raises what it raises, and `InputError` as `mask_of`."""
+        """What the planner decides; raises what it raises, and `InputError` as `feasible_action_mask`."""
         plan, settings = self.planner.plan(state, poses, rng=rng), self.settings
         at, times = check_poses(poses, len(self.sensors)), settings.horizon_times()
         rows = zip(self.sensors, at, plan.chosen_actions, strict=True)
@@ -150,5 +150,5 @@ class WatchedPlanner:
         courses, scans = tuple(courses_of(*way) for way in ways), tuple(scans_of(*way) for way in ways)
         fused = getattr(state, "fused", None)
         beliefs = beliefs_ahead(self.constraints, self.sensors, fused, settings, 1, settings.horizon_steps)
-        told = violated(self.constraints, Situation(courses, times, beliefs, at, scans))
+        told = violation_notes(self.constraints, ConstraintContext(courses, times, beliefs, at, scans))
         return replace(plan, notes=(*plan.notes, *told))

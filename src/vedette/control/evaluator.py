@@ -10,10 +10,10 @@ import numpy as np
 
 from vedette.control.additive.rewards import AdditiveRewards
 from vedette.control.additive.table import lay_out
-from vedette.control.beyond import Beyond, drawing
-from vedette.control.cases import CaseRewards, SampleRewards
+from vedette.control.beyond_horizon import BeyondHorizon, attracting_targets
 from vedette.control.constraints import VisibilityGraph
 from vedette.control.prediction import predicted
+from vedette.control.pseudo_posterior_rewards import PseudoPosteriorRewards, SampleRewards
 from vedette.control.rewards.base import LabelReward, PowerReward, Reward
 from vedette.control.rewards.power import ExpectedLossReward
 from vedette.control.settings import Belief, MobileSensor, PlanningSettings
@@ -45,7 +45,7 @@ class Evaluator:
     settings: PlanningSettings
     options: tuple[Options, ...]
     prediction: Belief
-    source: CaseRewards | AdditiveRewards
+    source: PseudoPosteriorRewards | AdditiveRewards
     additive: AdditiveRewards | None
     counts: dict[str, int]
     notes: dict[str, None] = field(default_factory=dict)
@@ -66,7 +66,7 @@ class Evaluator:
         """By the sensors' own filters; raises as `JointPlanner.plan`."""
         motion = sensors[0].filter.targets.motion
         prediction: Any = predicted(state.fused, motion, settings.horizon_steps, settings.horizon_period)
-        cases = CaseRewards.prepare(sensors, options, fusion, settings, reward, state, prediction, rng=rng)
+        cases = PseudoPosteriorRewards.prepare(sensors, options, fusion, settings, reward, state, prediction, rng=rng)
         return cls(settings, tuple(options), prediction, cases, None, cases.counts, cases.notes)
 
     @classmethod
@@ -86,13 +86,13 @@ class Evaluator:
         """By sums over labels, each followed over every course that reaches it; beliefs are LMBs.
 
         horizons: further ones, at whose ends the expected loss is taken as well; None: those that are due
-        (`vedette.control.beyond.Beyond.horizons`). graph: of the zones that constraints forbid, for paths beyond the
-        horizon; None: there are none. Raises as `JointPlanner.plan`.
+        (`vedette.control.beyond_horizon.BeyondHorizon.horizons`). graph: of the zones that constraints forbid, for
+        paths beyond the horizon; None: there are none. Raises as `JointPlanner.plan`.
         """
         first, prediction = lay_out(sensors, options, rule, settings, reward, state, rng=rng)
         due, beyond = isinstance(reward, ExpectedLossReward) if horizons is None else len(horizons) > 0, None
         if due:
-            beyond = Beyond.of(sensors, options, *drawing(prediction), graph, state.undetected)
+            beyond = BeyondHorizon.of(sensors, options, *attracting_targets(prediction), graph, state.undetected)
         if horizons is None:
             horizons = () if beyond is None else beyond.horizons(settings)
         found = [first]
@@ -103,7 +103,7 @@ class Evaluator:
         counts = {"filter_steps": 0, "rewards": 0}
         for each, own in zip(found, (settings, *horizons), strict=True):
             counts["filter_steps"] += len(each.table.labels) * each.num_samples * own.horizon_steps
-        source = at_all(found) if horizons else found[0]
+        source = mean_over_horizons(found) if horizons else found[0]
         notes = dict.fromkeys(() if beyond is None else beyond.notes())
         return cls(settings, tuple(options), prediction, source, source, counts, notes, horizons=horizons)
 
@@ -147,7 +147,7 @@ class Evaluator:
         return evaluate
 
 
-def at_all(horizons: Sequence[AdditiveRewards]) -> AdditiveRewards:
+def mean_over_horizons(horizons: Sequence[AdditiveRewards]) -> AdditiveRewards:
     """The mean of expected losses at several times, which are as of so many labels more; cells likewise."""
     first, num = horizons[0], len(horizons)
     order, offsets = _in_turn([own.table.offsets for own in horizons])

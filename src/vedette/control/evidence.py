@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.control.additive.rewards import AdditiveRewards
-from vedette.control.cases import SampleRewards
+from vedette.control.contributions import Contributions, contributions_of
 from vedette.control.evaluator import Evaluator
 from vedette.control.plan import RewardTable, SearchCurve
-from vedette.control.shares import Shares, shares_of
+from vedette.control.pseudo_posterior_rewards import SampleRewards
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
 
@@ -231,7 +231,7 @@ class Part(NamedTuple):
         own = additive if additive is None or others is not None else additive.alone(sensor)
         return cls(evidence, (course,), own, others)
 
-    def shares(self) -> Shares | None:
+    def shares(self) -> Contributions | None:
         """What contributes to its reward; None where rewards are no sums over labels."""
         if self.additive is None:
             return None
@@ -239,4 +239,4 @@ class Part(NamedTuple):
         if self.others is not None:
             joint, which = np.array(self.others), np.array(self.evidence.which)
             joint[which] = self.chosen
-        return shares_of(self.additive, joint, which)
+        return contributions_of(self.additive, joint, which)

@@ -82,7 +82,7 @@ class RunnerUp(NamedTuple):
         return _ratio(self.margin, self.standard_error)
 
 
-class Had(NamedTuple):
+class Counterfactual(NamedTuple):
     """What would have been had a sensor done something else, the others as chosen."""
 
     sensor: int
@@ -127,7 +127,7 @@ class Explanation:
         bound: how far from the best the choice can be; None where nothing is known of that.
         missing: why fields are None, by name.
         price: of all chosen actions, which is subtracted from what is gained.
-        answer: behind `had`; None once the evidence is gone.
+        answer: behind `counterfactual`; None once the evidence is gone.
     """
 
     planner: str
@@ -144,7 +144,9 @@ class Explanation:
     bound: Bound | None
     missing: dict[str, str]
     price: float = 0.0
-    answer: Callable[[int, int | None, dict[str, float]], Had] | None = field(default=None, repr=False, compare=False)
+    answer: Callable[[int, int | None, dict[str, float]], Counterfactual] | None = field(
+        default=None, repr=False, compare=False
+    )
 
     @classmethod
     def nothing(cls, planner: str, chosen: tuple[str, ...], why: str) -> Explanation:
@@ -152,7 +154,7 @@ class Explanation:
         nothing = (None,) * 7
         return cls(planner, chosen, None, None, 0, *nothing, dict.fromkeys(EXPLAINED, why))
 
-    def had(self, sensor: int, action: int | None = None, **columns: float) -> Had:
+    def counterfactual(self, sensor: int, action: int | None = None, **columns: float) -> Counterfactual:
         """What would have been had a sensor done something else, the others as chosen.
 
         Args:
@@ -172,7 +174,7 @@ class Explanation:
         return self.answer(sensor, action, columns)
 
     def without_evidence(self) -> Explanation:
-        """The same to be kept: it cannot answer `had`."""
+        """The same to be kept: it cannot answer `counterfactual`."""
         values = {name: getattr(self, name) for name in self.__slots__ if name != "answer"}
         return Explanation(**values)
 

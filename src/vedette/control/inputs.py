@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from vedette.control.constraints import Active, Constraint, Mask, Situation, mask_of
+from vedette.control.constraints import Active, Constraint, ConstraintContext, Mask, feasible_action_mask
 from vedette.control.prediction import predicted
 from vedette.control.rewards.base import LabelReward, PowerReward
 from vedette.control.rewards.power import ExpectedLossReward
@@ -131,14 +131,14 @@ def mask_of_decision(
     """What constraints allow; None where there are none.
 
     fused: the fused belief now, of which constraints may ask where targets will be.
-    Raises `InputError` as `mask_of`.
+    Raises `InputError` as `feasible_action_mask`.
     """
     if not constraints:
         return None
     beliefs = beliefs_ahead(constraints, sensors, fused, settings, 1, settings.horizon_steps)
     courses, scans = tuple(own.courses for own in options), tuple(own.scans for own in options)
-    situation = Situation(courses, settings.horizon_times(), beliefs, poses, scans)
-    return mask_of(constraints, situation)
+    situation = ConstraintContext(courses, settings.horizon_times(), beliefs, poses, scans)
+    return feasible_action_mask(constraints, situation)
 
 
 def beliefs_ahead(
@@ -172,7 +172,7 @@ def single_mask(mask: Mask | None, sensor: int, num_courses: int) -> np.ndarray:
 _SAME_CHANGE = 1e-9
 
 
-def staying(options: Sequence[Options], mask: Mask | None) -> tuple[int, ...]:
+def stationary_courses(options: Sequence[Options], mask: Mask | None) -> tuple[int, ...]:
     """For each sensor the course that changes its pose least, among those it may take: what it does until it decides.
 
     The course with the least change of heading, of these that with the least change of where a camera points, then of

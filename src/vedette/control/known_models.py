@@ -11,8 +11,17 @@ from vedette.control.settings import IDEAL_MODES, MobileSensor, PlanningSettings
 from vedette.filters.inputs import nobody
 from vedette.kernels.base.types import Bools, Floats, Motion, Sensor
 from vedette.kernels.gaussian.sigma_points import LINEARISED
-from vedette.kernels.planning.forms import ANY, BEARING_RANGE, CONSTANT, GAUSSIAN, GROWING, POSITION, SAME, Forms
-from vedette.kernels.planning.ideal import Decision, Futures, Horizon
+from vedette.kernels.planning.batched_models import (
+    ANY,
+    BEARING_RANGE,
+    CONSTANT,
+    GAUSSIAN,
+    GROWING,
+    POSITION,
+    SAME,
+    ModelForms,
+)
+from vedette.kernels.planning.ideal import Decision, Horizon, SampledTrajectories
 from vedette.models import (
     bearing_range,
     constant_detection,
@@ -46,7 +55,7 @@ _DETECTIONS = {gaussian_detection(1.0).function: GAUSSIAN, constant_detection(0.
 def decision_of(
     sensor: MobileSensor,
     courses: Floats,
-    futures: Futures,
+    futures: SampledTrajectories,
     settings: PlanningSettings,
     scans: Bools,
     detection_at: str | None = None,
@@ -75,7 +84,7 @@ def decision_of(
     )
 
 
-def forms_of(motion: Motion, sensor: Sensor, dt: float, state_dim: int, turns: bool = False) -> Forms:
+def forms_of(motion: Motion, sensor: Sensor, dt: float, state_dim: int, turns: bool = False) -> ModelForms:
     """The forms of models as kernels take them, over steps of `dt` seconds.
 
     turns: whether the sensor is a turning radar, whose measurements have none of the forms.
@@ -88,7 +97,7 @@ def forms_of(motion: Motion, sensor: Sensor, dt: float, state_dim: int, turns: b
         )
     else:
         step = np.zeros((2, state_dim, state_dim))
-    return Forms(
+    return ModelForms(
         int(is_linear),
         step[0],
         step[1],

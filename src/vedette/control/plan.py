@@ -49,7 +49,7 @@ class RewardTable(SummaryRepr):
             )
 
 
-class Certainty(NamedTuple):
+class SamplingOutcome(NamedTuple):
     """How a decision that takes as many samples as it needs came to its end.
 
     A decision of several parts, one a sensor, is as certain as the least certain part.
@@ -108,7 +108,7 @@ class Plan(TabularRepr):
             actions that were chosen, the first of which is to be taken; else empty.
         certainty: how the decision ended where it takes as many samples as it needs; else None.
         explanation: why it is what it is, where that has been worked out to be kept; see `explain`.
-        questions: what `explain` asks, with the evidence; None once it is left behind (`settled`, a pickle, a record).
+        questions: answers `explain` from the evidence; None without it (`without_evidence`, a pickle, a record).
     """
 
     planner: str
@@ -119,7 +119,7 @@ class Plan(TabularRepr):
     notes: tuple[str, ...] = ()
     curve: SearchCurve | None = None
     bound: Bound | None = None
-    certainty: Certainty | None = None
+    certainty: SamplingOutcome | None = None
     explanation: Explanation | None = None
     questions: Callable[[], Explanation] | None = field(default=None, repr=False, compare=False)
     sequence: tuple[Floats, ...] = ()
@@ -146,7 +146,7 @@ class Plan(TabularRepr):
             )
         return Explanation.nothing(self.planner, chosen, f"{self.planner} does not choose by rewards")
 
-    def settled(self, *, explained: bool) -> Plan:
+    def without_evidence(self, *, explained: bool) -> Plan:
         """The plan to be kept: without its evidence, which takes memory; with its explanation where that is wanted."""
         kept = self.explanation
         if explained and self.questions is not None:

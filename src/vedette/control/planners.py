@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from vedette.control.constraints import Constraint
-from vedette.control.deciding import Presumption, decide_alone, decide_jointly
+from vedette.control.decisions import Presumption, decide_alone, decide_jointly
 from vedette.control.inputs import check_steering, check_valuing
 from vedette.control.plan import Plan
 from vedette.control.preparation import AnyReward, Preparation
@@ -84,7 +84,8 @@ class IndependentPlanner:
         constraints: what each sensor by itself must not do; those on pairs of sensors are not looked at.
         notes: what every plan is to say beside what comes up.
         others: what each sensor presumes of the others. "stay": they go on as they are, on the course that changes
-            their pose least (`vedette.control.inputs.staying`), and the reward is that of all scans together.
+            their pose least (`vedette.control.inputs.stationary_courses`), and the reward is that of all scans
+            together.
             "absent", as in the paper: there are none, and the reward is that of its own update alone.
 
     Raises:

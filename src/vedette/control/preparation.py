@@ -12,8 +12,8 @@ import numpy as np
 from vedette.control.constraints import Constraint, Mask, VisibilityGraph, visibility_graph
 from vedette.control.evaluator import Evaluator
 from vedette.control.inputs import check_state, mask_of_decision, options_of
-from vedette.control.plan import Certainty
-from vedette.control.rewards.base import LabelReward, PowerReward, Reward, speaks_for
+from vedette.control.plan import SamplingOutcome
+from vedette.control.rewards.base import LabelReward, PowerReward, Reward, may_replace
 from vedette.control.rewards.power import ExpectedLossReward
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import (
@@ -36,7 +36,7 @@ _PARALLEL = ParallelUpdate()  # how the expected loss adds up
 _PLANNED_ON_LMBS = "planned on the LMBs of the GLMB beliefs: {}"
 
 
-class Planned(NamedTuple):
+class PlanningBeliefs(NamedTuple):
     """What is planned on."""
 
     state: State
@@ -60,7 +60,7 @@ class Preparation:
     sensors: tuple[MobileSensor, ...]
     settings: PlanningSettings
     reward: AnyReward
-    planned: Planned
+    planned: PlanningBeliefs
     options: tuple[Options, ...]
     mask: Mask | None
     graph: VisibilityGraph | None
@@ -78,7 +78,7 @@ class Preparation:
     ) -> Preparation:
         """Raises `InputError` for inputs that do not fit."""
         options = options_of(sensors, poses, settings)
-        planned = planned_on(sensors, fusion, settings, reward, state)
+        planned = planning_beliefs(sensors, fusion, settings, reward, state)
         mask, graph = None, None
         if constraints:
             mask = mask_of_decision(constraints, sensors, options, state.fused, np.asarray(poses), settings)
@@ -91,9 +91,9 @@ class Preparation:
         return self.settings.confidence is not None and not isinstance(self.reward, ExpectedLossReward)
 
     @property
-    def certainty(self) -> Certainty | None:
+    def certainty(self) -> SamplingOutcome | None:
         """Of a decision that does not race."""
-        return None if self.settings.confidence is None else Certainty("no samples", 1.0, 0, (), ())
+        return None if self.settings.confidence is None else SamplingOutcome("no samples", 1.0, 0, (), ())
 
     def evaluator(
         self, num_samples: int, options: tuple[Options, ...] | None = None, *, rng: np.random.Generator
@@ -153,14 +153,14 @@ def check_sums(
     return rule
 
 
-def planned_on(
+def planning_beliefs(
     sensors: Sequence[MobileSensor],
     fusion: Fusion,
     settings: PlanningSettings,
     reward: AnyReward,
     state: State,
     why: str = "",
-) -> Planned:
+) -> PlanningBeliefs:
     """The beliefs in the form in which they are planned on. why: GLMBs are LMBs there in any case.
 
     Raises `InputError` for a state that does not fit.
@@ -185,17 +185,19 @@ def planned_on(
     if from_one:
         state = replace(state, local=(state.fused,) * num_sensors)
     summed = not _has_glmb((*state.local, state.fused))
-    return Planned(state, fusion, _rule_of_lmbs(num_sensors, fusion, settings, reward) if summed else None, notes)
+    return PlanningBeliefs(
+        state, fusion, _rule_of_lmbs(num_sensors, fusion, settings, reward) if summed else None, notes
+    )
 
 
-def _planned_on_loss(fusion: Fusion, state: State, why: str) -> Planned:
+def _planned_on_loss(fusion: Fusion, state: State, why: str) -> PlanningBeliefs:
     """The fused belief as that of all sensors: an LMB, of each label its heaviest Gaussian. why: what a note says."""
     fused, num_sensors, notes = state.fused, len(state.local), tuple[str, ...]()
     if _has_glmb((*state.local, fused)):
         fused, fusion, notes = settled_lmb(fused), _of_lmbs(fusion), (_PLANNED_ON_LMBS.format(why),)
     fused = at_peaks(fused)
     state = replace(state, local=(fused,) * num_sensors, fused=fused)
-    return Planned(state, fusion, _PARALLEL.linear_rule(num_sensors), notes)
+    return PlanningBeliefs(state, fusion, _PARALLEL.linear_rule(num_sensors), notes)
 
 
 def _of_lmbs(fusion: Fusion) -> Fusion:
@@ -234,9 +236,9 @@ def _rule_of_lmbs(num_sensors: int, fusion: Fusion, settings: PlanningSettings, 
         return None
     if not (provides(reward, PowerReward) or provides(reward, LabelReward)):
         return None
-    if not speaks_for(reward, "combine", "__call__"):
+    if not may_replace(reward, "combine", "__call__"):
         return None
-    if not provides(fusion, Linear) or not speaks_for(fusion, "linear_rule", "fuse"):
+    if not provides(fusion, Linear) or not may_replace(fusion, "linear_rule", "fuse"):
         return None
     rule: LinearRule = fusion.linear_rule(num_sensors)
     return rule

@@ -13,7 +13,7 @@ from vedette.control.constraints import Mask
 from vedette.control.evaluator import Evaluator
 from vedette.control.evidence import Evidence
 from vedette.control.explanation import Bound
-from vedette.control.inputs import allowed_of, check_choice, single_mask, staying
+from vedette.control.inputs import allowed_of, check_choice, single_mask, stationary_courses
 from vedette.control.search import JointProblem, JointSearch, all_joint_actions, first_best
 from vedette.densities.checks import offsets_of
 from vedette.internal.probabilities import expit
@@ -49,7 +49,7 @@ def searched(
 def joint_problem(evidence: Evidence, mask: Mask | None) -> JointProblem:
     """The search problem of a joint decision; what it evaluates is kept in the evidence."""
     evaluator = evidence.evaluator
-    stay = cache(lambda: staying(evaluator.options, mask))
+    stay = cache(lambda: stationary_courses(evaluator.options, mask))
 
     def partial(actions: Ints) -> Floats:
         means = evidence.rewards(np.where(actions < 0, stay(), actions)).mean(axis=1)

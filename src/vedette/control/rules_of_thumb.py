@@ -7,8 +7,8 @@ from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
-from vedette.control.beyond import Beyond
-from vedette.control.constraints import Constraint, VisibilityGraph, repaired, visibility_graph
+from vedette.control.beyond_horizon import BeyondHorizon
+from vedette.control.constraints import Constraint, VisibilityGraph, nearest_feasible, visibility_graph
 from vedette.control.inputs import check_steering, mask_of_decision, options_of, single_mask
 from vedette.control.plan import Plan
 from vedette.control.search import first_best
@@ -96,7 +96,9 @@ class RulePlanner:
         mask = mask_of_decision(self.constraints, self.sensors, options, state.fused, at, self.settings)
         estimate, graph = self.estimate(state.fused, state.step), visibility_graph(self.constraints)
         places = np.ascontiguousarray(np.asarray(estimate.means)[:, :2])
-        beyond = Beyond.of(self.sensors, options, estimate.labels, places, graph, None) if graph is not None else None
+        beyond = (
+            BeyondHorizon.of(self.sensors, options, estimate.labels, places, graph, None) if graph is not None else None
+        )
         goals = self._goals(places, at[:, :2], beyond) if len(places) else [None] * len(options)
         merits = [_merits(own, goal, graph) for own, goal in zip(options, goals, strict=True)]
         joint = tuple(
@@ -105,12 +107,12 @@ class RulePlanner:
         if mask is not None:
             if mask.active is not None:
                 joint = mask.active.kept(joint, [own[course] for own, course in zip(merits, joint, strict=True)])
-            joint = repaired(mask, joint)
+            joint = nearest_feasible(mask, joint)
         chosen = tuple(own.first_action(course) for own, course in zip(options, joint, strict=True))
         notes = (*(mask.notes if mask else ()), *(beyond.notes() if beyond else ()))
         return Plan(self.name, tuple(own.actions for own in options), chosen, (), {}, notes)
 
-    def _goals(self, places: Floats, sensors: Floats, beyond: Beyond | None) -> Floats:
+    def _goals(self, places: Floats, sensors: Floats, beyond: BeyondHorizon | None) -> Floats:
         """(num_sensors, 2) m, where the sensors (num_sensors, 2) head for, of the places (num_targets, 2)."""
         if self.rule == "centroid":
             return np.tile(places.mean(axis=0), (len(sensors), 1))

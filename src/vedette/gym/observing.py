@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vedette.control import Constraint, MobileSensor, PlanningSettings
-from vedette.control.constraints import Mask, repaired
+from vedette.control.constraints import Mask, nearest_feasible
 from vedette.control.inputs import mask_of_decision, options_of, single_mask
 from vedette.densities import Labelled, best_estimate
 from vedette.errors import InputError
@@ -92,7 +92,7 @@ class Observer:
         if outlook.mask is None:
             return tuple(every), 0
         wanted = [int(own.which[index]) for own, index in zip(outlook.options, every, strict=True)]
-        courses = repaired(outlook.mask, wanted)
+        courses = nearest_feasible(outlook.mask, wanted)
         kept = [
             index if course == before else own.first_action(course)
             for own, index, course, before in zip(outlook.options, every, courses, wanted, strict=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from vedette.control import KnowsTruth, WatchedPlanner
+from vedette.control import ConstraintReportingPlanner, RequiresTruth
 from vedette.errors import InputError
 from vedette.internal.quantities import COMPONENTS
 from vedette.live.loop import Live
@@ -52,9 +52,11 @@ def live_of(
     if decide_every is not None or experiment.decision_steps:
         decides = build_planner(known.scenario, planner, num_threads)
         inside: Any = decides
-        while isinstance(inside, Named | WatchedPlanner):  # which pass the truth on, and need none themselves
+        while isinstance(
+            inside, Named | ConstraintReportingPlanner
+        ):  # which pass the truth on, and need none themselves
             inside = inside.planner
-        if isinstance(inside, KnowsTruth):
+        if isinstance(inside, RequiresTruth):
             raise InputError(f"planner: expected one that does not know the targets; got {planner}")
     return Live(
         LateScans(experiment.tracker, experiment.poses, window, seed),

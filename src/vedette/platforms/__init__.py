@@ -2,23 +2,24 @@
 
 from vedette.platforms.base import Actions, Options, Platform, options_at
 from vedette.platforms.by_compass import ByCompass
-from vedette.platforms.camera import Carried, Pointing
+from vedette.platforms.camera import MountedPlatform, Pointing
 from vedette.platforms.compass import Compass, PlaneCompass
-from vedette.platforms.courses import PAPER_HEADINGS_DEG, Courses
+from vedette.platforms.courses import PAPER_HEADINGS_DEG, HeadingPlatform
 from vedette.platforms.fleet import Fleet
 from vedette.platforms.operated import Operated
 from vedette.platforms.patrolling import Patrolling
 from vedette.platforms.sequences import Sequences
-from vedette.platforms.steps import Steps, Still, Waypoints
+from vedette.platforms.steps import GridPlatform, Stationary, Waypoints
 
 __all__ = [
     "PAPER_HEADINGS_DEG",
     "Actions",
     "ByCompass",
-    "Carried",
     "Compass",
-    "Courses",
     "Fleet",
+    "GridPlatform",
+    "HeadingPlatform",
+    "MountedPlatform",
     "Operated",
     "Options",
     "Patrolling",
@@ -26,8 +27,7 @@ __all__ = [
     "Platform",
     "Pointing",
     "Sequences",
-    "Steps",
-    "Still",
+    "Stationary",
     "Waypoints",
     "options_at",
 ]

@@ -62,7 +62,7 @@ class Abilities(NamedTuple):
     @classmethod
     def of(cls, platform: Platform) -> Abilities:
         """Find it out."""
-        return cls(*[provides(platform, more) for more in (TakesManyActions, WithPrices, WithScans)])
+        return cls(*[provides(platform, more) for more in (SupportsManyActions, HasPrices, HasScans)])
 
 
 def options_at(
@@ -164,7 +164,7 @@ class Platform(Protocol):
 
 
 @runtime_checkable
-class TakesManyActions(Protocol):
+class SupportsManyActions(Protocol):
     """A platform that gives the courses of many actions at once, equal to those of `Platform.course`."""
 
     def courses(self, pose: Floats, actions: Floats, times: Floats) -> Floats:
@@ -173,7 +173,7 @@ class TakesManyActions(Protocol):
 
 
 @runtime_checkable
-class WithPrices(Protocol):
+class HasPrices(Protocol):
     """A platform whose actions have prices, which planners subtract from rewards; those of others cost nothing."""
 
     def prices(self, actions: Floats) -> Floats:
@@ -182,7 +182,7 @@ class WithPrices(Protocol):
 
 
 @runtime_checkable
-class WithScans(Protocol):
+class HasScans(Protocol):
     """A platform some of whose actions keep its sensor from scanning; under those of others it always scans."""
 
     def scans(self, pose: Floats, actions: Floats, times: Floats) -> Bools:
@@ -226,7 +226,7 @@ def courses_of(
 
 def prices_of(field: str, platform: Platform, actions: Floats) -> Floats:
     """(num_actions,) what actions cost, in units of the reward; `InputError` for what are no prices."""
-    if not provides(platform, WithPrices):
+    if not provides(platform, HasPrices):
         return np.zeros(len(actions))
     return float_array(f"{field}.prices", platform.prices(actions.copy()), (len(actions),))
 
@@ -234,7 +234,7 @@ def prices_of(field: str, platform: Platform, actions: Floats) -> Floats:
 def scans_of(field: str, platform: Platform, pose: Floats, actions: Floats, times: Floats) -> Bools:
     """(num_actions, num_times) whether each action lets its sensor scan; `InputError` for what is no such table."""
     shape = len(actions), len(times)
-    if not provides(platform, WithScans):
+    if not provides(platform, HasScans):
         return np.ones(shape, np.bool_)
     scans = as_array(f"{field}.scans", platform.scans(pose.copy(), actions.copy(), times.copy()), "b", "booleans")
     if scans.shape != shape:

@@ -9,10 +9,10 @@ import numpy as np
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models.arguments import instance
 from vedette.platforms.base import Platform, actions_at, check_platform, courses_of, scans_of
-from vedette.platforms.camera import Carried, Pointing
+from vedette.platforms.camera import MountedPlatform, Pointing
 from vedette.platforms.compass import Compass, PlaneCompass, course_deg
-from vedette.platforms.courses import Courses
-from vedette.platforms.steps import Steps, Waypoints
+from vedette.platforms.courses import HeadingPlatform
+from vedette.platforms.steps import GridPlatform, Waypoints
 
 _COURSES = {"heading_deg": "course_deg", "pointing_deg": "azimuth_deg"}
 _NAMES = {**_COURSES, "speed": "speed_mps"}
@@ -26,8 +26,8 @@ class ByCompass:
 
     `heading_deg` becomes `course_deg`, from 0 to 360, with `speed_mps`; `pointing_deg` becomes `azimuth_deg`. A step is
     `course_deg`, `speed_mps` and `distance_m`; a waypoint has the course and the speed at which it is headed for.
-    The fixed directions of `Courses`, `Steps` and `Pointing` are true ones wherever the platform is. Those that the
-    pose or a custom platform gives are angles of the plane, which are turned at the place of the platform.
+    The fixed directions of `HeadingPlatform`, `GridPlatform` and `Pointing` are relative to true north at any position.
+    Angles given by the pose or by a custom platform are angles in the plane, converted at the position of the platform.
 
     Attributes:
         platform: what moves.
@@ -72,7 +72,7 @@ class ByCompass:
     @property
     def _parts(self) -> tuple[Platform, ...]:
         found = self.platform
-        return (found.carrier, found.pointing) if isinstance(found, Carried) else (found,)
+        return (found.carrier, found.pointing) if isinstance(found, MountedPlatform) else (found,)
 
     def _given(self, rows: Floats, pose: Floats, *, fixed: bool) -> Floats:
         """(num_rows, num_columns) of rows of the platform's own columns; fixed directions may be true ones."""
@@ -94,18 +94,18 @@ class ByCompass:
         return np.hstack(found)
 
     def _pose_of(self, part: Platform, pose: Floats) -> Floats:
-        """What `Carried` passes on: a carrier gets place and heading alone."""
-        is_carrier = isinstance(self.platform, Carried) and part is self.platform.carrier
+        """What `MountedPlatform` passes on: a carrier gets place and heading alone."""
+        is_carrier = isinstance(self.platform, MountedPlatform) and part is self.platform.carrier
         return pose[:3] if is_carrier else pose
 
 
 def _is_fixed(part: Platform) -> bool:
     """Whether its directions are the same at every pose."""
-    return isinstance(part, Steps) or (isinstance(part, Courses | Pointing) and not part.relative)
+    return isinstance(part, GridPlatform) or (isinstance(part, HeadingPlatform | Pointing) and not part.relative)
 
 
 def _columns(part: Platform) -> tuple[str, ...]:
-    if isinstance(part, Steps):
+    if isinstance(part, GridPlatform):
         return ("course_deg", "speed_mps", "distance_m")
     if isinstance(part, Waypoints):
         return (*part.columns, "course_deg", "speed_mps")
@@ -117,7 +117,7 @@ def _columns(part: Platform) -> tuple[str, ...]:
 
 def _given(part: Platform, rows: Floats, pose: Floats, compass: Compass) -> Floats:
     """Rows of a platform under the columns of the compass."""
-    if isinstance(part, Steps):
+    if isinstance(part, GridPlatform):
         lengths = np.hypot(rows[:, 0], rows[:, 1])
         courses = np.where(lengths > 0.0, _course(compass, np.arctan2(rows[:, 1], rows[:, 0]), pose), 0.0)
         return np.column_stack([courses, np.where(lengths > 0.0, part.speed, 0.0), np.round(lengths, _DIGITS)])
@@ -130,7 +130,9 @@ def _given(part: Platform, rows: Floats, pose: Floats, compass: Compass) -> Floa
     if len(names) == len(part.columns):
         return found
     speeds = (
-        np.full(len(rows), part.speed) if isinstance(part, Courses) else _under_way(part, rows, pose, compass)[:, 1]
+        np.full(len(rows), part.speed)
+        if isinstance(part, HeadingPlatform)
+        else _under_way(part, rows, pose, compass)[:, 1]
     )
     return np.column_stack([found, speeds])
 
@@ -147,7 +149,7 @@ def _own(part: Platform, actions: Floats, pose: Floats, compass: Compass) -> Flo
     """The rows of a platform that actions under the columns of the compass are."""
     if isinstance(part, Waypoints):
         return actions[:, :1]
-    if isinstance(part, Steps):
+    if isinstance(part, GridPlatform):
         angles = compass.angle(np.radians(actions[:, 0]), pose)
         return np.asarray(actions[:, 2:] * np.column_stack([np.cos(angles), np.sin(angles)]))
     names, found = _columns(part), np.array(actions[:, : len(part.columns)])

@@ -111,7 +111,7 @@ def _check(pose: Floats) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Carried:
+class MountedPlatform:
     """What points, on what moves: every action of the one with every action of the other, columns side by side.
 
     Attributes:

@@ -15,7 +15,7 @@ PAPER_HEADINGS_DEG = tuple(float(angle) for angle in range(-180, 181, 30))
 
 
 @dataclass(frozen=True, slots=True)
-class Courses:
+class HeadingPlatform:
     """Courses from a list of headings, or of changes of heading, kept until the next decision; no border stops them.
 
     Attributes:

@@ -10,7 +10,7 @@ import numpy as np
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models.arguments import float_array, provides
-from vedette.platforms.base import Platform, WithScans, course_of, scans_of
+from vedette.platforms.base import HasScans, Platform, course_of, scans_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,7 +41,7 @@ class Fleet:
             if action is not None:
                 float_array(f"sensors[{s}] action", action, (len(platform.columns),))
         under_way = [s for s, action in enumerate(self.actions) if action is not None]
-        switched = tuple([s for s in under_way if provides(self.platforms[s], WithScans)])
+        switched = tuple([s for s in under_way if provides(self.platforms[s], HasScans)])
         object.__setattr__(self, "_switched", switched)
 
     def poses(self, time: float) -> Floats:

@@ -13,7 +13,7 @@ from vedette.models.fields import Positive, check_fields
 
 
 @dataclass(frozen=True, slots=True)
-class Still:
+class Stationary:
     """Stays where it is, as it is."""
 
     @property
@@ -31,7 +31,7 @@ class Still:
 
 
 @dataclass(frozen=True, slots=True)
-class Steps:
+class GridPlatform:
     """Steps of one length, each made at a speed and followed by waiting.
 
     Attributes:

@@ -174,7 +174,7 @@ class LiveScreen:
         plan = self._planner.last
         if plan is not None and plan is not self._decided[0]:
             axes = dict[str, dict[str, Any]]()
-            told = drawn_decision(Decision(1, 0.0, poses, plan.settled(explained=True)), axes, self._names)
+            told = drawn_decision(Decision(1, 0.0, poses, plan.without_evidence(explained=True)), axes, self._names)
             self._decided = (plan, {**told, "axes": list(axes.values()), "number": self._planner.num_plans})
         return self._decided[1]
 

@@ -1,6 +1,6 @@
 """The world that the program does not get to see: truth, scans; the loop, and what a run leaves behind."""
 
-from vedette.control import KnowsTruth
+from vedette.control import RequiresTruth
 from vedette.kernels.gaussian.scans import CLUTTER
 from vedette.simulation.born_targets import PoissonTargets
 from vedette.simulation.crowds import CrowdTargets
@@ -19,10 +19,10 @@ __all__ = [
     "CrowdTargets",
     "Decision",
     "Experiment",
-    "KnowsTruth",
     "Moment",
     "OraclePlanner",
     "PoissonTargets",
+    "RequiresTruth",
     "RunRecord",
     "Scan",
     "ScriptedTargets",

@@ -123,7 +123,7 @@ class Journal:
 
     def decide(self, plan: Plan, undetected: UndetectedIntensity | None = None, *, explain: bool) -> None:
         """Record the decision after the current scan, with its explanation if explanations are kept."""
-        kept = plan.settled(explained=explain)
+        kept = plan.without_evidence(explained=explain)
         found = undetected if explain and kept.explanation is not None else None
         self._decisions.append(Decision(self.step, self.time, self._poses[-1], kept, found))
 

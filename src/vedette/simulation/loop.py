@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vedette.control import KnowsTruth, Planner, RandomPlanner
+from vedette.control import Planner, RandomPlanner, RequiresTruth
 from vedette.densities import Estimate, Estimator
 from vedette.errors import InputError
 from vedette.internal.unit_warnings import suppress_unit_warnings
@@ -55,7 +55,7 @@ class RunningTracker:
     def __init__(
         self, tracker: Tracker, estimate: Estimator, truth: Truth, rngs: Sequence[np.random.Generator]
     ) -> None:
-        self._tracker = tracker.told(truth) if isinstance(tracker, Central) else tracker
+        self._tracker = tracker.with_truth(truth) if isinstance(tracker, Central) else tracker
         self._estimate, self._rngs, self._state = estimate, rngs, self._tracker.initial()
 
     def step(
@@ -212,7 +212,7 @@ def simulate(
 
 def _told(planner: Any, truth: Truth) -> Planner | None:
     """The planner of this run, where it is one that knows the targets."""
-    told: Planner | None = planner.told(truth) if isinstance(planner, KnowsTruth) else planner
+    told: Planner | None = planner.with_truth(truth) if isinstance(planner, RequiresTruth) else planner
     return told
 
 

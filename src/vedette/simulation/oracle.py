@@ -16,7 +16,7 @@ from vedette.control import (
     Plan,
     PlanningSettings,
 )
-from vedette.control.constraints import Mask, repaired
+from vedette.control.constraints import Mask, nearest_feasible
 from vedette.control.inputs import check_poses, check_steering, mask_of_decision, options_of
 from vedette.densities import Estimator, best_estimate
 from vedette.errors import InputError
@@ -77,7 +77,7 @@ class OraclePlanner:
         search: which joint actions are looked at.
         constraints: what the sensors must not do, tested at the decision at hand.
         estimate: reads the tracks off a belief.
-        truth: the targets; None: `told` brings them.
+        truth: the targets; None: `with_truth` sets them.
 
     Raises:
         InputError: parts of another kind, or targets with more components than the motion's states.
@@ -109,7 +109,7 @@ class OraclePlanner:
         """How the filters take the targets to move."""
         return shared_targets([sensor.filter for sensor in self.sensors]).motion
 
-    def told(self, truth: Truth) -> OraclePlanner:
+    def with_truth(self, truth: Truth) -> OraclePlanner:
         """The same for the targets of a run."""
         return replace(self, truth=truth)
 
@@ -118,7 +118,7 @@ class OraclePlanner:
         generator(rng)
         instance("state", state, State)
         if self.truth is None:
-            raise InputError("truth: expected the targets of the run, as of told(); got None")
+            raise InputError("truth: expected the targets of the run, as of with_truth(); got None")
         at = check_poses(poses, len(self.sensors))
         options = options_of(self.sensors, at, self.settings)
         mask = mask_of_decision(self.constraints, self.sensors, options, state.fused, at, self.settings)
@@ -155,7 +155,7 @@ class OraclePlanner:
             return -costs
 
         first = (0,) * len(self.sensors)
-        first = first if mask is None else repaired(mask, first)
+        first = first if mask is None else nearest_feasible(mask, first)
         problem = JointProblem(tuple(len(own.courses) for own in options), evaluate, lambda: first, mask)
         best = self.search.search(problem, rng=rng)
         if depth == 1 or last >= len(self.timetable.times):

@@ -53,13 +53,13 @@ class OracleFilter(_Reference):
 
     Attributes:
         targets, sensors: as of all.
-        truth: the targets of the run; None: `told` brings them.
+        truth: the targets of the run; None: `with_truth` sets them.
     """
 
     truth: Truth | None = None
     _covs: dict[int, Floats] = field(init=False, default_factory=dict, repr=False)
 
-    def told(self, truth: Truth) -> OracleFilter:
+    def with_truth(self, truth: Truth) -> OracleFilter:
         """The same for the targets of a run."""
         return replace(self, truth=truth)
 
@@ -76,7 +76,7 @@ class OracleFilter(_Reference):
     ) -> tuple[LMB, FilterInfo]:
         """The targets at that step. Raises `InputError` where it was not told of them."""
         if self.truth is None:
-            raise InputError("truth: expected the targets of the run, as of told(); got None")
+            raise InputError("truth: expected the targets of the run, as of with_truth(); got None")
         ids, states = self.truth.at(step - 1)
         motion, dim = self.targets.motion, self.targets.state_dim
         if states.shape[1] != dim:

@@ -45,7 +45,7 @@ class ToldPlanner:
         sensors: that it steers.
         cutoff: the error that counts as a lost target, m.
         estimate: reads the tracks off a belief.
-        truth: the targets; None: `told` brings them.
+        truth: the targets; None: `with_truth` sets them.
 
     Raises:
         InputError: parts of another kind, or targets with more components than the motion's states.
@@ -65,7 +65,7 @@ class ToldPlanner:
             truth = with_components(self.truth, check_sensors(self.sensors).state_dim)
             object.__setattr__(self, "truth", truth)
 
-    def told(self, truth: Truth) -> ToldPlanner:
+    def with_truth(self, truth: Truth) -> ToldPlanner:
         """The same for the targets of a run."""
         return replace(self, truth=truth)
 
@@ -73,7 +73,7 @@ class ToldPlanner:
         """What the planner decides on the true targets; raises what it raises, and `InputError` without a truth."""
         instance("state", state, State)
         if self.truth is None:
-            raise InputError("truth: expected the targets of the run, as of told(); got None")
+            raise InputError("truth: expected the targets of the run, as of with_truth(); got None")
         plan = self.planner.plan(self._on_truth(state, self.truth), poses, rng=rng)
         return replace(plan, planner=self.name)
 

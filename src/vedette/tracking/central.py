@@ -108,9 +108,9 @@ class Central(OfAllScans):
     Attributes and errors: as `OfAllScans`.
     """
 
-    def told(self, truth: Any) -> Central:
+    def with_truth(self, truth: Any) -> Central:
         """The same, where the filter is one that is told the targets of a run."""
-        return replace(self, filter=self.filter.told(truth)) if hasattr(self.filter, "told") else self
+        return replace(self, filter=self.filter.with_truth(truth)) if hasattr(self.filter, "with_truth") else self
 
     def initial(self) -> State:
         """No target."""

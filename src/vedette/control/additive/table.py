@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from vedette.control.additive.rewards import AdditiveRewards, valuation_of
-from vedette.control.additive.situation import SensorGroup, Start, Task, starts_of
+from vedette.control.additive.sensor_groups import SensorGroup, Start, Task, starts_of
 from vedette.control.prediction import Prediction
-from vedette.control.rewards.base import WithMissedCost
+from vedette.control.rewards.base import HasMissedCost
 from vedette.control.rewards.power import ExpectedLossReward
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import LMB, UndetectedIntensity
@@ -23,8 +23,8 @@ from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.planning.ascent import Cells
 from vedette.kernels.planning.bernoulli_rows import Table
 from vedette.kernels.planning.cells import cells_in_view
-from vedette.kernels.planning.expected import fill_expected_changes
-from vedette.kernels.planning.known import Entries, fill_changes
+from vedette.kernels.planning.expected_information import fill_expected_changes
+from vedette.kernels.planning.known_association import Entries, fill_changes
 from vedette.kernels.planning.reach import fill_reach, fill_within
 from vedette.models.arguments import provides
 from vedette.platforms import Options
@@ -64,7 +64,7 @@ def lay_out(
     prediction = ahead.end
     valuation = valuation_of(reward, prediction, start.prior)
     cells = no_cells(len(table.offsets) - 1)
-    if undetected is not None and (worth := worth_of_finding(reward, settings)) > 0.0:
+    if undetected is not None and (worth := undetected_target_value(reward, settings)) > 0.0:
         cells = cells_of(start, undetected, worth, table.first_courses, prediction.state_dim)
     prices = np.concatenate([each.prices for each in options])
     own = reward if task.sampled else None
@@ -160,9 +160,9 @@ def _filling(
     )
 
 
-def worth_of_finding(reward: Any, settings: PlanningSettings) -> float:
+def undetected_target_value(reward: Any, settings: PlanningSettings) -> float:
     """What finding an undetected target is worth, in units of the reward."""
-    if not provides(reward, WithMissedCost):
+    if not provides(reward, HasMissedCost):
         return settings.undetected_worth or 0.0
     cost: float = reward.missed_cost
     return cost * (1.0 if settings.undetected_worth is None else settings.undetected_worth)

@@ -8,7 +8,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from vedette.control.constraints.protocol import Constraint, Situation, WithMostActive
+from vedette.control.constraints.protocol import ActivationConstraint, Constraint, ConstraintContext
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models.arguments import provides
 from vedette.models.fields import Checked, Count, part
@@ -33,7 +33,7 @@ class MaxActive(Checked):
     sensors: Count
     name: ClassVar[str] = "max_active"
     needs_beliefs: ClassVar[bool] = False
-    timeless = True
+    time_invariant = True
     reach = 0.0
 
     @property
@@ -41,11 +41,11 @@ class MaxActive(Checked):
         """The number."""
         return self.sensors
 
-    def courses(self, situation: Situation) -> tuple[Bools, ...]:
+    def courses(self, situation: ConstraintContext) -> tuple[Bools, ...]:
         """All."""
         return tuple(np.ones(len(own), np.bool_) for own in situation.courses)
 
-    def pairs(self, situation: Situation, first: int, second: int) -> Bools | None:
+    def pairs(self, situation: ConstraintContext, first: int, second: int) -> Bools | None:
         """All."""
         return None
 
@@ -97,7 +97,7 @@ def active_of(constraints: Sequence[Constraint], courses: Sequence[Floats], scan
 
     courses: (num_courses, num_times, pose_dim) of each sensor. scans: (num_courses, num_times) whether they scan.
     """
-    numbers = [own.most_active for own in constraints if provides(own, WithMostActive)]
+    numbers = [own.most_active for own in constraints if provides(own, ActivationConstraint)]
     if not numbers or not scans:
         return None
     on = tuple(np.asarray(own.any(axis=1)) for own in scans)

@@ -101,7 +101,7 @@ class Mask:
         return found
 
 
-def repaired(mask: Mask, start: Sequence[int]) -> tuple[int, ...]:
+def nearest_feasible(mask: Mask, start: Sequence[int]) -> tuple[int, ...]:
     """A joint action of few violations near `start`: none wherever that is found, `start` itself if it has none.
 
     One sensor after the other takes its course of fewest violations, as long as any has fewer. What is left is
@@ -121,7 +121,7 @@ def repaired(mask: Mask, start: Sequence[int]) -> tuple[int, ...]:
     return tuple(at) if mask.active is None else mask.active.kept(at)
 
 
-def opened(mask: Mask) -> tuple[Mask, tuple[int, ...]]:
+def relaxed(mask: Mask) -> tuple[Mask, tuple[int, ...]]:
     """The mask with a joint action that it allows; where none was found, opened as little as that takes.
 
     A sensor without an allowed course may take any. Of what is then left, the violations of the joint action that has
@@ -130,7 +130,7 @@ def opened(mask: Mask) -> tuple[Mask, tuple[int, ...]]:
     """
     blocked = [s for s, own in enumerate(mask.single) if not own.any()]
     mask = _forgiven(mask, {s: slice(None) for s in blocked}, set())
-    start = repaired(mask, [int(own.argmax()) for own in mask.single])
+    start = nearest_feasible(mask, [int(own.argmax()) for own in mask.single])
     courses = {s: course for s, course in enumerate(start) if not mask.single[s][course]}
     pairs = {pair for pair, table in mask.together.items() if not table[start[pair[0]], start[pair[1]]]}
     mask = _forgiven(mask, courses, pairs)

@@ -9,8 +9,13 @@ from typing import Any
 import numpy as np
 
 from vedette.control.constraints.active import active_of
-from vedette.control.constraints.mask import Mask, opened
-from vedette.control.constraints.protocol import Constraint, Situation, WithViolations, reach_of
+from vedette.control.constraints.mask import Mask, relaxed
+from vedette.control.constraints.protocol import (
+    Constraint,
+    ConstraintContext,
+    QuantifiedConstraint,
+    interaction_range_of,
+)
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models.arguments import provides
@@ -19,11 +24,11 @@ from vedette.models.arguments import provides
 _SAME = 1e-9
 
 
-def mask_of(constraints: Sequence[Constraint], situation: Situation) -> Mask:
+def feasible_action_mask(constraints: Sequence[Constraint], situation: ConstraintContext) -> Mask:
     """The courses and pairs of courses that all constraints allow.
 
     A sensor for which none is left keeps those that violate them least, and pairs of sensors that no joint action was
-    found to keep apart keep all (`opened`); the mask's notes say of whom.
+    found to keep apart keep all (`relaxed`); the mask's notes say of whom.
 
     Raises:
         InputError: a constraint that needs beliefs where there are none, or an answer of another shape.
@@ -33,23 +38,23 @@ def mask_of(constraints: Sequence[Constraint], situation: Situation) -> Mask:
             wanted = f"{len(situation.times)} predicted beliefs, one a time"
             raise InputError(f"constraint {constraint.name}: expected {wanted}; got {len(situation.beliefs)}")
     single, blocked = courses_allowed(constraints, situation)
-    notes = tuple(f"sensor {s + 1}: {without_course(constraints)}" for s in blocked)
+    notes = tuple(f"sensor {s + 1}: {infeasible_note(constraints)}" for s in blocked)
     active = active_of(constraints, situation.courses, situation.scans)
-    return opened(Mask(single, pairs_allowed(constraints, situation), notes, active))[0]
+    return relaxed(Mask(single, pairs_allowed(constraints, situation), notes, active))[0]
 
 
-def without_course(constraints: Sequence[Constraint]) -> str:
+def infeasible_note(constraints: Sequence[Constraint]) -> str:
     """What notes say of a sensor that has no course that meets the constraints."""
     names = ", ".join(constraint.name for constraint in constraints)
     return f"no course meets its constraints ({names}); it may take those that violate them least"
 
 
 def courses_allowed(
-    constraints: Sequence[Constraint], situation: Situation
+    constraints: Sequence[Constraint], situation: ConstraintContext
 ) -> tuple[tuple[Bools, ...], tuple[int, ...]]:
     """(num_courses,) which courses each sensor may take, and the sensors that have none that all constraints allow.
 
-    These may take the courses of least violation. Raises as `mask_of`.
+    These may take the courses of least violation. Raises as `feasible_action_mask`.
     """
     shape = [len(own) for own in situation.courses]
     answers = [_answers(constraint, situation) for constraint in constraints]
@@ -67,8 +72,11 @@ def courses_allowed(
     return tuple(allowed), blocked
 
 
-def violated(constraints: Sequence[Constraint], situation: Situation) -> tuple[str, ...]:
-    """What constraints forbid of the one course that each sensor has, as notes of a plan; raises as `mask_of`."""
+def violation_notes(constraints: Sequence[Constraint], situation: ConstraintContext) -> tuple[str, ...]:
+    """Return notes of a plan on the constraints that each sensor's only course violates.
+
+    Raises as `feasible_action_mask`.
+    """
     found = []
     for constraint in constraints:
         single, pairs = _answers(constraint, situation), pairs_allowed([constraint], situation)
@@ -82,7 +90,7 @@ def violated(constraints: Sequence[Constraint], situation: Situation) -> tuple[s
     return tuple(found)
 
 
-def _answers(constraint: Constraint, situation: Situation) -> list[Bools]:
+def _answers(constraint: Constraint, situation: ConstraintContext) -> list[Bools]:
     """(num_courses,) which courses of each sensor a constraint allows."""
     answer, num = constraint.courses(situation), len(situation.courses)
     if len(answer) != num:
@@ -90,9 +98,9 @@ def _answers(constraint: Constraint, situation: Situation) -> list[Bools]:
     return [_checked(constraint, own, (len(each),)) for own, each in zip(answer, situation.courses, strict=True)]
 
 
-def _violations(constraint: Constraint, situation: Situation, answers: Sequence[Bools]) -> Sequence[Floats]:
+def _violations(constraint: Constraint, situation: ConstraintContext, answers: Sequence[Bools]) -> Sequence[Floats]:
     """(num_courses,) how much each course violates a constraint; one that does not say it, by 1 what it forbids."""
-    if not provides(constraint, WithViolations):
+    if not provides(constraint, QuantifiedConstraint):
         return [np.asarray(~own, np.float64) for own in answers]
     given = [np.asarray(own, np.float64) for own in constraint.violations(situation)]
     for s, own in enumerate(answers):
@@ -104,15 +112,15 @@ def _violations(constraint: Constraint, situation: Situation, answers: Sequence[
     return given
 
 
-def pairs_allowed(constraints: Sequence[Constraint], situation: Situation) -> dict[tuple[int, int], Bools]:
+def pairs_allowed(constraints: Sequence[Constraint], situation: ConstraintContext) -> dict[tuple[int, int], Bools]:
     """(num_courses of i, of j) the tables of the pairs of sensors i < j of which something is forbidden.
 
-    Sensors without courses are not asked about. Raises as `mask_of`.
+    Sensors without courses are not asked about. Raises as `feasible_action_mask`.
     """
     gaps = _least_distances(situation)
     found: dict[tuple[int, int], Bools] = {}
     for constraint in constraints:
-        for first, second in np.argwhere(np.triu(gaps < reach_of(constraint), 1)).tolist():
+        for first, second in np.argwhere(np.triu(gaps < interaction_range_of(constraint), 1)).tolist():
             answer = constraint.pairs(situation, first, second)
             if answer is not None:
                 shape = (len(situation.courses[first]), len(situation.courses[second]))
@@ -122,7 +130,7 @@ def pairs_allowed(constraints: Sequence[Constraint], situation: Situation) -> di
     return dict(sorted(found.items()))
 
 
-def _least_distances(situation: Situation) -> Floats:
+def _least_distances(situation: ConstraintContext) -> Floats:
     """(num_sensors, num_sensors) no more than the distance that sensors keep: of the circles around all their ways.
 
     inf: one of them has no courses.

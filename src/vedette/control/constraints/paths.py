@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from vedette.control.constraints.protocol import Constraint, WithZone
+from vedette.control.constraints.protocol import Constraint, ZoneConstraint
 from vedette.control.constraints.regions import edges_of, inside_edges
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.planning.lines import Edges, clear_lengths, first_touches
@@ -175,7 +175,7 @@ def visibility_graph(constraints: Sequence[Constraint]) -> VisibilityGraph | Non
 
     The graph of the same zones is built once, however many decisions, planners or runs ask for it.
     """
-    zones = [own.zone for own in constraints if provides(own, WithZone)]
+    zones = [own.zone for own in constraints if provides(own, ZoneConstraint)]
     return _built(tuple(tuple(ring.tobytes() for ring in rings) for rings in zones)) if zones else None
 
 

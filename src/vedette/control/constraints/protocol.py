@@ -15,7 +15,7 @@ from vedette.models.arguments import provides
 _Values = TypeVar("_Values", Bools, Floats)
 
 
-class Situation(NamedTuple):
+class ConstraintContext(NamedTuple):
     """What constraints judge by. Positions are the first two components of a pose and of a state, m.
 
     courses: (num_courses, num_times, pose_dim) where each course takes its sensor, one array a sensor.
@@ -56,8 +56,8 @@ class Situation(NamedTuple):
 class Constraint(Protocol):
     """Says which courses a sensor may take, and which courses of two sensors go together.
 
-    It may have more members: those of `WithReach`, `Timeless`, `WithViolations`, `WithZone` and
-    `WithMostActive`. Decisions over several
+    It may have more members: those of `RangeLimitedConstraint`, `TimeInvariantConstraint`, `QuantifiedConstraint`,
+    `ZoneConstraint` and `ActivationConstraint`. Decisions over several
     periods show it one sensor, or two, at a time: the others have no courses then.
     """
 
@@ -68,52 +68,52 @@ class Constraint(Protocol):
 
     @property
     def needs_beliefs(self) -> bool:
-        """Whether it looks at `Situation.beliefs`."""
+        """Whether it looks at `ConstraintContext.beliefs`."""
         ...
 
-    def courses(self, situation: Situation) -> tuple[Bools, ...]:
+    def courses(self, situation: ConstraintContext) -> tuple[Bools, ...]:
         """(num_courses,) which courses each sensor may take, one array a sensor."""
         ...
 
-    def pairs(self, situation: Situation, first: int, second: int) -> Bools | None:
+    def pairs(self, situation: ConstraintContext, first: int, second: int) -> Bools | None:
         """(num_courses of first, of second) which courses of two sensors go together; None: all."""
         ...
 
 
 @runtime_checkable
-class WithReach(Protocol):
+class RangeLimitedConstraint(Protocol):
     """A constraint that is asked about pairs of sensors only where they may come near each other."""
 
     @property
-    def reach(self) -> float:
+    def interaction_range(self) -> float:
         """m; so near some two of their courses might come. 0: it is asked about none; without it, about all."""
         ...
 
 
 @runtime_checkable
-class Timeless(Protocol):
+class TimeInvariantConstraint(Protocol):
     """A constraint that decisions over several periods may ask once about each place."""
 
     @property
-    def timeless(self) -> bool:
+    def time_invariant(self) -> bool:
         """Whether answers hang on poses and courses alone, neither on times nor on beliefs; without it: no."""
         ...
 
 
 @runtime_checkable
-class WithViolations(Protocol):
+class QuantifiedConstraint(Protocol):
     """A constraint that says how much courses violate it; otherwise one that is not allowed counts 1.
 
     Where a sensor has no course that all constraints allow, it may take those of the least sum.
     """
 
-    def violations(self, situation: Situation) -> tuple[Floats, ...]:
+    def violations(self, situation: ConstraintContext) -> tuple[Floats, ...]:
         """(num_courses,) how much each course violates it, one array a sensor; above 0 where it is not allowed."""
         ...
 
 
 @runtime_checkable
-class WithZone(Protocol):
+class ZoneConstraint(Protocol):
     """A constraint that forbids an area at all times, round which plans look for ways beyond their horizon."""
 
     @property
@@ -123,7 +123,7 @@ class WithZone(Protocol):
 
 
 @runtime_checkable
-class WithMostActive(Protocol):
+class ActivationConstraint(Protocol):
     """A constraint on how many sensors may scan after a decision."""
 
     @property
@@ -132,26 +132,26 @@ class WithMostActive(Protocol):
         ...
 
 
-def reach_of(constraint: Constraint) -> float:
-    """m; what lies within it is asked of pairs of sensors, see `WithReach`."""
-    return constraint.reach if provides(constraint, WithReach) else math.inf
+def interaction_range_of(constraint: Constraint) -> float:
+    """m; what lies within it is asked of pairs of sensors, see `RangeLimitedConstraint`."""
+    return constraint.interaction_range if provides(constraint, RangeLimitedConstraint) else math.inf
 
 
-class Alone:
+class PerSensorConstraint:
     """A constraint on each sensor: any courses go together. What violates it by more than 0 is forbidden."""
 
     __slots__ = ()
     reach = 0.0
 
-    def violations(self, situation: Situation) -> tuple[Floats, ...]:
+    def violations(self, situation: ConstraintContext) -> tuple[Floats, ...]:
         """(num_courses,) how much each course violates it, one array a sensor."""
         raise NotImplementedError
 
-    def courses(self, situation: Situation) -> tuple[Bools, ...]:
+    def courses(self, situation: ConstraintContext) -> tuple[Bools, ...]:
         """Those that do not violate it."""
         return tuple(np.asarray(own == 0.0) for own in self.violations(situation))
 
-    def pairs(self, situation: Situation, first: int, second: int) -> Bools | None:
+    def pairs(self, situation: ConstraintContext, first: int, second: int) -> Bools | None:
         """All."""
         return None
 

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from vedette.control.constraints.protocol import Alone, Situation
+from vedette.control.constraints.protocol import ConstraintContext, PerSensorConstraint
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models import Region
 from vedette.models.arguments import float_array, reject
@@ -19,7 +19,7 @@ _EDGE, _BEYOND = 1e-6, 1e7
 
 
 @dataclass(frozen=True, slots=True)
-class StayInside(Alone):
+class StayInside(PerSensorConstraint):
     """Every platform that moves stays inside a rectangle, its edge included, at all times of the horizon.
 
     Attributes:
@@ -32,7 +32,7 @@ class StayInside(Alone):
     region: Region
     name: ClassVar[str] = "stay_inside"
     needs_beliefs: ClassVar[bool] = False
-    timeless = True
+    time_invariant = True
 
     def __post_init__(self) -> None:
         if not isinstance(self.region, Region):
@@ -45,7 +45,7 @@ class StayInside(Alone):
         inner = np.array([[x_min, y_min], [x_max, y_min], [x_max, y_max], [x_min, y_max]])
         return inner + _BEYOND * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]), inner
 
-    def violations(self, situation: Situation) -> tuple[Floats, ...]:
+    def violations(self, situation: ConstraintContext) -> tuple[Floats, ...]:
         """m from it, the mean over the times. Between two places in a rectangle the straight way is in it, too."""
         places = np.concatenate([own[:, :, :2] for own in situation.courses])
         low, high = self.region.corners.min(axis=0), self.region.corners.max(axis=0)
@@ -54,7 +54,7 @@ class StayInside(Alone):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class KeepOut(Alone):
+class KeepOut(PerSensorConstraint):
     """No platform enters a region: neither at the times of the horizon nor on the straight way between two of them.
 
     The way from where it is now counts where it is not inside already. One that cannot move at all may be where it is.
@@ -70,7 +70,7 @@ class KeepOut(Alone):
 
     area: Region | Floats
     holes: tuple[Floats, ...] = ()
-    timeless = True
+    time_invariant = True
     _edges: tuple[Floats, Floats] = field(init=False, repr=False)  # (num_edges, 2) where each begins and ends
     name: ClassVar[str] = "keep_out"
     needs_beliefs: ClassVar[bool] = False
@@ -89,7 +89,7 @@ class KeepOut(Alone):
         """The polygon and its holes."""
         return (self.area.corners if isinstance(self.area, Region) else self.area, *self.holes)
 
-    def violations(self, situation: Situation) -> tuple[Floats, ...]:
+    def violations(self, situation: ConstraintContext) -> tuple[Floats, ...]:
         """m inside it, the mean over the way's corners; next to nothing where it is only crossed between two."""
         edges = self._edges
         ways = np.concatenate([situation.ways(s) for s in range(len(situation.courses))])

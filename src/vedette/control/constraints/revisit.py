@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from vedette.control.constraints.protocol import Alone, Situation, least_on_legs
+from vedette.control.constraints.protocol import ConstraintContext, PerSensorConstraint, least_on_legs
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import float_array, positive
@@ -19,7 +19,7 @@ _HORIZONS = 2.0
 
 
 @dataclass(frozen=True, slots=True)
-class Revisit(Alone):
+class Revisit(PerSensorConstraint):
     """Maximum time between visits of each place, by any platform.
 
     Poses have the seconds since their platforms were at each place (`Patrolling`). When the time that is left is little
@@ -47,7 +47,7 @@ class Revisit(Alone):
         positive("radius", self.radius)
         positive("every", self.every)
 
-    def violations(self, situation: Situation) -> tuple[Floats, ...]:
+    def violations(self, situation: ConstraintContext) -> tuple[Floats, ...]:
         """(num_courses,) m that each course stays further from the place of its sensor than the nearest one."""
         found = [np.zeros(len(own)) for own in situation.courses]
         poses = situation.poses
@@ -63,7 +63,7 @@ class Revisit(Alone):
                 found[sensor] = gaps - gaps.min()
         return tuple(found)
 
-    def _sent(self, situation: Situation, poses: Floats) -> list[tuple[int, int]]:
+    def _sent(self, situation: ConstraintContext, poses: Floats) -> list[tuple[int, int]]:
         """Sensors that must go to a place, with the place.
 
         The place that was not visited for longest comes first: by the way that is left, a sensor would turn round again
@@ -96,7 +96,7 @@ def _horizon(times: Floats) -> float:
     return float(times[-1] - times[0] + step)
 
 
-def _speed(situation: Situation, sensor: int) -> float:
+def _speed(situation: ConstraintContext, sensor: int) -> float:
     """m/s of the fastest course of a sensor; 0 of one whose courses are not known."""
     ways = situation.ways(sensor)
     lengths = np.hypot(*np.diff(ways, axis=1).transpose(2, 0, 1)).sum(axis=1)

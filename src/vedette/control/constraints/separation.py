@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from vedette.control.constraints.protocol import Situation, least_on_legs
+from vedette.control.constraints.protocol import ConstraintContext, least_on_legs
 from vedette.kernels.base.types import Bools
 from vedette.models.fields import Checked, Positive, part
 
@@ -30,18 +30,18 @@ class Separation(Checked):
     distance: Positive
     name: ClassVar[str] = "separation"
     needs_beliefs: ClassVar[bool] = False
-    timeless = True
+    time_invariant = True
 
     @property
-    def reach(self) -> float:
+    def interaction_range(self) -> float:
         """Sensors further apart need not be asked about."""
         return self.distance
 
-    def courses(self, situation: Situation) -> tuple[Bools, ...]:
+    def courses(self, situation: ConstraintContext) -> tuple[Bools, ...]:
         """All."""
         return tuple(np.ones(len(own), bool) for own in situation.courses)
 
-    def pairs(self, situation: Situation, first: int, second: int) -> Bools | None:
+    def pairs(self, situation: ConstraintContext, first: int, second: int) -> Bools | None:
         """The courses on which two sensors are never nearer than `distance`."""
         one, other = situation.ways(first), situation.ways(second)
         x = one[:, np.newaxis, :, 0] - other[:, :, 0]

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from vedette.control.constraints.discs import disc_probabilities, near_pairs
-from vedette.control.constraints.protocol import Alone, Situation
+from vedette.control.constraints.protocol import ConstraintContext, PerSensorConstraint
 from vedette.densities import Labelled, TrackTable
 from vedette.densities.labelled import LABELLED
 from vedette.kernels.base.types import FactoredGlmb, Floats, Ints
@@ -21,7 +21,7 @@ _BLOCK = 1 << 21
 
 @part("void_probability", "constraint")
 @dataclass(frozen=True, slots=True)
-class VoidProbability(Alone, Checked):
+class VoidProbability(PerSensorConstraint, Checked):
     """Around every sensor no target is near, with a least probability at each time of the horizon (Beard et al.).
 
     M. Beard, B.-T. Vo, B.-N. Vo and S. Arulampalam, Void probabilities and Cauchy-Schwarz divergence for generalized
@@ -40,7 +40,7 @@ class VoidProbability(Alone, Checked):
     name: ClassVar[str] = "void_probability"
     needs_beliefs: ClassVar[bool] = True
 
-    def violations(self, situation: Situation) -> tuple[Floats, ...]:
+    def violations(self, situation: ConstraintContext) -> tuple[Floats, ...]:
         """By how much the void probability is less than `probability`, the sum over the times."""
         places = np.concatenate([own[:, :, :2] for own in situation.courses])
         lacking = np.zeros(len(places))

@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from vedette.control.lookahead.ahead import Ahead, Place, Stages
+from vedette.control.lookahead.constraints import MultiStepConstraints, Place, Stages
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models.measurement import wrap_angles
 from vedette.platforms import Options, Platform, options_at
@@ -46,7 +46,7 @@ class CourseTree:
     platform: Platform
     pose: Floats
     stages: Stages
-    ahead: Ahead | None = None
+    ahead: MultiStepConstraints | None = None
     now: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
     far_sighted: bool = True
     _found: dict[Sequence, Options] = field(default_factory=dict)

@@ -12,17 +12,17 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from vedette.control.constraints import Constraint, visibility_graph
-from vedette.control.deciding import plan_of
+from vedette.control.decisions import plan_of
 from vedette.control.evaluator import Evaluator
 from vedette.control.evidence import Evidence, Part
 from vedette.control.inputs import check_poses, check_steering, check_valuing
-from vedette.control.lookahead.ahead import Ahead, Stages
 from vedette.control.lookahead.beam import BeamSearch
+from vedette.control.lookahead.constraints import MultiStepConstraints, Stages
 from vedette.control.lookahead.courses import CourseTree
+from vedette.control.lookahead.feasibility import FeasibleSequences
 from vedette.control.lookahead.problem import Best, JointSequence, LaidCourses, SequenceProblem, SequenceSearch
-from vedette.control.lookahead.rules import Rules
 from vedette.control.plan import Plan
-from vedette.control.preparation import AnyReward, Planned, check_sums, notes_of_state, planned_on
+from vedette.control.preparation import AnyReward, PlanningBeliefs, check_sums, notes_of_state, planning_beliefs
 from vedette.control.problem import bound_of, searched
 from vedette.control.rewards import ExpectedLossReward
 from vedette.control.search import AutomaticSearch
@@ -42,8 +42,8 @@ class _Given(NamedTuple):
 
     stages: Stages
     trees: tuple[CourseTree, ...]
-    rules: Rules | None  # None: there are no constraints
-    planned: Planned
+    rules: FeasibleSequences | None  # None: there are no constraints
+    planned: PlanningBeliefs
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,7 +129,7 @@ class HorizonPlanner:
         """
         generator(rng)
         why = "so are all sequences of decisions"
-        planned = planned_on(self.sensors, self.fusion, self.settings, self.reward, state, why)
+        planned = planning_beliefs(self.sensors, self.fusion, self.settings, self.reward, state, why)
         given, samples = self._given(state, poses, planned), copy.deepcopy(rng)
         evidence, choice = self._single(given, rng)
         if given.stages.depth == 1:
@@ -151,13 +151,15 @@ class HorizonPlanner:
             depth = min(depth, max(1, math.ceil(still - 1e-9)))
         return Stages(depth, stride, settings.horizon_steps, float(settings.horizon_period))
 
-    def _given(self, state: State, poses: Floats, planned: Planned) -> _Given:
+    def _given(self, state: State, poses: Floats, planned: PlanningBeliefs) -> _Given:
         at, stages = check_poses(poses, len(self.sensors)), self._stages(state)
         trees = tuple(CourseTree(s, own.platform, at[s], stages) for s, own in enumerate(self.sensors))
         if not self.constraints:
             return _Given(stages, trees, None, planned)
         at = np.array([tree.pose for tree in trees])
-        rules = Rules.of(trees, Ahead(self.constraints, self.sensors, self.settings, state.fused, at, stages))
+        rules = FeasibleSequences.of(
+            trees, MultiStepConstraints(self.constraints, self.sensors, self.settings, state.fused, at, stages)
+        )
         return _Given(stages, rules.trees, rules, planned)
 
     def _single(self, given: _Given, rng: np.random.Generator) -> tuple[Evidence, tuple[int, ...]]:

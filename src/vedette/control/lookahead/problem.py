@@ -14,7 +14,7 @@ from vedette.control.additive.rewards import AdditiveRewards
 from vedette.control.evaluator import Evaluator
 from vedette.control.explanation import Bound
 from vedette.control.lookahead.courses import CourseTree, Sequence
-from vedette.control.lookahead.rules import Rules
+from vedette.control.lookahead.feasibility import FeasibleSequences
 from vedette.control.plan import SearchCurve
 from vedette.control.search import first_best
 from vedette.kernels.base.types import Bools, Floats, Ints
@@ -148,7 +148,7 @@ class SequenceProblem:
     depth: int
     parts: tuple[LaidCourses, ...]
     budget: int
-    rules: Rules | None = None
+    rules: FeasibleSequences | None = None
     found: dict[tuple[int, ...], Best] = field(default_factory=dict)
     _values: dict[Taken, float] = field(default_factory=dict)
     _evaluations: list[int] = field(default_factory=list)

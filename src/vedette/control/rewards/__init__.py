@@ -1,6 +1,6 @@
 """How much a planned update is worth."""
 
-from vedette.control.rewards.base import LabelReward, LinearReward, PowerReward, Reward, WithMissedCost, WithUnitVolume
+from vedette.control.rewards.base import HasMissedCost, HasUnitVolume, LabelReward, LinearReward, PowerReward, Reward
 from vedette.control.rewards.labels import (
     CardinalityVarianceReward,
     ExpectedGospaReward,
@@ -14,6 +14,8 @@ __all__ = [
     "CauchySchwarzReward",
     "ExpectedGospaReward",
     "ExpectedLossReward",
+    "HasMissedCost",
+    "HasUnitVolume",
     "KullbackLeiblerReward",
     "LabelReward",
     "LinearReward",
@@ -21,6 +23,4 @@ __all__ = [
     "PowerReward",
     "RenyiReward",
     "Reward",
-    "WithMissedCost",
-    "WithUnitVolume",
 ]

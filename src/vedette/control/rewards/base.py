@@ -38,7 +38,7 @@ class PowerReward(Protocol):
 
     Z(a, b) is the log of the set integral of K^((a + b - 1) |X|) predicted(X)^a updated(X)^b over the label sets that
     both have (see `vedette.divergence.power_integral`). The update need not be normalised: exp(Z(0, 1)) is what it
-    integrates to. It may have the members of `WithUnitVolume` and `LinearReward`, too; without the first K is 1.
+    integrates to. It may have the members of `HasUnitVolume` and `LinearReward`, too; without the first K is 1.
     """
 
     @property
@@ -80,7 +80,7 @@ class LabelReward(Protocol):
 
 
 @runtime_checkable
-class WithUnitVolume(Protocol):
+class HasUnitVolume(Protocol):
     """A reward of densities that says what their unit of volume is."""
 
     @property
@@ -90,7 +90,7 @@ class WithUnitVolume(Protocol):
 
 
 @runtime_checkable
-class WithMissedCost(Protocol):
+class HasMissedCost(Protocol):
     """A reward that says what a missed target costs; finding one that was never detected is worth so much."""
 
     @property
@@ -138,7 +138,7 @@ def combined(reward: PowerReward, z: Floats) -> Floats:
     return rewards
 
 
-def speaks_for(thing: Any, method: str, other: str) -> bool:
+def may_replace(thing: Any, method: str, other: str) -> bool:
     """Whether one method may be asked instead of the other: not where a subclass has changed the other alone."""
     for owner in type(thing).__mro__:
         if method in vars(owner) or other in vars(owner):
@@ -164,7 +164,7 @@ def _of_labels(reward: LabelReward, predicted: GLMB | LMB, updated: GLMB | LMB) 
 def reward_value(reward: Reward | PowerReward | LabelReward, predicted: GLMB | LMB, updated: Any) -> float:
     """The reward of one update; `InputError` where it is no number."""
     value: Any
-    if callable(reward) and speaks_for(reward, "__call__", "combine"):
+    if callable(reward) and may_replace(reward, "__call__", "combine"):
         value = reward(predicted, updated)
     elif isinstance(reward, LabelReward):
         value = _of_labels(reward, predicted, updated)

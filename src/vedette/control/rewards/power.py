@@ -111,7 +111,7 @@ class ExpectedLossReward(Checked):
 
     Where a sensor has no target in its sight within the horizon, or a target is in nobody's, the loss is the mean of
     those at the end of the horizon and at two later times, at which sensors have gone on as they did
-    (`vedette.control.beyond.Beyond.horizons`): otherwise all courses of the sensor were worth the same.
+    (`vedette.control.beyond_horizon.BeyondHorizon.horizons`): otherwise all courses of the sensor were worth the same.
 
     It assumes that what the sensors measure is used in full, whatever the fusion.
 

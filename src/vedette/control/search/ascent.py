@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vedette.control.constraints import Active
-from vedette.control.search.problem import Joint, JointProblem, Known, best_of_all, tie_of
+from vedette.control.search.problem import Joint, JointProblem, RewardCache, best_of_all, tie_of
 from vedette.models.fields import Checked, Count, Repeats, part
 
 # Beyond so many sensors, every joint action is more than a decision has time for.
@@ -30,7 +30,7 @@ class CoordinateAscent(Checked):
     maximum: no change of one sensor's action improves it, a change of two might. No joint action is evaluated twice.
 
     With a mask it goes from one allowed joint action to another. A start that is not allowed is first moved to one near
-    it that is; where none is, the mask is opened (`vedette.control.constraints.opened`). Where only some sensors may
+    it that is; where none is, the mask is opened (`vedette.control.constraints.relaxed`). Where only some sensors may
     scan, no sensor alone can change which; then exchanges of two are tried from the best end, and ascents go on from
     there.
 
@@ -45,17 +45,17 @@ class CoordinateAscent(Checked):
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
         """The best of all ascents; of equal ones that were evaluated the first in printed order."""
-        known = Known(problem)
+        known = RewardCache(problem)
         ascents(known, first_starts(known, self.num_restarts, rng=rng))
         return known.best()
 
 
-def first_starts(known: Known, num_restarts: int, *, rng: np.random.Generator) -> list[Joint]:
+def first_starts(known: RewardCache, num_restarts: int, *, rng: np.random.Generator) -> list[Joint]:
     """The independent decision, and joint actions drawn at random."""
     return [known.allowed(known.problem.independent()), *known.drawn(num_restarts, rng=rng)]
 
 
-def ascents(known: Known, starts: Sequence[Joint]) -> list[Joint]:
+def ascents(known: RewardCache, starts: Sequence[Joint]) -> list[Joint]:
     """The ends of ascents, which are known then, and so is the first start.
 
     Where only some sensors may scan, exchanges of two and ascents go on from the best end until none improves it.
@@ -75,13 +75,13 @@ def ascents(known: Known, starts: Sequence[Joint]) -> list[Joint]:
     return ends
 
 
-def _climbed(known: Known, start: Joint) -> Joint:
+def _climbed(known: RewardCache, start: Joint) -> Joint:
     """The end of an ascent."""
     climb = known.problem.ascend
     return _ascend(known, start) if climb is None else known.allowed(climb(start))
 
 
-def _exchanged(known: Known, at: Joint, active: Active) -> Joint | None:
+def _exchanged(known: RewardCache, at: Joint, active: Active) -> Joint | None:
     """The best joint action with another sensor scanning in the place of one; None: no such one is better."""
     found, value = [at], known.values.__getitem__
     for s, course in enumerate(at):
@@ -96,7 +96,7 @@ def _exchanged(known: Known, at: Joint, active: Active) -> Joint | None:
     return best if value(best) > value(at) + tie_of(value(at)) else None
 
 
-def _ascend(known: Known, start: Joint) -> Joint:
+def _ascend(known: RewardCache, start: Joint) -> Joint:
     """One ascent. Along a line the first of the largest is taken, to the last digit, so that none goes in circles."""
     at, settled, sensor, num_sensors = start, 0, 0, len(start)
     while settled < num_sensors:
@@ -128,7 +128,7 @@ class AutomaticSearch(Checked):
         """As the search that it is."""
         if len(problem.shape) <= _MAX_SENSORS and math.prod(problem.shape) <= self.max_joint_actions:
             return best_of_all(problem, self.max_joint_actions)
-        known = Known(problem)
+        known = RewardCache(problem)
         ascents(known, first_starts(known, _NUM_RESTARTS, rng=rng))
         more = _FIRST_TRIES // sum(problem.shape) - _NUM_RESTARTS
         if known.is_late():

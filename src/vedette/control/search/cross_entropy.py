@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vedette.control.constraints import Mask
-from vedette.control.search.problem import JointProblem, Known
+from vedette.control.search.problem import JointProblem, RewardCache
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.fields import Chance, Checked, Count, Portion, part
 
@@ -27,7 +27,7 @@ class CrossEntropy(Checked):
     action is evaluated twice: what is drawn again keeps its reward.
 
     With a mask, each sensor's action is drawn from those that go with the sensors before it; where there are none, the
-    joint action is moved to one near it that is allowed (`vedette.control.constraints.repaired`, `opened`).
+    joint action is moved to one near it that is allowed (`vedette.control.constraints.nearest_feasible`, `relaxed`).
 
     Attributes:
         num_samples: joint actions drawn in a round.
@@ -46,7 +46,7 @@ class CrossEntropy(Checked):
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
         """The best of all that were drawn; of equal ones the first in printed order."""
-        known = Known(problem)
+        known = RewardCache(problem)
         probabilities = _uniform(known)
         num_elite = math.ceil(self.elite_share * self.num_samples)
         drawn = [known.allowed(problem.independent())]
@@ -64,7 +64,7 @@ class CrossEntropy(Checked):
         return known.best()
 
 
-def _uniform(known: Known) -> Floats:
+def _uniform(known: RewardCache) -> Floats:
     """(num_sensors, most courses) the same probability for all that a sensor may do; 0 elsewhere."""
     shape = known.problem.shape
     found = np.zeros((len(shape), max(shape)))

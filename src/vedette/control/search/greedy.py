@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from vedette.control.search.problem import Joint, JointProblem, Known, first_best
+from vedette.control.search.problem import Joint, JointProblem, RewardCache, first_best
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.fields import Checked, part
@@ -20,11 +20,11 @@ from vedette.models.fields import Checked, part
 class SequentialGreedy(Checked):
     """Sensors are decided one after the other, each by the reward of all; the undecided are presumed to stay.
 
-    These go on as they are (`vedette.control.inputs.staying`), so that what they see is not looked at again. The joint
-    action found is never worse than that in which all sensors stay, where that is allowed.
+    These go on as they are (`vedette.control.inputs.stationary_courses`), so that what they see is not looked at again.
+    The joint action found is never worse than that in which all sensors stay, where that is allowed.
 
     With a mask a sensor takes only what goes with those decided; sensors that are left without anything are decided in
-    the end, by the fewest changes found (`vedette.control.constraints.repaired`, `opened`).
+    the end, by the fewest changes found (`vedette.control.constraints.nearest_feasible`, `relaxed`).
 
     Attributes:
         order: "printed": as the sensors stand. "best_first": always the sensor that adds most; what it adds is taken to
@@ -45,7 +45,7 @@ class SequentialGreedy(Checked):
         if problem.partial is None:
             expected = "rewards of sensors that have not decided (JointProblem.partial), for SequentialGreedy"
             raise InputError(f"search: expected {expected}; got none; search by CoordinateAscent")
-        known = Known(problem)
+        known = RewardCache(problem)
         steps = _Steps(known, problem.partial)
         if self.order == "printed":
             for sensor in range(len(problem.shape)):
@@ -58,7 +58,7 @@ class SequentialGreedy(Checked):
 class _Steps:
     """What has been decided, with its reward; -1: not decided."""
 
-    def __init__(self, known: Known, partial: Callable[[Ints], Floats]) -> None:
+    def __init__(self, known: RewardCache, partial: Callable[[Ints], Floats]) -> None:
         self.known, self.partial = known, partial
         self.at: list[int] = [-1] * len(known.problem.shape)
         self.reward = 0.0

@@ -9,7 +9,7 @@ from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from vedette.control.constraints import Mask, opened, repaired
+from vedette.control.constraints import Mask, nearest_feasible, relaxed
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.fields import Checked, Count, part
@@ -82,11 +82,11 @@ def all_joint_actions(shape: tuple[int, ...]) -> Ints:
     return actions
 
 
-class Known:
+class RewardCache:
     """Rewards of a problem's joint actions, each asked for once.
 
     Only joint actions that the problem's mask allows are evaluated. Where none was found that it allows, the mask is
-    opened first (`vedette.control.constraints.opened`): to those with the fewest violations that were found.
+    opened first (`vedette.control.constraints.relaxed`): to those with the fewest violations that were found.
     """
 
     def __init__(self, problem: JointProblem) -> None:
@@ -95,7 +95,7 @@ class Known:
         self.mask: Mask | None = None
         self._allowed: Joint | None = None
         if problem.mask is not None:
-            self.mask, self._allowed = opened(problem.mask)
+            self.mask, self._allowed = relaxed(problem.mask)
 
     def is_late(self) -> bool:
         """Whether a search is to end."""
@@ -136,7 +136,7 @@ class Known:
         if self.mask is None or self._allowed is None:
             return joints
         for row in np.flatnonzero(~self.mask.allows(actions)).tolist():
-            near = repaired(self.mask, joints[row])
+            near = nearest_feasible(self.mask, joints[row])
             joints[row] = near if self.mask.allows(np.array([near]))[0] else self._allowed
         return joints
 
@@ -157,7 +157,7 @@ class ExhaustiveSearch(Checked):
     """Every joint action (paper, Algorithm 2): the best there is, and the oracle for all other searches.
 
     With a mask only the joint actions that it allows are formed; if there is none, the mask is opened first
-    (`vedette.control.constraints.opened`).
+    (`vedette.control.constraints.relaxed`).
 
     Attributes:
         max_joint_actions: bound on their number, which grows as a power of the number of sensors.
@@ -182,7 +182,7 @@ def best_of_all(problem: JointProblem, most: int) -> Joint:
             raise _too_many(most, f"{sizes} = {num_joint}")
         joint_actions = all_joint_actions(problem.shape)
     else:
-        joint_actions = _allowed(opened(problem.mask)[0], most)
+        joint_actions = _allowed(relaxed(problem.mask)[0], most)
     best = first_best(problem.evaluate(joint_actions))
     return tuple(joint_actions[best].tolist())
 

@@ -13,14 +13,14 @@ from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Bools, Floats, Ints, Lmb, Motion, Sensor
 from vedette.kernels.gaussian.linalg import cholesky
 from vedette.kernels.gaussian.scratch import Scratch, wrap_angle
-from vedette.kernels.planning.forms import Forms
+from vedette.kernels.planning.batched_models import ModelForms
 
 IDEAL = 0
 EXPECTED = 1
 SAMPLED = 2
 
 
-class Futures(NamedTuple):
+class SampledTrajectories(NamedTuple):
     """Sampled multi-target states over the horizon, and the random numbers of their measurements."""
 
     offsets: Ints  # (num_samples + 1,) into the targets
@@ -59,14 +59,14 @@ class Decision(NamedTuple):
     birth: Lmb  # none: over the horizon nobody is born
     motion: Motion  # all survive
     sensor: Sensor
-    forms: Forms
+    forms: ModelForms
     horizon: Horizon
-    futures: Futures  # as this sensor sees them
+    futures: SampledTrajectories  # as this sensor sees them
     truncation: Truncation
 
 
 @borrowing
-def most_targets(futures: Futures) -> int:
+def most_targets(futures: SampledTrajectories) -> int:
     """Number of targets of the sample that has most."""
     most = 0
     for sample in range(len(futures.offsets) - 1):

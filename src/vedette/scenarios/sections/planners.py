@@ -250,11 +250,13 @@ class Named:
         """What the planner decides."""
         return replace(self.planner.plan(*situation, rng=rng), planner=self.name)
 
-    def told(self, truth: Truth) -> Named:
+    def with_truth(self, truth: Truth) -> Named:
         """The same, where the planner is one that knows the targets of a run."""
-        from vedette.simulation import KnowsTruth
+        from vedette.simulation import RequiresTruth
 
-        return replace(self, planner=self.planner.told(truth)) if isinstance(self.planner, KnowsTruth) else self
+        return (
+            replace(self, planner=self.planner.with_truth(truth)) if isinstance(self.planner, RequiresTruth) else self
+        )
 
 
 AnyPlanner = Annotated[

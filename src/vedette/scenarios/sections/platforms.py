@@ -41,10 +41,10 @@ class Still(_PlatformSection):
     """Stays where it is."""
 
     kind: Literal["still"] = Field(default="still", description="Kind of platform [-].")
-    of: ClassVar[str] = "vedette.platforms.steps:Still"
+    of: ClassVar[str] = "vedette.platforms.steps:Stationary"
 
 
-@derived("vedette.platforms.courses:Courses", first=("speed", "speeds"))
+@derived("vedette.platforms.courses:HeadingPlatform", first=("speed", "speeds"))
 class Courses(_PlatformSection):
     """Turns at once, and keeps course and speed until the next decision; an action is a heading."""
 
@@ -78,7 +78,7 @@ class Courses(_PlatformSection):
         return max(self.speeds) if self.speeds is not None else self.speed or 0.0
 
 
-@derived("vedette.platforms.steps:Steps")
+@derived("vedette.platforms.steps:GridPlatform")
 class Steps(_PlatformSection):
     """Steps of one length, each made at a speed and followed by waiting; an action is a step."""
 
@@ -138,10 +138,10 @@ class Camera(_PlatformSection):
 
     def build(self, folder: Path | None = None, **_: Any) -> Platform:
         """A camera, carried where its carrier moves."""
-        from vedette.platforms import Carried
+        from vedette.platforms import MountedPlatform
 
         pointing: Platform = super().build(folder)
-        return pointing if isinstance(self.carrier, Still) else Carried(self.carrier.build(folder), pointing)
+        return pointing if isinstance(self.carrier, Still) else MountedPlatform(self.carrier.build(folder), pointing)
 
     def components(self) -> Row:
         """Pointing and half width, rad."""

@@ -15,7 +15,7 @@ from vedette.scenarios.sections.tracking import LABELLING, UNLABELLED
 
 if TYPE_CHECKING:  # with the planners comes the compiler, which a check does without
     from vedette.control import Constraint, JointSearch, MobileSensor, Planner, PlanningSettings
-    from vedette.control.deciding import Presumption
+    from vedette.control.decisions import Presumption
     from vedette.control.preparation import AnyReward as PlannedReward
     from vedette.densities import Estimator
     from vedette.fusion import Fusion
@@ -138,8 +138,8 @@ def unknown_truth(model: ScenarioModel) -> str:
 
 def watched(decides: Planner, parts: Parts) -> Planner:
     """A planner that does not keep to all constraints: its plans say which they violate."""
-    from vedette.control import WatchedPlanner
+    from vedette.control import ConstraintReportingPlanner
 
     if not parts.constraints:
         return decides
-    return WatchedPlanner(decides, parts.sensors, parts.settings, parts.constraints)
+    return ConstraintReportingPlanner(decides, parts.sensors, parts.settings, parts.constraints)

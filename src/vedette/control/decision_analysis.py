@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from vedette.control.contributions import Contributions
 from vedette.control.evidence import Part
-from vedette.control.explanation import Bound, Explanation, Had, RunnerUp, TargetGains
-from vedette.control.shares import Shares
+from vedette.control.explanation import Bound, Counterfactual, Explanation, RunnerUp, TargetGains
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import reject
@@ -26,7 +26,7 @@ _SAME_NUMBER = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Questions:
+class DecisionAnalysis:
     """A decision that can be questioned. Neither copied nor pickled: None is what arrives.
 
     Attributes:
@@ -63,7 +63,7 @@ class Questions:
             bound=self.bound,
             missing=missing,
             price=float(sum(own.prices[course] for own, course in zip(self._options, self._courses, strict=True))),
-            answer=self.had,
+            answer=self.counterfactual,
         )
 
     @property
@@ -83,7 +83,7 @@ class Questions:
         return tuple(own.first_action(course) for own, course in zip(self._options, self._courses, strict=True))
 
     @cached_property
-    def _contributions(self) -> tuple[Shares | None, ...]:
+    def _contributions(self) -> tuple[Contributions | None, ...]:
         """Of each part; None where its rewards are evaluated case by case."""
         return tuple(part.shares() for part in self.parts)
 
@@ -117,7 +117,7 @@ class Questions:
             missing["of_targets"] = _NOT_LINEAR
         return found
 
-    def _targets(self, each: Sequence[Shares]) -> TargetGains | None:
+    def _targets(self, each: Sequence[Contributions]) -> TargetGains | None:
         existence = [shares.existence for shares in each if shares.existence is not None]
         localisation = [shares.localisation for shares in each if shares.localisation is not None]
         if not existence:
@@ -145,8 +145,8 @@ class Questions:
         rewards = part.evidence.rewards(np.array([other]))[0]
         return RunnerUp(tuple(actions), ", ".join(words), margin, _error(self._samples[place] - rewards))
 
-    def had(self, sensor: int, action: int | None, columns: dict[str, float]) -> Had:
-        """The answer to `Explanation.had`."""
+    def counterfactual(self, sensor: int, action: int | None, columns: dict[str, float]) -> Counterfactual:
+        """The answer to `Explanation.counterfactual`."""
         num = len(self._options)
         if isinstance(sensor, bool) or not isinstance(sensor, int | np.integer) or not 0 <= sensor < num:
             raise reject("sensor", f"the number of one of {num} sensors, from 0", sensor)
@@ -158,7 +158,7 @@ class Questions:
         difference = part.evidence.rewards(np.array([other]))[0] - self._samples[place]
         off = float(difference.mean())
         assert self._explanation.reward is not None
-        return Had(
+        return Counterfactual(
             int(sensor), self._actions[sensor].text(index), self._explanation.reward + off, off, _error(difference)
         )
 
@@ -201,6 +201,6 @@ def _error(samples: Floats) -> float | None:
     return float(samples.std(ddof=1) / math.sqrt(num)) if num > 1 else None
 
 
-def _is_finite(shares: Shares) -> bool:
+def _is_finite(shares: Contributions) -> bool:
     values: list[Floats | Ints | float] = [shares.baseline, shares.found, shares.sensors, shares.last]
     return all(bool(np.isfinite(value).all()) for value in values)

@@ -1,7 +1,7 @@
 """Models at many states side by side: built-in ones in loops that the compiler vectorises, any other state by state.
 
 A model is a function of one state. Of the built-in ones that decisions ask most often, the same formulas stand here
-over an index of states; which of them a decision has, its `Forms` say. All arrays have the states along their last
+over an index of states; which of them a decision has, its `ModelForms` say. All arrays have the states along their last
 axis. A loop writes one array: the compiler gives up on vectorising where many of them might overlap.
 """
 
@@ -25,7 +25,7 @@ GROWING, CONSTANT = 1, 2  # noise: of bearing and range, growing with the distan
 GAUSSIAN, SAME = 1, 2  # detection: less with the distance, as exp(-d^2 / (2 sigma^2)); the same everywhere
 
 
-class Forms(NamedTuple):
+class ModelForms(NamedTuple):
     """The forms of a decision's models."""
 
     is_linear: int  # 1 where the motion is x -> F x with the same noise everywhere, else 0
@@ -188,7 +188,7 @@ def fill_noise(
 
 
 @inlined
-def _detect_by_form(sensor: Sensor, forms: Forms, offsets: Offsets, num: int, out: Floats) -> None:
+def _detect_by_form(sensor: Sensor, forms: ModelForms, offsets: Offsets, num: int, out: Floats) -> None:
     if forms.detection == SAME:
         for s in range(num):
             out[s] = sensor.detection_params[0]
@@ -205,7 +205,7 @@ def _detect_by_form(sensor: Sensor, forms: Forms, offsets: Offsets, num: int, ou
 @borrowing
 def fill_detection(
     sensor: Sensor,
-    forms: Forms,
+    forms: ModelForms,
     pose: Floats,
     states: Floats,
     offsets: Offsets,
@@ -226,7 +226,7 @@ def fill_detection(
 @borrowing
 def fill_detection_of_gaussians(
     sensor: Sensor,
-    forms: Forms,
+    forms: ModelForms,
     pose: Floats,
     means: Floats,
     covs: Floats,

@@ -28,8 +28,8 @@ from vedette.kernels.gaussian.prediction import predict
 from vedette.kernels.gaussian.relinearisation import Pair, PairWork, relinearise
 from vedette.kernels.gaussian.scratch import Scratch, make_scratch
 from vedette.kernels.gaussian.sigma_points import LINEARISED, SWITCHED
-from vedette.kernels.planning.forms import (
-    Forms,
+from vedette.kernels.planning.batched_models import (
+    ModelForms,
     Offsets,
     fill_detection_of_gaussians,
     fill_jacobians,
@@ -44,7 +44,7 @@ from vedette.kernels.planning.forms import (
 )
 
 
-class Lanes(NamedTuple):
+class BatchedGaussians(NamedTuple):
     """Predicted Gaussians and what each expects of a scan, as `Innovation` has it; of matrices the lower triangles."""
 
     means: Floats  # (state_dim, room)
@@ -57,7 +57,7 @@ class Lanes(NamedTuple):
     prob_detection: Floats  # (room,)
 
 
-class LaneWork(NamedTuple):
+class BatchWork(NamedTuple):
     """Arrays to work in."""
 
     offsets: Offsets
@@ -76,9 +76,9 @@ class LaneWork(NamedTuple):
 
 
 @kernel
-def make_lanes(dim: int, meas_dim: int, room: int) -> Lanes:
+def make_batch(dim: int, meas_dim: int, room: int) -> BatchedGaussians:
     size, meas_size = place(dim, 0), place(meas_dim, 0)
-    return Lanes(
+    return BatchedGaussians(
         np.empty((dim, room)),
         np.empty((size, room)),
         np.empty((meas_dim, room)),
@@ -91,8 +91,8 @@ def make_lanes(dim: int, meas_dim: int, room: int) -> Lanes:
 
 
 @kernel
-def make_lane_work(dim: int, meas_dim: int, room: int) -> LaneWork:
-    return LaneWork(
+def make_batch_work(dim: int, meas_dim: int, room: int) -> BatchWork:
+    return BatchWork(
         make_offsets(room),
         np.empty((dim * dim, room)),
         np.empty((meas_dim * dim, room)),
@@ -142,7 +142,9 @@ def _lower(i: int, j: int) -> int:
 
 
 @borrowing
-def _predict_linear(forms: Forms, means: Floats, covs: Floats, num: int, lanes: Lanes, work: LaneWork) -> int:
+def _predict_linear(
+    forms: ModelForms, means: Floats, covs: Floats, num: int, lanes: BatchedGaussians, work: BatchWork
+) -> int:
     """m <- F m, P <- F P F' + Q; returns how many are not finite or not positive on the diagonal."""
     dim, transition, noise, wrong = means.shape[0], forms.transition, forms.motion_noise, 0
     for i in range(dim):
@@ -165,8 +167,15 @@ def _predict_linear(forms: Forms, means: Floats, covs: Floats, num: int, lanes: 
 
 
 @borrowing
-def predict_lanes(
-    motion: Motion, forms: Forms, dt: float, means: Floats, covs: Floats, num: int, lanes: Lanes, work: LaneWork
+def predict_batch(
+    motion: Motion,
+    forms: ModelForms,
+    dt: float,
+    means: Floats,
+    covs: Floats,
+    num: int,
+    lanes: BatchedGaussians,
+    work: BatchWork,
 ) -> None:
     """Predict the first `num` Gaussians of means (state_dim, room) and covs into the lanes, as `prediction.predict`."""
     if forms.is_linear == 1 and _predict_linear(forms, means, covs, num, lanes, work) == 0:
@@ -182,7 +191,7 @@ def predict_lanes(
 
 
 @inlined
-def _project(width: int, num: int, lanes: Lanes, work: LaneWork) -> None:
+def _project(width: int, num: int, lanes: BatchedGaussians, work: BatchWork) -> None:
     """W = H P, and the lower triangle of H P H' + R to the factor."""
     dim, meas_dim = lanes.means.shape[0], lanes.predicted.shape[0]
     for a in range(meas_dim):
@@ -201,7 +210,7 @@ def _project(width: int, num: int, lanes: Lanes, work: LaneWork) -> None:
 
 
 @inlined
-def _condition(num: int, lanes: Lanes, work: LaneWork) -> None:
+def _condition(num: int, lanes: BatchedGaussians, work: BatchWork) -> None:
     """Factor the innovation covariances, whiten the cross, and take the posterior covariances."""
     dim, meas_dim, volume = lanes.means.shape[0], lanes.predicted.shape[0], work.volume
     _set(1.0, num, volume)
@@ -236,7 +245,7 @@ def _condition(num: int, lanes: Lanes, work: LaneWork) -> None:
 
 
 @inlined
-def _mark_bent(width: int, num: int, lanes: Lanes, work: LaneWork) -> None:
+def _mark_bent(width: int, num: int, lanes: BatchedGaussians, work: BatchWork) -> None:
     """Make NaN the volumes of Gaussians over which measurements bend, see `innovation`."""
     volume, squares, first, second = work.volume, work.offsets.squares, lanes.covs[0], lanes.covs[place(1, 1)]
     dim, scale = lanes.means.shape[0], 4.0 * LARGEST_BEND * LARGEST_BEND
@@ -251,7 +260,7 @@ def _mark_bent(width: int, num: int, lanes: Lanes, work: LaneWork) -> None:
 
 
 @inlined
-def _mark_cancelled(num: int, lanes: Lanes, work: LaneWork) -> int:
+def _mark_cancelled(num: int, lanes: BatchedGaussians, work: BatchWork) -> int:
     """Make NaN the volumes of Gaussians that must go by themselves, see `innovation`; returns their number."""
     volume, noise, wrong = work.volume, work.noise, 0
     if lanes.predicted.shape[0] == 1:
@@ -269,7 +278,7 @@ def _mark_cancelled(num: int, lanes: Lanes, work: LaneWork) -> int:
 
 
 @inlined
-def _put_innovation(s: int, lanes: Lanes, work: LaneWork) -> None:
+def _put_innovation(s: int, lanes: BatchedGaussians, work: BatchWork) -> None:
     """Write what one Gaussian expects to its lane, all except the probability of detection."""
     dim, innovation = lanes.means.shape[0], work.innovation
     for a in range(lanes.predicted.shape[0]):
@@ -285,7 +294,7 @@ def _put_innovation(s: int, lanes: Lanes, work: LaneWork) -> None:
 
 
 @borrowing
-def _expect_alone(sensor: Sensor, pose: Floats, s: int, lanes: Lanes, work: LaneWork) -> None:
+def _expect_alone(sensor: Sensor, pose: Floats, s: int, lanes: BatchedGaussians, work: BatchWork) -> None:
     take_state(lanes.means, s, work.mean)
     take_matrix(lanes.covs, s, work.cov)
     expect(sensor, pose, work.mean, work.cov, 0, work.innovation, work.scratch)
@@ -294,7 +303,9 @@ def _expect_alone(sensor: Sensor, pose: Floats, s: int, lanes: Lanes, work: Lane
 
 
 @borrowing
-def expect_lanes(sensor: Sensor, forms: Forms, pose: Floats, num: int, lanes: Lanes, work: LaneWork) -> None:
+def expect_batch(
+    sensor: Sensor, forms: ModelForms, pose: Floats, num: int, lanes: BatchedGaussians, work: BatchWork
+) -> None:
     """Fill in what the first `num` predicted Gaussians expect of a scan from a pose, as `innovation.expect`."""
     meas_dim, scratch, offsets = lanes.predicted.shape[0], work.scratch, work.offsets
     for s in range(num):
@@ -327,8 +338,14 @@ def expect_lanes(sensor: Sensor, forms: Forms, pose: Floats, num: int, lanes: La
 
 
 @borrowing
-def relinearise_lanes(
-    sensor: Sensor, pose: Floats, measurements: Floats, is_seen: Bools, num: int, lanes: Lanes, work: LaneWork
+def relinearise_batch(
+    sensor: Sensor,
+    pose: Floats,
+    measurements: Floats,
+    is_seen: Bools,
+    num: int,
+    lanes: BatchedGaussians,
+    work: BatchWork,
 ) -> None:
     """Replace what Gaussians that bend expect by what they expect near their measurements, where these are seen.
 

@@ -30,8 +30,8 @@ from vedette.internal.threads import run_chunks
 from vedette.kernels.association.marginals import Association
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.gaussian.linalg import log_sum
-from vedette.kernels.planning.ideal import Decision, Futures
-from vedette.kernels.planning.known import pseudo_update_known
+from vedette.kernels.planning.ideal import Decision, SampledTrajectories
+from vedette.kernels.planning.known_association import pseudo_update_known
 from vedette.kernels.planning.pseudo_glmb import GlmbResults, pseudo_update_glmb
 from vedette.kernels.planning.pseudo_lmb import LmbResults, pseudo_update_lmb
 from vedette.kernels.planning.reach import Belief as KnownBelief
@@ -40,7 +40,7 @@ from vedette.kernels.planning.reach import label_radii, predict_paths
 
 def draw_futures(
     fused: Belief, sensors: Sequence[MobileSensor], settings: PlanningSettings, *, rng: np.random.Generator
-) -> tuple[Ints, tuple[Futures, ...]]:
+) -> tuple[Ints, tuple[SampledTrajectories, ...]]:
     """Samples of the fused density carried over the horizon without noise; the same states for every sensor.
 
     Returns the labels (num_targets, 2) of the sampled targets, and the future as each sensor meets it. The random
@@ -52,7 +52,7 @@ def draw_futures(
         shape = (settings.horizon_steps, len(samples.states))
         uniforms = rng.random(shape)
         normals = rng.standard_normal((*shape, sensor.filter.sensor.meas_dim))
-        futures.append(Futures(samples.offsets, states, uniforms, normals))
+        futures.append(SampledTrajectories(samples.offsets, states, uniforms, normals))
     return samples.labels, tuple(futures)
 
 
@@ -61,7 +61,7 @@ def pseudo_posteriors(
     sensor: MobileSensor,
     courses: Floats,
     labels: Ints,
-    futures: Futures,
+    futures: SampledTrajectories,
     settings: PlanningSettings,
     scans: Bools,
 ) -> LabelledCases:

@@ -23,7 +23,7 @@ from vedette.kernels.gaussian.scratch import Scratch, make_scratch
 from vedette.kernels.gaussian.sigma_points import LINEARISED, SWITCHED
 from vedette.kernels.planning.bernoulli_rows import log_miss
 from vedette.kernels.planning.ideal import Decision
-from vedette.kernels.planning.known import Entries
+from vedette.kernels.planning.known_association import Entries
 from vedette.kernels.planning.reach import Belief, is_beyond
 
 

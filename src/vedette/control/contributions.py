@@ -11,7 +11,7 @@ from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.planning.joint_values import existence_logits, label_values
 
 
-class Shares(NamedTuple):
+class Contributions(NamedTuple):
     """How a reward comes about, in its own unit; means over the samples.
 
     Together with `baseline`, `sensors` add up to the reward, and so do `existence`, `localisation` and `found` less
@@ -27,7 +27,7 @@ class Shares(NamedTuple):
     samples: Floats  # (num_samples,) rewards of the choice
 
 
-def shares_of(additive: AdditiveRewards, chosen: Ints, which: Ints) -> Shares:
+def contributions_of(additive: AdditiveRewards, chosen: Ints, which: Ints) -> Contributions:
     """The shares of some sensors in the reward of courses (num_sensors,), one a sensor; the others always scan.
 
     A sensor's share is its Shapley value on two orders, the printed and the reverse one: rewards of the first sensors,
@@ -44,7 +44,7 @@ def shares_of(additive: AdditiveRewards, chosen: Ints, which: Ints) -> Shares:
     existence, localisation = _of_labels(additive, chosen, actions[0])
     found = additive.found(chosen) - additive.found(actions[0])
     shares = 0.5 * (np.diff(ahead) - np.diff(behind))
-    return Shares(float(means[0]), existence, localisation, found, shares, ahead[num] - without, rewards[num])
+    return Contributions(float(means[0]), existence, localisation, found, shares, ahead[num] - without, rewards[num])
 
 
 def _of_labels(additive: AdditiveRewards, chosen: Ints, rest: Ints) -> tuple[Floats, Floats] | tuple[None, None]:

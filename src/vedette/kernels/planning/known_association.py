@@ -23,8 +23,16 @@ from vedette.kernels.base.elementary import exponentials, logs, logs_of_one_and
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.gaussian.information import to_information
 from vedette.kernels.gaussian.scratch import wrap_angle
-from vedette.kernels.planning.bernoulli_rows import ALL_BUT_CERTAIN, LEAST_MISS, bernoulli_size
-from vedette.kernels.planning.forms import (
+from vedette.kernels.planning.batched_ekf import (
+    BatchedGaussians,
+    BatchWork,
+    expect_batch,
+    make_batch,
+    make_batch_work,
+    predict_batch,
+    relinearise_batch,
+)
+from vedette.kernels.planning.batched_models import (
     fill_detection,
     fill_measurements,
     find_offsets,
@@ -32,16 +40,8 @@ from vedette.kernels.planning.forms import (
     take_matrix,
     take_state,
 )
+from vedette.kernels.planning.bernoulli_rows import ALL_BUT_CERTAIN, LEAST_MISS, bernoulli_size
 from vedette.kernels.planning.ideal import IDEAL, SAMPLED, Decision, add_noise
-from vedette.kernels.planning.lanes import (
-    Lanes,
-    LaneWork,
-    expect_lanes,
-    make_lane_work,
-    make_lanes,
-    predict_lanes,
-    relinearise_lanes,
-)
 from vedette.kernels.planning.pseudo_lmb import LmbResults
 from vedette.kernels.planning.reach import Belief
 
@@ -73,8 +73,8 @@ class Followed(NamedTuple):
 class Work(NamedTuple):
     """Arrays in which samples are followed."""
 
-    lanes: Lanes
-    own: LaneWork
+    lanes: BatchedGaussians
+    own: BatchWork
     targets: Floats  # (state_dim, room) the label's targets; its own predicted mean where it is not there
     measurements: Floats  # (meas_dim, room) of the targets, and then the whitened residuals
     is_seen: Bools  # (room,) the targets that are measured
@@ -92,8 +92,8 @@ def _make_followed(dim: int, room: int) -> Followed:
 @kernel
 def _make_work(dim: int, meas_dim: int, room: int) -> Work:
     return Work(
-        make_lanes(dim, meas_dim, room),
-        make_lane_work(dim, meas_dim, room),
+        make_batch(dim, meas_dim, room),
+        make_batch_work(dim, meas_dim, room),
         np.empty((dim, room)),
         np.empty((meas_dim, room)),
         np.empty(room, np.bool_),
@@ -104,7 +104,7 @@ def _make_work(dim: int, meas_dim: int, room: int) -> Work:
 
 
 @inlined
-def _take_path(belief: Belief, label: int, step: int, num: int, lanes: Lanes) -> None:
+def _take_path(belief: Belief, label: int, step: int, num: int, lanes: BatchedGaussians) -> None:
     """As the label is without any scan."""
     mean, cov = belief.paths.means[label, step], belief.paths.covs[label, step]
     for i in range(len(mean)):
@@ -231,7 +231,7 @@ def _update(num: int, work: Work, out: Followed) -> None:
 
 
 @borrowing
-def _keep_predicted(num: int, lanes: Lanes, out: Followed) -> None:
+def _keep_predicted(num: int, lanes: BatchedGaussians, out: Followed) -> None:
     for i in range(out.means.shape[0]):
         given, means = lanes.means[i], out.means[i]
         for s in range(num):
@@ -257,11 +257,11 @@ def _follow(
         if is_path:
             _take_path(belief, label, step, num, lanes)
         else:
-            predict_lanes(decision.motion, forms, horizon.dt, out.means, out.covs, num, lanes, own)
+            predict_batch(decision.motion, forms, horizon.dt, out.means, out.covs, num, lanes, own)
         if not horizon.scans[course, step]:
             _keep_predicted(num, lanes, out)
             continue
-        expect_lanes(sensor, forms, pose, num, lanes, own)
+        expect_batch(sensor, forms, pose, num, lanes, own)
         for s in range(num):
             missed[s] = max(1.0 - lanes.prob_detection[s], LEAST_MISS)
         logs(missed[:num], own.offsets.bits, own.offsets.more_bits)
@@ -270,7 +270,7 @@ def _follow(
             out.log_odds[s] += missed[s]
         if _look(belief, decision, course, label, step, first, num, work) > 0:
             _take_clutter(decision, pose, num, work)
-            relinearise_lanes(sensor, pose, work.measurements, work.is_seen, num, lanes, own)
+            relinearise_batch(sensor, pose, work.measurements, work.is_seen, num, lanes, own)
             _whiten(decision, num, work)
             _weigh(num, work, out)
             _update(num, work, out)
@@ -294,7 +294,7 @@ def rows_without_scans(means: Floats, covs: Floats, logits: Floats, references: 
 
 @borrowing
 def _write_changes(
-    found: Followed, first: int, num: int, reference: Floats, base: Floats, own: LaneWork, row: Floats, changes: Floats
+    found: Followed, first: int, num: int, reference: Floats, base: Floats, own: BatchWork, row: Floats, changes: Floats
 ) -> None:
     """Changes (bernoulli_size, num_samples) of a label, of `num` samples from `first` on."""
     size = len(base)

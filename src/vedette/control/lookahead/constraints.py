@@ -11,14 +11,14 @@ import numpy as np
 from vedette.control.constraints import (
     Active,
     Constraint,
+    ConstraintContext,
     Mask,
-    Situation,
-    Timeless,
+    TimeInvariantConstraint,
     active_of,
     courses_allowed,
-    mask_of,
+    feasible_action_mask,
+    interaction_range_of,
     pairs_allowed,
-    reach_of,
 )
 from vedette.control.inputs import beliefs_ahead
 from vedette.control.settings import MobileSensor, PlanningSettings
@@ -53,7 +53,7 @@ class Place(NamedTuple):
 
 
 @dataclass(slots=True, eq=False)
-class Ahead:
+class MultiStepConstraints:
     """Constraints on several decisions: each is tested from where its courses begin to the end of its horizon, or to
     the next decision where that is later.
 
@@ -73,28 +73,30 @@ class Ahead:
     poses: Floats
     stages: Stages
     on_pairs: bool = field(init=False)
-    _timeless: bool = field(init=False)
+    _time_invariant: bool = field(init=False)
     _beliefs: dict[int, tuple[Labelled, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.on_pairs = max(map(reach_of, self.constraints)) > 0.0
-        self._timeless = all(isinstance(own, Timeless) and own.timeless for own in self.constraints)
+        self.on_pairs = max(map(interaction_range_of, self.constraints)) > 0.0
+        self._time_invariant = all(
+            isinstance(own, TimeInvariantConstraint) and own.time_invariant for own in self.constraints
+        )
 
     def mask(self, places: Mapping[int, Place]) -> Mask:
-        """Of the first decision, of all sensors; opened where it has to be. Raises `InputError` as `mask_of`."""
-        return mask_of(self.constraints, self._situation(1, places))
+        """Mask of the first decision, relaxed if necessary. Raises `InputError` as `feasible_action_mask`."""
+        return feasible_action_mask(self.constraints, self._situation(1, places))
 
     def courses(self, sensor: int, stage: int, place: Place) -> tuple[Bools, bool]:
         """(num_courses,) which courses of one sensor are allowed at a decision, and whether they meet the constraints.
 
         Where none does, those that violate them least. stage: 1 for the decision now. Other sensors have no courses in
-        what constraints are shown. Raises `InputError` as `mask_of`.
+        what constraints are shown. Raises `InputError` as `feasible_action_mask`.
         """
         allowed, blocked = courses_allowed(self.constraints, self._situation(stage, {sensor: place}))
         return allowed[sensor], sensor not in blocked
 
     def pairs(self, stage: int, places: Mapping[int, Place]) -> dict[tuple[int, int], Bools]:
-        """The tables of pairs of sensors i < j of which something is forbidden; raises `InputError` as `mask_of`."""
+        """Tables of pairs of sensors i < j with forbidden courses; raises `InputError` as `feasible_action_mask`."""
         return pairs_allowed(self.constraints, self._situation(stage, places))
 
     def active(self, places: Mapping[int, Place]) -> Active | None:
@@ -104,9 +106,9 @@ class Ahead:
 
     def moment(self, stage: int) -> int:
         """What is equal for decisions at which the same courses are allowed as far as constraints tell."""
-        return -len(self.stages.times(stage)) if self._timeless else stage
+        return -len(self.stages.times(stage)) if self._time_invariant else stage
 
-    def _situation(self, stage: int, places: Mapping[int, Place]) -> Situation:
+    def _situation(self, stage: int, places: Mapping[int, Place]) -> ConstraintContext:
         done, num = (stage - 1) * self.stages.stride, len(self.stages.times(stage))
         if stage not in self._beliefs:
             ahead = beliefs_ahead(self.constraints, self.sensors, self.fused, self.settings, done + 1, done + num)
@@ -117,4 +119,4 @@ class Ahead:
         for s, place in places.items():
             poses[s], courses[s], scans[s] = place
         times = self.stages.period * np.arange(done + 1.0, done + num + 1.0)
-        return Situation(tuple(courses), times, self._beliefs[stage], poses, tuple(scans))
+        return ConstraintContext(tuple(courses), times, self._beliefs[stage], poses, tuple(scans))

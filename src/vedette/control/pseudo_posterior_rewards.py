@@ -14,14 +14,14 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from vedette.control.pseudo import draw_futures, pseudo_posteriors
+from vedette.control.pseudo_updates import draw_futures, pseudo_posteriors
 from vedette.control.rewards.base import (
     LabelReward,
     PowerReward,
     Reward,
     combined,
+    may_replace,
     reward_value,
-    speaks_for,
     unit_volume_of,
 )
 from vedette.control.settings import Belief, MobileSensor, PlanningSettings, scans_within
@@ -40,7 +40,7 @@ SLOWER_BY = "a joint decision of two sensors takes 40 to 70 times as long, an in
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CaseRewards:
+class PseudoPosteriorRewards:
     """Rewards by the sensors' own filters, of which the pseudo-updates are run once, in `prepare`.
 
     Attributes:
@@ -76,7 +76,7 @@ class CaseRewards:
         prediction: Belief,
         *,
         rng: np.random.Generator,
-    ) -> CaseRewards:
+    ) -> PseudoPosteriorRewards:
         """Draw the samples and run the pseudo-updates of every sensor (paper section III-B, steps 1 to 4)."""
         labels, futures = draw_futures(state.fused, sensors, settings, rng=rng)
         scans = scans_within(sensors, options, state.time, settings)
@@ -158,12 +158,12 @@ def lay_out_rewards(
 
     fusion: None for a sensor alone.
     """
-    if not provides(reward, PowerReward) or not speaks_for(reward, "combine", "__call__"):
+    if not provides(reward, PowerReward) or not may_replace(reward, "combine", "__call__"):
         return f"{_name(reward)} is a function of two densities"
     laid: LaidOut | None = None
     if fusion is None:
         laid = lay_out_alone(cases[0], prediction)
-    elif provides(fusion, LaysOut) and speaks_for(fusion, "lay_out", "fuse"):
+    elif provides(fusion, LaysOut) and may_replace(fusion, "lay_out", "fuse"):
         laid = fusion.lay_out(cases, prediction)
     if laid is None:
         return f"{'a sensor alone' if fusion is None else _name(fusion)} cannot lay out these beliefs"

@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 
-from vedette.control.turning import turned_on
+from vedette.control.camera_turning import turned_on
 from vedette.kernels.base.types import Floats
 from vedette.platforms import Options
 from vedette.platforms.camera import POINTING, is_camera
 
 
-def continued(own: Options, horizon: Floats, times: Floats) -> Options:
+def extrapolated(own: Options, horizon: Floats, times: Floats) -> Options:
     """The options with courses (num_courses, num_times, pose_dim) at other times, s, from now on.
 
     horizon: (num_steps,) s of the poses that there are. Between them a sensor goes straight; after the last it goes on

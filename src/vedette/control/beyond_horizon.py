@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vedette.control.camera_turning import seconds_to_search, seconds_to_turn, turn_rate, views_a_second
 from vedette.control.constraints import Paths, VisibilityGraph
-from vedette.control.continuing import continued, follow
+from vedette.control.extrapolation import extrapolated, follow
 from vedette.control.settings import MobileSensor, PlanningSettings
-from vedette.control.turning import seconds_to_search, seconds_to_turn, turn_rate, views_a_second
 from vedette.densities import LMB, UndetectedIntensity
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models.functions import numbers_at
@@ -32,7 +32,7 @@ _SAME_PROGRESS, _LEAST_PROGRESS = 0.05, 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Beyond:
+class BeyondHorizon:
     """What there is for sensors beyond their horizon.
 
     Attributes:
@@ -60,9 +60,9 @@ class Beyond:
         places: Floats,
         graph: VisibilityGraph | None,
         undetected: UndetectedIntensity | None,
-    ) -> Beyond:
+    ) -> BeyondHorizon:
         """Collect it. graph: of the zones that constraints forbid; None: there are none."""
-        reaches = np.array([sight(sensor, own.pose) for sensor, own in zip(sensors, options, strict=True)])
+        reaches = np.array([detection_range(sensor, own.pose) for sensor, own in zip(sensors, options, strict=True)])
         paths = None if graph is None else tuple(graph.to(places, own.pose[:2]) for own in options)
         return cls(tuple(options), reaches, labels, places, paths, undetected)
 
@@ -92,8 +92,8 @@ class Beyond:
         return tuple(replace(settings, horizon_steps=steps, horizon_period=total / num) for steps in (num // 2, num))
 
     def continued(self, horizon: Floats, times: Floats) -> tuple[Options, ...]:
-        """The options with courses at `times` (num_times,) s, around what is forbidden; horizon: as of `continued`."""
-        later = tuple(continued(own, horizon, times) for own in self.options)
+        """Return the options with courses at `times` (num_times,) s around forbidden zones; see `extrapolated`."""
+        later = tuple(extrapolated(own, horizon, times) for own in self.options)
         if self.paths is None:
             return later
         return tuple(self._around(s, own, horizon, times) for s, own in enumerate(later))
@@ -217,13 +217,13 @@ class Beyond:
         return np.where(largest[:, 0] > 0.0, goals, -1), largest[:, 0] * lengths[best[goals]]
 
 
-def drawing(prediction: LMB) -> tuple[Ints, Floats]:
+def attracting_targets(prediction: LMB) -> tuple[Ints, Floats]:
     """Labels (num, 2) and places (num, 2), m, of the targets that draw sensors from afar."""
     draws = prediction.existence >= _LEAST_EXISTENCE
     return prediction.tracks.labels[draws], np.ascontiguousarray(prediction.tracks.means[draws, :2])
 
 
-def sight(sensor: MobileSensor, pose: Floats) -> float:
+def detection_range(sensor: MobileSensor, pose: Floats) -> float:
     """m, the distance up to which it detects at least half as well as it does anywhere, in the best direction."""
     model, dim = sensor.filter.sensor.detection, sensor.filter.targets.state_dim
     states = np.zeros((len(_DISTANCES) * _DIRECTIONS, dim))

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.control.constraints import Mask, opened, repaired, without_course
+from vedette.control.constraints import Mask, infeasible_note, nearest_feasible, relaxed
 from vedette.control.constraints.mask import depth_first
-from vedette.control.lookahead.ahead import Ahead
+from vedette.control.lookahead.constraints import MultiStepConstraints
 from vedette.control.lookahead.courses import CourseTree, Sequence
 from vedette.kernels.base.types import Bools
 
@@ -23,7 +23,7 @@ _MOST_TRIES = 10_000
 
 
 @dataclass(slots=True, eq=False)
-class Rules:
+class FeasibleSequences:
     """What is allowed.
 
     Attributes:
@@ -35,7 +35,7 @@ class Rules:
     """
 
     trees: tuple[CourseTree, ...]
-    ahead: Ahead
+    ahead: MultiStepConstraints
     mask: Mask
     until: int
     start: tuple[Sequence, ...]
@@ -44,12 +44,12 @@ class Rules:
     _single: dict[tuple[int, Sequence], bool] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, trees: tuple[CourseTree, ...], ahead: Ahead) -> Rules:
+    def of(cls, trees: tuple[CourseTree, ...], ahead: MultiStepConstraints) -> FeasibleSequences:
         """Of trees without constraints.
 
         Dead ends are left out, unless these leave pairs of sensors no way at the first decision. Where no joint
         sequence is found on which all pairs are as they must be, that holds for as many decisions as one was found for;
-        see `notes`. Raises `InputError` as `mask_of`.
+        see `notes`. Raises `InputError` as `feasible_action_mask`.
         """
         mask = ahead.mask({s: tree.place(()) for s, tree in enumerate(trees)})
         bound = tuple(replace(tree, ahead=ahead, now=own) for tree, own in zip(trees, mask.single, strict=True))
@@ -107,7 +107,7 @@ class Rules:
     def notes(self, sequence: Several[Sequence]) -> tuple[str, ...]:
         """What a reader of a decision for a joint sequence must know."""
         found = [
-            f"sensor {s + 1}, decision {k} of the sequence: {without_course(self.ahead.constraints)}"
+            f"sensor {s + 1}, decision {k} of the sequence: {infeasible_note(self.ahead.constraints)}"
             for s, (tree, own) in enumerate(zip(self.trees, sequence, strict=True))
             for k in tree.blocked(own)
         ]
@@ -179,7 +179,7 @@ class _Begun(NamedTuple):
     at: tuple[int, ...] = ()
 
 
-def _furthest(trees: tuple[CourseTree, ...], ahead: Ahead, mask: Mask) -> tuple[Sequence, ...]:
+def _furthest(trees: tuple[CourseTree, ...], ahead: MultiStepConstraints, mask: Mask) -> tuple[Sequence, ...]:
     """Courses that all sensors may take together, for as many decisions as such were found; perhaps for none.
 
     Decision after decision the courses that keep to the last action, repaired, are tried first; depth first, with a
@@ -196,7 +196,7 @@ def _furthest(trees: tuple[CourseTree, ...], ahead: Ahead, mask: Mask) -> tuple[
         places = {s: tree.place(own) for s, (tree, own) in enumerate(zip(trees, joint, strict=True))}
         together = ahead.pairs(len(joint[0]) + 1, places) if joint[0] else mask.together
         here = Mask(single, together, active=mask.active and ahead.active(places))
-        first = repaired(here, [own[0] for own in orders] if joint[0] else opened(mask)[1])
+        first = nearest_feasible(here, [own[0] for own in orders] if joint[0] else relaxed(mask)[1])
         if not here.allows(np.array([first]))[0]:
             return _Begun(joint, here, [[]] * num)
         return _Begun(

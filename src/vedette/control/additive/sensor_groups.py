@@ -18,8 +18,8 @@ from vedette.densities.containers import unchecked
 from vedette.densities.tracks import places_of, single_gaussians, take_tracks
 from vedette.internal.probabilities import logit
 from vedette.kernels.base.types import Bools, Floats, Ints, Lmb
-from vedette.kernels.planning.ideal import EXPECTED, IDEAL, Decision, Futures
-from vedette.kernels.planning.known import rows_without_scans
+from vedette.kernels.planning.ideal import EXPECTED, IDEAL, Decision, SampledTrajectories
+from vedette.kernels.planning.known_association import rows_without_scans
 from vedette.kernels.planning.reach import Belief, Paths, label_radii, predict_paths
 from vedette.models import SensorModel
 from vedette.platforms import Options
@@ -58,14 +58,14 @@ class Samples(NamedTuple):
         states = np.empty((settings.horizon_steps, 0, fused.state_dim))
         return cls(states, np.zeros(2, np.int64), np.full((fused.tracks.num_tracks, 1), -1))
 
-    def futures(self, meas_dim: int, settings: PlanningSettings, *, rng: np.random.Generator) -> Futures:
+    def futures(self, meas_dim: int, settings: PlanningSettings, *, rng: np.random.Generator) -> SampledTrajectories:
         """As one sensor meets them; random numbers of detections and noise are drawn where they are wanted."""
         mode = IDEAL_MODES[settings.ideal_measurements]
         shape = self.states.shape[:2]
         uniforms = rng.random(shape) if mode != IDEAL else np.empty((0, 0))
         noisy = mode not in (IDEAL, EXPECTED)
         normals = rng.standard_normal((*shape, meas_dim)) if noisy else np.empty((0, 0, meas_dim))
-        return Futures(self.offsets, self.states, uniforms, normals)
+        return SampledTrajectories(self.offsets, self.states, uniforms, normals)
 
 
 class SensorGroup(NamedTuple):

@@ -11,12 +11,12 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from vedette.control.constraints import Mask
+from vedette.control.decision_analysis import DecisionAnalysis
 from vedette.control.evaluator import Evaluator
 from vedette.control.evidence import Evidence, Part
-from vedette.control.explaining import Questions
 from vedette.control.explanation import Bound
-from vedette.control.inputs import single_mask, staying
-from vedette.control.plan import Certainty, Plan, RewardTable
+from vedette.control.inputs import single_mask, stationary_courses
+from vedette.control.plan import Plan, RewardTable, SamplingOutcome
 from vedette.control.preparation import Preparation
 from vedette.control.problem import beyond_cutoff, bound_of, searched
 from vedette.control.racing import FIRST_ROUND, Race, next_total
@@ -129,7 +129,7 @@ class Rounds:
         self.evaluator.notes.update(evaluator.notes)
         return rewards
 
-    def certainty(self, races: Sequence[Race]) -> Certainty:
+    def certainty(self, races: Sequence[Race]) -> SamplingOutcome:
         """Run all races: how they ended. What may go wrong in any of them adds up."""
         stopped = self._run(races)
         over: Literal["one left", "indifferent"] = "indifferent"
@@ -137,7 +137,7 @@ class Rounds:
             over = "one left"
         confidence = max(0.0, 1.0 - sum(1.0 - race.reached for race in races))
         left, started = tuple(len(race.left) for race in races), tuple(len(race.actions) for race in races)
-        return Certainty(stopped or over, confidence, self.num_samples, left, started)
+        return SamplingOutcome(stopped or over, confidence, self.num_samples, left, started)
 
 
 def decide_jointly(
@@ -186,7 +186,7 @@ def decide_alone(
     presume: what each sensor presumes of the others.
     """
     settings, options, races = preparation.settings, preparation.options, preparation.races
-    others = staying(options, preparation.mask) if presume == "stay" else None
+    others = stationary_courses(options, preparation.mask) if presume == "stay" else None
     rounds = Rounds.begin(preparation, FIRST_ROUND if races else settings.num_samples, others, rng=rng)
     each_sure = 1.0 - (1.0 - float(settings.confidence or 0.0)) / len(options)
     parts, entered = [], []
@@ -219,7 +219,9 @@ def _active(parts: Sequence[Part], mask: Mask | None) -> Sequence[Part]:
     return [part._replace(chosen=(course,)) for part, course in zip(parts, kept, strict=True)]
 
 
-def _raced_plan(name: str, parts: Sequence[Part], notes: Sequence[str], certainty: Certainty, **fields: Any) -> Plan:
+def _raced_plan(
+    name: str, parts: Sequence[Part], notes: Sequence[str], certainty: SamplingOutcome, **fields: Any
+) -> Plan:
     """Of what took part in fewer rounds the samples are not those of the choice, so that it cannot be questioned."""
     return replace(plan_of(name, parts, notes, (str(certainty),), certainty=certainty, **fields), questions=None)
 
@@ -246,7 +248,7 @@ def plan_of(
         tuple(tables),
         dict(evaluator.counts),
         (*notes, *evaluator.notes, *more_notes, *beyond_cutoff(evaluator, courses)),
-        questions=Questions(name, tuple(parts), fields.get("bound")),
+        questions=DecisionAnalysis(name, tuple(parts), fields.get("bound")),
         **fields,
     )
 
