@@ -96,7 +96,7 @@ from vedette.densities import LMB
 from vedette.filters import LmbFilter
 from vedette.fusion import Clmb
 from vedette.tracking import State
-from vedette.platforms import Courses
+from vedette.platforms import HeadingPlatform
 
 region = models.Region(-1000.0, 1000.0, -1000.0, 1000.0)
 sensor = models.SensorModel(
@@ -122,7 +122,7 @@ def counted(prior, decision, association, first, last, results):
     done.append(last - first)
 
 pseudo.pseudo_update_lmb = counted
-sensors = (MobileSensor(tracker, Courses(50.0)),)
+sensors = (MobileSensor(tracker, HeadingPlatform(50.0)),)
 planner = IndependentPlanner(sensors, Clmb((1.0,)), settings, CauchySchwarzReward())
 try:
     planner.plan(State((belief,), belief), [[-700.0, 0.0, 0.0]], rng=np.random.default_rng(1))
