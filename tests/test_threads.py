@@ -91,7 +91,7 @@ import numpy as np
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # what is started in the background ignores it
 from vedette import models
-from vedette.control import CauchySchwarzReward, IndependentPlanner, MobileSensor, PlanningSettings, pseudo
+from vedette.control import CauchySchwarzReward, IndependentPlanner, MobileSensor, PlanningSettings, pseudo_updates
 from vedette.densities import LMB
 from vedette.filters import LmbFilter
 from vedette.fusion import Clmb
@@ -113,7 +113,7 @@ belief = LMB.from_bernoullis(
     [[100.0 * i, 30.0, 1.0, 0.0] for i in range(num)], [100.0 * np.eye(4)] * num,
 )
 settings = PlanningSettings(num_samples=30_000, association="full", num_threads=int(sys.argv[1]))
-kernel, done = pseudo.pseudo_update_lmb, []
+kernel, done = pseudo_updates.pseudo_update_lmb, []
 
 def counted(prior, decision, association, first, last, results):
     if done:  # all is loaded: CPython ends by the signal where it met exec() of a string, caught or not
@@ -121,7 +121,7 @@ def counted(prior, decision, association, first, last, results):
     kernel(prior, decision, association, first, last, results)
     done.append(last - first)
 
-pseudo.pseudo_update_lmb = counted
+pseudo_updates.pseudo_update_lmb = counted
 sensors = (MobileSensor(tracker, HeadingPlatform(50.0)),)
 planner = IndependentPlanner(sensors, Clmb((1.0,)), settings, CauchySchwarzReward())
 try:

@@ -35,7 +35,7 @@ from vedette.control import (
     void_probability,
 )
 from vedette.control.lookahead import courses as courses_module
-from vedette.control.lookahead import rules as rules_module
+from vedette.control.lookahead import feasibility as rules_module
 from vedette.control.lookahead.constraints import Stages
 from vedette.densities import LMB, track_moments
 from vedette.fusion import Clmb

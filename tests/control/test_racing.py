@@ -15,7 +15,7 @@ from vedette.control import (
     CauchySchwarzReward,
     CoordinateAscent,
     ExpectedLossReward,
-    deciding,
+    decisions,
 )
 from vedette.control.preparation import Preparation
 from vedette.control.racing import FIRST_ROUND, Race, next_total
@@ -215,7 +215,7 @@ def test_a_reward_without_samples_is_certain_at_once() -> None:
 
 def test_what_a_search_picks_races_on_fresh_samples(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its own samples speak for what it picked; the race's speak for the choice."""
-    monkeypatch.setattr(deciding, "_MOST_OF_ALL", 1)
+    monkeypatch.setattr(decisions, "_MOST_OF_ALL", 1)
     example = situation("lmb", 3, 2, platform=HeadingPlatform(30.0))
     example = certain(example, association="known", indifference=0.02)
     plan = decided(example, search=CoordinateAscent(1))

@@ -1,4 +1,4 @@
-"""Where to send the sensors next: ideal measurements, rewards, joint action search, constraints, planners."""
+"""Sensor control: ideal measurements, rewards, searches over joint actions, constraints and planners."""
 
 from vedette.control.baselines import ConstraintReportingPlanner, FixedPlanner, Planner, RandomPlanner, RequiresTruth
 from vedette.control.constraints import (

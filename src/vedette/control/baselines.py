@@ -1,4 +1,5 @@
-"""What a planner is, and those without rewards: random, fixed, and a planner that is watched for what it violates."""
+"""The planner protocol, and planners without rewards: random, fixed, and a wrapper that reports constraint violations.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +21,7 @@ from vedette.tracking import State
 
 
 class Planner(Protocol):
-    """Chooses an action for every sensor."""
+    """A planner, which chooses an action for every sensor."""
 
     @property
     def name(self) -> str:
@@ -28,30 +29,31 @@ class Planner(Protocol):
         ...
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
-        """Decide from what a tracker believes after a scan and the poses (num_sensors, 3 or more)."""
+        """Return the plan for the state of a tracker after a scan and the sensor poses (num_sensors, 3 or more)."""
         ...
 
 
 @runtime_checkable
 class RequiresTruth(Protocol):
-    """A planner that is told the true targets at the beginning of a run; `vedette.simulation.simulate` does."""
+    """A planner that receives the true targets at the beginning of a run, from `vedette.simulation.simulate`."""
 
     def with_truth(self, truth: Any) -> Planner:
-        """The planner for these targets, a `vedette.simulation.Truth`."""
+        """Return the planner for these targets, a `vedette.simulation.Truth`."""
         ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RandomPlanner:
-    """Every sensor takes one of its different courses at random, each as likely (the paper's baseline).
+    """A planner that draws one of the distinct courses of each sensor, with equal probabilities (the paper's baseline).
 
     Attributes:
         sensors: the sensors.
-        settings: the horizon, over which courses are told apart.
-        constraints: what the sensors must not do; a joint action that is drawn and not allowed is moved to one near it.
+        settings: the horizon, over which courses are distinguished.
+        constraints: limits on the sensors' courses. A joint action that violates them is replaced by a feasible one
+            near it.
 
     Raises:
-        InputError: parts of another kind, or constraints that look at beliefs with filters that have no labels.
+        InputError: parts of another type, or constraints that need beliefs with filters that have no labels.
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -66,7 +68,7 @@ class RandomPlanner:
             raise reject("constraints", "none that asks where targets will be, as filters have no labels", asking[0])
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
-        """Drawn from `rng`; the beliefs are not looked at, but by constraints."""
+        """Return a plan drawn from `rng`; beliefs are used only by constraints."""
         generator(rng)
         options, fused = options_of(self.sensors, poses, self.settings), None
         if self.constraints:
@@ -81,13 +83,13 @@ class RandomPlanner:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FixedPlanner:
-    """Every sensor keeps to an action set beforehand.
+    """A planner that always takes the same action of each sensor.
 
     Attributes:
         actions: for each sensor its one action, in the columns of its platform: `Actions.of(heading_deg=30.0)`.
 
     Raises:
-        InputError: no sensor, or not one action of each.
+        InputError: no sensor, or not exactly one action for each.
     """
 
     actions: tuple[Actions, ...]
@@ -100,7 +102,7 @@ class FixedPlanner:
             raise reject("actions", expected, self.actions)
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
-        """The set actions, whatever is believed."""
+        """Return the fixed actions, whatever the state."""
         generator(rng)
         check_poses(poses, len(self.actions))
         return Plan(self.name, self.actions, (0,) * len(self.actions), (), {})
@@ -108,16 +110,16 @@ class FixedPlanner:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ConstraintReportingPlanner:
-    """A planner as it is; notes of its plans name the sensors whose courses violate constraints, and the constraints.
+    """A planner that decides as another does, and notes which sensors violate which constraints.
 
     Attributes:
-        planner: decides, whatever the constraints.
-        sensors: that it steers.
-        settings: the horizon, over which courses are judged.
-        constraints: what the sensors must not do.
+        planner: the planner that decides, regardless of the constraints.
+        sensors: the sensors that it steers.
+        settings: the horizon, over which courses are tested.
+        constraints: the constraints that are tested.
 
     Raises:
-        InputError: parts of another kind.
+        InputError: parts of another type.
     """
 
     planner: Planner
@@ -130,16 +132,16 @@ class ConstraintReportingPlanner:
 
     @property
     def name(self) -> str:
-        """Of the planner."""
+        """Name of the planner."""
         return self.planner.name
 
     def with_truth(self, truth: Any) -> ConstraintReportingPlanner:
-        """The same, where the planner is one that is told the targets of a run."""
+        """Return this planner with the true targets, if the wrapped planner requires them."""
         planner = self.planner
         return replace(self, planner=planner.with_truth(truth)) if isinstance(planner, RequiresTruth) else self
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
-        """What the planner decides; raises what it raises, and `InputError` as `feasible_action_mask`."""
+        """Return the planner's decision; raises its errors, and `InputError` as `feasible_action_mask`."""
         plan, settings = self.planner.plan(state, poses, rng=rng), self.settings
         at, times = check_poses(poses, len(self.sensors)), settings.horizon_times()
         rows = zip(self.sensors, at, plan.chosen_actions, strict=True)

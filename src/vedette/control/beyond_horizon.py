@@ -1,4 +1,4 @@
-"""Beyond the horizon: how long sensors take to the targets, and how their courses go on, around forbidden zones."""
+"""Targets beyond the horizon: how long sensors take to reach them, and how courses continue around forbidden zones."""
 
 from __future__ import annotations
 
@@ -18,30 +18,30 @@ from vedette.models.functions import numbers_at
 from vedette.platforms import Options
 from vedette.platforms.camera import line_of_sight
 
-# Targets that exist with less probability draw no sensor from afar.
+# Minimum existence probability of targets that sensors approach from beyond the horizon.
 _LEAST_EXISTENCE = 0.1
-# A sensor goes so much longer than it takes to its target, to see it for a while.
+# Factor on the time to a target, so that the sensor observes it for a while.
 _STAY = 1.25
-# Where it is asked how far a sensor sees, m, and in how many directions.
+# Distances, m, and number of directions at which the detection range of a sensor is evaluated.
 _DISTANCES, _DIRECTIONS = np.geomspace(1.0, 1e6, 121), 8
-# Pseudo-updates on the way. A step is no longer than a sensor sees, so that it does not pass a target unseen.
+# Number of pseudo-updates on the way. A step is at most the detection range, so that no target is passed undetected.
 _LEAST_STEPS, _MOST_STEPS = 4, 12
-# A course leads to the target of which it approaches the most, as a share of what the best course does; among targets
-# that differ in this share by no more than so much, to the nearest. What is less than so many metres is no approach.
+# A course leads to the target that it approaches most, as a fraction of the progress of the best course. If these
+# fractions differ by at most the first number, it leads to the nearest target. Second number: minimum progress, m.
 _SAME_PROGRESS, _LEAST_PROGRESS = 0.05, 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BeyondHorizon:
-    """What there is for sensors beyond their horizon.
+    """Targets that attract sensors from beyond their horizon, and the data to continue courses towards them.
 
     Attributes:
-        options: of each sensor within the horizon.
-        reaches: (num_sensors,) m, how far each sensor sees.
-        labels: (num_targets, 2) of the targets that draw sensors from afar.
-        places: (num_targets, 2) m, where they are expected.
-        paths: of each sensor to these places; None: nothing is forbidden at all times.
-        undetected: where else there may be targets; None: it is not known.
+        options: for each sensor, its options within the horizon.
+        reaches: (num_sensors,) m, detection range of each sensor.
+        labels: (num_targets, 2) labels of the targets that attract sensors.
+        places: (num_targets, 2) m, expected positions of these targets.
+        paths: for each sensor, its paths to these positions; None: no zone is forbidden.
+        undetected: intensity of undetected targets; None: not known.
     """
 
     options: tuple[Options, ...]
@@ -61,20 +61,22 @@ class BeyondHorizon:
         graph: VisibilityGraph | None,
         undetected: UndetectedIntensity | None,
     ) -> BeyondHorizon:
-        """Collect it. graph: of the zones that constraints forbid; None: there are none."""
+        """Return the data for these targets. graph: of the zones that constraints forbid; None: there are none."""
         reaches = np.array([detection_range(sensor, own.pose) for sensor, own in zip(sensors, options, strict=True)])
         paths = None if graph is None else tuple(graph.to(places, own.pose[:2]) for own in options)
         return cls(tuple(options), reaches, labels, places, paths, undetected)
 
     def horizons(self, settings: PlanningSettings) -> tuple[PlanningSettings, ...]:
-        """The settings of further horizons, half way and at the end; none where all see what there is to see.
+        """Return settings of further horizons, halfway and at the end; none if every sensor can already reach its
+        targets.
 
-        Within the horizon, a sensor that sees 250 m and goes 20 m has nothing to gain from a target 300 m off, and of
-        courses worth the same the first is taken. So all sensors are taken to go on as they do, until each may have
-        come to a target and each target may be reached by one of them, and the loss is the mean of those at all these
-        times. Targets that no allowed path brings into sight do not count. Cameras turn to targets too, and until they
-        have searched the directions of nearly all undetected targets. Where an action switches a sensor off, there is
-        at least one more horizon: otherwise nothing would depend on where it goes meanwhile.
+        Within the horizon, a sensor with a detection range of 250 m that moves 20 m gains nothing from a target 300 m
+        away, and of courses with equal rewards the first is taken. Therefore all sensors are assumed to continue as
+        they move, until each sensor may have reached a target and each target may be reached by a sensor. The loss is
+        the mean over the losses at all these times. Targets that no feasible path brings into detection range do not
+        count. Cameras turn to targets too, and until they have searched the directions of nearly all undetected
+        targets. If an action switches a sensor off, there is at least one more horizon; otherwise the reward would not
+        depend on how the sensor moves meanwhile.
         """
         horizon = settings.horizon_steps * settings.horizon_period
         speeds, turns = self._rates(horizon)
@@ -92,14 +94,14 @@ class BeyondHorizon:
         return tuple(replace(settings, horizon_steps=steps, horizon_period=total / num) for steps in (num // 2, num))
 
     def continued(self, horizon: Floats, times: Floats) -> tuple[Options, ...]:
-        """Return the options with courses at `times` (num_times,) s around forbidden zones; see `extrapolated`."""
+        """Return the options with courses at `times` (num_times,) s, around forbidden zones. See `extrapolated`."""
         later = tuple(extrapolated(own, horizon, times) for own in self.options)
         if self.paths is None:
             return later
         return tuple(self._around(s, own, horizon, times) for s, own in enumerate(later))
 
     def notes(self) -> tuple[str, ...]:
-        """Notes on targets that no sensor can see from any place that allowed paths lead to."""
+        """Return notes on targets that no sensor can detect from any position on a feasible path."""
         if self.paths is None:
             return ()
         moves = [bool((own.courses[:, :, :2] != own.pose[:2]).any()) for own in self.options]
@@ -110,13 +112,16 @@ class BeyondHorizon:
         )
 
     def distances(self) -> Floats:
-        """(num_sensors, num_targets) m, from the sensors now to the targets, by allowed paths; there must be zones."""
+        """Return distances (num_sensors, num_targets) m from the sensors to the targets by feasible paths; needs zones.
+        """
         assert self.paths is not None
         rows = zip(self.paths, self.options, strict=True)
         return np.concatenate([paths.distances(own.pose[np.newaxis, :2]) for paths, own in rows])
 
     def _rates(self, horizon: float) -> tuple[Floats, Floats]:
-        """(num_sensors,) m/s of each sensor's course that goes farthest, and rad/s of the one that turns most."""
+        """Return (num_sensors,) speed in m/s of each sensor's farthest course, and turn rate in rad/s of its largest
+        turn.
+        """
         speeds, turns = np.empty(len(self.options)), np.zeros(len(self.options))
         for s, own in enumerate(self.options):
             offsets = own.courses[:, -1, :2] - own.pose[:2]
@@ -125,7 +130,8 @@ class BeyondHorizon:
         return speeds, turns
 
     def _seconds_to_targets(self, speeds: Floats, turns: Floats) -> float:
-        """s until each sensor may have come to a target, and each target may be reached by one of them."""
+        """Return the time in s until each sensor may have reached a target, and each target may be reached by a sensor.
+        """
         if len(self.places) == 0:
             return 0.0
         seconds = np.full((len(self.options), len(self.places)), np.inf)
@@ -140,13 +146,16 @@ class BeyondHorizon:
         return float(np.where(np.isfinite(longest), longest, 0.0).max())
 
     def _seconds_to_search(self, turns: Floats) -> float:
-        """s until cameras have looked where undetected targets are; 0 where none turns, or nothing is known of them."""
+        """Return the time in s until cameras have searched for undetected targets; 0 if none turns or none are
+        modelled.
+        """
         if self.undetected is None or not turns.any():
             return 0.0
         return seconds_to_search(self.options, turns.tolist(), self.reaches, self.undetected, _LEAST_EXISTENCE)
 
     def _gaps(self, s: int) -> Floats:
-        """(num_targets,) m from the end of the best course of a sensor to the targets; straight where it sees them."""
+        """Return the distance (num_targets,) m from the best course's end to each target; straight if it is in range.
+        """
         own = self.options[s]
         ends = np.ascontiguousarray(own.courses[:, -1, :2])
         straight = np.hypot(*(ends[:, np.newaxis] - self.places).transpose(2, 0, 1))
@@ -158,21 +167,22 @@ class BeyondHorizon:
         return np.asarray(np.where(straight <= self.reaches[s], straight, around)[allowed].min(axis=0))
 
     def _in_sight(self, s: int) -> Bools:
-        """(num_targets,) which targets a sensor has in its sight from where it is now."""
+        """Return (num_targets,) whether each target is within the detection range of a sensor at its present position.
+        """
         return np.asarray(np.hypot(*(self.places - self.options[s].pose[:2]).T) <= self.reaches[s])
 
     def _is_attainable(self, s: int) -> Bools:
-        """(num_targets,) which targets a sensor sees from where its paths to them end."""
+        """Return (num_targets,) whether a sensor detects each target from the end of its path to it."""
         assert self.paths is not None
         return np.asarray(self.paths[s].left <= self.reaches[s])
 
     def _around(self, s: int, later: Options, horizon: Floats, times: Floats) -> Options:
-        """The continued courses of one sensor where constraints forbid zones: around them to a target, or up to them.
+        """Return the continued courses of one sensor with zones: along a path to a target, or up to a zone.
 
-        A course whose continuation would touch a zone, or that approaches a target by a path with bends, goes on along
-        the shortest path to that target, as fast as it approaches it: the best course at its own speed, one that
-        approaches it half as much at half of this. At the target it stays. One that approaches none stops short of the
-        zone.
+        A course continues along the shortest path to a target if its straight continuation would touch a zone, or if it
+        approaches the target by a path with bends. It moves as fast as it approaches the target: the best course at its
+        own speed, a course with half the progress at half of this speed. At the target it stays. A course that
+        approaches no target stops short of the zone.
         """
         assert self.paths is not None
         own, paths = self.options[s], self.paths[s]
@@ -193,12 +203,13 @@ class BeyondHorizon:
         return later._replace(courses=courses)
 
     def _leads_to(self, s: int, ends: Floats, lengths: Floats, allowed: Bools) -> tuple[Ints, Floats]:
-        """(num_courses,) the target that each course of a sensor leads to, and m that it goes on towards it a horizon.
+        """Return (num_courses,) the target of each course of a sensor, and its advance in m per horizon towards it.
 
-        It goes on by as much as it approaches the target, as a share of what the best allowed course does; where a step
-        to the side has to be made first, as none approaches it, by as little as it moves away. Of targets with about
-        the same share the nearest; -1: it leads to none that is not in its sight. ends: (num_courses, 2) m, where
-        courses end. lengths: (num_courses,) m, from the pose.
+        The advance is in proportion to the progress of a course towards the target, relative to the best feasible
+        course. If no course approaches the target, because a step to the side has to be made first, the course with the
+        smallest retreat advances most. Of targets with about the same fraction the nearest is taken; -1: the course
+        leads to no target beyond detection range. ends: (num_courses, 2) m, end points of the courses. lengths:
+        (num_courses,) m, from the pose.
         """
         assert self.paths is not None
         now, then = (self.paths[s].distances(own) for own in (self.options[s].pose[np.newaxis, :2], ends))
@@ -218,13 +229,14 @@ class BeyondHorizon:
 
 
 def attracting_targets(prediction: LMB) -> tuple[Ints, Floats]:
-    """Labels (num, 2) and places (num, 2), m, of the targets that draw sensors from afar."""
+    """Return labels (num, 2) and positions (num, 2), m, of the targets that sensors approach from beyond the horizon.
+    """
     draws = prediction.existence >= _LEAST_EXISTENCE
     return prediction.tracks.labels[draws], np.ascontiguousarray(prediction.tracks.means[draws, :2])
 
 
 def detection_range(sensor: MobileSensor, pose: Floats) -> float:
-    """m, the distance up to which it detects at least half as well as it does anywhere, in the best direction."""
+    """Return the range in m up to which P_D is at least half of its maximum, in the best direction."""
     model, dim = sensor.filter.sensor.detection, sensor.filter.targets.state_dim
     states = np.zeros((len(_DISTANCES) * _DIRECTIONS, dim))
     angles = line_of_sight(pose) + 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS

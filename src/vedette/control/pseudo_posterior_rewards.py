@@ -1,7 +1,7 @@
-"""Rewards of joint actions from the sensors' pseudo-posteriors: any reward, any fusion, any density.
+"""Rewards of joint actions from the sensors' pseudo-posteriors, for any reward, fusion and density.
 
-Where fusion and reward allow it they are laid out and made of power integrals; else the public functions are called for
-one joint action and sample at a time.
+If fusion and reward allow it, the densities are precomputed and rewards are made of power integrals. Otherwise the
+public functions are called for each joint action and sample.
 """
 
 from __future__ import annotations
@@ -35,22 +35,22 @@ from vedette.tracking import State
 
 SampleRewards: TypeAlias = Callable[[Ints], Floats]
 
-# Of decisions of paper-a, two sensors of 13 actions each: benchmarks/planning.py --one-by-one.
+# Measured on decisions of paper-a, two sensors with 13 actions each: benchmarks/planning.py --one-by-one.
 SLOWER_BY = "a joint decision of two sensors takes 40 to 70 times as long, an independent one 4 to 6 times,"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PseudoPosteriorRewards:
-    """Rewards by the sensors' own filters, of which the pseudo-updates are run once, in `prepare`.
+    """Rewards from the sensors' own filters, whose pseudo-updates are run once, in `prepare`.
 
     Attributes:
         sensors, fusion, settings, reward: as in the planners.
-        options: of each sensor.
-        prediction: the fused density predicted to the horizon, one Gaussian a track.
+        options: for each sensor.
+        prediction: the fused density predicted to the horizon, one Gaussian per track.
         posteriors: the pseudo-posteriors of each sensor.
-        scanned: (num_courses,) of each sensor whether it scans within the horizon.
-        counts: how many filter steps, fusions and divergences have been evaluated so far.
-        notes: what a reader of the decision must know, in the order in which it came up (keys; no values).
+        scanned: for each sensor (num_courses,) whether it scans within the horizon.
+        counts: numbers of filter steps, fusions and divergences evaluated so far.
+        notes: notes for readers of the decision, in order of occurrence (keys; values are unused).
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -92,19 +92,19 @@ class PseudoPosteriorRewards:
         )
 
     def joint(self) -> SampleRewards:
-        """Of all sensors, fused."""
+        """Return the reward function of all sensors, fused."""
         return self.rewards(range(len(self.sensors)), self.fusion)
 
     def alone(self, sensor: int) -> SampleRewards:
-        """Of one sensor's own density, actions (num, 1)."""
+        """Return the reward function of one sensor's own density; its actions have shape (num, 1)."""
         return self.rewards((sensor,), None)
 
     def rewards(self, which: Sequence[int], fusion: Fusion | None) -> SampleRewards:
-        """The function that gives (num_joint, num_samples) rewards of joint actions (num_joint, num of `which`).
+        """Return a function from joint actions (num_joint, num of `which`) to rewards (num_joint, num_samples).
 
-        which: the sensors that act. Their actions are numbers of different courses. fusion: None for a single sensor,
-        whose own density is then compared with the prediction. The function raises `NumericalError` where a reward is
-        not finite, which names the action and the sample.
+        which: the sensors that act. Actions are indices of distinct courses. fusion: None for a single sensor, whose
+        own density is compared with the prediction. The function raises `NumericalError` with the action and the sample
+        if a reward is not finite.
         """
         compute = self._compute([self.posteriors[s] for s in which], fusion)
 
@@ -127,7 +127,8 @@ class PseudoPosteriorRewards:
         return PlainRewards(posteriors, self.prediction, fusion, self.reward, self.settings.num_samples, self.views)
 
     def views(self, chosen: Sequence[int]) -> Views:
-        """What the sensors could see at the end of chosen courses, and what all their updates began with."""
+        """Return the fields of view at the ends of the chosen courses, with the prediction that all updates start from.
+        """
         models = tuple(sensor.filter.sensor for sensor in self.sensors)
         poses = np.stack([own.courses[course, -1] for own, course in zip(self.options, chosen, strict=True)])
         scanned = tuple(bool(own[course]) for own, course in zip(self.scanned, chosen, strict=True))
@@ -154,9 +155,9 @@ def lay_out_rewards(
     fusion: Fusion | None,
     reward: Reward | PowerReward | LabelReward,
 ) -> SampleRewards | str:
-    """What `PlainRewards` computes, for all joint actions and samples at once; or why it cannot be laid out.
+    """Return a function that equals `PlainRewards` for all joint actions and samples at once, or the reason for none.
 
-    fusion: None for a sensor alone.
+    fusion: None for a single sensor.
     """
     if not provides(reward, PowerReward) or not may_replace(reward, "combine", "__call__"):
         return f"{_name(reward)} is a function of two densities"
@@ -172,13 +173,13 @@ def lay_out_rewards(
 
 
 def _name(thing: Any) -> str:
-    named = getattr(thing, "func", thing)  # of a partial
+    named = getattr(thing, "func", thing)  # the function of a partial
     return str(getattr(named, "__name__", type(named).__name__))
 
 
 @functools.cache
 def warn_slow(why: str) -> None:
-    """Warn, once in a process, that rewards are computed one by one."""
+    """Warn, once per process, that rewards are computed one by one."""
     warnings.warn(
         f"rewards are computed one by one: {SLOWER_BY} as by a PowerReward under a fusion that lays out; {why}",
         SlowRewardWarning,
@@ -188,14 +189,14 @@ def warn_slow(why: str) -> None:
 
 @dataclass(slots=True, eq=False)
 class PlainRewards:
-    """Every reward, by `fusion.fuse` and the reward itself, one joint action and sample after the other.
+    """Any reward by `fusion.fuse` and the reward function, one joint action and sample at a time.
 
     Attributes:
-        posteriors: one a sensor.
+        posteriors: one for each sensor.
         prediction: the fused density at the horizon.
         fusion: None for a single sensor, whose own density is then compared with the prediction.
         reward, num_samples: as in the planners.
-        views: what the sensors could see at the end of a joint action, which a fusion may ask for.
+        views: returns the fields of view at the end of a joint action, which a fusion may need.
     """
 
     posteriors: Sequence[LabelledCases]
@@ -207,7 +208,7 @@ class PlainRewards:
     _densities: dict[tuple[int, int], Belief] = field(default_factory=dict)
 
     def __call__(self, actions: Ints) -> Floats:
-        """(num_joint, num_samples) rewards of joint actions (num_joint, num_sensors)."""
+        """Return rewards (num_joint, num_samples) of joint actions (num_joint, num_sensors)."""
         rewards = np.empty((len(actions), self.num_samples))
         for joint, chosen in enumerate(actions.tolist()):
             views = None if self.fusion is None else self.views(chosen)

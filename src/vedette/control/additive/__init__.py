@@ -1,1 +1,1 @@
-"""Rewards of joint actions that are sums over targets, of what each sensor's scans say of each target."""
+"""Rewards of joint actions that are sums over targets, from the information that each sensor adds about each target."""

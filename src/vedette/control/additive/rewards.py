@@ -1,4 +1,4 @@
-"""Rewards of joint actions from the table of changes, and the searches that its shape makes cheap."""
+"""Rewards of joint actions from the table of changes, and the searches that this structure makes cheap."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from vedette.kernels.planning.joint_values import alone_values, joint_values, li
 from vedette.kernels.planning.label_values import EXPECTED_LOSS, FUNCTION, POWER_INTEGRALS, Valuation
 from vedette.models.arguments import provides
 
-# Lines after which an ascent is stopped, a hundred sweeps of a hundred sensors.
+# Maximum number of lines of an ascent: a hundred sweeps of a hundred sensors.
 _MOST_LINES = 10_000
 
-# Samples of labels that a thread values before it looks at the clock, in a few milliseconds.
+# Samples of labels that a thread evaluates, in a few milliseconds, before it checks the clock.
 _QUICK = 20_000
 
 
@@ -34,14 +34,15 @@ class AdditiveRewards:
     """Rewards that are made of sums over labels.
 
     Attributes:
-        table: what the scans of each course say of each label.
-        valuation: what a label is worth.
+        table: changes of each label by the scans of each course.
+        valuation: contribution of a label to the reward.
         bases: for each sensor, the rows of its own belief without scans.
-        reward: whose `combine` makes rewards of the sums; None: the sum itself.
-        cells: where targets may be that were not found yet.
-        prices: (num_courses,) what each course costs, in units of the reward.
+        reward: its `combine` turns the sums into rewards; None: the reward is the sum itself.
+        cells: expected numbers of undetected targets by cell, and the cells that each course sees.
+        prices: (num_courses,) price of each course, in units of the reward.
         num_threads: threads that may share the work; the result does not depend on it.
-        num_horizons: at whose ends labels are valued, each as of labels of its own, one horizon after the other.
+        num_horizons: number of horizons at whose ends labels are evaluated. The labels of each horizon are separate
+            labels, one horizon after the other.
     """
 
     table: Table
@@ -55,23 +56,23 @@ class AdditiveRewards:
 
     @property
     def num_samples(self) -> int:
-        """Samples of each reward."""
+        """Number of samples of each reward."""
         return int(self.table.changes.shape[2])
 
     @property
     def coefficients(self) -> Floats | None:
-        """Of the sums, where the reward is linear in them; None where it is not known to be."""
+        """Coefficients of the sums, if the reward is linear in them; None if it is not known to be linear."""
         if self.reward is None:
             return np.ones(1)
         found = self.reward.coefficients if provides(self.reward, LinearReward) else None
         return None if found is None else np.asarray(found, np.float64)
 
     def joint(self) -> AdditiveRewards:
-        """Of all sensors, fused: themselves."""
+        """Return the rewards of all sensors, fused: this object."""
         return self
 
     def alone(self, sensor: int) -> AdditiveRewards:
-        """Of one sensor, compared by itself with the prediction."""
+        """Return the rewards of one sensor alone, compared with the prediction."""
         first, last = self.table.first_courses[sensor : sensor + 2].tolist()
         offsets = self.table.offsets[first : last + 1]
         own = Table(
@@ -81,7 +82,9 @@ class AdditiveRewards:
         return replace(self, table=own, bases=(self.bases[sensor],), cells=cells, prices=self.prices[first:last])
 
     def __call__(self, actions: Ints) -> Floats:
-        """(num_joint, num_samples) rewards of joint actions (num_joint, num_sensors); -1: the sensor does not scan."""
+        """Return rewards (num_joint, num_samples) of joint actions (num_joint, num_sensors); -1: the sensor does not
+        scan.
+        """
         sums = np.empty((len(actions), self.valuation.num, self.num_samples))
 
         def work(first: int, last: int) -> None:
@@ -92,7 +95,8 @@ class AdditiveRewards:
         return np.asarray(self.of_sums(sums) + self._beside(actions))
 
     def with_scans(self, chosen: Ints) -> Floats:
-        """(num_labels, bernoulli_size, num_samples) joint rows with the scans of a joint action (num_sensors,).
+        """Return the joint rows (num_labels, bernoulli_size, num_samples) with the scans of a joint action
+        (num_sensors,).
 
         -1: the sensor does not scan.
         """
@@ -104,11 +108,13 @@ class AdditiveRewards:
         return rows
 
     def line(self, chosen: Ints, sensor: int) -> Floats:
-        """(num_courses, num_samples) rewards of all courses of one sensor, the others as chosen."""
+        """Return rewards (num_courses, num_samples) of all courses of one sensor, given the other sensors' choices."""
         return self._lines(chosen, sensor, sensor + 1)
 
     def lines(self, chosen: Ints) -> Floats:
-        """(num_courses, num_samples) the lines of all sensors through a joint action, one after the other."""
+        """Return rewards (num_courses, num_samples) of the lines of all sensors through a joint action, sensor by
+        sensor.
+        """
         return self._lines(chosen, 0, len(chosen))
 
     def _lines(self, chosen: Ints, first: int, last: int) -> Floats:
@@ -129,7 +135,7 @@ class AdditiveRewards:
         return rewards
 
     def each_alone(self) -> Floats:
-        """(num_courses, num_samples) rewards of all courses of each sensor by itself, one sensor after the other."""
+        """Return rewards (num_courses, num_samples) of all courses of each sensor alone, sensor by sensor."""
         distinct = {id(base): base for base in self.bases}
         bases, places = np.stack(list(distinct.values())), {key: place for place, key in enumerate(distinct)}
         which = np.array([places[id(base)] for base in self.bases])
@@ -145,35 +151,38 @@ class AdditiveRewards:
         return rewards - self.prices[:, np.newaxis]
 
     def ascend(self, start: Ints, allowed: Allowed) -> tuple[Ints, float, Trace]:
-        """One compiled ascent; for rewards that are linear in their sums."""
+        """Run one compiled ascent; only for rewards that are linear in their sums."""
         coefficients = self.coefficients
         assert coefficients is not None
         return ascend(self.table, self.valuation, coefficients, self.cells, self.prices, allowed, start, _MOST_LINES)
 
     def of_sums(self, sums: Floats) -> Floats:
-        """(..., num_samples) rewards of sums over labels (..., num, num_samples), without cells and prices."""
+        """Return rewards (..., num_samples) of sums over labels (..., num, num_samples), without cells and prices."""
         sums = np.moveaxis(sums, -2, -1)
         return sums[..., 0] if self.reward is None else combined(self.reward, sums)
 
     def price(self, actions: Ints) -> Floats:
-        """(num_joint,) what joint actions (num_joint, num_sensors) cost; -1: the sensor does not scan, for free."""
+        """Return the prices (num_joint,) of joint actions (num_joint, num_sensors); -1: the sensor does not scan, at no
+        price.
+        """
         prices = self.prices[np.maximum(actions, 0) + self.table.first_courses[:-1]]
         return np.asarray(np.where(actions >= 0, prices, 0.0).sum(axis=1))
 
     def _beside(self, actions: Ints) -> Floats:
-        """(num_joint, 1) what rewards of joint actions have beside sums over labels: cells, less prices."""
+        """Return the terms of the rewards other than sums over labels, (num_joint, 1): undetected targets less prices.
+        """
         found = np.array([self.found(joint) for joint in actions]) if len(self.cells.worth) else 0.0
         return np.asarray(found - self.price(actions))[:, np.newaxis]
 
     def _found_alone(self) -> Floats:
-        """(num_courses,) what each course finds by itself."""
+        """Return the value (num_courses,) of the undetected targets that each course finds alone."""
         cells = self.cells
         shares = -cells.worth[cells.cells] * np.expm1(cells.log_miss)
         course = np.repeat(np.arange(len(cells.offsets) - 1), np.diff(cells.offsets))
         return np.asarray(np.bincount(course, shares, len(cells.offsets) - 1), np.float64)
 
     def found(self, chosen: Ints) -> float:
-        """What the reward has for targets that are expected to be found."""
+        """Return the value of the undetected targets that a joint action is expected to find."""
         cells, totals = self.cells, np.zeros(len(self.cells.worth))
         for s in np.flatnonzero(chosen >= 0).tolist():
             course = self.table.first_courses[s] + chosen[s]
@@ -183,7 +192,7 @@ class AdditiveRewards:
 
 
 def valuation_of(reward: Any, prediction: LMB, prior: Floats) -> Valuation:
-    """How a reward, by labels or by power integrals, values the labels of a prediction of one Gaussian each.
+    """Return the valuation of the labels of a prediction of single Gaussians, for a label reward or a power reward.
 
     prior: (num_labels, bernoulli_size) rows of the prediction.
     """
@@ -196,7 +205,7 @@ def valuation_of(reward: Any, prediction: LMB, prior: Floats) -> Valuation:
         np.empty((0, 2)),
         0.0,
         np.empty(0),
-        cardinality_variance_of_label,  # not asked but by FUNCTION
+        cardinality_variance_of_label,  # only used by FUNCTION
         gaussians.means,
         gaussians.covs,
     )
@@ -215,7 +224,7 @@ def valuation_of(reward: Any, prediction: LMB, prior: Floats) -> Valuation:
 
 
 def _of_prediction(prediction: LMB, exponents: Floats, log_volume: float, logits: Floats) -> Floats:
-    """(num_labels, num_exponents) a log(1 - r), and of pairs (a, 0) the whole of their term."""
+    """Return log(1 - r) times a, (num_labels, num_exponents); for pairs (a, 0) the whole term."""
     dim = prediction.state_dim
     log_dets = np.linalg.slogdet(prediction.tracks.covs)[1] + dim * LOG_2PI
     terms = np.outer(log_expit(-logits), exponents[:, 0])

@@ -1,4 +1,4 @@
-"""Where a decision by sums over labels starts: beliefs without scans, samples, sensors that can be worked on as one."""
+"""Starting point of a decision by sums over labels: beliefs without scans, samples, and sensors evaluated as one."""
 
 from __future__ import annotations
 
@@ -27,39 +27,39 @@ from vedette.tracking import State
 
 
 class Task(NamedTuple):
-    """What one horizon is laid out from."""
+    """Inputs from which one horizon is prepared."""
 
     sensors: Sequence[MobileSensor]
-    options: Sequence[Options]  # of each sensor, with courses over the horizon
+    options: Sequence[Options]  # for each sensor, with courses over the horizon
     settings: PlanningSettings
     state: State
     prediction: Prediction
-    sampled: bool  # False for what needs no samples, and takes the mean P_D over the predicted Gaussian
+    sampled: bool  # False: no samples, P_D is the mean over the predicted Gaussian
 
 
 class Samples(NamedTuple):
-    """Samples of the fused density over the horizon, and which target is of which label."""
+    """Samples of the fused density over the horizon, and the target of each label."""
 
     states: Floats  # (horizon_steps, num_targets, state_dim)
-    offsets: Ints  # (num_samples + 1,) into the targets
-    targets: Ints  # (num_labels, num_samples) place of each label's target, -1 where it is not there
+    offsets: Ints  # (num_samples + 1,) first target of each sample
+    targets: Ints  # (num_labels, num_samples) index of each label's target, -1 if absent
 
     @classmethod
     def draw(
         cls, fused: Any, sensors: Sequence[MobileSensor], settings: PlanningSettings, *, rng: np.random.Generator
     ) -> Samples:
-        """`num_samples` of them, carried over the horizon without noise."""
+        """Draw `num_samples` samples and propagate them over the horizon without noise."""
         drawn, states = draw_paths(fused, sensors, settings, rng=rng)
         return cls(states, drawn.offsets, targets_of(fused.tracks.labels, drawn.labels, drawn.offsets))
 
     @classmethod
     def none(cls, fused: Any, settings: PlanningSettings) -> Samples:
-        """One sample in which nobody is there, for what needs no samples."""
+        """Return one sample without targets, for rewards that need no samples."""
         states = np.empty((settings.horizon_steps, 0, fused.state_dim))
         return cls(states, np.zeros(2, np.int64), np.full((fused.tracks.num_tracks, 1), -1))
 
     def futures(self, meas_dim: int, settings: PlanningSettings, *, rng: np.random.Generator) -> SampledTrajectories:
-        """As one sensor meets them; random numbers of detections and noise are drawn where they are wanted."""
+        """Return the trajectories for one sensor; draws random numbers for detections and noise if they are needed."""
         mode = IDEAL_MODES[settings.ideal_measurements]
         shape = self.states.shape[:2]
         uniforms = rng.random(shape) if mode != IDEAL else np.empty((0, 0))
@@ -69,29 +69,30 @@ class Samples(NamedTuple):
 
 
 class SensorGroup(NamedTuple):
-    """Sensors of one model that start from one belief: their courses are those of one sensor."""
+    """Sensors with equal models and the same belief, whose courses are evaluated as those of one sensor."""
 
     members: tuple[int, ...]
-    belief: Belief  # of labels that the fused density has
-    labels: Ints  # (num_own,) place of the sensor's labels among those of the fused density
+    belief: Belief  # restricted to labels of the fused density
+    labels: Ints  # (num_own,) indices of the sensor's labels in the fused density
     decision: Decision
     rows: Floats  # (num_own, bernoulli_size) without scans
-    course_offsets: Ints  # (num_members + 1,)
-    reach: float  # m, beyond which these sensors detect nothing
+    course_offsets: Ints  # (num_members + 1,) first course of each member
+    reach: float  # m, maximum detection range of these sensors
 
 
 class Start(NamedTuple):
-    """All groups, and the prediction's rows."""
+    """All sensor groups, and the rows of the prediction."""
 
     groups: tuple[SensorGroup, ...]
-    references: Floats  # (num_labels, state_dim) means of the prediction, about which all rows are taken
+    references: Floats  # (num_labels, state_dim) means of the prediction, reference points of all rows
     prior: Floats  # (num_labels, bernoulli_size)
-    bases: tuple[Floats, ...]  # for each sensor (num_labels, bernoulli_size) of its own belief without scans
+    bases: tuple[Floats, ...]  # for each sensor (num_labels, bernoulli_size), its own belief without scans
     num_samples: int
 
 
 def starts_of(task: Task, missing_existence: float, *, rng: np.random.Generator) -> Start:
-    """Return the table's rows without any scan. missing_existence: existence of a label that a sensor lacks."""
+    """Return the table's rows without any scan. missing_existence: existence assumed for a label that a sensor lacks.
+    """
     settings, given = task.settings, task.prediction.end.to_kernel()
     if task.sampled:
         samples = Samples.draw(task.state.fused, task.sensors, settings, rng=rng)
@@ -112,7 +113,7 @@ def starts_of(task: Task, missing_existence: float, *, rng: np.random.Generator)
 
 
 def _alike(task: Task, *, shared: bool) -> list[tuple[int, ...]]:
-    """Sensors with the same belief and equal models together; each by itself unless `shared`."""
+    """Return groups of sensors with the same belief and equal models; each sensor alone unless `shared`."""
     if not shared:
         return [(s,) for s in range(len(task.sensors))]
     found: dict[object, list[int]] = {}
@@ -151,9 +152,9 @@ def _group(
 def _without_scans(
     prediction: Prediction, belief: LMB, decision: Decision, prior: Floats
 ) -> tuple[Ints, Lmb, Paths, Floats]:
-    """Labels shared with the prediction (as places there), their tracks now, their paths, and their rows without scans.
+    """Return the labels shared with the prediction, their present tracks, their paths, and their rows without scans.
 
-    For the fused belief these are the prediction's own.
+    Labels are indices into the prediction. For the fused belief these are the prediction's own.
     """
     exists = belief.existence_logit > -np.inf
     if belief is prediction.fused and exists.all():
@@ -170,7 +171,7 @@ def _without_scans(
 
 
 def _spread(group: SensorGroup, prior: Floats, missing_existence: float) -> Floats:
-    """The rows on all labels; of one that the sensor lacks, an existence that it would hardly have missed."""
+    """Return rows for all labels; a label that the sensor lacks gets the existence `missing_existence` or less."""
     if group.rows is prior:
         return prior
     rows = np.zeros_like(prior)

@@ -1,4 +1,4 @@
-"""The changes of a decision: what the scans of every course say of every label in its reach, and of every cell."""
+"""The changes of a decision: the effect of each course's scans on each label in reach, and on each cell."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ from vedette.models.arguments import provides
 from vedette.platforms import Options
 from vedette.tracking import State
 
-# A label that no sample and no prediction gives a higher probability of detection is out of reach.
+# A label is out of reach if its probability of detection is no higher, for every sample and for the prediction.
 LEAST_DETECTION = 1e-6
 
-# No cell is searched so well that nothing can be left in it.
+# Lower limit: a search never empties a cell completely.
 _LEAST_LOG_MISS = float(np.log(1e-12))
 
-# Courses that a thread works on before it looks at the clock: followed by samples, or without.
+# Courses that a thread processes before it checks the clock: with samples, and without.
 _SAMPLED, _UNSAMPLED = 16, 512
 
-# Bytes of changes beyond which a decision is refused rather than left to run out of memory.
+# Maximum size of the changes in bytes; a larger decision is refused, so that it does not run out of memory.
 _MOST_BYTES = 8e9
 
 
@@ -53,7 +53,9 @@ def lay_out(
     *,
     rng: np.random.Generator,
 ) -> tuple[AdditiveRewards, LMB]:
-    """The rewards at the end of the horizon, each label followed over every course that reaches it; the prediction."""
+    """Return the rewards at the end of the horizon, with each label followed over each course in reach, and the
+    prediction.
+    """
     fused: Any = state.fused
     num_threads, undetected, motion = settings.threads(), state.undetected, sensors[0].filter.targets.motion
     with model_errors():
@@ -72,11 +74,11 @@ def lay_out(
 
 
 def lay_out_changes(start: Start, rule: LinearRule, num_threads: int, *, sampled: bool) -> Table:
-    """The changes of all sensors' courses, by samples or, without, as they are expected.
+    """Return the changes of all sensors' courses, by samples or, without samples, their expectation.
 
     Raises:
-        InputError: more changes than memory should be asked for.
-        ModelError, NumericalError: as the models and the filters.
+        InputError: the changes would take too much memory.
+        ModelError, NumericalError: errors of the models and the filters.
     """
     num_sensors, num_samples, size = len(start.bases), start.num_samples, start.prior.shape[1]
     reached = [_reach(group, num_threads, sampled=sampled) for group in start.groups]
@@ -106,7 +108,7 @@ def lay_out_changes(start: Start, rule: LinearRule, num_threads: int, *, sampled
 
 
 def _seen(table: Table) -> Table:
-    """Without the entries that say nothing."""
+    """Return the table without the entries of labels that are certain to be missed."""
     kept = table.changes[:, -1, 0] < 0.0
     course = np.repeat(np.arange(len(table.offsets) - 1), np.diff(table.offsets))
     offsets = offsets_of(np.bincount(course[kept], minlength=len(table.offsets) - 1))
@@ -114,7 +116,7 @@ def _seen(table: Table) -> Table:
 
 
 def _reach(group: SensorGroup, num_threads: int, *, sampled: bool) -> Ints:
-    """(num_courses, num_own) 1 where a course reaches a label; without samples, where it might."""
+    """Return (num_courses, num_own): 1 where a course reaches a label; without samples, where it might."""
     num_courses, belief, decision = int(group.course_offsets[-1]), group.belief, group.decision
     out = np.empty((num_courses, len(group.labels)), np.int64)
     if not sampled:
@@ -129,7 +131,7 @@ def _reach(group: SensorGroup, num_threads: int, *, sampled: bool) -> Ints:
 
 
 def _sizes(groups: Sequence[SensorGroup], reached: Sequence[Ints], num_sensors: int) -> tuple[Ints, Ints]:
-    """Entries of each course, sensor after sensor, and the first course of each sensor."""
+    """Return the number of entries of each course, sensor by sensor, and the first course of each sensor."""
     own: list[Ints] = [np.empty(0, np.int64)] * num_sensors
     first_courses = np.zeros(num_sensors + 1, np.int64)
     for group, reach in zip(groups, reached, strict=True):
@@ -141,7 +143,7 @@ def _sizes(groups: Sequence[SensorGroup], reached: Sequence[Ints], num_sensors: 
 
 
 def places_of_courses(group: SensorGroup, first_courses: Ints) -> Ints:
-    """Place of each course of a group among those of all sensors."""
+    """Return the index of each course of a group among the courses of all sensors."""
     sizes = np.diff(group.course_offsets)
     starts = first_courses[list(group.members)] - group.course_offsets[:-1]
     return np.asarray(np.repeat(starts, sizes) + np.arange(group.course_offsets[-1]))
@@ -161,7 +163,7 @@ def _filling(
 
 
 def undetected_target_value(reward: Any, settings: PlanningSettings) -> float:
-    """What finding an undetected target is worth, in units of the reward."""
+    """Return the value of finding an undetected target, in units of the reward."""
     if not provides(reward, HasMissedCost):
         return settings.undetected_worth or 0.0
     cost: float = reward.missed_cost
@@ -169,16 +171,16 @@ def undetected_target_value(reward: Any, settings: PlanningSettings) -> float:
 
 
 def no_cells(num_courses: int) -> Cells:
-    """Nothing to be found."""
+    """Return cells without undetected targets."""
     none = np.empty(0)
     return Cells(np.zeros(num_courses + 1, np.int64), np.empty(0, np.int64), none, none)
 
 
 def cells_of(start: Start, undetected: UndetectedIntensity, worth: float, first_courses: Ints, state_dim: int) -> Cells:
-    """The cells that each course sees, of a grid of targets not found yet that are taken to stay where they are.
+    """Return the cells that each course sees, from a grid of undetected targets that are assumed not to move.
 
-    worth: of finding a target, in units of the reward. first_courses: (num_sensors + 1,) of each sensor.
-    Raises `ModelError` as the sensors.
+    worth: value of finding a target, in units of the reward. first_courses: (num_sensors + 1,) first course of each
+    sensor. Raises `ModelError` from the sensor models.
     """
     num_courses = int(first_courses[-1])
     found: list[tuple[Ints, Floats]] = [(np.empty(0, np.int64), np.empty(0))] * num_courses

@@ -1,4 +1,4 @@
-"""What sensors must not do: which of their courses, and which pairs of courses, are allowed."""
+"""Constraints on sensors: which of their courses, and which pairs of courses, are allowed."""
 
 from vedette.control.constraints.active import Active, MaxActive, active_of
 from vedette.control.constraints.mask import Mask, nearest_feasible, relaxed

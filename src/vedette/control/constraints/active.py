@@ -1,4 +1,4 @@
-"""How many sensors may scan after a decision."""
+"""Limit on the number of sensors that may scan after a decision."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from vedette.platforms.operated import LEFT
 @part("max_active", "constraint")
 @dataclass(frozen=True, slots=True)
 class MaxActive(Checked):
-    """At most so many sensors scan after a decision; the others take an action that switches them off.
+    """A limit on the number of sensors that scan after a decision; the others take an action that switches them off.
 
-    Each course of a sensor that can be switched is there a second time without scans, so that it forbids no course and
-    no pair of courses by itself: which sensors scan is for the planner to choose.
+    Each course of a sensor that can be switched is listed a second time without scans. The constraint therefore forbids
+    no course and no pair of courses by itself: the planner chooses which sensors scan.
 
     Attributes:
         sensors: largest number of sensors that scan.
@@ -38,24 +38,25 @@ class MaxActive(Checked):
 
     @property
     def most_active(self) -> int:
-        """The number."""
+        """Largest number of sensors that scan."""
         return self.sensors
 
     def courses(self, situation: ConstraintContext) -> tuple[Bools, ...]:
-        """All."""
+        """Return masks that allow all courses."""
         return tuple(np.ones(len(own), np.bool_) for own in situation.courses)
 
     def pairs(self, situation: ConstraintContext, first: int, second: int) -> Bools | None:
-        """All."""
+        """Return None: all pairs of courses are allowed."""
         return None
 
 
 class Active(NamedTuple):
-    """Which courses scan, and how many sensors may.
+    """The courses that scan, and the number of sensors that may scan.
 
-    on: (num_courses,) whether each course scans, one array a sensor. off: (num_courses,) the course of the same poses
-    that does not scan; itself of those that do not, and of those of a sensor that cannot be switched off. most: number
-    of sensors that may scan.
+    on: (num_courses,) whether each course scans, one array per sensor.
+    off: (num_courses,) index of the course with the same poses that does not scan; the course itself if it does not
+        scan, or if its sensor cannot be switched off.
+    most: number of sensors that may scan.
     """
 
     on: tuple[Bools, ...]
@@ -63,21 +64,23 @@ class Active(NamedTuple):
     most: int
 
     def excess(self, actions: Ints) -> Ints:
-        """(num,) how many sensors too many scan in joint actions (num, num_sensors)."""
+        """Return (num,) the number of sensors that scan beyond the limit in joint actions (num, num_sensors)."""
         num = np.zeros(len(actions), np.int64)
         for s, own in enumerate(self.on):
             num += own[actions[:, s]]
         return np.maximum(num - self.most, 0)
 
     def is_full(self, at: Sequence[int], sensor: int) -> bool:
-        """Whether no further sensor may scan beside the others of a joint action; below 0: not decided, and off."""
+        """Return True if no further sensor may scan besides the others of a joint action; below 0: undecided, and off.
+        """
         return sum(bool(self.on[s][own]) for s, own in enumerate(at) if s != sensor and own >= 0) >= self.most
 
     def kept(self, at: Sequence[int], gains: Sequence[float] | None = None) -> tuple[int, ...]:
-        """A joint action with the sensors off that scan beyond `most`, on courses of the same poses.
+        """Return a joint action in which sensors beyond `most` are off, on courses of the same poses.
 
-        gains: of each sensor's scans; the largest are kept, of equal ones the first. None: those are kept that come
-        first from a sensor on that depends on the joint action, so that draws spare none.
+        gains: value of each sensor's scans; the sensors with the largest keep scanning, of equal ones the first. None:
+        sensors keep scanning in order from a sensor that depends on the joint action, so that random draws favour no
+        sensor.
         """
         scanning = [s for s, own in enumerate(at) if self.on[s][own]]
         if len(scanning) <= self.most:
@@ -93,9 +96,9 @@ class Active(NamedTuple):
 
 
 def active_of(constraints: Sequence[Constraint], courses: Sequence[Floats], scans: Sequence[Bools]) -> Active | None:
-    """What constraints say of how many sensors may scan; None: nothing, or nothing is known of scans.
+    """Return the limit on active sensors given by constraints; None if there is no limit or scans are not known.
 
-    courses: (num_courses, num_times, pose_dim) of each sensor. scans: (num_courses, num_times) whether they scan.
+    courses: (num_courses, num_times, pose_dim) for each sensor. scans: (num_courses, num_times) whether they scan.
     """
     numbers = [own.most_active for own in constraints if provides(own, ActivationConstraint)]
     if not numbers or not scans:
@@ -105,7 +108,7 @@ def active_of(constraints: Sequence[Constraint], courses: Sequence[Floats], scan
 
 
 def _twins(courses: Floats, on: Bools) -> Ints:
-    """(num_courses,) see `Active.off`."""
+    """Return (num_courses,) indices as in `Active.off`."""
     twins, silent = np.arange(len(courses)), np.flatnonzero(~on)
     poses = np.delete(courses, LEFT, axis=2) if courses.shape[2] > LEFT else courses
     of_pose = {poses[course].tobytes(): course for course in silent[::-1].tolist()}

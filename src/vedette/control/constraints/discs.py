@@ -1,4 +1,4 @@
-"""Probability that a Gaussian puts into a disc."""
+"""Probability mass of a Gaussian within a disc."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ import numpy as np
 
 from vedette.kernels.base.types import Floats, Ints
 
-# Outside so many standard deviations a Gaussian in the plane has 1.3e-14 of its mass, and one on a line less.
+# Beyond this number of standard deviations a Gaussian in the plane has 1.3e-14 of its mass, and one on a line less.
 _FAR = 8.0
 
-# Nodes of the quadrature that are held at a time.
+# Number of quadrature nodes held in memory at a time.
 _BLOCK = 1 << 19
 
 
 def near_pairs(centres: Floats, means: Floats, covs: Floats, radius: float) -> tuple[Ints, Ints]:
-    """Indices of the discs (num_discs, 2) and Gaussians (num_gaussians, 2) that are not further apart than matters.
+    """Return indices of the discs (num_discs, 2) and Gaussians (num_gaussians, 2) that are close enough to matter.
 
-    What is left out has less than exp(-32) = 1.3e-14 in the disc: no more than a Gaussian has beyond 8 of its largest
+    The omitted pairs have less than exp(-32) = 1.3e-14 in the disc, the mass of a Gaussian beyond 8 of its largest
     standard deviations.
     """
     reach = radius + _FAR * np.sqrt(_largest_variance(covs))
@@ -29,17 +29,17 @@ def near_pairs(centres: Floats, means: Floats, covs: Floats, radius: float) -> t
 
 
 def disc_probabilities(offsets: Floats, which: Ints, covs: Floats, radius: float) -> Floats:
-    """(num,) probability that a Gaussian of mean 0 is within `radius` of `offsets` (num, 2), to about 1e-13.
+    """Return the probability (num,) that a Gaussian of mean 0 is within `radius` of `offsets` (num, 2), to about 1e-13.
 
-    Along the axes of the covariance, with s <= l its standard deviations and (x, y) the offset,
+    Along the axes of the covariance, with standard deviations s <= l and offset (x, y),
 
         P = integral over t in [-pi / 2, pi / 2] of N(x + r sin t; 0, s^2) (Phi((y + h) / l) - Phi((y - h) / l)) h,
 
-    where h = r cos t. As a function of t on the full circle the integrand is periodic and analytic, so that the
-    midpoint rule converges geometrically: 8 r / s + 40 nodes. Those beyond 8 s from the mean are left out.
+    where h = r cos t. As a function of t on the full circle the integrand is periodic and analytic, so the midpoint
+    rule converges geometrically: 8 r / s + 40 nodes. Nodes beyond 8 s from the mean are omitted.
 
-    covs: (num_gaussians, 2, 2), of which `which` (num,) are taken. Discs wholly within, or
-    beyond, 8 l are certain, or void.
+    covs: (num_gaussians, 2, 2); `which` (num,) are their indices. Discs wholly within 8 l have probability 1, discs
+    beyond it 0.
     """
     variances, axes = np.linalg.eigh(covs)
     small, large = np.sqrt(np.maximum(variances, np.finfo(float).tiny))[which].T
@@ -63,13 +63,13 @@ def disc_probabilities(offsets: Floats, which: Ints, covs: Floats, radius: float
 
 
 def _node(x: Floats, side: float, small: Floats, half: Floats, radius: float) -> Floats:
-    """Number of the node at x + r sin t = 8 s to one side, of those in [-pi / 2, pi / 2]."""
+    """Return the index of the node at x + r sin t = 8 s to one side, among the nodes in [-pi / 2, pi / 2]."""
     angle = np.arcsin(np.clip((side * _FAR * small - x) / radius, -1.0, 1.0))
     return np.asarray(np.clip(np.floor((angle + math.pi / 2.0) * half / math.pi), 0.0, half - 1.0))
 
 
 def _midpoints(shape: tuple[Floats, ...], radius: float, half: Floats, first: Floats, num: Ints) -> Floats:
-    """(num_pairs,) sums over the nodes first .. first + num - 1 of `half` in [-pi / 2, pi / 2]."""
+    """Return sums (num_pairs,) over the nodes first .. first + num - 1 of `half` in [-pi / 2, pi / 2]."""
     from scipy.special import ndtr
 
     pair = np.repeat(np.arange(len(num)), num)
@@ -86,6 +86,6 @@ def _midpoints(shape: tuple[Floats, ...], radius: float, half: Floats, first: Fl
 
 
 def _largest_variance(covs: Floats) -> Floats:
-    """(num,) larger eigenvalue of each covariance (num, 2, 2)."""
+    """Return the larger eigenvalue (num,) of each covariance (num, 2, 2)."""
     middle, apart = (covs[:, 0, 0] + covs[:, 1, 1]) / 2.0, (covs[:, 0, 0] - covs[:, 1, 1]) / 2.0
     return np.asarray(middle + np.hypot(apart, covs[:, 0, 1]))

@@ -1,4 +1,4 @@
-"""Which joint actions are allowed, by course and by pair of courses; and one that is, near a given one."""
+"""Feasible joint actions, by course and by pair of courses, and the search for one near a given joint action."""
 
 from __future__ import annotations
 
@@ -12,28 +12,31 @@ from vedette.control.constraints.active import Active
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Ints
 
-# Courses that are tried for a group of sensors that hold each other up. With more, a decision would wait for the proof
-# that nothing is allowed; what is found in so many is as good as known.
+# Maximum number of courses tried for a group of conflicting sensors. With more, a decision would wait for the proof
+# that no joint action is feasible; a feasible one is nearly always found within this number.
 _TRIES = 1000
 
 _Node = TypeVar("_Node")
-_OVER: Any = object()  # of an iterator
+_OVER: Any = object()  # end of an iterator
 
 _GIVEN = "the constraint is given up"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mask:
-    """Which courses and pairs of courses are allowed, and how many sensors may scan; a joint action is where all are.
+    """Allowed courses and pairs of courses, and the number of sensors that may scan.
+
+    A joint action is allowed if all its courses and pairs are, and not too many sensors scan.
 
     Attributes:
-        single: (num_courses,) which courses each sensor may take, one array a sensor.
-        together: (num_courses of i, of j) which courses of sensors i < j go together, by (i, j); others all do.
-        notes: what a reader of the decision must know.
-        active: which courses scan, and how many sensors may; None: all.
+        single: (num_courses,) allowed courses of each sensor, one array per sensor.
+        together: (num_courses of i, of j) compatible courses of sensors i < j, by (i, j); all courses of other pairs
+            are compatible.
+        notes: notes for readers of the decision.
+        active: the courses that scan, and the number of sensors that may; None: all may.
 
     Raises:
-        InputError: a table of another shape, or of a pair that is none.
+        InputError: a table of the wrong shape, or of a pair that does not exist.
     """
 
     single: tuple[Bools, ...]
@@ -52,7 +55,7 @@ class Mask:
             if table.shape != wanted:
                 raise InputError(f"mask of sensors {first, second}: expected shape {wanted}; got {table.shape}")
             clash = np.asarray(~table, np.int64)
-            # One row a course of the other sensor, so that a look-up is a row in one piece.
+            # One row per course of the other sensor, so that a look-up reads one contiguous row.
             beside[first][second] = np.ascontiguousarray(clash.T)
             beside[second][first] = clash
         object.__setattr__(self, "_beside", beside)
@@ -63,8 +66,9 @@ class Mask:
         return tuple(len(own) for own in self.single)
 
     def violations(self, actions: Ints) -> Ints:
-        """(num,) how many courses and pairs of courses of joint actions (num, num_sensors) are forbidden, and how many
-        sensors too many scan.
+        """Return (num,) the number of violations of each joint action (num, num_sensors).
+
+        Counts forbidden courses, forbidden pairs of courses, and sensors that scan beyond the limit.
         """
         found = np.zeros(len(actions), np.int64)
         for s, own in enumerate(self.single):
@@ -75,17 +79,20 @@ class Mask:
         return found if self.active is None else found + self.active.excess(actions)
 
     def allows(self, actions: Ints) -> Bools:
-        """(num,) whether joint actions (num, num_sensors) are allowed."""
+        """Return (num,) whether joint actions (num, num_sensors) are allowed."""
         return np.asarray(self.violations(actions) == 0)
 
     def others(self, sensor: int) -> Mapping[int, Ints]:
-        """The sensors that one may clash with, each with (its num_courses, num_courses of `sensor`): 1 for a clash."""
+        """Return the sensors that `sensor` may conflict with, each with (its num_courses, num_courses of `sensor`): 1:
+        conflict.
+        """
         return self._beside[sensor]
 
     def clashes(self, at: Sequence[int], sensor: int) -> Ints:
-        """(num_courses,) violations that each course of one sensor has part in, the others as in a joint action.
+        """Return the number of violations (num_courses,) that involve each course of one sensor, given the other
+        courses.
 
-        at: courses; those below 0 are of sensors that are not decided, and clash with none.
+        at: courses; negative ones belong to undecided sensors, which cause no conflict.
         """
         found = self.forbidden(at, sensor)
         if self.active is not None and self.active.is_full(at, sensor):
@@ -93,7 +100,7 @@ class Mask:
         return found
 
     def forbidden(self, at: Sequence[int], sensor: int) -> Ints:
-        """As `clashes`, however many sensors scan."""
+        """Return the same numbers as `clashes`, without the limit on the number of sensors that scan."""
         found = (~self.single[sensor]).astype(np.int64)
         for other, clash in self._beside[sensor].items():
             if at[other] >= 0:
@@ -102,12 +109,12 @@ class Mask:
 
 
 def nearest_feasible(mask: Mask, start: Sequence[int]) -> tuple[int, ...]:
-    """A joint action of few violations near `start`: none wherever that is found, `start` itself if it has none.
+    """Return a joint action with few violations near `start`: none if one is found; `start` if it has none.
 
-    One sensor after the other takes its course of fewest violations, as long as any has fewer. What is left is
-    searched by branch and bound, for each group of sensors that hold each other up, with a bound on its tries:
-    within it the fewest violations are found, beyond it perhaps not. Sensors that scan beyond the number that may then
-    go on without scans, on the same courses.
+    Sensor by sensor, each takes its course with the fewest violations, as long as this improves any. The remaining
+    conflicts are searched by branch and bound, for each group of conflicting sensors, with a limit on the number of
+    tries. Within the limit the fewest violations are found, beyond it perhaps not. Sensors that scan beyond the allowed
+    number then continue without scans, on the same courses.
     """
     at = list(start)
     _descend(mask, at)
@@ -122,11 +129,11 @@ def nearest_feasible(mask: Mask, start: Sequence[int]) -> tuple[int, ...]:
 
 
 def relaxed(mask: Mask) -> tuple[Mask, tuple[int, ...]]:
-    """The mask with a joint action that it allows; where none was found, opened as little as that takes.
+    """Return the mask and a joint action that it allows; if none was found, the mask is relaxed as little as possible.
 
-    A sensor without an allowed course may take any. Of what is then left, the violations of the joint action that has
-    fewest are forgiven: its courses that are forbidden, and all courses of its pairs of sensors that do not go
-    together. So no joint action that the opened mask allows has more of them. The notes say of whom.
+    A sensor without an allowed course may take any. Then the violations of the joint action with the fewest are
+    permitted: its forbidden courses, and all courses of its incompatible pairs of sensors. No joint action that the
+    relaxed mask allows has more of these violations. The notes name the sensors.
     """
     blocked = [s for s, own in enumerate(mask.single) if not own.any()]
     mask = _forgiven(mask, {s: slice(None) for s in blocked}, set())
@@ -141,7 +148,7 @@ def relaxed(mask: Mask) -> tuple[Mask, tuple[int, ...]]:
 
 
 def _forgiven(mask: Mask, courses: Mapping[int, int | slice], pairs: set[tuple[int, int]]) -> Mask:
-    """The mask with these courses of sensors allowed, and with any of these pairs of sensors."""
+    """Return the mask with these courses of sensors allowed, and with all courses of these pairs of sensors."""
     if not courses and not pairs:
         return mask
     single = [own.copy() for own in mask.single]
@@ -156,7 +163,7 @@ def _forgiven(mask: Mask, courses: Mapping[int, int | slice], pairs: set[tuple[i
 
 
 def _descend(mask: Mask, at: list[int]) -> None:
-    """Each sensor to its course of fewest violations, of equal ones the first, as long as one has fewer than now."""
+    """Move each sensor to its first course of fewest violations, as long as one has fewer than now."""
     moved = True
     while moved:
         moved = False
@@ -168,7 +175,7 @@ def _descend(mask: Mask, at: list[int]) -> None:
 
 
 def _group(mask: Mask, sensor: int) -> list[int]:
-    """The sensors that one clashes with, directly or not, in printed order."""
+    """Return the sensors that `sensor` conflicts with, directly or indirectly, in printed order."""
     found, waiting = {sensor}, [sensor]
     while waiting:
         new = set(mask.others(waiting.pop())) - found
@@ -180,9 +187,9 @@ def _group(mask: Mask, sensor: int) -> list[int]:
 def depth_first(
     start: _Node, ways: Callable[[_Node], Iterator[_Node | None]], is_end: Callable[[_Node], bool], tries: int
 ) -> _Node | None:
-    """The first end that is come to, way by way, back where there is no way on; None: none in so many tries.
+    """Return the first end node of a depth-first search with backtracking; None if none is found within `tries`.
 
-    ways: on from a node; None for one that is closed, which is a try all the same.
+    ways: successors of a node; None is a closed branch, which counts as a try.
     """
     waiting: list[Iterator[_Node | None]] = [iter((start,))]
     for _ in range(tries):
@@ -201,19 +208,19 @@ class _Decided(NamedTuple):
     """Courses of some sensors of a group."""
 
     courses: dict[int, int]
-    violated: int  # by them
-    costs: dict[int, Ints]  # of each other sensor what each of its courses is then certain to violate
+    violated: int  # number of violations by these courses
+    costs: dict[int, Ints]  # for each other sensor, certain violations of each of its courses
 
 
 def _settle(mask: Mask, at: list[int], group: list[int]) -> None:
-    """Branch and bound for the fewest violations in one group; better joint actions are written into `at`.
+    """Search one group for the fewest violations by branch and bound, and write better joint actions into `at`.
 
-    A group so large that one dive would take all tries is left as it is.
+    A group is left unchanged if it is so large that one dive would take all tries.
     """
     costs: dict[int, Ints] = {s: (~mask.single[s]).astype(np.int64) for s in group}
     alone = sum(int(costs[s][at[s]]) for s in group)
     every = sum(int(mask.forbidden(at, s)[at[s]]) for s in group)
-    fewest = (every + alone) // 2  # each pair is counted at both its ends
+    fewest = (every + alone) // 2  # each pair is counted twice
 
     def is_end(node: _Decided) -> bool:
         nonlocal fewest

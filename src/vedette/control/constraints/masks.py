@@ -1,4 +1,4 @@
-"""What constraints say of a situation, put together as a mask."""
+"""The mask of feasible joint actions from the answers of several constraints."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models.arguments import provides
 
-# Violations that differ by no more, relative to the least of them or to 1, are equal.
+# Violations are equal if they differ by at most this, relative to the smallest or to 1.
 _SAME = 1e-9
 
 
 def feasible_action_mask(constraints: Sequence[Constraint], situation: ConstraintContext) -> Mask:
-    """The courses and pairs of courses that all constraints allow.
+    """Return the courses and pairs of courses that all constraints allow.
 
-    A sensor for which none is left keeps those that violate them least, and pairs of sensors that no joint action was
-    found to keep apart keep all (`relaxed`); the mask's notes say of whom.
+    A sensor without a feasible course keeps the courses with the least violation. Pairs of sensors that no joint action
+    was found to satisfy keep all courses (`relaxed`). The mask's notes name the sensors.
 
     Raises:
-        InputError: a constraint that needs beliefs where there are none, or an answer of another shape.
+        InputError: a constraint that needs beliefs when there are none, or an answer of the wrong shape.
     """
     for constraint in constraints:
         if constraint.needs_beliefs and len(situation.beliefs) != len(situation.times):
@@ -44,7 +44,7 @@ def feasible_action_mask(constraints: Sequence[Constraint], situation: Constrain
 
 
 def infeasible_note(constraints: Sequence[Constraint]) -> str:
-    """What notes say of a sensor that has no course that meets the constraints."""
+    """Return the note on a sensor that has no feasible course."""
     names = ", ".join(constraint.name for constraint in constraints)
     return f"no course meets its constraints ({names}); it may take those that violate them least"
 
@@ -52,9 +52,9 @@ def infeasible_note(constraints: Sequence[Constraint]) -> str:
 def courses_allowed(
     constraints: Sequence[Constraint], situation: ConstraintContext
 ) -> tuple[tuple[Bools, ...], tuple[int, ...]]:
-    """(num_courses,) which courses each sensor may take, and the sensors that have none that all constraints allow.
+    """Return (num_courses,) the allowed courses of each sensor, and the sensors that no course of which is feasible.
 
-    These may take the courses of least violation. Raises as `feasible_action_mask`.
+    The latter may take the courses with the least violation. Raises as `feasible_action_mask`.
     """
     shape = [len(own) for own in situation.courses]
     answers = [_answers(constraint, situation) for constraint in constraints]
@@ -91,7 +91,7 @@ def violation_notes(constraints: Sequence[Constraint], situation: ConstraintCont
 
 
 def _answers(constraint: Constraint, situation: ConstraintContext) -> list[Bools]:
-    """(num_courses,) which courses of each sensor a constraint allows."""
+    """Return (num_courses,) the courses of each sensor that a constraint allows."""
     answer, num = constraint.courses(situation), len(situation.courses)
     if len(answer) != num:
         raise InputError(f"constraint {constraint.name}: expected courses of {num} sensors; got {len(answer)}")
@@ -99,7 +99,8 @@ def _answers(constraint: Constraint, situation: ConstraintContext) -> list[Bools
 
 
 def _violations(constraint: Constraint, situation: ConstraintContext, answers: Sequence[Bools]) -> Sequence[Floats]:
-    """(num_courses,) how much each course violates a constraint; one that does not say it, by 1 what it forbids."""
+    """Return (num_courses,) the violation of each course; 1 for a forbidden course if the constraint gives no amount.
+    """
     if not provides(constraint, QuantifiedConstraint):
         return [np.asarray(~own, np.float64) for own in answers]
     given = [np.asarray(own, np.float64) for own in constraint.violations(situation)]
@@ -113,9 +114,9 @@ def _violations(constraint: Constraint, situation: ConstraintContext, answers: S
 
 
 def pairs_allowed(constraints: Sequence[Constraint], situation: ConstraintContext) -> dict[tuple[int, int], Bools]:
-    """(num_courses of i, of j) the tables of the pairs of sensors i < j of which something is forbidden.
+    """Return tables (num_courses of i, of j) for the pairs of sensors i < j with forbidden pairs of courses.
 
-    Sensors without courses are not asked about. Raises as `feasible_action_mask`.
+    Constraints are not evaluated for sensors without courses. Raises as `feasible_action_mask`.
     """
     gaps = _least_distances(situation)
     found: dict[tuple[int, int], Bools] = {}
@@ -131,7 +132,7 @@ def pairs_allowed(constraints: Sequence[Constraint], situation: ConstraintContex
 
 
 def _least_distances(situation: ConstraintContext) -> Floats:
-    """(num_sensors, num_sensors) no more than the distance that sensors keep: of the circles around all their ways.
+    """Return lower bounds (num_sensors, num_sensors) on the distances between sensors, from circles around their paths.
 
     inf: one of them has no courses.
     """

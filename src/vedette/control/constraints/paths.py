@@ -1,4 +1,4 @@
-"""Shortest paths around the zones that constraints forbid, by a visibility graph over the corners of the zones.
+"""Shortest paths around forbidden zones, by a visibility graph over the corners of the zones.
 
 A shortest path among polygons is straight except for bends at their convex corners (T. Lozano-Perez and M. A. Wesley,
 An algorithm for planning collision-free paths among polyhedral obstacles, Communications of the ACM 22 (1979) 560-570).
@@ -18,20 +18,20 @@ from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.planning.lines import Edges, clear_lengths, first_touches
 from vedette.models.arguments import provides
 
-# m; paths keep this distance from corners, as edges are forbidden. Straits narrower than twice this are closed.
+# m; paths keep this distance from corners, as edges are forbidden. Gaps narrower than twice this are closed.
 MARGIN = 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VisibilityGraph:
-    """Shortest paths in the plane outside of zones.
+    """Shortest paths in the plane outside forbidden zones.
 
     Attributes:
-        edges: of all zones.
-        nodes: (num_nodes, 2) m, the corners at which paths may bend, by `MARGIN` outside of the zones.
-        coast: (num_points, 2) m, where free space reaches farthest into the zones: at their other corners, and where
-            edges of two zones cross.
-        lengths: (num_nodes, num_nodes) m, of the shortest paths between nodes; inf where there is none.
+        edges: edges of all zones.
+        nodes: (num_nodes, 2) m, the corners at which paths may bend, `MARGIN` outside the zones.
+        coast: (num_points, 2) m, points where free space extends farthest into the zones: at their other corners, and
+            where edges of two zones cross.
+        lengths: (num_nodes, num_nodes) m, lengths of the shortest paths between nodes; inf if there is none.
         before: (num_nodes, num_nodes) the node before the second one on the path from the first; below 0: none.
     """
 
@@ -43,7 +43,7 @@ class VisibilityGraph:
 
     @classmethod
     def of(cls, zones: Sequence[Sequence[Floats]]) -> VisibilityGraph:
-        """Build the graph of zones, each the area inside of polygons (num_corners, 2), m, by the even-odd rule."""
+        """Return the graph of zones, each the interior of polygons (num_corners, 2), m, by the even-odd rule."""
         from scipy.sparse.csgraph import shortest_path
 
         zones = [[_distinct(ring) for ring in rings] for rings in zones]
@@ -61,9 +61,9 @@ class VisibilityGraph:
         return cls(edges, nodes, coast, lengths, np.asarray(before, np.int64))
 
     def to(self, goals: Floats, start: Floats) -> Paths:
-        """Return the paths from about a start (2,) to goals (num_goals, 2), m.
+        """Return the paths from near a start (2,) to goals (num_goals, 2), m.
 
-        A goal inside a zone, or to which no path leads, is approached as near as paths from the start lead to it.
+        A goal inside a zone, or one that no path reaches, is approached as closely as paths from the start allow.
         """
         points, origin = np.array(goals, np.float64, order="C"), self.outside(start[np.newaxis])
         from_origin = _added(clear_lengths(origin, self.nodes, self.edges), self.lengths)[0]
@@ -78,9 +78,9 @@ class VisibilityGraph:
         return Paths(self, points, left, through.min(axis=2), through.argmin(axis=2))
 
     def is_barred(self, start: Floats, courses: Floats) -> Bools:
-        """(num_courses,) whether courses (num_courses, num_times, 2) from `start` (2,) touch a zone.
+        """Return (num_courses,) whether courses (num_courses, num_times, 2) from `start` (2,) touch a zone.
 
-        Zones in which they begin do not count: a sensor may leave them.
+        Zones that contain the start do not count: a sensor may leave them.
         """
         points = np.concatenate([np.broadcast_to(start, (len(courses), 1, 2)), courses], axis=1)
         ignored = np.repeat(_inside(self.edges, points[:, 0]), courses.shape[1], axis=0)
@@ -89,20 +89,22 @@ class VisibilityGraph:
         return np.asarray(touched.reshape(courses.shape[:2]).any(axis=1))
 
     def until_barred(self, starts: Floats, ends: Floats) -> Floats:
-        """(num,) share of the line from each start to its end (num, 2) that is allowed, short of a zone; 1: all."""
+        """Return the fraction (num,) of the line from each start to its end (num, 2) that is outside zones; 1: all of
+        it.
+        """
         shares = first_touches(starts, ends, self.edges, _inside(self.edges, starts))
         length = np.maximum(np.hypot(*(ends - starts).T), MARGIN)
         return np.where(np.isinf(shares), 1.0, np.maximum(shares - MARGIN / length, 0.0))
 
     def outside(self, points: Floats) -> Floats:
-        """(num, 2) the points (num, 2) themselves, or the nearest ones outside of all zones for those inside one."""
+        """Return the points (num, 2), with those inside a zone replaced by the nearest points outside all zones."""
         found = np.array(points, np.float64, order="C")
         for i in np.flatnonzero(~_is_free(self.edges, found)).tolist():
             found[i] = next(self._nearest(found[i]), found[i : i + 1])[0]
         return found
 
     def _nearest(self, point: Floats) -> Iterator[Floats]:
-        """Yield points (1, 2) outside of all zones near a point (2,), the nearest first."""
+        """Yield points (1, 2) outside all zones near a point (2,), the nearest first."""
         along = self.edges.ends - self.edges.starts
         length = np.hypot(*along.T)[:, np.newaxis]
         share = ((point - self.edges.starts) * along).sum(axis=1, keepdims=True) / length**2
@@ -113,7 +115,7 @@ class VisibilityGraph:
         return (own[np.newaxis] for own in near if _is_free(self.edges, own[np.newaxis])[0])
 
     def _are_linked(self, points: Floats, origin: Floats, from_origin: Floats) -> Bools:
-        """(num,) whether paths lead from the origin (1, 2) to points (num, 2) that are outside of all zones.
+        """Return (num,) whether paths lead from the origin (1, 2) to points (num, 2) outside all zones.
 
         from_origin: (num_nodes,) m, path lengths from the origin to the nodes.
         """
@@ -124,13 +126,13 @@ class VisibilityGraph:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Paths:
-    """Shortest paths to some goals.
+    """Shortest paths to a set of goals.
 
     Attributes:
-        graph: of the zones that they keep out of.
-        points: (num_goals, 2) m, where the paths end: the goals, or the places that they may be approached to.
-        left: (num_goals,) m, from these points to the goals.
-        lengths: (num_nodes, num_goals) m, from each node to each point; inf where no path leads there.
+        graph: visibility graph of the zones that the paths avoid.
+        points: (num_goals, 2) m, end points of the paths: the goals, or the nearest points that paths reach.
+        left: (num_goals,) m, distance from these points to the goals.
+        lengths: (num_nodes, num_goals) m, path length from each node to each point; inf if there is no path.
         last: (num_nodes, num_goals) the last node on that path.
     """
 
@@ -141,14 +143,16 @@ class Paths:
     last: Ints
 
     def are_straight(self, starts: Floats) -> Bools:
-        """(num_starts, num_goals) whether the straight line from each start (num_starts, 2) to each point is free."""
+        """Return (num_starts, num_goals) whether the straight line from each start (num_starts, 2) to each point is
+        free.
+        """
         return np.isfinite(clear_lengths(starts, self.points, self.graph.edges))
 
     def distances(self, starts: Floats) -> Floats:
-        """(num_starts, num_goals) m, lengths of shortest paths from starts (num_starts, 2) and on to the goals.
+        """Return the lengths (num_starts, num_goals) m of shortest paths from starts (num_starts, 2) to the goals.
 
-        The last part, from the points to the goals, and the first one out of a zone in which a start is, are straight.
-        inf: no path leads there.
+        The last part, from the points to the goals, is straight; so is the first part out of a zone that contains a
+        start. inf: no path.
         """
         graph, origins = self.graph, self.graph.outside(starts)
         found = clear_lengths(origins, self.points, graph.edges)
@@ -158,7 +162,7 @@ class Paths:
         return np.asarray(np.hypot(*(origins - starts).T)[:, np.newaxis] + found + self.left)
 
     def path(self, start: Floats, goal: int) -> Floats:
-        """(num_corners, 2) m, the shortest path from a start (2,) to the point of a goal; there must be one."""
+        """Return the shortest path (num_corners, 2) m from a start (2,) to the point of a goal; a path must exist."""
         graph, origin = self.graph, self.graph.outside(start[np.newaxis])
         begin = start[np.newaxis] if np.array_equal(origin[0], start) else np.stack([start, origin[0]])
         if self.are_straight(origin)[0, goal]:
@@ -171,9 +175,9 @@ class Paths:
 
 
 def visibility_graph(constraints: Sequence[Constraint]) -> VisibilityGraph | None:
-    """Return the graph of the zones of constraints; None where they have none.
+    """Return the visibility graph of the zones of constraints; None if they have none.
 
-    The graph of the same zones is built once, however many decisions, planners or runs ask for it.
+    The graph of the same zones is built once and shared by all decisions, planners and runs.
     """
     zones = [own.zone for own in constraints if provides(own, ZoneConstraint)]
     return _built(tuple(tuple(ring.tobytes() for ring in rings) for rings in zones)) if zones else None
@@ -185,13 +189,13 @@ def _built(zones: tuple[tuple[bytes, ...], ...]) -> VisibilityGraph:
 
 
 def _added(first: Floats, then: Floats) -> Floats:
-    """(num_starts, num_goals) m, the least sum over nodes of lengths to (num_starts, num_nodes) and on from them."""
+    """Return the least sum (num_starts, num_goals) m over nodes of `first` (num_starts, num_nodes) and `then`."""
     columns = [(first + own).min(axis=1, initial=np.inf) for own in then.T]
     return np.stack(columns, axis=1) if columns else np.empty((len(first), 0))
 
 
 def _inside(edges: Edges, points: Floats) -> Bools:
-    """(num_points, num_zones) which points are inside which zones."""
+    """Return (num_points, num_zones) whether each point is inside each zone."""
     found = np.empty((len(points), int(edges.zones[-1]) + 1), np.bool_)
     for zone in range(found.shape[1]):
         own = edges.zones == zone
@@ -200,18 +204,18 @@ def _inside(edges: Edges, points: Floats) -> Bools:
 
 
 def _is_free(edges: Edges, points: Floats) -> Bools:
-    """(num_points,) which points are in no zone and on no edge."""
+    """Return (num_points,) whether each point is in no zone and on no edge."""
     inside = _inside(edges, points)
     return ~inside.any(axis=1) & np.isinf(first_touches(points, points, edges, np.zeros_like(inside)))
 
 
 def _distinct(ring: Floats) -> Floats:
-    """A polygon without corners that repeat the one before."""
+    """Return a polygon without repeated consecutive corners."""
     return ring[np.any(ring != np.roll(ring, 1, axis=0), axis=1)]
 
 
 def _beside_corners(corners: Floats) -> tuple[Floats, Floats]:
-    """(num, 2) points at `MARGIN` from the corners of a polygon, outside of their bends and in them."""
+    """Return points (num, 2) at `MARGIN` from the corners of a polygon: outside convex corners, and in reflex ones."""
     to, on = np.roll(corners, 1, axis=0) - corners, np.roll(corners, -1, axis=0) - corners
     middle = to / np.hypot(*to.T)[:, np.newaxis] + on / np.hypot(*on.T)[:, np.newaxis]
     size = np.hypot(*middle.T)
@@ -221,7 +225,7 @@ def _beside_corners(corners: Floats) -> tuple[Floats, Floats]:
 
 
 def _crossings(edges: Edges) -> Floats:
-    """(num, 2) points at `MARGIN` from where edges of two zones cross, one on each of the four sides."""
+    """Return points (num, 2) at `MARGIN` from the crossings of edges of two zones, one on each of the four sides."""
     found = [np.empty((0, 2))]
     for start, end, zone in zip(*edges, strict=True):
         others = edges.zones > zone

@@ -1,4 +1,4 @@
-"""Where platforms have to stay, and where they must not go."""
+"""Regions that platforms must stay inside, and regions that they must not enter."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from vedette.models import Region
 from vedette.models.arguments import float_array, reject
 from vedette.models.region import tell_degrees
 
-# m; how far beyond a fence its zone begins, and how wide that is.
+# m; distance from a fence to its zone, and width of the zone.
 _EDGE, _BEYOND = 1e-6, 1e7
 
 
 @dataclass(frozen=True, slots=True)
 class StayInside(PerSensorConstraint):
-    """Every platform that moves stays inside a rectangle, its edge included, at all times of the horizon.
+    """Every moving platform stays inside a rectangle, its edge included, at all times of the horizon.
 
     Attributes:
         region: the rectangle.
 
     Raises:
-        InputError: something else than a region.
+        InputError: an object other than a region.
     """
 
     region: Region
@@ -40,13 +40,14 @@ class StayInside(PerSensorConstraint):
 
     @property
     def zone(self) -> tuple[Floats, ...]:
-        """What is outside of the rectangle, whose edge is allowed: a frame around it, wider than anything goes."""
+        """The exterior of the rectangle, whose edge is allowed: a frame around it, wider than any course."""
         (x_min, y_min), (x_max, y_max) = self.region.corners[0] - _EDGE, self.region.corners[2] + _EDGE
         inner = np.array([[x_min, y_min], [x_max, y_min], [x_max, y_max], [x_min, y_max]])
         return inner + _BEYOND * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]), inner
 
     def violations(self, situation: ConstraintContext) -> tuple[Floats, ...]:
-        """m from it, the mean over the times. Between two places in a rectangle the straight way is in it, too."""
+        """Return the distance in m from the rectangle, averaged over the times; straight ways inside it need no test.
+        """
         places = np.concatenate([own[:, :, :2] for own in situation.courses])
         low, high = self.region.corners.min(axis=0), self.region.corners.max(axis=0)
         beyond = np.maximum(np.maximum(low - places, places - high), 0.0)
@@ -57,21 +58,22 @@ class StayInside(PerSensorConstraint):
 class KeepOut(PerSensorConstraint):
     """No platform enters a region: neither at the times of the horizon nor on the straight way between two of them.
 
-    The way from where it is now counts where it is not inside already. One that cannot move at all may be where it is.
+    The way from the present position counts unless that position is already inside. A platform that cannot move at all
+    may be inside.
 
     Attributes:
-        area: a `Region`, or the corners (num_corners, 2) of a polygon in order, m, 3 or more; one that crosses itself
-            forbids what is inside by the even-odd rule. Its edge is forbidden, too.
-        holes: polygons inside it that are not forbidden, but for their edges: a lake on an island.
+        area: a `Region`, or the corners (num_corners, 2) of a polygon in order, m, 3 or more; the interior of a polygon
+            that crosses itself is by the even-odd rule. Its edge is forbidden, too.
+        holes: polygons inside the area that are allowed, except for their edges: a lake on an island.
 
     Raises:
-        InputError: an area or hole that is neither.
+        InputError: an area or a hole that is neither a region nor a polygon.
     """
 
     area: Region | Floats
     holes: tuple[Floats, ...] = ()
     time_invariant = True
-    _edges: tuple[Floats, Floats] = field(init=False, repr=False)  # (num_edges, 2) where each begins and ends
+    _edges: tuple[Floats, Floats] = field(init=False, repr=False)  # (num_edges, 2) start and end of each edge
     name: ClassVar[str] = "keep_out"
     needs_beliefs: ClassVar[bool] = False
 
@@ -90,7 +92,7 @@ class KeepOut(PerSensorConstraint):
         return (self.area.corners if isinstance(self.area, Region) else self.area, *self.holes)
 
     def violations(self, situation: ConstraintContext) -> tuple[Floats, ...]:
-        """m inside it, the mean over the way's corners; next to nothing where it is only crossed between two."""
+        """Return the depth in m inside the area, averaged over the way's corners; nearly 0 if only a leg crosses it."""
         edges = self._edges
         ways = np.concatenate([situation.ways(s) for s in range(len(situation.courses))])
         inside, crosses = inside_edges(ways, edges), _cross(ways, edges)
@@ -103,7 +105,7 @@ class KeepOut(PerSensorConstraint):
 
 
 def edges_of(rings: Sequence[Floats]) -> tuple[Floats, Floats]:
-    """(num_edges, 2) where the edges of polygons begin and end."""
+    """Return the start and end points (num_edges, 2) of the edges of polygons."""
     return np.concatenate(rings), np.concatenate([np.roll(ring, -1, axis=0) for ring in rings])
 
 
@@ -115,7 +117,7 @@ def _polygon(name: str, given: Any) -> Floats:
 
 
 def inside_edges(points: Floats, edges: tuple[Floats, Floats]) -> Bools:
-    """(...) whether points (..., 2) are inside: whether a ray to the east crosses the edges an odd number of times."""
+    """Return (...) whether points (..., 2) are inside: a ray to the east crosses the edges an odd number of times."""
     x, y = points[..., 0, np.newaxis], points[..., 1, np.newaxis]
     (x1, y1), (x2, y2) = edges[0].T, edges[1].T
     spans = (y1 > y) != (y2 > y)
@@ -125,7 +127,7 @@ def inside_edges(points: Floats, edges: tuple[Floats, Floats]) -> Bools:
 
 
 def _distances(points: Floats, edges: tuple[Floats, Floats]) -> Floats:
-    """(...) m from points (..., 2) to the nearest edge."""
+    """Return the distance (...) m from points (..., 2) to the nearest edge."""
     along, off = edges[1] - edges[0], points[..., np.newaxis, :] - edges[0]
     length = np.maximum((along**2).sum(axis=-1), np.finfo(float).tiny)
     share = np.clip((off * along).sum(axis=-1) / length, 0.0, 1.0)
@@ -133,21 +135,21 @@ def _distances(points: Floats, edges: tuple[Floats, Floats]) -> Floats:
 
 
 def _cross(ways: Floats, edges: tuple[Floats, Floats]) -> Bools:
-    """(num_courses, num_legs) whether the straight legs of ways (num_courses, num_points, 2) touch an edge.
+    """Return (num_courses, num_legs) whether straight legs of ways (num_courses, num_points, 2) touch an edge.
 
-    Of one point only there is one leg, without length.
+    A way of a single point has one leg, without length.
     """
     starts = ways[:, :-1] if ways.shape[1] > 1 else ways
     ends = ways[:, 1:] if ways.shape[1] > 1 else ways
     a, b = starts[:, :, np.newaxis], ends[:, :, np.newaxis]
     c, d = edges
-    # Two segments touch where neither lies wholly on one side of the other, nor beside it.
+    # Two segments touch if neither lies wholly on one side of the other, or beyond its end.
     apart = (_side(a, b, c) * _side(a, b, d) > 0.0) | (_side(c, d, a) * _side(c, d, b) > 0.0)
     beside = (np.maximum(a, b) < np.minimum(c, d)) | (np.maximum(c, d) < np.minimum(a, b))
     return np.asarray((~(apart | beside.any(axis=-1))).any(axis=-1))
 
 
 def _side(start: Floats, end: Floats, point: Floats) -> Floats:
-    """Sign of the side of a line on which a point is."""
+    """Return the sign of the side of a line that a point is on."""
     along, to = end - start, point - start
     return np.asarray(np.sign(along[..., 0] * to[..., 1] - along[..., 1] * to[..., 0]))

@@ -1,4 +1,4 @@
-"""Places that some platform must visit again and again."""
+"""Places that platforms must visit repeatedly."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from vedette.kernels.base.types import Floats
 from vedette.models.arguments import float_array, positive
 from vedette.platforms.patrolling import CLOCKS
 
-# Horizons before a place is due at which a platform sets out: one in which it may still go away, and one for the way.
+# Horizons of lead before a place is due: one in which a platform may still move away, and one for the way.
 _HORIZONS = 2.0
 
 
 @dataclass(frozen=True, slots=True)
 class Revisit(PerSensorConstraint):
-    """Maximum time between visits of each place, by any platform.
+    """A maximum time between visits of each place, by any platform.
 
-    Poses have the seconds since their platforms were at each place (`Patrolling`). When the time that is left is little
-    more than that of the way, the platform that is there earliest takes only courses that come to the place, or nearest
-    to it. Platforms share out the places. Ways are straight, at the speed of the fastest course.
+    Poses contain the seconds since their platforms were at each place (`Patrolling`). When the remaining time is little
+    more than the travel time, the platform that can arrive first takes only courses that come to the place, or nearest
+    to it. Platforms share the places. Ways are straight, at the speed of the fastest course.
 
     Attributes:
         places: (num_places, 2) m, those of `Patrolling`.
-        radius: m, within which a platform is at a place, as of `Patrolling`.
+        radius: m, distance within which a platform is at a place, as in `Patrolling`.
         every: s.
 
     Raises:
@@ -48,7 +48,9 @@ class Revisit(PerSensorConstraint):
         positive("every", self.every)
 
     def violations(self, situation: ConstraintContext) -> tuple[Floats, ...]:
-        """(num_courses,) m that each course stays further from the place of its sensor than the nearest one."""
+        """Return (num_courses,) m, the distance of each course from its sensor's place beyond that of the nearest
+        course.
+        """
         found = [np.zeros(len(own)) for own in situation.courses]
         poses = situation.poses
         if poses is None:
@@ -64,11 +66,11 @@ class Revisit(PerSensorConstraint):
         return tuple(found)
 
     def _sent(self, situation: ConstraintContext, poses: Floats) -> list[tuple[int, int]]:
-        """Sensors that must go to a place, with the place.
+        """Return the sensors that must go to a place, each with the place.
 
-        The place that was not visited for longest comes first: by the way that is left, a sensor would turn round again
-        and again. Each goes to the sensor that is there earliest, maybe by way of others. A sensor goes to its first
-        place when any of its places is due.
+        The place that was not visited for longest comes first: with an order by remaining distance, a sensor would turn
+        back and forth. Each place goes to the sensor that can arrive first, possibly by way of other places. A sensor
+        moves to its first place when any of its places is due.
         """
         patrols = np.flatnonzero(poses[:, CLOCKS] >= 0.0)
         speed = max((_speed(situation, s) for s in patrols.tolist()), default=0.0)
@@ -91,18 +93,18 @@ class Revisit(PerSensorConstraint):
 
 
 def _horizon(times: Floats) -> float:
-    """s from one decision to the next, of steps of one length."""
+    """Return the time in s from one decision to the next, with steps of equal length."""
     step = times[0] if len(times) == 1 else times[1] - times[0]
     return float(times[-1] - times[0] + step)
 
 
 def _speed(situation: ConstraintContext, sensor: int) -> float:
-    """m/s of the fastest course of a sensor; 0 of one whose courses are not known."""
+    """Return the speed in m/s of the fastest course of a sensor; 0 if its courses are not known."""
     ways = situation.ways(sensor)
     lengths = np.hypot(*np.diff(ways, axis=1).transpose(2, 0, 1)).sum(axis=1)
     return float(lengths.max(initial=0.0)) / _horizon(situation.times)
 
 
 def _gaps(ways: Floats, place: Floats) -> Floats:
-    """(num_courses,) least distance of each way from a place, m."""
+    """Return the least distance (num_courses,) m of each way from a place."""
     return np.asarray(np.sqrt(least_on_legs(ways[..., 0] - place[0], ways[..., 1] - place[1]).min(axis=1)))

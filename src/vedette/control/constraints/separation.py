@@ -1,4 +1,4 @@
-"""Platforms that keep their distance from each other."""
+"""Minimum distance between platforms."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from vedette.models.fields import Checked, Positive, part
 @part("separation", "constraint")
 @dataclass(frozen=True, slots=True)
 class Separation(Checked):
-    """Any two platforms keep a least distance.
+    """A minimum distance between any two platforms.
 
-    At the times of the horizon, and between two of them, where both are taken to go straight and evenly from one
-    position to the next. The way from where they are now counts where they are not too near already.
+    It holds at the times of the horizon and between them, where both platforms are assumed to move linearly from one
+    position to the next. The way from the present positions counts unless these are already too close.
 
     Attributes:
         distance: least distance, which is allowed itself [m].
@@ -34,15 +34,15 @@ class Separation(Checked):
 
     @property
     def interaction_range(self) -> float:
-        """Sensors further apart need not be asked about."""
+        """Distance in m beyond which pairs of sensors need no test."""
         return self.distance
 
     def courses(self, situation: ConstraintContext) -> tuple[Bools, ...]:
-        """All."""
+        """Return masks that allow all courses."""
         return tuple(np.ones(len(own), bool) for own in situation.courses)
 
     def pairs(self, situation: ConstraintContext, first: int, second: int) -> Bools | None:
-        """The courses on which two sensors are never nearer than `distance`."""
+        """Return the pairs of courses on which two sensors are never closer than `distance`."""
         one, other = situation.ways(first), situation.ways(second)
         x = one[:, np.newaxis, :, 0] - other[:, :, 0]
         y = one[:, np.newaxis, :, 1] - other[:, :, 1]

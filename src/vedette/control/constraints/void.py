@@ -1,4 +1,4 @@
-"""Sensors that keep their distance from the targets, as far as it is known where these are."""
+"""Sensors that keep their distance from targets, by the probability that a disc around a sensor is free of them."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from vedette.kernels.base.types import FactoredGlmb, Floats, Ints
 from vedette.models.arguments import float_array, positive, reject
 from vedette.models.fields import Checked, Positive, Probability, part
 
-# Entries of the tables that a GLMB's hypotheses take at a time.
+# Maximum number of table entries for the hypotheses of a GLMB at a time.
 _BLOCK = 1 << 21
 
 
 @part("void_probability", "constraint")
 @dataclass(frozen=True, slots=True)
 class VoidProbability(PerSensorConstraint, Checked):
-    """Around every sensor no target is near, with a least probability at each time of the horizon (Beard et al.).
+    """A minimum probability, at each time of the horizon, that no target is near a sensor (Beard et al.).
 
     M. Beard, B.-T. Vo, B.-N. Vo and S. Arulampalam, Void probabilities and Cauchy-Schwarz divergence for generalized
     labeled multi-Bernoulli models, IEEE Transactions on Signal Processing 65 (2017) 5047-5061, arXiv:1510.05532.
 
     Attributes:
-        radius: within which no target is to be [m].
-        probability: that there is none, at least, at each time of the horizon.
+        radius: radius of the disc around a sensor that must be free of targets [m].
+        probability: minimum probability that it is, at each time of the horizon.
 
     Raises:
         InputError: a radius that is not above 0, or no probability.
@@ -41,7 +41,7 @@ class VoidProbability(PerSensorConstraint, Checked):
     needs_beliefs: ClassVar[bool] = True
 
     def violations(self, situation: ConstraintContext) -> tuple[Floats, ...]:
-        """By how much the void probability is less than `probability`, the sum over the times."""
+        """Return the amounts by which the void probability is below `probability`, summed over the times."""
         places = np.concatenate([own[:, :, :2] for own in situation.courses])
         lacking = np.zeros(len(places))
         for t, belief in enumerate(situation.beliefs):
@@ -50,13 +50,12 @@ class VoidProbability(PerSensorConstraint, Checked):
 
 
 def void_probability(belief: Labelled, centres: Floats, radius: float) -> Floats:
-    """(num,) probability that no target is within `radius`, m, of `centres` (num, 2).
+    """Return the probability (num,) that no target is within `radius`, m, of `centres` (num, 2).
 
     With P_l the probability of the disc under a track: the product over l of 1 - r_l P_l for an LMB; for a GLMB the sum
     over hypotheses of weight times the product over their tracks of 1 - P_l (Beard et al., as in `VoidProbability`);
-    for a product of GLMBs the product of theirs.
-    Tracks with less than 1.3e-14 in the disc are passed over. Raises `InputError` for centres that are no positions, or
-    a radius that is not above 0.
+    for a product of GLMBs the product of theirs. Tracks with less than 1.3e-14 in the disc are ignored. Raises
+    `InputError` for invalid centres, or a radius that is not above 0.
     """
     positive("radius", radius)
     if not isinstance(belief, Labelled):
@@ -73,20 +72,20 @@ def void_probability(belief: Labelled, centres: Floats, radius: float) -> Floats
 
 
 def _inside(tracks: TrackTable, centres: Floats, radius: float) -> tuple[Ints, Ints, Floats]:
-    """Discs, tracks, and the probability of the one under the other, of those near each other."""
+    """Return discs, tracks, and the probability of the disc under the track, for pairs near each other."""
     means, covs = tracks.means[:, :2], tracks.covs[:, :2, :2]
     disc, component = near_pairs(centres, means, covs, radius)
     parts = disc_probabilities(centres[disc] - means[component], component, covs, radius)
     owner = np.repeat(np.arange(tracks.num_tracks), np.diff(tracks.offsets))
     track = owner[component]
-    # Components of one track follow each other, and so do the entries of one disc and track.
+    # Components of one track are contiguous, and so are the entries of one disc and track.
     new = (np.diff(disc, prepend=-1) != 0) | (np.diff(track, prepend=-1) != 0)
     total = np.bincount(np.cumsum(new) - 1, np.exp(tracks.log_weights[component]) * parts)
     return disc[new], track[new], np.minimum(total, 1.0)
 
 
 def _over_hypotheses(belief: FactoredGlmb, outside: Floats) -> Floats:
-    """(num,) product over factors of the mean over hypotheses of the products of their tracks' columns of `outside`.
+    """Return (num,) the product over factors of the mean over hypotheses of the products of their tracks' `outside`.
 
     outside: (num, num_tracks).
     """
@@ -99,7 +98,7 @@ def _over_hypotheses(belief: FactoredGlmb, outside: Floats) -> Floats:
     for begun in range(0, len(outside), rows):
         columns = outside[begun : begun + rows, belief.hyp_tracks]
         terms = np.tile(weights, (len(columns), 1))
-        # Between the starts of hypotheses with tracks there are no others' tracks.
+        # Between the starts of hypotheses with tracks there are no tracks of other hypotheses.
         terms[:, filled] *= np.multiply.reduceat(columns, belief.hyp_offsets[filled], axis=1)
         found[begun : begun + rows] = np.add.reduceat(terms, belief.factor_offsets[:-1], axis=1).prod(axis=1)
     return found
