@@ -1,4 +1,5 @@
-"""The planner protocol, and planners without rewards: random, fixed, and a wrapper that reports constraint violations.
+"""The planner protocol, and planners without rewards: random, fixed, and a wrapper that reports constraint
+violations.
 """
 
 from __future__ import annotations

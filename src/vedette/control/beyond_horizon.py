@@ -112,15 +112,16 @@ class BeyondHorizon:
         )
 
     def distances(self) -> Floats:
-        """Return distances (num_sensors, num_targets) m from the sensors to the targets by feasible paths; needs zones.
+        """Return distances (num_sensors, num_targets) m from the sensors to the targets by feasible paths;
+        needs zones.
         """
         assert self.paths is not None
         rows = zip(self.paths, self.options, strict=True)
         return np.concatenate([paths.distances(own.pose[np.newaxis, :2]) for paths, own in rows])
 
     def _rates(self, horizon: float) -> tuple[Floats, Floats]:
-        """Return (num_sensors,) speed in m/s of each sensor's farthest course, and turn rate in rad/s of its largest
-        turn.
+        """Return (num_sensors,) speed in m/s of each sensor's farthest course, and turn rate in rad/s of
+        its largest turn.
         """
         speeds, turns = np.empty(len(self.options)), np.zeros(len(self.options))
         for s, own in enumerate(self.options):
@@ -130,7 +131,8 @@ class BeyondHorizon:
         return speeds, turns
 
     def _seconds_to_targets(self, speeds: Floats, turns: Floats) -> float:
-        """Return the time in s until each sensor may have reached a target, and each target may be reached by a sensor.
+        """Return the time in s until each sensor may have reached a target, and each target may be reached
+        by a sensor.
         """
         if len(self.places) == 0:
             return 0.0
@@ -146,15 +148,16 @@ class BeyondHorizon:
         return float(np.where(np.isfinite(longest), longest, 0.0).max())
 
     def _seconds_to_search(self, turns: Floats) -> float:
-        """Return the time in s until cameras have searched for undetected targets; 0 if none turns or none are
-        modelled.
+        """Return the time in s until cameras have searched for undetected targets; 0 if none turns or none
+        are modelled.
         """
         if self.undetected is None or not turns.any():
             return 0.0
         return seconds_to_search(self.options, turns.tolist(), self.reaches, self.undetected, _LEAST_EXISTENCE)
 
     def _gaps(self, s: int) -> Floats:
-        """Return the distance (num_targets,) m from the best course's end to each target; straight if it is in range.
+        """Return the distance (num_targets,) m from the best course's end to each target; straight if it is
+        in range.
         """
         own = self.options[s]
         ends = np.ascontiguousarray(own.courses[:, -1, :2])
@@ -167,7 +170,8 @@ class BeyondHorizon:
         return np.asarray(np.where(straight <= self.reaches[s], straight, around)[allowed].min(axis=0))
 
     def _in_sight(self, s: int) -> Bools:
-        """Return (num_targets,) whether each target is within the detection range of a sensor at its present position.
+        """Return (num_targets,) whether each target is within the detection range of a sensor at its
+        present position.
         """
         return np.asarray(np.hypot(*(self.places - self.options[s].pose[:2]).T) <= self.reaches[s])
 
@@ -229,7 +233,8 @@ class BeyondHorizon:
 
 
 def attracting_targets(prediction: LMB) -> tuple[Ints, Floats]:
-    """Return labels (num, 2) and positions (num, 2), m, of the targets that sensors approach from beyond the horizon.
+    """Return labels (num, 2) and positions (num, 2), m, of the targets that sensors approach from beyond
+    the horizon.
     """
     draws = prediction.existence >= _LEAST_EXISTENCE
     return prediction.tracks.labels[draws], np.ascontiguousarray(prediction.tracks.means[draws, :2])

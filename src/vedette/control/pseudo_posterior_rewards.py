@@ -127,7 +127,8 @@ class PseudoPosteriorRewards:
         return PlainRewards(posteriors, self.prediction, fusion, self.reward, self.settings.num_samples, self.views)
 
     def views(self, chosen: Sequence[int]) -> Views:
-        """Return the fields of view at the ends of the chosen courses, with the prediction that all updates start from.
+        """Return the fields of view at the ends of the chosen courses, with the prediction that all updates
+        start from.
         """
         models = tuple(sensor.filter.sensor for sensor in self.sensors)
         poses = np.stack([own.courses[course, -1] for own, course in zip(self.options, chosen, strict=True)])

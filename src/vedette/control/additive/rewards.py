@@ -82,8 +82,8 @@ class AdditiveRewards:
         return replace(self, table=own, bases=(self.bases[sensor],), cells=cells, prices=self.prices[first:last])
 
     def __call__(self, actions: Ints) -> Floats:
-        """Return rewards (num_joint, num_samples) of joint actions (num_joint, num_sensors); -1: the sensor does not
-        scan.
+        """Return rewards (num_joint, num_samples) of joint actions (num_joint, num_sensors); -1: the sensor
+        does not scan.
         """
         sums = np.empty((len(actions), self.valuation.num, self.num_samples))
 
@@ -112,8 +112,8 @@ class AdditiveRewards:
         return self._lines(chosen, sensor, sensor + 1)
 
     def lines(self, chosen: Ints) -> Floats:
-        """Return rewards (num_courses, num_samples) of the lines of all sensors through a joint action, sensor by
-        sensor.
+        """Return rewards (num_courses, num_samples) of the lines of all sensors through a joint action,
+        sensor by sensor.
         """
         return self._lines(chosen, 0, len(chosen))
 
@@ -169,7 +169,8 @@ class AdditiveRewards:
         return np.asarray(np.where(actions >= 0, prices, 0.0).sum(axis=1))
 
     def _beside(self, actions: Ints) -> Floats:
-        """Return the terms of the rewards other than sums over labels, (num_joint, 1): undetected targets less prices.
+        """Return the terms of the rewards other than sums over labels, (num_joint, 1): undetected targets
+        less prices.
         """
         found = np.array([self.found(joint) for joint in actions]) if len(self.cells.worth) else 0.0
         return np.asarray(found - self.price(actions))[:, np.newaxis]

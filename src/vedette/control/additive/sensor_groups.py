@@ -91,7 +91,8 @@ class Start(NamedTuple):
 
 
 def starts_of(task: Task, missing_existence: float, *, rng: np.random.Generator) -> Start:
-    """Return the table's rows without any scan. missing_existence: existence assumed for a label that a sensor lacks.
+    """Return the table's rows without any scan. missing_existence: existence assumed for a label that a
+    sensor lacks.
     """
     settings, given = task.settings, task.prediction.end.to_kernel()
     if task.sampled:

@@ -99,7 +99,8 @@ def _answers(constraint: Constraint, situation: ConstraintContext) -> list[Bools
 
 
 def _violations(constraint: Constraint, situation: ConstraintContext, answers: Sequence[Bools]) -> Sequence[Floats]:
-    """Return (num_courses,) the violation of each course; 1 for a forbidden course if the constraint gives no amount.
+    """Return (num_courses,) the violation of each course; 1 for a forbidden course if the constraint gives
+    no amount.
     """
     if not provides(constraint, QuantifiedConstraint):
         return [np.asarray(~own, np.float64) for own in answers]

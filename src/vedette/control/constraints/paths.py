@@ -89,8 +89,8 @@ class VisibilityGraph:
         return np.asarray(touched.reshape(courses.shape[:2]).any(axis=1))
 
     def until_barred(self, starts: Floats, ends: Floats) -> Floats:
-        """Return the fraction (num,) of the line from each start to its end (num, 2) that is outside zones; 1: all of
-        it.
+        """Return the fraction (num,) of the line from each start to its end (num, 2) that is outside zones;
+        1: all of it.
         """
         shares = first_touches(starts, ends, self.edges, _inside(self.edges, starts))
         length = np.maximum(np.hypot(*(ends - starts).T), MARGIN)
@@ -143,8 +143,8 @@ class Paths:
     last: Ints
 
     def are_straight(self, starts: Floats) -> Bools:
-        """Return (num_starts, num_goals) whether the straight line from each start (num_starts, 2) to each point is
-        free.
+        """Return (num_starts, num_goals) whether the straight line from each start (num_starts, 2) to each
+        point is free.
         """
         return np.isfinite(clear_lengths(starts, self.points, self.graph.edges))
 

@@ -91,8 +91,8 @@ class RangeLimitedConstraint(Protocol):
 
     @property
     def interaction_range(self) -> float:
-        """Distance in m within which courses may be incompatible; 0: never. A constraint without this member has no
-        limit.
+        """Distance in m within which courses may be incompatible; 0: never. A constraint without this
+        member has no limit.
         """
         ...
 
@@ -145,7 +145,8 @@ def interaction_range_of(constraint: Constraint) -> float:
 
 
 class PerSensorConstraint:
-    """A constraint on each sensor alone, so that all pairs of courses are compatible. A violation above 0 is forbidden.
+    """A constraint on each sensor alone, so that all pairs of courses are compatible. A violation above 0
+    is forbidden.
     """
 
     __slots__ = ()

@@ -46,7 +46,8 @@ class StayInside(PerSensorConstraint):
         return inner + _BEYOND * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]), inner
 
     def violations(self, situation: ConstraintContext) -> tuple[Floats, ...]:
-        """Return the distance in m from the rectangle, averaged over the times; straight ways inside it need no test.
+        """Return the distance in m from the rectangle, averaged over the times; straight ways inside it
+        need no test.
         """
         places = np.concatenate([own[:, :, :2] for own in situation.courses])
         low, high = self.region.corners.min(axis=0), self.region.corners.max(axis=0)
