@@ -1,4 +1,4 @@
-"""What is asked of a decision after it was made, answered from its evidence."""
+"""Analysis of a decision after it was made, from its evidence."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ _SAME_NUMBER = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class DecisionAnalysis:
-    """A decision that can be questioned. Neither copied nor pickled: None is what arrives.
+    """A decision with its evidence, which can be analysed. Neither copied nor pickled: a copy is None.
 
     Attributes:
         planner: name of the planner.
-        parts: what was decided together; the reward is the sum of theirs.
+        parts: the decisions made as units; the reward is the sum of theirs.
         bound: of the plan.
     """
 
@@ -43,7 +43,7 @@ class DecisionAnalysis:
         return type(None), ()
 
     def __call__(self) -> Explanation:
-        """The answer to `Plan.explain`."""
+        """Return the explanation for `Plan.explain`."""
         return self._explanation
 
     @cached_property
@@ -84,19 +84,19 @@ class DecisionAnalysis:
 
     @cached_property
     def _contributions(self) -> tuple[Contributions | None, ...]:
-        """Of each part; None where its rewards are evaluated case by case."""
+        """Contributions of each part; None if its rewards are evaluated case by case."""
         return tuple(part.shares() for part in self.parts)
 
     @cached_property
     def _samples(self) -> tuple[Floats, ...]:
-        """For each part (num_samples,) rewards of its choice."""
+        """Rewards (num_samples,) of the choice, for each part."""
         return tuple(
             part.evidence.rewards(np.array([part.chosen]))[0] if shares is None else shares.samples
             for part, shares in zip(self.parts, self._contributions, strict=True)
         )
 
     def _shares(self, missing: dict[str, str]) -> dict[str, Any]:
-        """The fields of an `Explanation` that tell who contributes; why they are None is put in `missing`."""
+        """Return the fields of an `Explanation` with contributions; reasons for None are put in `missing`."""
         names = ("baseline", "of_targets", "of_undetected", "of_sensors", "without")
         found: dict[str, Any] = dict.fromkeys(names)
         each = [shares for shares in self._contributions if shares is not None]
@@ -126,7 +126,7 @@ class DecisionAnalysis:
         return TargetGains(prediction.tracks.labels.copy(), np.sum(existence, axis=0), np.sum(localisation, axis=0))
 
     def _runner_up(self) -> RunnerUp | None:
-        """The best other joint action: of an independent decision, one sensor's own second best."""
+        """Return the best other joint action; for an independent decision, one sensor's own second best."""
         found = [
             (part.evidence.mean_of(part.chosen) - best[1], place, best[0])
             for place, part in enumerate(self.parts)
@@ -146,7 +146,7 @@ class DecisionAnalysis:
         return RunnerUp(tuple(actions), ", ".join(words), margin, _error(self._samples[place] - rewards))
 
     def counterfactual(self, sensor: int, action: int | None, columns: dict[str, float]) -> Counterfactual:
-        """The answer to `Explanation.counterfactual`."""
+        """Return the answer of `Explanation.counterfactual`."""
         num = len(self._options)
         if isinstance(sensor, bool) or not isinstance(sensor, int | np.integer) or not 0 <= sensor < num:
             raise reject("sensor", f"the number of one of {num} sensors, from 0", sensor)
@@ -182,7 +182,7 @@ class DecisionAnalysis:
 
 
 def _same(own: Actions, wanted: Floats) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """(num_actions,) which actions have these numbers, degrees up to whole turns."""
+    """Return (num_actions,) whether each action has these numbers, angles modulo full turns."""
     off = np.abs(own.values - wanted)
     turns = np.array([name.endswith("_deg") for name in own.columns], np.bool_)
     off = np.where(turns, np.abs(np.remainder(off + 180.0, 360.0) - 180.0), off)
@@ -190,13 +190,13 @@ def _same(own: Actions, wanted: Floats) -> np.ndarray[Any, np.dtype[np.bool_]]:
 
 
 def _few(own: Actions) -> str:
-    """Some of the actions in words."""
+    """Return some of the actions as text."""
     words = [own.text(i) for i in range(min(len(own), 5))]
     return "; ".join(words) + ("; ..." if len(own) > len(words) else "")
 
 
 def _error(samples: Floats) -> float | None:
-    """Standard error of a mean over samples; None with a single one."""
+    """Return the standard error of a mean over samples; None with a single sample."""
     num = len(samples)
     return float(samples.std(ddof=1) / math.sqrt(num)) if num > 1 else None
 

@@ -1,4 +1,4 @@
-"""Decisions: rewards on samples and a search of them; and rounds of fresh samples where a decision is to be certain."""
+"""Decisions: rewards on samples and a search over them, with rounds of fresh samples if a confidence is required."""
 
 from __future__ import annotations
 
@@ -24,47 +24,47 @@ from vedette.control.search import JointSearch, all_joint_actions, first_best
 from vedette.kernels.base.types import Floats, Ints
 from vedette.platforms import Actions, Options
 
-# Joint actions that race against each other where a search evaluates all there are; with more, its best ones do.
+# Maximum number of joint actions in a race if a search evaluates all of them; with more, only its best ones race.
 _MOST_OF_ALL = 4096
 _MOST_OF_SEARCH = 64
 
-# Samples of a search that leaves joint actions out. In nine decisions of eight sensors 8 lost 0.3 % of the reward, 16
-# and 40 lost 0.1 %, and of 256 candidates no better one came than of 64.
+# Samples of a search that omits joint actions. In nine decisions of eight sensors 8 lost 0.3 % of the reward, 16
+# and 40 lost 0.1 %, and 256 candidates gave no better result than 64.
 _SEARCHED = 2 * FIRST_ROUND
 
-# Samples are drawn at most so many at a time, to bound the memory of their pseudo-updates.
+# Maximum number of samples drawn at a time, to bound the memory of their pseudo-updates.
 _BLOCK = 250
 
 
-# What a sensor that decides by itself presumes of the others: that they stay as they are, or that there are none.
+# What a sensor that decides alone assumes about the others: that they stay as they are, or that there are none.
 Presumption: TypeAlias = Literal["stay", "absent"]
 
 
 @dataclass(slots=True)
 class Deadline:
-    """Whether the seconds after a moment on the clock are over; and whether somebody has been told so."""
+    """A time limit that starts at a moment on the clock, and remembers whether it was found to have passed."""
 
     began: float
     seconds: float | None
     has_passed: bool = False
 
     def __call__(self) -> bool:
-        """Asked now."""
+        """Return True if the limit has passed now."""
         self.has_passed = self.seconds is not None and time.perf_counter() - self.began >= self.seconds
         return self.has_passed
 
 
 @dataclass(slots=True, eq=False)
 class Rounds:
-    """Fresh samples, round after round, and an account of all.
+    """Rounds of fresh samples, with counts over all rounds.
 
     Attributes:
         preparation: of the decision.
-        evaluator: the first one, of all courses, whose account is that of all.
-        num_samples: so many were drawn.
-        rng: draws them.
+        evaluator: the first evaluator, of all courses, whose counts are those of all rounds.
+        num_samples: number of samples drawn so far.
+        rng: generator of the samples.
         deadline: of searches and rounds.
-        others: (num_sensors,) courses that sensors which decide by themselves presume of the others; None: none.
+        others: (num_sensors,) courses that sensors which decide alone assume for the others; None: no other sensors.
     """
 
     preparation: Preparation
@@ -83,12 +83,14 @@ class Rounds:
         *,
         rng: np.random.Generator,
     ) -> Rounds:
-        """With an evaluator of all courses on so many samples."""
+        """Return rounds with an evaluator of all courses on `num_samples` samples."""
         deadline = Deadline(time.perf_counter(), preparation.settings.max_seconds)
         return cls(preparation, preparation.evaluator(num_samples, rng=rng), num_samples, rng, deadline, others)
 
     def _run(self, races: Sequence[Race]) -> Literal["max_samples", "max_seconds"] | None:
-        """Rounds until all races are over, or why they were stopped before; the first round is always run."""
+        """Run rounds until all races are over; return the reason if they were stopped before. At least one
+        round is run.
+        """
         settings = self.preparation.settings
         most = settings.max_samples - self.num_samples + races[0].num_samples
         while going := [race for race in races if race.verdict is None or race.num_samples == 0]:
@@ -101,7 +103,7 @@ class Rounds:
         return None
 
     def _run_one(self, going: Sequence[Race], num: int) -> None:
-        """One round of so many samples."""
+        """Run one round of `num` samples."""
         sizes = [min(_BLOCK, num - first) for first in range(0, num, _BLOCK)]
         blocks = [self._rewards(going, size) for size in sizes]
         for place, race in enumerate(going):
@@ -109,7 +111,7 @@ class Rounds:
         self.num_samples += num
 
     def _rewards(self, going: Sequence[Race], num: int) -> list[Floats]:
-        """Of each race (num_left, num) rewards on samples drawn now, of the courses that are still wanted."""
+        """Return for each race rewards (num_left, num) of its remaining courses on newly drawn samples."""
         options = self.preparation.options
         wanted = [_wanted(going, s) for s in range(len(options))]
         others = None
@@ -130,7 +132,7 @@ class Rounds:
         return rewards
 
     def certainty(self, races: Sequence[Race]) -> SamplingOutcome:
-        """Run all races: how they ended. What may go wrong in any of them adds up."""
+        """Run all races and return how they ended; their error probabilities add up."""
         stopped = self._run(races)
         over: Literal["one left", "indifferent"] = "indifferent"
         if all(race.verdict == "one left" for race in races):
@@ -143,10 +145,11 @@ class Rounds:
 def decide_jointly(
     name: str, preparation: Preparation, search: JointSearch, notes: Sequence[str], *, rng: np.random.Generator
 ) -> Plan:
-    """The joint action that a search finds; where it is to be certain, of all or of its best ones the best by races.
+    """Return the plan with the joint action that a search finds; with a confidence, the winner of races.
 
-    All joint actions race from the first sample on. What a search has picked is raced on fresh samples, as those that
-    it was picked by speak for it; so are those that a mask allows.
+    If the search evaluates all joint actions, all of them race from the first sample on. Otherwise its best ones race
+    on fresh samples, because they were selected for high rewards on the samples of the search; so do those that a mask
+    allows.
     """
     settings, races, mask = preparation.settings, preparation.races, preparation.mask
     num_joint = math.prod([len(own.courses) for own in preparation.options])
@@ -181,9 +184,9 @@ def decide_jointly(
 def decide_alone(
     name: str, preparation: Preparation, presume: Presumption, notes: Sequence[str], *, rng: np.random.Generator
 ) -> Plan:
-    """For every sensor its own best course of those it may take; that all are, has the confidence asked for.
+    """Return the plan with the best feasible course of each sensor; the confidence is that all of them are best.
 
-    presume: what each sensor presumes of the others.
+    presume: what each sensor assumes about the others.
     """
     settings, options, races = preparation.settings, preparation.options, preparation.races
     others = stationary_courses(options, preparation.mask) if presume == "stay" else None
@@ -208,7 +211,7 @@ def decide_alone(
 
 
 def _active(parts: Sequence[Part], mask: Mask | None) -> Sequence[Part]:
-    """What sensors choose by themselves, where only some may scan with those off whose scans gain least."""
+    """Return the parts with those sensors off whose scans gain least, if only some sensors may scan."""
     if mask is None or mask.active is None:
         return parts
     joint, gains = [part.chosen[0] for part in parts], list[float]()
@@ -222,16 +225,18 @@ def _active(parts: Sequence[Part], mask: Mask | None) -> Sequence[Part]:
 def _raced_plan(
     name: str, parts: Sequence[Part], notes: Sequence[str], certainty: SamplingOutcome, **fields: Any
 ) -> Plan:
-    """Of what took part in fewer rounds the samples are not those of the choice, so that it cannot be questioned."""
+    """Return the plan of a race. It cannot be explained: candidates that left early have other samples than
+    the choice.
+    """
     return replace(plan_of(name, parts, notes, (str(certainty),), certainty=certainty, **fields), questions=None)
 
 
 def plan_of(
     name: str, parts: Sequence[Part], notes: Sequence[str], more_notes: Sequence[str] = (), **fields: Any
 ) -> Plan:
-    """The plan of decisions that were made together or each by itself, one after the other of all sensors.
+    """Return the plan of decisions made together or sensor by sensor, in the order of the sensors.
 
-    notes, more_notes: what is told before and after what came up. fields: further ones of the plan.
+    notes, more_notes: notes before and after those of the decisions. fields: further fields of the plan.
     """
     evaluator = parts[0].evidence.evaluator
     courses, tables, actions, chosen = list[int](), list[RewardTable](), list[Actions](), list[int]()
@@ -254,14 +259,14 @@ def plan_of(
 
 
 def _wanted(going: Sequence[Race], sensor: int) -> Ints:
-    """Courses of a sensor that some candidate takes; one, where no race asks for any."""
+    """Return the courses of a sensor that some candidate takes; one course, if no race needs any."""
     wanted = [race for race in going if race.sensor in (None, sensor)]
     columns = [race.candidates[:, sensor if race.sensor is None else 0] for race in wanted]
     return np.unique(np.concatenate(columns)) if columns else np.zeros(1, np.int64)
 
 
 def _only(own: Options, courses: Ints) -> Options:
-    """The options that take some courses, which are numbered anew."""
+    """Return the options restricted to some courses, which are renumbered."""
     kept = np.isin(own.which, courses)
     actions = Actions(own.actions.columns, own.actions.values[kept])
     which, chosen = np.searchsorted(courses, own.which[kept]), np.ascontiguousarray(own.courses[courses])

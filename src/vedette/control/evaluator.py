@@ -1,4 +1,4 @@
-"""The one evaluator behind all planners: expected rewards of actions, and how far ahead they are taken."""
+"""The evaluator of all planners: expected rewards of actions, and the horizons that they cover."""
 
 from __future__ import annotations
 
@@ -27,19 +27,19 @@ from vedette.tracking import State
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evaluator:
-    """Everything that the rewards of one decision depend on; what takes long is done once, when it is prepared.
+    """Expected rewards of the actions of one decision; expensive parts are computed once, when it is made.
 
     Attributes:
         settings: as in the planners.
-        options: for each sensor, its actions in printed order and the different courses that they lead to, which are
-            what is evaluated.
-        prediction: the fused density predicted to the horizon, one Gaussian a track.
-        source: which rewards come from: the sensors' pseudo-posteriors, or sums over labels.
-        additive: the sums over labels that rewards are made of; None where they are not: then there are no lines or
+        options: for each sensor, its actions in printed order and the distinct courses that they lead to, which are
+            evaluated.
+        prediction: the fused density predicted to the horizon, one Gaussian per track.
+        source: source of the rewards: the sensors' pseudo-posteriors, or sums over labels.
+        additive: the sums over labels that rewards are made of; None if they are not, and then there are no lines or
             bounds.
-        counts: how much of each thing has been evaluated so far.
-        notes: what a reader of the decision must know, in the order in which it came up (keys; no values).
-        horizons: further ones, beyond that of the settings.
+        counts: numbers of filter steps, fusions and rewards evaluated so far.
+        notes: notes for readers of the decision, in order of occurrence (keys; values are unused).
+        horizons: further horizons, beyond that of the settings.
     """
 
     settings: PlanningSettings
@@ -63,7 +63,7 @@ class Evaluator:
         *,
         rng: np.random.Generator,
     ) -> Evaluator:
-        """By the sensors' own filters; raises as `JointPlanner.plan`."""
+        """Return an evaluator by the sensors' own filters; raises as `JointPlanner.plan`."""
         motion = sensors[0].filter.targets.motion
         prediction: Any = predicted(state.fused, motion, settings.horizon_steps, settings.horizon_period)
         cases = PseudoPosteriorRewards.prepare(sensors, options, fusion, settings, reward, state, prediction, rng=rng)
@@ -83,9 +83,9 @@ class Evaluator:
         graph: VisibilityGraph | None = None,
         rng: np.random.Generator,
     ) -> Evaluator:
-        """By sums over labels, each followed over every course that reaches it; beliefs are LMBs.
+        """Return an evaluator by sums over labels, each followed over every course that reaches it; beliefs are LMBs.
 
-        horizons: further ones, at whose ends the expected loss is taken as well; None: those that are due
+        horizons: further horizons at whose ends the expected loss is evaluated as well; None: those that are needed
         (`vedette.control.beyond_horizon.BeyondHorizon.horizons`). graph: of the zones that constraints forbid, for
         paths beyond the horizon; None: there are none. Raises as `JointPlanner.plan`.
         """
@@ -108,20 +108,20 @@ class Evaluator:
         return cls(settings, tuple(options), prediction, source, source, counts, notes, horizons=horizons)
 
     def joint_shape(self) -> tuple[int, ...]:
-        """Number of different courses of each sensor."""
+        """Number of distinct courses of each sensor."""
         return tuple([len(own.courses) for own in self.options])
 
     def joint(self) -> SampleRewards:
-        """The function that gives (num_joint, num_samples) rewards of joint actions (num_joint, num_sensors).
+        """Return a function from joint actions (num_joint, num_sensors) to rewards (num_joint, num_samples).
 
-        Their actions are numbers of different courses. NaN, or a `NumericalError`, where a reward is not finite.
+        Actions are indices of distinct courses. A reward that is not finite is NaN, or raises `NumericalError`.
         """
         return self._counted(self.source.joint())
 
     def alone(self, sensor: int, others: Sequence[int] | None = None) -> SampleRewards:
-        """The same of one sensor's actions (num, 1).
+        """Return the same function for one sensor's actions (num, 1).
 
-        others: (num_sensors,) courses that the other sensors are presumed to take; None: they are absent, and the
+        others: (num_sensors,) courses that the other sensors are assumed to take; None: they are absent, and the
         rewards are those of the sensor's own density.
         """
         if others is None:
@@ -148,7 +148,7 @@ class Evaluator:
 
 
 def mean_over_horizons(horizons: Sequence[AdditiveRewards]) -> AdditiveRewards:
-    """The mean of expected losses at several times, which are as of so many labels more; cells likewise."""
+    """Return the mean of expected losses at several times, as one table with the labels and cells of each time."""
     first, num = horizons[0], len(horizons)
     order, offsets = _in_turn([own.table.offsets for own in horizons])
     num_labels = len(first.table.start)
@@ -165,7 +165,7 @@ def mean_over_horizons(horizons: Sequence[AdditiveRewards]) -> AdditiveRewards:
         covs=np.concatenate([own.covs for own in several]),
     )
     of_sensors = list(zip(*(own.bases for own in horizons), strict=True))
-    # Sensors that share their rows go on sharing them.
+    # Sensors that share rows continue to share them.
     distinct = {tuple(map(id, each)): each for each in of_sensors}
     joined = {key: np.concatenate(each) for key, each in distinct.items()}
     bases = tuple(joined[tuple(map(id, each))] for each in of_sensors)
@@ -182,7 +182,7 @@ def _cells(horizons: Sequence[AdditiveRewards]) -> Cells:
 
 
 def _in_turn(offsets: Sequence[Ints]) -> tuple[Ints, Ints]:
-    """The order in which entries that stand one list after the other go course by course, and their offsets."""
+    """Return the order that sorts concatenated lists of entries by course, and the offsets of the courses."""
     counts = np.stack([np.diff(own) for own in offsets])
     num_lists, num_courses = counts.shape
     lists = np.repeat(np.tile(np.arange(num_courses), num_lists), counts.ravel())

@@ -1,4 +1,4 @@
-"""The rewards that a decision was made on, kept as tables over the actions in printed order."""
+"""The rewards on which a decision was made, as tables over the actions in printed order."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ from vedette.control.pseudo_posterior_rewards import SampleRewards
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
 
-# A joint table of more entries is not formed: it would take more memory than all that was evaluated.
+# Maximum number of entries of a joint table; a larger one would take more memory than all evaluated rewards.
 MAX_TABLE = 2_000_000
 
-# NumPy's arrays have no more axes than this.
+# Maximum number of axes of a NumPy array.
 _MAX_AXES = 32
 
-# Joint actions are evaluated so many rewards at a time, to bound the memory of an exhaustive search.
+# Number of rewards evaluated at a time, to bound the memory of an exhaustive search.
 _BLOCK = 4_000_000
 
 
 @dataclass(slots=True, eq=False)
 class Evidence:
-    """Mean rewards of the joint actions of some sensors, and every one that was ever asked for.
+    """Mean rewards of the joint actions of some sensors: every one that was evaluated.
 
     Attributes:
-        evaluator: that gives the rewards.
+        evaluator: source of the rewards.
         which: the sensors.
-        rewards: their sample rewards.
-        shape: number of different courses of each of the sensors.
+        rewards: function that returns their sample rewards.
+        shape: number of distinct courses of each of the sensors.
         keeps: whether `evaluate` keeps the rewards of all samples.
-        most_by_target: what `vedette.control.problem` found, where it was asked.
+        most_by_target: cached result of `vedette.control.problem.most_by_target`.
     """
 
     evaluator: Evaluator
@@ -57,9 +57,9 @@ class Evidence:
         self.shape = tuple([shape[s] for s in self.which])
 
     def evaluate(self, actions: Ints) -> Floats:
-        """(num,) mean rewards of joint actions (num, num_sensors); -inf where one is no number.
+        """Return mean rewards (num,) of joint actions (num, num_sensors); -inf if one is not finite.
 
-        Raises `InputError` for what are no joint actions.
+        Raises `InputError` for invalid joint actions.
         """
         checked = np.array(actions, order="C")
         fits = checked.ndim == 2 and checked.shape[1] == len(self.which) and checked.dtype.kind in "iu"
@@ -77,7 +77,9 @@ class Evidence:
         return np.asarray(np.concatenate(means))
 
     def samples(self) -> Floats | None:
-        """(num_joint, num_samples) rewards that were kept, in printed order; None unless each was asked for once."""
+        """Return kept rewards (num_joint, num_samples) in printed order; None unless each was evaluated
+        exactly once.
+        """
         num = sum(len(actions) for actions, _ in self._samples)
         if num != math.prod(self.shape) or not self.is_complete():
             return None
@@ -85,7 +87,7 @@ class Evidence:
         return np.asarray(np.concatenate([rewards for _, rewards in self._samples])[np.argsort(places)])
 
     def note(self, actions: Ints, rewards: Floats) -> Floats:
-        """Keep what was evaluated, (num, num_samples) rewards; returns their means, -inf where one is no number."""
+        """Store rewards (num, num_samples) and return their means, -inf if one is not finite."""
         num = rewards.shape[1]
         with np.errstate(invalid="ignore"):
             mean = np.asarray(rewards.mean(axis=1))
@@ -101,22 +103,24 @@ class Evidence:
         return ranked
 
     def progress(self, num_evaluated: int, best: float) -> None:
-        """Note that so many joint actions more were evaluated, the best of them worth this."""
+        """Add a step to the search curve: `num_evaluated` further joint actions, the best of them with
+        reward `best`.
+        """
         self._evaluations.append(num_evaluated + (self._evaluations[-1] if self._evaluations else 0))
         self._best.append(max(best, self._best[-1] if self._best else -math.inf))
 
     @property
     def best(self) -> float:
-        """The largest mean reward that was found."""
+        """The largest mean reward found."""
         return self._best[-1]
 
     def _all(self) -> tuple[Ints, Floats, Floats]:
-        """Joint actions, means and errors in the order in which they were evaluated."""
+        """Return joint actions, means and standard errors in order of evaluation."""
         actions, means, errors = zip(*self._noted, strict=True)
         return np.concatenate(actions), np.concatenate(means), np.concatenate(errors)
 
     def is_complete(self) -> bool:
-        """Whether every joint action was evaluated."""
+        """Return True if every joint action was evaluated."""
         if not self._is_complete:
             num, noted = math.prod(self.shape), [noted[0] for noted in self._noted]
             if sum(map(len, noted)) >= num:
@@ -125,7 +129,7 @@ class Evidence:
         return self._is_complete
 
     def mean_of(self, choice: Sequence[int]) -> float:
-        """Mean reward of a joint action that was evaluated."""
+        """Return the mean reward of a joint action that was evaluated."""
         for actions, means, _ in self._noted:
             at = np.flatnonzero((actions == np.array(choice)).all(axis=1))
             if len(at):
@@ -134,13 +138,13 @@ class Evidence:
 
     @property
     def num_evaluated(self) -> int:
-        """How many joint actions were evaluated, those of compiled ascents included."""
+        """Number of joint actions evaluated, including those of compiled ascents."""
         return self._evaluations[-1] if self._evaluations else 0
 
     def best_other(self, choice: Sequence[int]) -> tuple[tuple[int, ...], float] | None:
-        """The best joint action but the choice of those that are kept, and its mean reward; None where there is none.
+        """Return the best stored joint action other than the choice, and its mean reward; None if there is none.
 
-        Of equal ones the first that was evaluated.
+        Of equal ones the first evaluated.
         """
         actions, means, _ = self._all()
         others = np.where((actions == np.array(choice)).all(axis=1) | np.isnan(means), -math.inf, means)
@@ -148,9 +152,9 @@ class Evidence:
         return (tuple(actions[at].tolist()), float(others[at])) if others[at] > -math.inf else None
 
     def foremost(self, choice: Sequence[int], most: int) -> Ints:
-        """(num, num_sensors) up to `most` joint actions of the largest means found, the choice first among equals.
+        """Return (num, num_sensors) up to `most` joint actions with the largest means, the choice first among equals.
 
-        In printed order, those without a finite mean left out but for the choice.
+        They are in printed order, without joint actions that have no finite mean, except the choice.
         """
         noted, means, _ = self._all()
         actions, places = np.unique(noted, axis=0, return_index=True)
@@ -161,7 +165,7 @@ class Evidence:
         return np.ascontiguousarray(actions[np.sort(order)])
 
     def curve(self) -> SearchCurve:
-        """How the search went."""
+        """Return the progress of the search."""
         return SearchCurve(np.array(self._evaluations, np.int64), np.array(self._best))
 
     def _named(self, courses: Ints) -> str:
@@ -173,14 +177,15 @@ class Evidence:
         return " and ".join(named)
 
     def holds(self, choice: Sequence[int]) -> bool:
-        """Whether this joint action has been evaluated."""
+        """Return True if this joint action has been evaluated."""
         noted = [actions for actions, _, _ in self._noted]
         return bool(noted) and bool((np.concatenate(noted) == np.array(choice)).all(axis=1).any())
 
     def tables(self, choice: Sequence[int]) -> tuple[RewardTable, ...]:
-        """One table of all that was evaluated, gaps elsewhere; or, where it would be too large, a line a sensor.
+        """Return one table of all evaluated rewards, with gaps elsewhere; if it would be too large, one line per
+        sensor.
 
-        A line holds one sensor's actions with the others at their `choice`.
+        A line contains one sensor's actions, with the others at their `choice`.
         """
         num_entries = math.prod([len(self.evaluator.options[s].which) for s in self.which])
         actions, means, errors = self._all()
@@ -195,14 +200,14 @@ class Evidence:
         return tuple(found)
 
     def _table(self, sensors: tuple[int, ...], actions: Ints, means: Floats, errors: Floats) -> RewardTable:
-        """Rewards of joint actions (num, num of `sensors`), numbers of courses, spread over the actions."""
+        """Return rewards of joint actions (num, num of `sensors`), as course indices, as a table over the actions."""
         which, shape, filled = [], [], []
         for s in sensors:
             own = self.evaluator.options[s]
             which.append(own.which)
             shape.append(len(own.courses))
         spread = np.ix_(*which)
-        # The first evaluation holds: a later one, along a line, may differ from it in the last digit.
+        # The first evaluation is used: a later one, along a line, may differ from it in the last digit.
         places, first = np.unique(np.ravel_multi_index(tuple(actions.T), shape), return_index=True)
         for values in (means, errors):
             table = np.full(shape, math.nan)
@@ -212,27 +217,27 @@ class Evidence:
 
 
 class Part(NamedTuple):
-    """A decision that is made by itself: that of all sensors together, or of one alone."""
+    """A decision made as a unit: that of all sensors together, or of one sensor alone."""
 
     evidence: Evidence
     chosen: tuple[int, ...]  # courses of its sensors
-    additive: AdditiveRewards | None  # its rewards, where they are made of sums over labels
-    others: tuple[int, ...] | None = None  # courses that one sensor presumes of all; None: `additive` is of its own
+    additive: AdditiveRewards | None  # its rewards, if they are sums over labels
+    others: tuple[int, ...] | None = None  # courses that one sensor assumes for all; None: `additive` is its own
 
     @classmethod
     def together(cls, evidence: Evidence, chosen: Sequence[int]) -> Part:
-        """Of all sensors."""
+        """Return the decision of all sensors."""
         return cls(evidence, tuple(chosen), evidence.evaluator.additive)
 
     @classmethod
     def alone(cls, evidence: Evidence, course: int, others: tuple[int, ...] | None = None) -> Part:
-        """Of the one sensor of the evidence. others: as of `Evaluator.alone`."""
+        """Return the decision of the one sensor of the evidence. others: as in `Evaluator.alone`."""
         additive, (sensor,) = evidence.evaluator.additive, evidence.which
         own = additive if additive is None or others is not None else additive.alone(sensor)
         return cls(evidence, (course,), own, others)
 
     def shares(self) -> Contributions | None:
-        """What contributes to its reward; None where rewards are no sums over labels."""
+        """Return the contributions to its reward; None if rewards are not sums over labels."""
         if self.additive is None:
             return None
         joint, which = np.array(self.chosen), np.arange(len(self.chosen))

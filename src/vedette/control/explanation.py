@@ -1,4 +1,4 @@
-"""Why a plan is what it is: what targets and sensors contribute to its reward, and how near the next best came."""
+"""Explanation of a plan: contributions of targets and sensors to its reward, and the margin to the runner-up."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ _SAME = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """How good the best joint action can be at most, on the same samples.
+    """Upper bound on the reward of the best joint action, on the same samples.
 
     Attributes:
-        upper: no joint action has a larger mean reward; inf where nothing is known of some target.
+        upper: no joint action has a larger mean reward; inf if some target has no bound.
         reward: mean reward of the choice.
-        kind: "exhaustive": every joint action was evaluated; "by target": every target is given the joint action that
-            is best for it.
-        unbounded: labels of which nothing is known, as too many sensors may see them.
+        kind: "exhaustive": every joint action was evaluated; "by target": the sum over targets of the best joint action
+            for each.
+        unbounded: number of targets without a bound, because too many sensors may see them.
     """
 
     upper: float
@@ -38,12 +38,12 @@ class Bound:
 
     @property
     def gap(self) -> float:
-        """How much better the best can be, in units of the reward."""
+        """Largest possible improvement, in units of the reward."""
         return self.upper - self.reward
 
     @property
     def relative(self) -> float:
-        """The gap relative to the magnitude of the bound or of the reward, the larger one; 0 for no gap."""
+        """The gap relative to the magnitude of the bound or of the reward, whichever is larger; 0 for no gap."""
         scale = max(abs(self.upper), abs(self.reward))
         return self.gap / scale if self.gap > 0.0 else 0.0
 
@@ -56,44 +56,44 @@ class Bound:
 
 
 class TargetGains(NamedTuple):
-    """What the reward gains by each target, in its own unit."""
+    """Gain of the reward from each target, in units of the reward."""
 
     labels: Ints  # (num_targets, 2)
-    existence: Floats  # (num_targets,) by the existence after all scans, with the density that there is without
-    localisation: Floats  # (num_targets,) by the rest: the density after all scans
+    existence: Floats  # (num_targets,) from existence after all scans, with the density without scans
+    localisation: Floats  # (num_targets,) the remaining gain: from the density after all scans
 
     @property
     def total(self) -> Floats:
-        """(num_targets,) both together."""
+        """Sum (num_targets,) of both gains."""
         return self.existence + self.localisation
 
 
 class RunnerUp(NamedTuple):
     """The best of the other joint actions that were evaluated."""
 
-    actions: tuple[int, ...]  # for each sensor, the index among its actions
-    text: str  # those of the sensors that would do something else
-    margin: float  # by how much its mean reward is smaller
-    standard_error: float | None  # of the margin, from differences sample by sample; None with a single sample
+    actions: tuple[int, ...]  # for each sensor, the index of its action
+    text: str  # actions of the sensors that differ from the choice
+    margin: float  # difference of the mean rewards
+    standard_error: float | None  # of the margin, from paired differences; None with a single sample
 
     @property
     def in_standard_errors(self) -> float | None:
-        """The margin in its standard errors, inf where all samples agree on it; None without standard error."""
+        """The margin in standard errors, inf if it is equal in all samples; None without standard error."""
         return _ratio(self.margin, self.standard_error)
 
 
 class Counterfactual(NamedTuple):
-    """What would have been had a sensor done something else, the others as chosen."""
+    """Reward if one sensor had taken another action and the others had kept theirs."""
 
     sensor: int
     action: str
     reward: float
-    difference: float  # of this reward from that of the choice
-    standard_error: float | None  # of the difference, from differences sample by sample; None with a single sample
+    difference: float  # this reward minus that of the choice
+    standard_error: float | None  # of the difference, from paired differences; None with a single sample
 
     @property
     def in_standard_errors(self) -> float | None:
-        """The difference in its standard errors; None without standard error."""
+        """The difference in standard errors; None without standard error."""
         return _ratio(self.difference, self.standard_error)
 
     def __str__(self) -> str:
@@ -103,31 +103,30 @@ class Counterfactual(NamedTuple):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Explanation:
-    """Why a plan is what it is. Rewards are means over the samples; a field is None where `missing` says why.
+    """Explanation of a plan. Rewards are means over the samples; `missing` gives the reason for a field that is None.
 
-    `baseline`, the sum of `of_targets.total` and `of_undetected` less `price` add up to `reward`; so do `baseline` and
-    `of_sensors`.
-    An independent decision is explained as one: its reward is the sum of those that the sensors decided on, with what
-    each of them presumes of the others.
+    `baseline` plus the sum of `of_targets.total` plus `of_undetected` less `price` equals `reward`; so does `baseline`
+    plus the sum of `of_sensors`. The reward of an independent decision is the sum of the rewards that the sensors
+    decided on, with what each of them assumes about the others.
 
     Attributes:
         planner: name of the planner.
-        chosen: what each sensor does, in words.
-        reward: of the choice.
-        standard_error: of that; None with a single sample.
-        evaluations: how many joint actions were evaluated; of an independent decision, actions.
-        baseline: the reward without any scan; where sensors presume that the others stay, the sum of rewards with
-            these alone.
-        of_targets: what is gained by each target of the fused belief.
-        of_undetected: what is gained by targets that were not found before.
-        of_sensors: (num_sensors,) the sensors' shares in what is gained, less their prices: half of what each adds to
-            those before it and half of what it adds to those after it (a Shapley value on two orders).
-        without: (num_sensors,) the reward had the sensor not scanned, at no price, the others as chosen.
+        chosen: the action of each sensor, as text.
+        reward: reward of the choice.
+        standard_error: standard error of the reward; None with a single sample.
+        evaluations: number of joint actions evaluated; for an independent decision, of actions.
+        baseline: the reward without any scan; if sensors assume that the others stay, the sum of rewards with these
+            alone.
+        of_targets: gains from each target of the fused belief.
+        of_undetected: gain from undetected targets.
+        of_sensors: (num_sensors,) contribution of each sensor to the gain, less its price: half of what it adds to the
+            sensors before it and half of what it adds to those after it (a Shapley value on two orders).
+        without: (num_sensors,) the reward had the sensor not scanned, at no price, given the other sensors' choices.
         runner_up: the best other joint action that was evaluated.
-        bound: how far from the best the choice can be; None where nothing is known of that.
-        missing: why fields are None, by name.
-        price: of all chosen actions, which is subtracted from what is gained.
-        answer: behind `counterfactual`; None once the evidence is gone.
+        bound: upper bound on the best reward; None if no bound is available.
+        missing: reasons for fields that are None, by name.
+        price: of all chosen actions, which is subtracted from the gain.
+        answer: function behind `counterfactual`; None without the evidence.
     """
 
     planner: str
@@ -150,21 +149,21 @@ class Explanation:
 
     @classmethod
     def nothing(cls, planner: str, chosen: tuple[str, ...], why: str) -> Explanation:
-        """Of a plan that was not made on rewards."""
+        """Return the explanation of a plan that was not made on rewards."""
         nothing = (None,) * 7
         return cls(planner, chosen, None, None, 0, *nothing, dict.fromkeys(EXPLAINED, why))
 
     def counterfactual(self, sensor: int, action: int | None = None, **columns: float) -> Counterfactual:
-        """What would have been had a sensor done something else, the others as chosen.
+        """Return the reward if one sensor had taken another action, given the other sensors' choices.
 
         Args:
-            sensor: its number, from 0.
-            action: the index among its actions, where no columns are given.
-            columns: the numbers of an action, as in `heading_deg=60.0`; those left out are as chosen. Degrees count up
-                to whole turns.
+            sensor: its index, from 0.
+            action: index of the action, if no columns are given.
+            columns: the numbers of an action, as in `heading_deg=60.0`; omitted ones are as chosen. Angles in degrees
+                are compared modulo full turns.
 
         Raises:
-            InputError: no such sensor or action, or a plan without its evidence: one that chose without rewards, was
+            InputError: no such sensor or action, or a plan without its evidence: one that was chosen without rewards,
                 read from a record or unpickled.
             NumericalError: a reward that is not finite.
         """
@@ -174,7 +173,7 @@ class Explanation:
         return self.answer(sensor, action, columns)
 
     def without_evidence(self) -> Explanation:
-        """The same to be kept: it cannot answer `counterfactual`."""
+        """Return a copy for storage, which cannot answer `counterfactual`."""
         values = {name: getattr(self, name) for name in self.__slots__ if name != "answer"}
         return Explanation(**values)
 
@@ -182,7 +181,7 @@ class Explanation:
         return text_of(self)
 
 
-# The fields that may be None with a reason.
+# Fields that may be None, with a reason.
 EXPLAINED = ("reward", "baseline", "of_targets", "of_undetected", "of_sensors", "without", "runner_up")
 
 
@@ -195,7 +194,9 @@ def _ratio(difference: float, error: float | None) -> float | None:
 
 
 def text_of(explanation: Explanation) -> str:
-    """The reward, how near the next best came, and what the ten most important targets and sensors contribute."""
+    """Return the reward, the margin to the runner-up, and the ten largest contributions of targets and
+    sensors, as text.
+    """
     lines = [*_of_choice(explanation), *_of_targets(explanation), *_of_sensors(explanation)]
     reasons: dict[str, list[str]] = {}
     for name, why in explanation.missing.items():
@@ -214,7 +215,7 @@ def with_error(value: float, error: float | None, sign: str = "+-") -> str:
 
 
 def number_text(value: float, scale: float) -> str:
-    """Four digits; 0 for what is rounding beside the scale."""
+    """Return a number with four digits; 0 if it is rounding error relative to the scale."""
     return "0" if abs(value) <= _SAME * abs(scale) else f"{value:.4g}"
 
 
@@ -277,6 +278,6 @@ def _of_sensors(found: Explanation) -> list[str]:
 
 
 def _most(values: Sequence[float] | np.ndarray) -> tuple[list[int], list[int]]:
-    """The places of the largest in magnitude, and those of the others."""
+    """Return the indices of the largest values in magnitude, and the indices of the others."""
     order = np.argsort(-np.abs(np.asarray(values)), kind="stable").tolist()
     return order[:_MOST_ROWS], order[_MOST_ROWS:]

@@ -1,4 +1,4 @@
-"""How courses go on beyond the horizon: as they did, or along a path."""
+"""Continuation of courses beyond the horizon: straight on, or along a path."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from vedette.platforms.camera import POINTING, is_camera
 
 
 def extrapolated(own: Options, horizon: Floats, times: Floats) -> Options:
-    """The options with courses (num_courses, num_times, pose_dim) at other times, s, from now on.
+    """Return the options with courses (num_courses, num_times, pose_dim) at other times, s, from now on.
 
-    horizon: (num_steps,) s of the poses that there are. Between them a sensor goes straight; after the last it goes on
-    by as much as it went over the whole horizon, again and again, a camera goes on as by `turned_on`, what else its
-    pose has stays, and it scans, even where its action keeps it from scanning up to then.
+    horizon: (num_steps,) s, times of the given poses. Between them a sensor moves straight. After the last pose its
+    displacement over the whole horizon is repeated, a camera turns on as in `turned_on`, the other components of its
+    pose stay, and it scans, even if its action kept it from scanning before.
     """
     start = np.broadcast_to(own.pose, (len(own.courses), 1, len(own.pose)))
     known = np.concatenate([start, own.courses], axis=1)
@@ -40,9 +40,10 @@ def extrapolated(own: Options, horizon: Floats, times: Floats) -> Options:
 def follow(course: Floats, corners: Floats, run: Floats, end: Floats, step: Floats) -> None:
     """Write poses along a path into a course (num_times, pose_dim).
 
-    corners: (num_corners, 2) m, of the path. run: (num_times,) m from the end of the horizon on; 0 before. end: the
-    pose (pose_dim,) there. step: (2,) m, from the pose now to it. A sensor that heads where it goes does so on the
-    path.
+    corners: (num_corners, 2) m, corners of the path.
+    run: (num_times,) m, distance travelled from the end of the horizon on; 0 before.
+    end: the pose (pose_dim,) at the end of the horizon.
+    step: (2,) m, from the present pose to it. A sensor that heads in its direction of motion does so on the path.
     """
     legs = np.diff(corners, axis=0)
     passed = np.concatenate([[0.0], np.cumsum(np.hypot(legs[:, 0], legs[:, 1]))])

@@ -1,4 +1,4 @@
-"""Checks of what a planner is given, and what its sensors may do."""
+"""Validation of the inputs of planners, and the options of their sensors."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ from vedette.tracking import State
 
 
 def check_sensors(sensors: Sequence[MobileSensor]) -> TargetModel:
-    """The targets that the sensors track; `InputError` unless there is a sensor, and all track the same."""
+    """Return the target model of the sensors; `InputError` unless there is a sensor and all have the same model."""
     if len(sensors) == 0 or not all(isinstance(sensor, MobileSensor) for sensor in sensors):
         raise reject("sensors", "at least one MobileSensor", sensors)
     return shared_targets([sensor.filter for sensor in sensors])
 
 
 def check_steering(planner: Any) -> None:
-    """Keep sensors and constraints of a planner as tuples; `InputError` where they or the settings are no such."""
+    """Store sensors and constraints of a planner as tuples; `InputError` if they or the settings are invalid."""
     for name, expected in (("sensors", "at least one MobileSensor"), ("constraints", "constraints in a tuple")):
         object.__setattr__(planner, name, sequence(name, getattr(planner, name), expected))
     check_sensors(planner.sensors)
@@ -45,7 +45,7 @@ def check_steering(planner: Any) -> None:
 
 
 def check_valuing(fusion: Any, reward: Any, notes: Any = ()) -> None:
-    """`InputError` for a fusion, reward or notes of a planner that are no such."""
+    """Raise `InputError` for an invalid fusion, reward or notes of a planner."""
     if not all(isinstance(note, str) for note in sequence("notes", notes, "texts in a tuple")):
         raise reject("notes", "texts in a tuple", notes)
     instance("fusion", fusion, Fusion)
@@ -54,7 +54,9 @@ def check_valuing(fusion: Any, reward: Any, notes: Any = ()) -> None:
 
 
 def check_poses(poses: Any, num_sensors: int) -> Floats:
-    """The poses as a (num_sensors, 3 or more) array; `InputError` if they are not that or not finite."""
+    """Return the poses as an array (num_sensors, 3 or more); `InputError` for another shape or values that
+    are not finite.
+    """
     checked = float_array("poses", poses, (num_sensors, None))
     if checked.shape[1] < 3:
         raise reject("poses", f"an array of shape ({num_sensors}, 3 or more)", f"shape {checked.shape}")
@@ -64,9 +66,7 @@ def check_poses(poses: Any, num_sensors: int) -> Floats:
 
 
 def options_of(sensors: Sequence[MobileSensor], poses: Any, settings: PlanningSettings) -> tuple[Options, ...]:
-    """For each sensor of a planner what it may do over the horizon; `InputError` for poses or platforms that do not
-    fit.
-    """
+    """Return the options of each sensor of a planner over the horizon; `InputError` for invalid poses or platforms."""
     at, times, found = check_poses(poses, len(sensors)), settings.horizon_times(), []
     for s, sensor in enumerate(sensors):
         found.append(options_at(f"sensors[{s}].platform", sensor.platform, at[s], times, sensor.abilities))
@@ -74,7 +74,7 @@ def options_of(sensors: Sequence[MobileSensor], poses: Any, settings: PlanningSe
 
 
 def check_state(sensors: Sequence[MobileSensor], state: State) -> None:
-    """`InputError` unless there is a valid belief of the right kind for each sensor's filter, and a valid fused one."""
+    """Raise `InputError` unless each sensor's filter has a valid belief of its type, and the fused belief is valid."""
     if not isinstance(state, State):
         raise InputError(f"state: expected a State; got {type(state).__name__}")
     if len(state.local) != len(sensors):
@@ -89,7 +89,7 @@ def check_state(sensors: Sequence[MobileSensor], state: State) -> None:
 
 
 def _check_density(name: str, density: Any, kind: type[Any], state_dim: int, checked: set[int]) -> None:
-    """checked: identities of densities that are known to be valid, of which one tracker's sensors may share one."""
+    """Validate a density. checked: identities of valid densities, as sensors of one tracker may share one."""
     if not isinstance(density, kind):
         expected = "GLMB, LMB or FactoredGLMB" if kind is Labelled else kind.__name__
         raise InputError(f"{name}: expected {expected}; got {type(density).__name__}")
@@ -98,7 +98,7 @@ def _check_density(name: str, density: Any, kind: type[Any], state_dim: int, che
     if id(density) in checked:
         return
     checked.add(id(density))
-    # A quick yes; otherwise its own checks, which tell what is wrong.
+    # A fast check; if it fails, the density's own checks report the fault.
     if not density.is_product and (is_valid_lmb if density.is_lmb else is_valid_glmb)(density.to_kernel()):
         return
     try:
@@ -108,7 +108,7 @@ def _check_density(name: str, density: Any, kind: type[Any], state_dim: int, che
 
 
 def check_choice(name: str, choice: Any, shape: tuple[int, ...]) -> tuple[int, ...]:
-    """A joint action as plain numbers; `InputError` unless it has one action a sensor, each within `shape`."""
+    """Return a joint action as integers; `InputError` unless it has one action per sensor, each within `shape`."""
     array = np.asarray(choice)
     fits = array.shape == (len(shape),) and array.dtype.kind in "iu" and bool(((array >= 0) & (array < shape)).all())
     if not fits:
@@ -116,7 +116,7 @@ def check_choice(name: str, choice: Any, shape: tuple[int, ...]) -> tuple[int, .
     return tuple(array.tolist())
 
 
-# A table of which courses go together is formed for so many courses at most; beyond, searches ask the mask.
+# Maximum number of courses in a table of compatible courses; with more, searches use the mask itself.
 _MOST_COURSES = 20_000
 
 
@@ -128,10 +128,10 @@ def mask_of_decision(
     poses: Floats,
     settings: PlanningSettings,
 ) -> Mask | None:
-    """What constraints allow; None where there are none.
+    """Return the mask of feasible joint actions; None without constraints.
 
-    fused: the fused belief now, of which constraints may ask where targets will be.
-    Raises `InputError` as `feasible_action_mask`.
+    fused: the present fused belief, from which constraints may predict targets. Raises `InputError` as
+    `feasible_action_mask`.
     """
     if not constraints:
         return None
@@ -149,9 +149,9 @@ def beliefs_ahead(
     first: int,
     last: int,
 ) -> tuple[Labelled, ...]:
-    """The fused belief predicted by `first` to `last` steps of the horizon; none where no constraint looks at it.
+    """Return the fused belief predicted by `first` to `last` steps of the horizon; empty if no constraint needs it.
 
-    Raises `InputError` for one without labels.
+    Raises `InputError` for a belief without labels.
     """
     asking = [constraint.name for constraint in constraints if constraint.needs_beliefs]
     if fused is None or not asking:
@@ -164,20 +164,20 @@ def beliefs_ahead(
 
 
 def single_mask(mask: Mask | None, sensor: int, num_courses: int) -> np.ndarray:
-    """(num_courses,) what one sensor may do, whatever the others do."""
+    """Return (num_courses,) the courses that one sensor may take, regardless of the other sensors."""
     return np.ones(num_courses, np.bool_) if mask is None else mask.single[sensor]
 
 
-# Changes of a pose that differ by less than this, relative to the largest or to 1, are equal.
+# Changes of a pose are equal if they differ by less than this, relative to the largest or to 1.
 _SAME_CHANGE = 1e-9
 
 
 def stationary_courses(options: Sequence[Options], mask: Mask | None) -> tuple[int, ...]:
-    """For each sensor the course that changes its pose least, among those it may take: what it does until it decides.
+    """Return for each sensor the feasible course that changes its pose least: its assumed course until it decides.
 
-    The course with the least change of heading, of these that with the least change of where a camera points, then of
-    position, then of all else up to the seconds of scanning that are left; means over the horizon. Where only some
-    sensors may scan, it is off.
+    The course with the least change of heading, of these that with the least change of the camera's pointing, then of
+    position, then of all else except the remaining seconds of scanning; means over the horizon. If only some sensors
+    may scan, the sensor is off.
     """
     found = []
     for s, own in enumerate(options):
@@ -196,12 +196,12 @@ def stationary_courses(options: Sequence[Options], mask: Mask | None) -> tuple[i
 
 
 def _silent(joint: Sequence[int], active: Active) -> tuple[int, ...]:
-    """The same courses without scans, where a sensor can be switched off."""
+    """Return the same courses without scans, for sensors that can be switched off."""
     return tuple(int(off[course]) for course, off in zip(joint, active.off, strict=True))
 
 
 def allowed_of(mask: Mask | None, shape: Sequence[int]) -> Allowed | None:
-    """The mask as the compiled ascent takes it; None where it would be too large."""
+    """Return the mask in the form of the compiled ascent; None if it would be too large."""
     none, num = np.ones((0, 0), np.bool_), sum(shape)
     on, most = np.zeros(num, np.bool_), len(shape)
     if mask is None:

@@ -1,4 +1,4 @@
-"""What the pseudo-updates of a sensor depend on besides its prior, with the forms of the models that kernels know."""
+"""Inputs of a sensor's pseudo-updates besides its prior, with the closed forms of built-in models."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from vedette.models.detection_functions import MAX_PROB_DETECTION
 from vedette.models.functions import ModelFunction
 from vedette.models.turns import is_turn
 
-# By the functions themselves: a model of a user's own is none of these.
+# Identified by the functions themselves: a custom model has none of these forms.
 _LINEAR = {
     (own.transition, own.process_noise_cov)
     for own in (constant_velocity(1.0, acceleration=kind) for kind in ("held", "continuous"))
@@ -60,9 +60,9 @@ def decision_of(
     scans: Bools,
     detection_at: str | None = None,
 ) -> Decision:
-    """What the pseudo-updates of a sensor depend on besides its prior.
+    """Return the inputs of a sensor's pseudo-updates besides its prior.
 
-    scans: (num_courses, horizon_steps) at which of them it scans. detection_at: as of `SensorModel.to_kernel`.
+    scans: (num_courses, horizon_steps) whether it scans at each step. detection_at: as in `SensorModel.to_kernel`.
     """
     horizon = Horizon(
         np.ascontiguousarray(courses),
@@ -85,9 +85,9 @@ def decision_of(
 
 
 def forms_of(motion: Motion, sensor: Sensor, dt: float, state_dim: int, turns: bool = False) -> ModelForms:
-    """The forms of models as kernels take them, over steps of `dt` seconds.
+    """Return the closed forms of models in kernel form, over steps of `dt` seconds.
 
-    turns: whether the sensor is a turning radar, whose measurements have none of the forms.
+    turns: whether the sensor is a rotating radar, whose measurements have none of the forms.
     """
     is_linear = motion.method == LINEARISED and (motion.transition, motion.process_noise_cov) in _LINEAR
     if is_linear:
@@ -112,7 +112,7 @@ def forms_of(motion: Motion, sensor: Sensor, dt: float, state_dim: int, turns: b
 def _linear_step(
     jacobian: ModelFunction, noise_cov: ModelFunction, params: bytes, noise_params: bytes, dt: float, state_dim: int
 ) -> Floats:
-    """(2, state_dim, state_dim) transition and noise of a linear motion, the same at every state."""
+    """Return (2, state_dim, state_dim) transition and noise of a linear motion, the same at every state."""
     anywhere, step = np.zeros(state_dim), np.zeros((2, state_dim, state_dim))
     jacobian(anywhere, dt, np.frombuffer(params).copy(), step[0])
     noise_cov(anywhere, dt, np.frombuffer(noise_params).copy(), step[1])

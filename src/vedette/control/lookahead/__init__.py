@@ -1,4 +1,4 @@
-"""Deciding over several periods at once: sequences of actions of all sensors, of which the first are taken."""
+"""Decisions over several periods at once: sequences of actions of all sensors, of which the first are taken."""
 
 from vedette.control.lookahead.beam import BeamSearch
 from vedette.control.lookahead.courses import Sequence

@@ -1,4 +1,4 @@
-"""Beams of sequences, sensor by sensor: an ascent over the sensors, along lines that are searched by beams."""
+"""Beam search over sequences: an ascent over the sensors, whose lines are searched by beams."""
 
 from __future__ import annotations
 
@@ -16,14 +16,15 @@ from vedette.models.arguments import dimension
 
 @dataclass(frozen=True, slots=True)
 class BeamSearch:
-    """One sensor at a time, the others held: a beam of its best beginnings grows decision by decision.
+    """A search of one sensor at a time: a beam of its best beginnings grows decision by decision, the others held
+    fixed.
 
-    A beginning is worth what the sequence is worth that keeps to its last action until the end, so that what lies far
-    ahead is seen from the first decision on, and whatever is evaluated is a whole sequence; of equal beginnings those
-    drawn at random stay. From the best that is known (that of a single decision, kept to), one sensor after the other
-    is searched until none alone does better; then, where the budget has room, all combinations of the sensors' beams
-    are tried, and if one is better, it goes on from there. At last the same once more, from where each sensor joins
-    those before it, the ones after it not scanning.
+    The value of a beginning is that of the sequence that repeats its last action until the end. So the far future
+    counts from the first decision on, and every evaluation is of a whole sequence; ties are broken at random. Starting
+    from the best known sequence (a single decision, repeated), sensor by sensor is searched until none alone improves
+    it. Then, if the budget allows, all combinations of the sensors' beams are tried, and if one is better, the search
+    continues from there. Finally the same is repeated from a start in which each sensor joins those before it, while
+    the ones after it do not scan.
 
     Attributes:
         beam_width: beginnings that are kept at each decision.
@@ -35,7 +36,7 @@ class BeamSearch:
         dimension("beam_width", self.beam_width)
 
     def search(self, problem: SequenceProblem, *, rng: np.random.Generator) -> None:
-        """Until nothing is better, or the budget is used up."""
+        """Search until nothing is better, or the budget is used up."""
         best = problem.best()
         self._climb(problem, best.sequence, best.value, rng)
         if problem.left > 0:
@@ -43,20 +44,20 @@ class BeamSearch:
             self._climb(problem, joint, problem.evaluate([joint])[0], rng)
 
     def _joined(self, problem: SequenceProblem, rng: np.random.Generator) -> JointSequence:
-        """Each sensor joins those before it, the ones after it not scanning."""
+        """Return a joint sequence in which each sensor joins those before it, the ones after it not scanning."""
         scanning: list[Sequence | None] = [None] * problem.num_sensors
-        # Who does not scan yet is in the way of others all the same.
+        # A sensor that does not scan yet still occupies its position.
         beside: list[Sequence | None] = [None] * problem.num_sensors
         if problem.rules is not None:
             beside[:] = problem.rules.start
         for s in range(problem.num_sensors):
-            # Every sensor has its share of the budget, and one evaluation is left for what comes of it.
+            # The sensors share the budget equally; one evaluation is left for the result.
             share = (problem.left - 1) // (problem.num_sensors - s)
             scanning[s] = beside[s] = self._grow(problem, scanning, beside, s, share, rng)[0]
         return tuple(own for own in scanning if own is not None)
 
     def _climb(self, problem: SequenceProblem, joint: JointSequence, value: float, rng: np.random.Generator) -> None:
-        """From a joint sequence to one that neither a sensor alone nor a combination of beams betters."""
+        """Improve a joint sequence until neither a sensor alone nor a combination of beams is better."""
         beams = [[own] for own in joint]
         while problem.left > 0:
             joint, value, beams = self._ascend(problem, joint, value, beams, rng)
@@ -77,7 +78,7 @@ class BeamSearch:
         beams: list[list[Sequence]],
         rng: np.random.Generator,
     ) -> tuple[JointSequence, float, list[list[Sequence]]]:
-        """Search the sensors in turn until none alone does better."""
+        """Search the sensors in turn until none alone improves the value."""
         settled, s, beams = 0, 0, list(beams)
         while settled < problem.num_sensors and problem.left > 0:
             beams[s] = self._grow(problem, list(joint), list(joint), s, problem.left, rng)
@@ -97,10 +98,10 @@ class BeamSearch:
         most: int,
         rng: np.random.Generator,
     ) -> list[Sequence]:
-        """The best whole sequences of one sensor that were found with at most so many evaluations, the best first.
+        """Return the best whole sequences of one sensor found with at most `most` evaluations, the best first.
 
-        scanning: what the others do, None where they do not scan. beside: what they do for the constraints, and what
-        the sensor itself does where nothing else is found.
+        scanning: sequences of the others, None if they do not scan. beside: their sequences for the constraints, and
+        the sensor's own if nothing else is found.
         """
         others = tuple(beside)
         ahead, behind = tuple(scanning[:sensor]), tuple(scanning[sensor + 1 :])
@@ -127,7 +128,7 @@ def _is_better(value: float, than: float) -> bool:
 
 
 def _ranked(values: list[float], rng: np.random.Generator) -> list[int]:
-    """Places of the values, the largest first; equal ones in random order."""
+    """Return the indices of the values, the largest first; equal ones in random order."""
     scale = tie_of(max(map(abs, filter(math.isfinite, values)), default=1.0))
     order = np.lexsort((rng.random(len(values)), -np.round(np.array(values) / scale)))
     return [int(place) for place in order]

@@ -1,4 +1,4 @@
-"""What constraints judge by at a later decision: where courses after earlier ones lead, and what is believed then."""
+"""Context of constraints at later decisions: poses after earlier courses, and the belief predicted to that time."""
 
 from __future__ import annotations
 
@@ -35,17 +35,17 @@ class Stages(NamedTuple):
     period: float  # s between pseudo-updates
 
     def num_steps(self, stage: int) -> int:
-        """Pseudo-updates to the end of the horizon of a decision, counted from 1."""
+        """Return the number of pseudo-updates to the end of the horizon of a decision, counted from 1."""
         return (stage - 1) * self.stride + self.steps
 
     def times(self, stage: int) -> Floats:
-        """s from a decision to the pseudo-updates that its courses are told apart by."""
+        """Return the times in s from a decision to the pseudo-updates by which its courses are distinguished."""
         num = self.steps if stage == self.depth else max(self.stride, self.steps)
         return self.period * np.arange(1.0, num + 1)
 
 
 class Place(NamedTuple):
-    """Where a sensor decides, and what it may do there."""
+    """The pose at which a sensor decides, and its courses from there."""
 
     pose: Floats  # (pose_dim,)
     courses: Floats  # (num_courses, num_times, pose_dim)
@@ -54,16 +54,17 @@ class Place(NamedTuple):
 
 @dataclass(slots=True, eq=False)
 class MultiStepConstraints:
-    """Constraints on several decisions: each is tested from where its courses begin to the end of its horizon, or to
-    the next decision where that is later.
+    """Constraints on several decisions.
+
+    Each course is tested from its beginning to the end of its horizon, or to the next decision if that is later.
 
     Attributes:
         constraints: at least one.
-        sensors, settings: as of the planner.
-        fused: the fused belief now.
-        poses: (num_sensors, pose_dim) where the sensors are now.
+        sensors, settings: as in the planner.
+        fused: the present fused belief.
+        poses: (num_sensors, pose_dim) present poses of the sensors.
         stages: the decisions.
-        on_pairs: whether any constraint has to do with pairs of sensors.
+        on_pairs: whether any constraint concerns pairs of sensors.
     """
 
     constraints: tuple[Constraint, ...]
@@ -83,29 +84,33 @@ class MultiStepConstraints:
         )
 
     def mask(self, places: Mapping[int, Place]) -> Mask:
-        """Mask of the first decision, relaxed if necessary. Raises `InputError` as `feasible_action_mask`."""
+        """Return the mask of the first decision, relaxed if necessary. Raises `InputError` as
+        `feasible_action_mask`.
+        """
         return feasible_action_mask(self.constraints, self._situation(1, places))
 
     def courses(self, sensor: int, stage: int, place: Place) -> tuple[Bools, bool]:
-        """(num_courses,) which courses of one sensor are allowed at a decision, and whether they meet the constraints.
+        """Return (num_courses,) the courses that one sensor may take at a decision, and whether they are feasible.
 
-        Where none does, those that violate them least. stage: 1 for the decision now. Other sensors have no courses in
-        what constraints are shown. Raises `InputError` as `feasible_action_mask`.
+        If no course is feasible, those with the least violation. stage: 1 for the present decision. Constraints see no
+        courses of other sensors. Raises `InputError` as `feasible_action_mask`.
         """
         allowed, blocked = courses_allowed(self.constraints, self._situation(stage, {sensor: place}))
         return allowed[sensor], sensor not in blocked
 
     def pairs(self, stage: int, places: Mapping[int, Place]) -> dict[tuple[int, int], Bools]:
-        """Tables of pairs of sensors i < j with forbidden courses; raises `InputError` as `feasible_action_mask`."""
+        """Return tables of pairs of sensors i < j with forbidden courses; raises `InputError` as
+        `feasible_action_mask`.
+        """
         return pairs_allowed(self.constraints, self._situation(stage, places))
 
     def active(self, places: Mapping[int, Place]) -> Active | None:
-        """How many sensors may scan, of all sensors' courses at a decision; None: all."""
+        """Return the limit on active sensors, from all sensors' courses at a decision; None: all may scan."""
         found = [places[s] for s in range(len(places))]
         return active_of(self.constraints, [own.courses for own in found], [own.scans for own in found])
 
     def moment(self, stage: int) -> int:
-        """What is equal for decisions at which the same courses are allowed as far as constraints tell."""
+        """Return a key that is equal for decisions at which constraints allow the same courses."""
         return -len(self.stages.times(stage)) if self._time_invariant else stage
 
     def _situation(self, stage: int, places: Mapping[int, Place]) -> ConstraintContext:

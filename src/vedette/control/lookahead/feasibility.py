@@ -1,4 +1,4 @@
-"""Which joint sequences constraints allow, pairs of sensors included, and one that they do."""
+"""Joint sequences that constraints allow, pairs of sensors included, and the search for one of them."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from vedette.control.lookahead.constraints import MultiStepConstraints
 from vedette.control.lookahead.courses import CourseTree, Sequence
 from vedette.kernels.base.types import Bools
 
-# Courses that are tried. With more, a decision would wait for the proof that nothing is allowed; what is found in so
-# many is as good as known.
+# Maximum number of courses tried. With more, a decision would wait for the proof that no sequence is feasible;
+# a feasible one is nearly always found within this number.
 _MOST_TRIES = 10_000
 
 
 @dataclass(slots=True, eq=False)
 class FeasibleSequences:
-    """What is allowed.
+    """The joint sequences that constraints allow.
 
     Attributes:
-        trees: what each sensor may do by itself.
-        ahead: what pairs of sensors are judged by.
+        trees: course tree of each sensor alone.
+        ahead: constraints on pairs of sensors.
         mask: of the first decision.
-        until: number of decisions at which pairs of sensors are judged.
-        start: a joint sequence that is allowed.
+        until: number of decisions at which pairs of sensors are tested.
+        start: a feasible joint sequence.
     """
 
     trees: tuple[CourseTree, ...]
@@ -45,11 +45,11 @@ class FeasibleSequences:
 
     @classmethod
     def of(cls, trees: tuple[CourseTree, ...], ahead: MultiStepConstraints) -> FeasibleSequences:
-        """Of trees without constraints.
+        """Return the feasible sequences of trees without constraints.
 
-        Dead ends are left out, unless these leave pairs of sensors no way at the first decision. Where no joint
-        sequence is found on which all pairs are as they must be, that holds for as many decisions as one was found for;
-        see `notes`. Raises `InputError` as `feasible_action_mask`.
+        Dead ends are left out, unless this leaves pairs of sensors no feasible courses at the first decision. If no
+        joint sequence is found that satisfies all constraints on pairs, they are tested for as many decisions as one
+        was found for; see `notes`. Raises `InputError` as `feasible_action_mask`.
         """
         mask = ahead.mask({s: tree.place(()) for s, tree in enumerate(trees)})
         bound = tuple(replace(tree, ahead=ahead, now=own) for tree, own in zip(trees, mask.single, strict=True))
@@ -61,14 +61,14 @@ class FeasibleSequences:
         return cls(bound, ahead, mask, len(found[0]), start)
 
     def first(self) -> Mask:
-        """Of the first decision, without dead ends."""
+        """Mask of the first decision, without dead ends."""
         single = tuple(np.zeros(len(own), bool) for own in self.mask.single)
         for own, tree in zip(single, self.trees, strict=True):
             own[list(tree.allowed(()))] = True
         return Mask(single, self.mask.together, active=self.mask.active)
 
     def allows(self, joint: Several[Sequence | None]) -> bool:
-        """Whether sequences that sensors take together are allowed; None: what a sensor does is not asked."""
+        """Return True if the sequences are allowed together; None: the sensor is not tested."""
         known = [(s, own) for s, own in enumerate(joint) if own is not None]
         pairs = combinations(known, 2) if self.ahead.on_pairs else ()
         if not all(self._alone(*each) for each in known) or not all(self._beside(*one, *two) for one, two in pairs):
@@ -76,9 +76,9 @@ class FeasibleSequences:
         return all(self._num_active(joint, stage) <= self.most_active for stage in range(1, self._depth + 1))
 
     def after(self, sensor: int, taken: Sequence, others: Several[Sequence | None]) -> Sequence:
-        """The courses of one sensor after those taken that are allowed beside the others' at that decision, maybe none.
+        """Return feasible next courses of one sensor, given the other sensors' choices; may be empty.
 
-        others: of each sensor what it takes; those that are None, too short, or the sensor's own are not asked about.
+        others: for each sensor its courses; those that are None, too short, or the sensor's own are not tested.
         """
         found, stage = self.trees[sensor].allowed(taken), len(taken) + 1
         for other, own in enumerate(others):
@@ -93,9 +93,9 @@ class FeasibleSequences:
         return found
 
     def kept(self, sensor: int, taken: Sequence, others: Several[Sequence | None]) -> Sequence | None:
-        """The whole sequence that keeps as near to the last action as is allowed beside the others; None: none found.
+        """Return the whole feasible sequence that stays nearest to the last action; None: none found.
 
-        At once from decision to decision, back where there is no way on.
+        The nearest course is taken from decision to decision, with backtracking from dead ends.
         """
         tree = self.trees[sensor]
 
@@ -105,7 +105,7 @@ class FeasibleSequences:
         return depth_first(taken, ways, lambda own: len(own) == tree.stages.depth, _MOST_TRIES)
 
     def notes(self, sequence: Several[Sequence]) -> tuple[str, ...]:
-        """What a reader of a decision for a joint sequence must know."""
+        """Return notes on a decision for a joint sequence."""
         found = [
             f"sensor {s + 1}, decision {k} of the sequence: {infeasible_note(self.ahead.constraints)}"
             for s, (tree, own) in enumerate(zip(self.trees, sequence, strict=True))
@@ -128,13 +128,13 @@ class FeasibleSequences:
         return self.trees[0].stages.depth if self.mask.active is not None else 0
 
     def _num_active(self, joint: Several[Sequence | None], stage: int) -> int:
-        """Number of sensors that scan after a decision, counted from 1, of those whose sequences reach so far."""
+        """Return the number of sensors that scan after a decision, counted from 1, among sequences that reach it."""
         if self.mask.active is None:
             return 0
         return sum(self._scans(s, own[:stage]) for s, own in enumerate(joint) if own is not None and len(own) >= stage)
 
     def _scans(self, sensor: int, taken: Sequence) -> bool:
-        """Whether a sensor scans after the last of the courses taken."""
+        """Return True if a sensor scans after the last of the courses taken."""
         return bool(self.trees[sensor].options(taken[:-1]).scans[taken[-1]].any())
 
     def _alone(self, sensor: int, sequence: Sequence) -> bool:
@@ -153,7 +153,7 @@ class FeasibleSequences:
         return self._together[key]
 
     def _table(self, first: int, one: Sequence, second: int, other: Sequence) -> Bools | None:
-        """(num_courses of the first, of the second) which go together after courses taken; None: all."""
+        """Return (num_courses of the first, of the second) compatible courses after the courses taken; None: all."""
         stage = len(one) + 1
         if stage > self.until or not self.ahead.on_pairs:
             return None
@@ -171,19 +171,19 @@ class FeasibleSequences:
 
 
 class _Begun(NamedTuple):
-    """A joint beginning, and the courses of the first sensors at the decision after it."""
+    """A joint beginning, and the courses of the first sensors at the next decision."""
 
     joint: tuple[Sequence, ...]
     mask: Mask
-    orders: list[list[int]]  # of each sensor the courses there, in the order in which they are tried
+    orders: list[list[int]]  # for each sensor its courses there, in the order of the tries
     at: tuple[int, ...] = ()
 
 
 def _furthest(trees: tuple[CourseTree, ...], ahead: MultiStepConstraints, mask: Mask) -> tuple[Sequence, ...]:
-    """Courses that all sensors may take together, for as many decisions as such were found; perhaps for none.
+    """Return courses that all sensors may take together, for as many decisions as possible; perhaps for none.
 
-    Decision after decision the courses that keep to the last action, repaired, are tried first; depth first, with a
-    bound on the tries. mask: of the first decision; allows a joint action.
+    At each decision the courses that repeat the last action, made feasible, are tried first; depth first, with a limit
+    on the tries. mask: of the first decision; allows a joint action.
     """
     num, depth = len(trees), trees[0].stages.depth
     furthest: tuple[Sequence, ...] = ((),) * num

@@ -1,4 +1,4 @@
-"""Joint decisions over several periods, of which the first actions are taken: open-loop receding horizon."""
+"""Joint decisions over several periods, whose first actions are taken: open-loop receding horizon."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ from vedette.models.arguments import dimension, generator, instance, positive, p
 from vedette.platforms import Options
 from vedette.tracking import State
 
-MOST_DECISIONS, MOST_STEPS = 100, 10_000  # of a sequence, and of pseudo-updates from one to the next
+MOST_DECISIONS, MOST_STEPS = 100, 10_000  # decisions of a sequence, and pseudo-updates between two of them
 
 
 class _Given(NamedTuple):
-    """What one plan is made on."""
+    """The inputs of one plan."""
 
     stages: Stages
     trees: tuple[CourseTree, ...]
@@ -48,38 +48,37 @@ class _Given(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HorizonPlanner:
-    """Joint decision making over `depth` decisions in a row: the first joint action of the best joint sequence.
+    """Joint decision making over `depth` successive decisions: the first joint action of the best joint sequence.
 
     The later actions are chosen without regard to what the scans before them will show (open loop), and chosen anew
-    when their time comes. Targets move, and pseudo-updates go on, up to the end of the last decision's horizon. With a
-    depth of 1 it is a `JointPlanner` on LMB beliefs, as it is where `PlanningSettings.end` leaves one decision.
+    when their time comes. Targets move, and pseudo-updates continue, up to the end of the last decision's horizon. With
+    a depth of 1 it is a `JointPlanner` on LMB beliefs, as it is if `PlanningSettings.end` leaves one decision.
 
-    A sequence is worth the sum of g^(d - 1) times the reward at the end of the horizon of decision d, over the
-    prediction for then. The `discount` g is small: the first reward is what is known best, and what it costs is lost,
-    while targets will be elsewhere than is foreseen, and later decisions mend what earlier ones did not see. A
-    divergence measures all that was learnt by then, so that its sum counts what is learnt early several times. Without
-    a discount the reward at the end of the last horizon alone counts, of which what is learnt late has most, and the
-    same decision taken again and again may put off what it means to do. Targets not found yet
-    (`PlanningSettings.undetected_worth`) are taken to stay where they may be, and count with the expected number that
-    all scans up to then find.
+    The value of a sequence is the sum of g^(d - 1) times the reward at the end of the horizon of decision d, relative
+    to the prediction for that time. The `discount` g should be small: the first reward is known best, and its cost is
+    certain, while targets will deviate from their prediction, and later decisions correct earlier ones. A divergence
+    measures all information gained until then, so that the sum counts early information several times. Without a
+    discount only the reward at the end of the last horizon counts. Late information then weighs most, and repeated
+    decisions may postpone their intended action. Undetected targets (`PlanningSettings.undetected_worth`) are assumed
+    not to move, and count with the expected number that all scans until then find.
 
-    The best single decision, kept to, is the first sequence evaluated, so that no plan is worth less; plans say where
-    nothing better came of the depth.
+    The best single decision, repeated, is the first sequence evaluated, so no plan has a lower value. Plans note if the
+    depth did not improve on it.
 
     Attributes:
-        sensors, fusion, settings, reward: as of `JointPlanner`; the horizon of the settings is that of one decision.
-            Reward and fusion are such as are sums over labels; GLMB beliefs are planned on as LMBs, and plans say so.
+        sensors, fusion, settings, reward: as in `JointPlanner`; the horizon of the settings is that of one decision.
+            Reward and fusion must be sums over labels; GLMB beliefs are planned on as LMBs, and plans say so.
         depth: number of decisions.
         period: s from a decision to the next, a whole multiple of the settings' period; None: their horizon.
         search: which joint sequences are evaluated, where the budget is too small for all.
-        budget: how many joint sequences are evaluated at most.
+        budget: maximum number of joint sequences evaluated.
         discount: g in [0, 1]; None: only the end counts.
-        constraints: what the sensors must not do, tested at every decision of a sequence: from where its courses begin
-            to the end of its horizon, or to the next decision where that is later.
-        notes: what every plan is to say.
+        constraints: limits on the sensors' courses, tested at every decision of a sequence: from where its courses
+            begin to the end of its horizon, or to the next decision if that is later.
+        notes: notes that every plan repeats.
 
     Raises:
-        InputError: a field out of range, or a reward, association or fusion that is no sum over labels.
+        InputError: a field out of range, or a reward, association or fusion that is not a sum over labels.
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -115,17 +114,17 @@ class HorizonPlanner:
         check_sums("sequences of decisions", len(self.sensors), self.fusion, self.settings, self.reward)
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
-        """The first actions of the best joint sequence that was found; of equal ones the first in printed order.
+        """Return the first actions of the best joint sequence found; of equal ones the first in printed order.
 
-        Where constraints allow no course of a sensor at some decision, all are kept, and where no joint sequence is
-        found on which all pairs of sensors are as they must be, that is given up from some decision on; the notes say
-        so. The tables are those of the first actions, each worth the best sequence found that begins with it; the whole
-        sequence is in `Plan.sequence`, the counts of the curve are of joint sequences. Arguments as of
-        `JointPlanner.plan`; the search draws after the samples.
+        If constraints allow no course of a sensor at some decision, all are kept. If no joint sequence is found that
+        satisfies all constraints on pairs of sensors, these constraints are dropped from some decision on. The notes
+        say so. The tables contain the first actions, each with the value of the best sequence found that begins with
+        it; the whole sequence is in `Plan.sequence`, and the counts of the curve are of joint sequences. Arguments as
+        in `JointPlanner.plan`; the search draws random numbers after the samples.
 
         Raises:
-            InputError: inputs that do not fit.
-            ModelError, NumericalError: as the filters; no sequence whose reward is a number.
+            InputError: invalid inputs.
+            ModelError, NumericalError: errors of the filters; no sequence with a finite reward.
         """
         generator(rng)
         why = "so are all sequences of decisions"
@@ -143,7 +142,7 @@ class HorizonPlanner:
         return self._plan(given, evidence, choice, problem)
 
     def _stages(self, state: State) -> Stages:
-        """`depth` decisions, or those that are still to come."""
+        """Return `depth` decisions, or those that remain until the end."""
         settings, depth = self.settings, self.depth
         stride = settings.horizon_steps if self.period is None else round(self.period / settings.horizon_period)
         if settings.end is not None and state.time is not None:
@@ -163,7 +162,7 @@ class HorizonPlanner:
         return _Given(stages, rules.trees, rules, planned)
 
     def _single(self, given: _Given, rng: np.random.Generator) -> tuple[Evidence, tuple[int, ...]]:
-        """What a `JointPlanner` would decide, and on what."""
+        """Return the evidence and the choice of a `JointPlanner`."""
         options, steps = tuple(tree.options(()) for tree in given.trees), given.stages.steps
         now = tuple(
             own._replace(courses=np.ascontiguousarray(own.courses[:, :steps]), scans=own.scans[:, :steps])
@@ -175,11 +174,11 @@ class HorizonPlanner:
         return evidence, searched(AutomaticSearch(), evidence, mask, rng=rng)
 
     def _problem(self, given: _Given, first: Evaluator, samples: np.random.Generator) -> SequenceProblem:
-        """What is searched; samples: draws them. first: whose account it goes on with."""
+        """Return the search problem. samples: generator of the samples. first: evaluator whose counts are continued."""
         depth = given.stages.depth
 
         def part(weight: float, stage: int) -> LaidCourses:
-            # From one state of the random numbers, and so of the same samples.
+            # Each call starts from the same generator state, so the samples are the same.
             def lay_out(options: tuple[Options, ...]) -> Evaluator:
                 horizons = first.horizons if stage == 1 else ()
                 return self._lay_out(given, stage, horizons, options, copy.deepcopy(samples))
@@ -201,7 +200,7 @@ class HorizonPlanner:
         options: tuple[Options, ...],
         rng: np.random.Generator,
     ) -> Evaluator:
-        """Rewards at the end of the horizon of a decision, counted from 1."""
+        """Return rewards at the end of the horizon of a decision, counted from 1."""
         rule, settings = given.planned.rule, replace(self.settings, horizon_steps=given.stages.num_steps(stage))
         assert rule is not None
         state = given.planned.state
@@ -213,7 +212,7 @@ class HorizonPlanner:
     def _plan(
         self, given: _Given, evidence: Evidence, choice: tuple[int, ...], problem: SequenceProblem | None
     ) -> Plan:
-        """Of the best sequence that was found; problem: None where a single decision is all."""
+        """Return the plan of the best sequence found; problem: None for a single decision."""
         sequence: JointSequence = tuple((course,) for course in choice)
         if problem is not None:
             sequence, evidence = _best(problem).sequence, Evidence(evidence.evaluator, evidence.which, evidence.rewards)
@@ -238,7 +237,7 @@ class HorizonPlanner:
         return plan if problem is None else replace(plan, questions=None)
 
     def _told(self, choice: tuple[int, ...], courses: tuple[int, ...], depth: int) -> Iterator[str]:
-        """What a reader must know of the depth and of the samples."""
+        """Yield notes on the depth and on the samples."""
         if depth < self.depth:
             yield f"depth {depth} in place of {self.depth}: no more decisions come before the end"
         if depth > 1 and courses == choice:

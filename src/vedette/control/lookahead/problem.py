@@ -1,4 +1,4 @@
-"""What a search over joint sequences may ask for, and what it found."""
+"""The search problem over joint sequences: its evaluations and its results."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.planning.ascent import Cells
 from vedette.platforms import Options
 
-# A whole sequence of each sensor.
+# A whole sequence for each sensor.
 JointSequence: TypeAlias = tuple[Sequence, ...]
-# Of each sensor the courses that it takes; None: it does not scan.
+# The courses taken by each sensor; None: it does not scan.
 Taken: TypeAlias = tuple[Sequence | None, ...]
 
 
 class _Lists:
-    """Lists that grow at their end, of entries in several columns; list i is offsets[i]:offsets[i + 1].
+    """Appendable lists of entries in several columns; list i is offsets[i]:offsets[i + 1].
 
-    What is there is copied each time that the room doubles.
+    The entries are copied each time the capacity doubles.
     """
 
     def __init__(self, offsets: Ints, *columns: np.ndarray[Any, Any]) -> None:
         self._rooms, self._nums = [offsets, *columns], [len(offsets), *map(len, columns)]
 
     def append(self, offsets: Ints, *columns: np.ndarray[Any, Any]) -> None:
-        """Put lists behind those that are there."""
+        """Append lists."""
         last = self._rooms[0][self._nums[0] - 1]
         for i, more in enumerate((offsets[1:] + last, *columns)):
             room, num, end = self._rooms[i], self._nums[i], self._nums[i] + len(more)
@@ -57,9 +57,9 @@ class LaidCourses:
     """Rewards at the end of the horizon of one decision, the `stage`-th from now.
 
     Attributes:
-        trees: what each sensor may do.
+        trees: course tree of each sensor.
         stage: number of courses that each sensor has taken by then.
-        lay_out: makes the changes of some courses of each sensor; with the same samples each time.
+        lay_out: computes the changes of some courses of each sensor, with the same samples each time.
         weight: of these rewards in the value of a sequence.
         first: the first decision, from 0, whose prices are subtracted here.
         counts: filter steps and rewards so far.
@@ -77,9 +77,9 @@ class LaidCourses:
     _prices: list[float] = field(default_factory=list)
 
     def __call__(self, joints: list[Taken]) -> Floats:
-        """(num, num_samples) rewards of joint actions."""
+        """Return rewards (num, num_samples) of joint actions."""
         wanted = {(s, taken) for joint in joints for s, taken in enumerate(joint) if taken is not None}
-        # Sensor after sensor, as they are laid out.
+        # Sensor by sensor, as they are precomputed.
         new = sorted(wanted - self._places.keys())
         if new or self._additive is None:
             self._add(new)
@@ -113,7 +113,7 @@ class LaidCourses:
         return Options(tree.options(()).actions, poses, np.arange(num), tree.pose, np.zeros(num), scans)
 
     def _rewards(self) -> AdditiveRewards:
-        """Of all courses so far: a sensor might take any of them, and is given its own."""
+        """Return the rewards of all courses so far; each sensor may index any of them, and is given its own."""
         old = self._additive
         assert old is not None
         (offsets, labels, changes), (cell_offsets, cells, log_miss) = (own.values for own in self._lists)
@@ -124,7 +124,7 @@ class LaidCourses:
 
 
 class Best(NamedTuple):
-    """The best sequence that was found of those that begin with some joint action."""
+    """The best sequence found among those that begin with a given joint action."""
 
     value: float
     sequence: JointSequence
@@ -133,15 +133,15 @@ class Best(NamedTuple):
 
 @dataclass(slots=True, eq=False)
 class SequenceProblem:
-    """Values of joint sequences, and of those of some of the sensors while the others do not scan.
+    """Values of joint sequences, and of sequences of some sensors while the others do not scan.
 
     Attributes:
-        trees: what each sensor may do.
+        trees: course tree of each sensor.
         depth: number of decisions.
-        parts: of which values are sums.
-        budget: how many joint sequences are evaluated at most.
-        rules: what constraints allow; None: everything.
-        found: for each joint first action (numbers of courses) of what was evaluated, the best that begins with it.
+        parts: the terms that values are sums of.
+        budget: maximum number of joint sequences evaluated.
+        rules: sequences that constraints allow; None: all.
+        found: for each evaluated joint first action (course indices), the best sequence that begins with it.
     """
 
     trees: tuple[CourseTree, ...]
@@ -161,32 +161,34 @@ class SequenceProblem:
 
     @property
     def left(self) -> int:
-        """How many joint sequences may still be evaluated."""
+        """Number of joint sequences that may still be evaluated."""
         return max(0, self.budget - len(self._values))
 
     def allows(self, joint: Taken) -> bool:
-        """Whether constraints allow sequences that sensors take together; None: what a sensor does is not asked."""
+        """Return True if constraints allow the sequences together; None: the sensor is not tested."""
         return self.rules is None or self.rules.allows(joint)
 
     def after(self, sensor: int, taken: Sequence, others: Taken) -> Sequence:
-        """The courses that one sensor may take after those taken, beside what others take then; perhaps none.
+        """Return the courses that one sensor may take next, given the other sensors' courses; may be empty.
 
-        others: of each sensor; those that are None, or do not reach so far, are not asked about.
+        others: for each sensor; sequences that are None or too short are not tested.
         """
         if self.rules is None:
             return self.trees[sensor].allowed(taken)
         return self.rules.after(sensor, taken, others)
 
     def kept(self, sensor: int, taken: Sequence, others: Taken) -> Sequence | None:
-        """The whole sequence of one sensor that keeps to its last action, or to the one nearest to it that it may take
-        beside the others; None: none was found."""
+        """Return the whole sequence of one sensor that repeats its last action, or the nearest one that is feasible.
+
+        others: sequences of the other sensors. None: no such sequence was found.
+        """
         return self.trees[sensor].kept(taken) if self.rules is None else self.rules.kept(sensor, taken, others)
 
     def evaluate(self, joints: Iterable[Taken]) -> list[float]:
-        """Values of joint sequences, none evaluated twice; -inf for those that the budget has no room for.
+        """Return values of joint sequences, none evaluated twice; -inf for those beyond the budget.
 
-        A sensor without a sequence (None) does not scan. A value that is no number is -inf, and so is that of what
-        constraints forbid, which is not evaluated.
+        A sensor without a sequence (None) does not scan. The value is -inf if it is not finite, and for sequences that
+        constraints forbid, which are not evaluated.
         """
         wanted = list(joints)
         unknown = [joint for joint in dict.fromkeys(wanted) if joint not in self._values]
@@ -208,7 +210,7 @@ class SequenceProblem:
         return np.asarray(total)
 
     def _keep(self, joints: list[Taken], rewards: Floats, values: Floats) -> None:
-        """Note the best one for each beginning; of equal ones the first in printed order."""
+        """Store the best sequence for each first joint action; of equal ones the first in printed order."""
         for joint, own, value in zip(joints, rewards, values.tolist(), strict=True):
             whole = tuple(taken for taken in joint if taken is not None)
             if len(whole) < self.num_sensors:
@@ -221,7 +223,7 @@ class SequenceProblem:
         self._best.append(max((best.value for best in self.found.values()), default=-math.inf))
 
     def begin(self, choice: tuple[int, ...]) -> None:
-        """Evaluate a joint sequence to begin with: all sensors keep to a joint action; or another that is allowed."""
+        """Evaluate a first joint sequence: all sensors repeat a joint action; or another that is allowed."""
         joint: Taken = tuple((course,) for course in choice)
         for s, own in enumerate(joint):
             whole = None if own is None else self.kept(s, own, joint)
@@ -232,31 +234,31 @@ class SequenceProblem:
             self.evaluate([self.rules.start])
 
     def best(self) -> Best:
-        """The best of all; of those that are equal up to rounding the first in printed order."""
+        """Return the best sequence; of those that are equal up to rounding the first in printed order."""
         each = sorted(self.found.values(), key=lambda best: printed(best.sequence))
         return each[first_best(np.array([best.value for best in each]))]
 
     def bound(self) -> Bound | None:
-        """That of the best, where all joint sequences were evaluated."""
+        """Return the bound given by the best sequence, if all joint sequences were evaluated."""
         if math.prod(tree.count(self.budget) for tree in self.trees) > self.budget:
             return None
         best = self.best().value
         return Bound(best, best, "exhaustive")
 
     def curve(self) -> SearchCurve:
-        """How the search went, from the first whole joint sequence on."""
+        """Return the progress of the search, from the first whole joint sequence on."""
         known = np.array(self._best) > -math.inf
         return SearchCurve(np.array(self._evaluations, np.int64)[known], np.array(self._best)[known])
 
 
 def printed(sequence: JointSequence) -> tuple[int, ...]:
-    """Sorts as tables are printed: by the first courses of all sensors, then by the second ones."""
+    """Return the sort key of printed tables: the first courses of all sensors, then the second ones."""
     return tuple(course for stage in zip(*sequence, strict=True) for course in stage)
 
 
 @runtime_checkable
 class SequenceSearch(Protocol):
-    """Finds a joint sequence of large value; what it evaluates is kept in the problem."""
+    """A search for a joint sequence with a large value; the problem stores its evaluations."""
 
     def search(self, problem: SequenceProblem, *, rng: np.random.Generator) -> None:
         """Evaluate whole joint sequences, at least one, within the budget."""

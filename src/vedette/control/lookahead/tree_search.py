@@ -1,4 +1,4 @@
-"""Monte-Carlo tree search over the joint sequences, one sensor's course at a time, decision after decision."""
+"""Monte Carlo tree search over the joint sequences, one sensor's course at a time, decision by decision."""
 
 from __future__ import annotations
 
@@ -12,23 +12,24 @@ from vedette.control.lookahead.courses import Sequence
 from vedette.control.lookahead.problem import JointSequence, SequenceProblem
 from vedette.models.arguments import dimension, non_negative, one_of
 
-# Rounds without an evaluation after which a tree that leads to what is known already is given up.
+# Number of rounds without a new evaluation after which the search ends.
 _IDLE_ROUNDS = 50
 
 
 @dataclass(frozen=True, slots=True)
 class TreeSearch:
-    """Upper confidence bounds on trees (Kocsis, Szepesvari 2006) for one decision whose values hold no chance.
+    """A search by upper confidence bounds on trees (Kocsis, Szepesvari 2006), for deterministic values.
 
-    A node is a beginning: the courses of all sensors at the first decisions, and of the first sensors at the next. From
+    A node is a beginning: the courses of all sensors at the first decisions, and of the first sensors at the next one.
+    From
     the root the child is taken whose mean value, scaled to the values seen so far, plus
     exploration sqrt(ln(visits) / visits of the child) is largest, until a node has a child that was never tried; from
-    there the sequence is completed by a rollout. Branches that are known whole are not entered again.
+    there the sequence is completed by a rollout. Branches that are fully evaluated are not entered again.
 
     Attributes:
-        exploration: weight of what was seldom tried.
-        rollout: "random": courses drawn at random; "kept": every sensor keeps to its last action.
-        batch: rollouts that are evaluated together, which is quicker; each counts as a visit before its value is known.
+        exploration: weight of rarely tried branches.
+        rollout: "random": courses drawn at random; "kept": every sensor repeats its last action.
+        batch: rollouts that are evaluated together, which is faster; each counts as a visit before its value is known.
 
     Raises:
         InputError: an exploration below 0, another rollout, a batch below 1.
@@ -44,7 +45,7 @@ class TreeSearch:
         one_of("rollout", self.rollout, ("random", "kept"))
 
     def search(self, problem: SequenceProblem, *, rng: np.random.Generator) -> None:
-        """Until the budget is used up, or all is known."""
+        """Search until the budget is used up, or all sequences are evaluated."""
         climb, idle = _Climb(problem, self, rng), 0
         while problem.left > 0 and not climb.root.closed and idle < _IDLE_ROUNDS:
             before = problem.left
@@ -54,16 +55,16 @@ class TreeSearch:
 
 @dataclass(slots=True, eq=False)
 class _Node:
-    untried: list[int]  # courses of the next sensor, in the order in which they will be tried
+    untried: list[int]  # courses of the next sensor, in the order of the tries
     visits: int = 0
-    num_known: int = 0  # of the visits those whose values are known
-    total: float = 0.0  # of these values
-    closed: bool = False  # whether all below is known
+    num_known: int = 0  # number of visits with known values
+    total: float = 0.0  # sum of these values
+    closed: bool = False  # whether all sequences below are evaluated
     children: dict[int, _Node] = field(default_factory=dict)
 
 
 class _Climb:
-    """A tree that grows."""
+    """A search tree that grows."""
 
     def __init__(self, problem: SequenceProblem, search: TreeSearch, rng: np.random.Generator) -> None:
         self.problem, self.search, self.rng = problem, search, rng
@@ -71,7 +72,7 @@ class _Climb:
         self.root = self._node(())
 
     def round(self, num: int) -> None:
-        """A batch of rollouts, and what came of them."""
+        """Evaluate a batch of rollouts and update the tree."""
         paths, joints = [], []
         for _ in range(num):
             if self.root.closed:
@@ -90,7 +91,7 @@ class _Climb:
                 node.num_known += 1
 
     def _descend(self) -> tuple[list[_Node], tuple[int, ...]]:
-        """The way to a node that is new, each on it visited once more; and the courses that it stands for."""
+        """Return the path to a new node, whose nodes count one more visit, and the courses of that node."""
         courses: tuple[int, ...] = ()
         node, path = self.root, [self.root]
         while not node.closed:
@@ -118,13 +119,13 @@ class _Climb:
         return _Node([allowed[place] for place in self.rng.permutation(len(allowed))])
 
     def _promising(self, node: _Node) -> int:
-        """The child to go on with, of those that are not known whole."""
+        """Return the child to continue with, among those that are not fully evaluated."""
         spread = self.highest - self.lowest
         log = math.log(node.visits)
 
         def bound(item: tuple[int, _Node]) -> float:
             child = item[1]
-            # What is not known yet counts as the worst.
+            # Values that are not known yet count as the worst.
             above = child.total - child.num_known * self.lowest
             mean = above / (child.visits * spread) if spread > 0.0 else 0.0
             return mean + self.search.exploration * math.sqrt(log / child.visits)
@@ -132,7 +133,7 @@ class _Climb:
         return max((item for item in node.children.items() if not item[1].closed), key=bound)[0]
 
     def _completed(self, courses: tuple[int, ...]) -> JointSequence | None:
-        """A whole joint sequence that begins so; None where none was found that is allowed."""
+        """Return a whole joint sequence with this beginning; None if no feasible one was found."""
         num_sensors = self.problem.num_sensors
         taken = [courses[s::num_sensors] for s in range(num_sensors)]
         for s in range(num_sensors):
@@ -148,7 +149,7 @@ class _Climb:
             return problem.kept(sensor, taken, joint)
         while len(taken) < problem.depth:
             allowed = problem.after(sensor, taken, joint)
-            if not allowed:  # by chance into a dead end
+            if not allowed:  # a random choice led to a dead end
                 return problem.kept(sensor, joint[sensor], joint)
             taken = (*taken, allowed[int(self.rng.integers(len(allowed)))])
             if self.search.rollout == "kept":
