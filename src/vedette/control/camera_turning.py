@@ -1,4 +1,4 @@
-"""How long cameras take to turn to where targets are, and how they turn on beyond their horizon."""
+"""Time that cameras need to turn to targets, and how they turn beyond their horizon."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from vedette.platforms import Options
 from vedette.platforms.base import SWITCH
 from vedette.platforms.camera import HALF_WIDTH, POINTING, is_camera
 
-POINTS = "pointing_deg"  # the column of actions that says where a camera points
+POINTS = "pointing_deg"  # the column of actions with the pointing of a camera
 _ARRIVED = 1e-9  # s
 
 
@@ -88,7 +88,7 @@ def is_blind_while_turning(own: Options) -> bool:
 
 
 def _stops(own: Options, step: float, times: Floats) -> tuple[Floats, Bools]:
-    """As `turned_on`, of a camera that is blind while it turns; step: s, for which it stays."""
+    """Return the result of `turned_on` for a camera that is blind while it turns; step: s, time that it stays."""
     column, first = own.actions.columns.index(POINTS), own.pose[POINTING]
     wanted = np.radians([own.actions.values[own.first_action(course), column] for course in range(len(own.courses))])
     turns = wrap_angles(wanted - first)[:, np.newaxis]

@@ -1,4 +1,4 @@
-"""What targets and sensors contribute to the reward of a joint action, where rewards are made of sums over labels."""
+"""Contributions of targets and sensors to the reward of a joint action, for rewards that are sums over labels."""
 
 from __future__ import annotations
 
@@ -12,26 +12,27 @@ from vedette.kernels.planning.joint_values import existence_logits, label_values
 
 
 class Contributions(NamedTuple):
-    """How a reward comes about, in its own unit; means over the samples.
+    """Contributions to a reward, in its own unit; means over the samples.
 
-    Together with `baseline`, `sensors` add up to the reward, and so do `existence`, `localisation` and `found` less
-    the price of the sensors' courses.
+    `baseline` plus the sum of `sensors` equals the reward, and so does `baseline` plus `existence`, `localisation` and
+    `found` less the price of the sensors' courses.
     """
 
     baseline: float  # the reward without any scan of these sensors
-    existence: Floats | None  # (num_labels,) what is gained by knowing better whether each target is there ...
-    localisation: Floats | None  # (num_labels,) ... and where; None where the reward is not linear in its sums
-    found: float  # what is gained by targets that were not found before
-    sensors: Floats  # (num_sensors,) mean of what each adds to those before it, and to those after it
-    last: Floats  # (num_sensors,) what each adds to all others
+    existence: Floats | None  # (num_labels,) gain from the existence of each target ...
+    localisation: Floats | None  # (num_labels,) ... and from its position; None if the reward is not linear in its sums
+    found: float  # gain from undetected targets
+    sensors: Floats  # (num_sensors,) mean of the gains when added to those before it, and to those after it
+    last: Floats  # (num_sensors,) gain of each when added to all others
     samples: Floats  # (num_samples,) rewards of the choice
 
 
 def contributions_of(additive: AdditiveRewards, chosen: Ints, which: Ints) -> Contributions:
-    """The shares of some sensors in the reward of courses (num_sensors,), one a sensor; the others always scan.
+    """Return the contributions of some sensors to the reward of courses (num_sensors,); the others always scan.
 
-    A sensor's share is its Shapley value on two orders, the printed and the reverse one: rewards of the first sensors,
-    of the last ones, and of all but one, while the rest of them do not scan. which: (num,) numbers of these sensors.
+    A sensor's contribution is its Shapley value on two orders, the printed and the reverse one: rewards of the first
+    sensors, of the last ones, and of all but one, while the rest of them do not scan. which: (num,) indices of these
+    sensors.
     """
     num = len(which)
     begun = np.arange(num) < np.arange(num + 1)[:, np.newaxis]
@@ -48,10 +49,10 @@ def contributions_of(additive: AdditiveRewards, chosen: Ints, which: Ints) -> Co
 
 
 def _of_labels(additive: AdditiveRewards, chosen: Ints, rest: Ints) -> tuple[Floats, Floats] | tuple[None, None]:
-    """(num_labels,) gains by existence, and by localisation; None where the reward is not linear in its sums.
+    """Return (num_labels,) gains by existence, and by localisation; None if the reward is not linear in its sums.
 
-    That by existence is the gain of the existence after all scans with the density after the scans of `rest`, in which
-    -1 says that a sensor does not scan; what is left is localisation.
+    The gain by existence is that of the existence after all scans with the density after the scans of `rest`, in which
+    -1 is a sensor that does not scan; the remainder is localisation.
     """
     valuation, coefficients, unseen = additive.valuation, additive.coefficients, additive.with_scans(rest)
     if coefficients is None:

@@ -1,4 +1,4 @@
-"""What a planner decided, with the evidence it decided on."""
+"""The plan that a planner returns, with the evidence of the decision."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ class RewardTable(SummaryRepr):
     """Expected reward of each action, or of each joint action, of some sensors (paper eq. 15 and 17).
 
     Attributes:
-        sensors: the sensors whose actions are the axes of the table, in axis order.
-        mean: (num_actions of sensors[0], ...) mean reward over the samples; one axis a sensor. NaN where a search did
+        sensors: the sensors whose actions index the axes of the table, in axis order.
+        mean: (num_actions of sensors[0], ...) mean reward over the samples; one axis per sensor. NaN if a search did
             not evaluate the action.
-        standard_error: same shape; standard error of that mean, 0 with a single sample; NaN where the mean is.
+        standard_error: same shape; standard error of that mean, 0 with a single sample; NaN if the mean is NaN.
     """
 
     sensors: tuple[int, ...]
@@ -34,7 +34,9 @@ class RewardTable(SummaryRepr):
     standard_error: Floats
 
     def validate(self) -> None:
-        """Raise `InputError` unless there is one axis a sensor, and every entry is a reward with its error or a gap."""
+        """Raise `InputError` unless there is one axis per sensor, and every entry is a reward with its
+        error or a gap.
+        """
         if self.mean.ndim != len(self.sensors) or self.mean.shape != self.standard_error.shape:
             raise InputError(
                 f"reward table: expected one axis for each of the sensors {self.sensors}; got a mean of shape "
@@ -50,22 +52,22 @@ class RewardTable(SummaryRepr):
 
 
 class SamplingOutcome(NamedTuple):
-    """How a decision that takes as many samples as it needs came to its end.
+    """Why the sampling of a decision with a confidence stopped, and the confidence reached.
 
-    A decision of several parts, one a sensor, is as certain as the least certain part.
+    A decision of several parts, one per sensor, is as certain as the least certain part.
     """
 
     reason: Literal["one left", "indifferent", "no samples", "max_samples", "max_seconds"]
-    # one left: all others are worse; indifferent: none that is left can be better by more than the indifference;
-    # no samples: the reward needs none; the other two: samples or time ran out before
-    confidence: float  # with which the choice is within the indifference of the best candidate
-    samples: int  # of all rounds, those of a search included
-    candidates: tuple[int, ...]  # left at the end, of each table: joint decisions have one, independent one a sensor
-    started: tuple[int, ...]  # candidates at the beginning, likewise
+    # one left: all others are worse; indifferent: no remaining one can be better by more than the indifference;
+    # no samples: the reward needs none; the other two: the limit of samples or time was reached
+    confidence: float  # that the choice is within the indifference of the best candidate
+    samples: int  # over all rounds, including those of a search
+    candidates: tuple[int, ...]  # remaining in each table: joint decisions have one, independent one per sensor
+    started: tuple[int, ...]  # candidates at the beginning of each table
 
     @property
     def certain(self) -> bool:
-        """Whether it ended because the choice was certain."""
+        """Whether sampling ended because the choice was certain."""
         return self.reason in ("one left", "indifferent", "no samples")
 
     def __str__(self) -> str:
@@ -81,7 +83,7 @@ class SamplingOutcome(NamedTuple):
 
 
 class SearchCurve(NamedTuple):
-    """How a search went, step by step."""
+    """Progress of a search, step by step."""
 
     evaluations: Ints  # (num_steps,) joint actions evaluated by then, increasing
     best: Floats  # (num_steps,) the best mean reward found by then
@@ -89,25 +91,24 @@ class SearchCurve(NamedTuple):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Plan(TabularRepr):
-    """One decision: the chosen action of each sensor, and what was evaluated to choose it.
+    """One decision: the chosen action of each sensor, and the evaluated alternatives.
 
     Attributes:
         planner: name of the planner.
-        actions: for each sensor, what it could do, in printed order.
+        actions: for each sensor, its possible actions, in printed order.
         chosen: for each sensor, the index of its chosen action in `actions`.
-        tables: independent decisions: one 1-D table a sensor; joint decisions: one table with one axis a sensor (where
-            that would be too large to hold, one 1-D table a sensor, the others at their chosen actions);
-            random and fixed control: none. Means are over the samples that an action got: with
-            `PlanningSettings.confidence` those that were excluded early got fewer than the choice, so that the largest
-            mean need not be the choice's.
-        counts: how many of each thing was evaluated.
-        notes: what a reader must know, such as that rewards were taken one by one.
-        curve: of a joint decision, how the search went; else None.
-        bound: of a joint decision, how far from the best it can be; None where nothing is known of that.
-        sequence: of a decision over several periods, for each sensor the rows (num_decisions, num_columns) of all the
-            actions that were chosen, the first of which is to be taken; else empty.
-        certainty: how the decision ended where it takes as many samples as it needs; else None.
-        explanation: why it is what it is, where that has been worked out to be kept; see `explain`.
+        tables: independent decisions: one 1-D table per sensor; joint decisions: one table with one axis per sensor (if
+            that would be too large, one 1-D table per sensor, the others at their chosen actions); random and fixed
+            control: none. Means are over the samples that an action got: with `PlanningSettings.confidence` those that
+            were excluded early got fewer than the choice, so that the largest mean need not be the choice's.
+        counts: numbers of filter steps, fusions and rewards evaluated.
+        notes: notes for readers, such as that rewards were evaluated one by one.
+        curve: of a joint decision, the progress of the search; else None.
+        bound: of a joint decision, the upper bound on its reward; None if no bound is available.
+        sequence: of a decision over several periods, for each sensor the rows (num_decisions, num_columns) of all
+            chosen actions, the first of which is to be taken; else empty.
+        certainty: why sampling stopped, if a confidence was required; else None.
+        explanation: the explanation, if it was computed for storage; see `explain`.
         questions: answers `explain` from the evidence; None without it (`without_evidence`, a pickle, a record).
     """
 
@@ -125,12 +126,13 @@ class Plan(TabularRepr):
     sequence: tuple[Floats, ...] = ()
 
     def explain(self) -> Explanation:
-        """Why it is what it is: what targets and sensors contribute to its reward, and how near the next best came.
+        """Return the explanation of the plan: contributions of targets and sensors to its reward, and the runner-up.
 
-        Worked out when it is first asked for. A plan that was not made on rewards has little to say, but says it.
+        It is computed on the first call. The explanation of a plan that was not made on rewards has little content, and
+        says so.
 
         Raises:
-            InputError: a plan that was kept or sent without its explanation, or made by a planner that gives none.
+            InputError: a plan that was stored or sent without its explanation, or made by a planner that gives none.
         """
         if self.questions is not None:
             return self.questions()
@@ -147,7 +149,7 @@ class Plan(TabularRepr):
         return Explanation.nothing(self.planner, chosen, f"{self.planner} does not choose by rewards")
 
     def without_evidence(self, *, explained: bool) -> Plan:
-        """The plan to be kept: without its evidence, which takes memory; with its explanation where that is wanted."""
+        """Return the plan for storage, without its evidence, which takes memory; `explained`: with its explanation."""
         kept = self.explanation
         if explained and self.questions is not None:
             kept = self.questions().without_evidence()
@@ -155,11 +157,12 @@ class Plan(TabularRepr):
 
     @property
     def num_sensors(self) -> int:
-        """Number of sensors that the plan steers."""
+        """Number of sensors that the plan controls."""
         return len(self.actions)
 
     def to_table(self) -> dict[str, list[Any]]:
-        """A row a sensor, by columns: `sensor` (from 0), `action`, of `num_actions`, and its numbers by their names.
+        """Return one row per sensor: `sensor` (from 0), `action`, of `num_actions`, and the numbers of the action by
+        name.
 
         A number that a sensor's actions do not have is None.
         """
@@ -184,12 +187,14 @@ class Plan(TabularRepr):
 
     @property
     def chosen_actions(self) -> tuple[Floats, ...]:
-        """The chosen row of each sensor's actions."""
+        """The row of each sensor's chosen action."""
         return tuple(own.values[index] for own, index in zip(self.actions, self.chosen, strict=True))
 
     @property
     def expected_rewards(self) -> tuple[tuple[float, float], ...]:
-        """Mean reward of the choice and its standard error, one a table: one a sensor, or one for a joint decision."""
+        """Mean reward of the choice and its standard error for each table: one per sensor, or one for a
+        joint decision.
+        """
         at = [tuple(self.chosen[sensor] for sensor in table.sensors) for table in self.tables]
         return tuple(
             (float(table.mean[index]), float(table.standard_error[index]))
@@ -197,7 +202,7 @@ class Plan(TabularRepr):
         )
 
     def validate(self) -> None:
-        """Raise `InputError` unless the tables fit the actions and hold the choice."""
+        """Raise `InputError` unless the tables match the actions and contain the choice."""
         if len(self.chosen) != self.num_sensors:
             raise InputError(
                 f"plan.chosen: expected one index for each of {self.num_sensors} sensors; got {self.chosen}"

@@ -27,15 +27,15 @@ class JointPlanner:
 
     Attributes:
         sensors: the sensors, in the order of the beliefs and of the fusion weights.
-        fusion: how their pseudo-updated densities become one.
+        fusion: fusion rule of their pseudo-updated densities.
         settings: horizon, samples, caps.
-        reward: one of `vedette.control.rewards`, or of the user's own.
+        reward: one of `vedette.control.rewards`, or a custom one.
         search: which joint actions are evaluated: all of them, as in the paper, or fewer.
-        constraints: what the sensors must not do.
-        notes: what every plan is to say beside what comes up, such as that the tracks are fused in another way.
+        constraints: limits on the sensors' courses.
+        notes: notes that every plan repeats, such as that the tracks are fused in another way.
 
     Raises:
-        InputError: parts of another kind.
+        InputError: parts of another type.
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -53,19 +53,19 @@ class JointPlanner:
         instance("search", self.search, JointSearch)
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
-        """The joint action of largest mean reward that the search finds; of equal ones the first in printed order.
+        """Return the joint action with the largest mean reward that the search finds; of equal ones the first printed.
 
         Rewards are equal within 1e-9, relative to the best or to 1.
 
         Args:
-            state: the belief of each sensor, as its filter left it; and the fused one, from which samples and
-                prediction are taken. Under `vedette.tracking.Central` they are all the same.
+            state: the belief of each sensor, as its filter left it; and the fused belief, from which samples and
+                prediction are taken. With `vedette.tracking.Central` they are all the same.
             poses: (num_sensors, 3 or more) present poses.
-            rng: draws the samples, then whatever the search draws.
+            rng: draws the samples, then the random numbers of the search.
 
         Raises:
-            InputError: inputs that do not fit, or more joint actions than the search takes.
-            ModelError, NumericalError: as the filters; a reward that is not finite.
+            InputError: invalid inputs, or more joint actions than the search allows.
+            ModelError, NumericalError: errors of the filters; a reward that is not finite.
         """
         generator(rng)
         prepared = Preparation.of(self.sensors, self.fusion, self.settings, self.reward, state, poses, self.constraints)
@@ -74,22 +74,21 @@ class JointPlanner:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IndependentPlanner:
-    """Independent decision making: each sensor maximises the reward by itself (paper, Algorithm 3).
+    """Independent decision making: each sensor maximises the reward alone (paper, Algorithm 3).
 
     Attributes:
         sensors: the sensors, in the order of the beliefs.
-        fusion: how their pseudo-updated densities become one, where the others are presumed to stay.
+        fusion: fusion rule of their pseudo-updated densities, if the others are assumed to stay.
         settings: horizon, samples, caps.
-        reward: one of `vedette.control.rewards`, or of the user's own.
-        constraints: what each sensor by itself must not do; those on pairs of sensors are not looked at.
-        notes: what every plan is to say beside what comes up.
-        others: what each sensor presumes of the others. "stay": they go on as they are, on the course that changes
+        reward: one of `vedette.control.rewards`, or a custom one.
+        constraints: limits on each sensor's courses; constraints on pairs of sensors are ignored.
+        notes: notes that every plan repeats.
+        others: what each sensor assumes about the others. "stay": they continue as they are, on the course that changes
             their pose least (`vedette.control.inputs.stationary_courses`), and the reward is that of all scans
-            together.
-            "absent", as in the paper: there are none, and the reward is that of its own update alone.
+            together. "absent", as in the paper: there are none, and the reward is that of its own update alone.
 
     Raises:
-        InputError: parts of another kind, or another presumption.
+        InputError: parts of another type, or another assumption.
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -107,7 +106,9 @@ class IndependentPlanner:
         one_of("others", self.others, ("stay", "absent"))
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
-        """Each sensor's action of largest mean reward; arguments, ties and errors as `JointPlanner.plan`."""
+        """Return each sensor's action with the largest mean reward; arguments, ties and errors as in
+        `JointPlanner.plan`.
+        """
         generator(rng)
         prepared = Preparation.of(self.sensors, self.fusion, self.settings, self.reward, state, poses, self.constraints)
         return decide_alone(self.name, prepared, self.others, self.notes, rng=rng)

@@ -1,4 +1,4 @@
-"""The fused density predicted to the end of the horizon, from which every decision starts."""
+"""The fused density predicted to the end of the horizon, the starting point of every decision."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from vedette.models import MotionModel, constant_survival, kernel_motion
 
 _Labelled = TypeVar("_Labelled", bound=Labelled)
 
-# No deaths over the horizon. All decisions share this model, so that the cached kernel input of a motion is found.
+# No deaths over the horizon. All decisions share this model, so that the cached kernel input of a motion is reused.
 ALWAYS_SURVIVES = constant_survival(1.0)
 
 
 class Prediction(NamedTuple):
-    """A fused LMB over the horizon, without birth or death."""
+    """A fused LMB over the horizon, without births or deaths."""
 
-    fused: LMB  # that it is of
-    now: Lmb  # the same of one Gaussian a label, as kernels take it
-    paths: Paths  # of its labels
-    end: LMB  # at the end of the horizon, of one Gaussian a label
+    fused: LMB  # the belief that is predicted
+    now: Lmb  # the belief with one Gaussian per label, in kernel form
+    paths: Paths  # predicted paths of its labels
+    end: LMB  # at the end of the horizon, one Gaussian per label
 
     @classmethod
     def of(cls, fused: LMB, motion: MotionModel, num_steps: int, period: float) -> Prediction:
-        """Predict over `num_steps` steps of `period` seconds. Call it within `model_errors`."""
+        """Return the prediction over `num_steps` steps of `period` seconds. Call it within `model_errors`."""
         tracks, logits = single_gaussians(fused.tracks).to_kernel(), fused.existence_logit
         own = kernel_motion(motion, ALWAYS_SURVIVES)
         paths = predict_paths(own, float(period), int(num_steps), tracks.components.means, tracks.components.covs)
@@ -39,10 +39,10 @@ class Prediction(NamedTuple):
 
 
 def predicted(fused: _Labelled, motion: MotionModel, num_steps: int, period: float) -> _Labelled:
-    """The fused density at the end of the horizon, without birth or death (paper, "pseudo-prediction").
+    """Return the fused density at the end of the horizon, without births or deaths (paper, "pseudo-prediction").
 
-    Tracks are first collapsed to one Gaussian each (GLMBs are marginalised), as those of the pseudo-updates are. Label
-    sets of weight zero are left out of a GLMB.
+    Tracks are first collapsed to one Gaussian each (GLMBs are marginalised), as in the pseudo-updates. Label sets of
+    weight zero are left out of a GLMB.
     """
     single = possible(collapsed(fused))
     means, covs = track_moments(single.tracks)

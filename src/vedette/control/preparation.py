@@ -1,4 +1,4 @@
-"""How a decision is evaluated: by sums over labels where beliefs, fusion and reward allow it, else case by case."""
+"""How a decision is evaluated: by sums over labels if beliefs, fusion and reward allow it, otherwise case by case."""
 
 from __future__ import annotations
 
@@ -32,29 +32,29 @@ from vedette.tracking import State
 AnyReward: TypeAlias = Reward | PowerReward | LabelReward | ExpectedLossReward
 
 
-_PARALLEL = ParallelUpdate()  # how the expected loss adds up
+_PARALLEL = ParallelUpdate()  # fusion assumed by the expected loss
 _PLANNED_ON_LMBS = "planned on the LMBs of the GLMB beliefs: {}"
 
 
 class PlanningBeliefs(NamedTuple):
-    """What is planned on."""
+    """The beliefs and the fusion that a decision is planned on."""
 
     state: State
     fusion: Fusion
-    rule: LinearRule | None  # how densities are summed; None where the decision is no sum
-    notes: tuple[str, ...]  # what a reader must know of the form
+    rule: LinearRule | None  # how densities are summed; None if the decision is not a sum
+    notes: tuple[str, ...]  # notes on their form
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Preparation:
-    """What one decision is planned on, from which evaluators on fresh samples can be had.
+    """The prepared inputs of one decision, which makes evaluators on fresh samples.
 
     Attributes:
         sensors, settings, reward: as in the planners.
-        planned: beliefs and fusion in the form in which they are planned on.
-        options: of each sensor.
-        mask: what constraints allow; None: everything.
-        graph: of the zones that they forbid; None: there are none.
+        planned: beliefs and fusion in the form that they are planned on.
+        options: for each sensor.
+        mask: feasible joint actions; None: all.
+        graph: of the zones that constraints forbid; None: there are none.
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -76,7 +76,7 @@ class Preparation:
         poses: Any,
         constraints: Sequence[Constraint] = (),
     ) -> Preparation:
-        """Raises `InputError` for inputs that do not fit."""
+        """Return the preparation; raises `InputError` for invalid inputs."""
         options = options_of(sensors, poses, settings)
         planned = planning_beliefs(sensors, fusion, settings, reward, state)
         mask, graph = None, None
@@ -87,18 +87,18 @@ class Preparation:
 
     @property
     def races(self) -> bool:
-        """Whether samples are added until the decision is certain; the expected loss is so without any."""
+        """Whether samples are added until the decision is certain; the expected loss needs no samples."""
         return self.settings.confidence is not None and not isinstance(self.reward, ExpectedLossReward)
 
     @property
     def certainty(self) -> SamplingOutcome | None:
-        """Of a decision that does not race."""
+        """The sampling outcome of a decision that does not race."""
         return None if self.settings.confidence is None else SamplingOutcome("no samples", 1.0, 0, (), ())
 
     def evaluator(
         self, num_samples: int, options: tuple[Options, ...] | None = None, *, rng: np.random.Generator
     ) -> Evaluator:
-        """The evaluator on samples drawn now; options: fewer of them. Raises as `JointPlanner.plan`."""
+        """Return the evaluator on newly drawn samples; options: a subset of them. Raises as `JointPlanner.plan`."""
         own, settings = options or self.options, self.settings
         if num_samples != settings.num_samples:
             settings = replace(settings, num_samples=num_samples)
@@ -122,9 +122,10 @@ class Preparation:
 def notes_of_state(
     sensors: Sequence[MobileSensor], settings: PlanningSettings, state: State, *, sums: bool
 ) -> tuple[str, ...]:
-    """Why targets that were not found yet are not looked for, though they should be; and which sensors do not scan.
+    """Return why undetected targets are not included, though requested, and which sensors do not scan.
 
-    Of these, within the horizon, it is all one what they do. sums: whether rewards are sums over labels.
+    All courses of a sensor that does not scan within the horizon are equivalent. sums: whether rewards are sums over
+    labels.
     """
     notes = []
     if settings.undetected_worth and not (sums and state.undetected is not None):
@@ -139,10 +140,10 @@ def notes_of_state(
 def check_sums(
     purpose: str, num_sensors: int, fusion: Fusion, settings: PlanningSettings, reward: AnyReward
 ) -> LinearRule:
-    """How densities are summed where beliefs are LMBs, or are planned on as LMBs.
+    """Return how densities are summed if beliefs are LMBs, or are planned on as LMBs.
 
-    Raises `InputError` for settings, a reward or a fusion of which a decision is no sum over labels, and says for which
-    `purpose` it has to be one.
+    Raises `InputError`, with the `purpose`, for settings, a reward or a fusion with which a decision is not a sum over
+    labels.
     """
     rule = _rule_of_lmbs(num_sensors, _of_lmbs(fusion), settings, reward)
     if rule is None:
@@ -161,18 +162,19 @@ def planning_beliefs(
     state: State,
     why: str = "",
 ) -> PlanningBeliefs:
-    """The beliefs in the form in which they are planned on. why: GLMBs are LMBs there in any case.
+    """Return the beliefs in the form that they are planned on. why: GLMBs are converted to LMBs in any case, for this
+    reason.
 
-    Raises `InputError` for a state that does not fit.
+    Raises `InputError` for an invalid state.
     """
     check_state(sensors, state)
     if isinstance(reward, ExpectedLossReward):
         return _planned_on_loss(fusion, state, why or "the expected loss asks for no more")
     num_sensors, beliefs, notes = len(sensors), (*state.local, state.fused), tuple[str, ...]()
-    # What divides by the common prediction needs beliefs that have one.
+    # A fusion that divides by the common prediction needs beliefs that have one.
     from_one = shares_prediction(fusion)
     if _has_glmb(beliefs) and (why := why or _why_lmbs(num_sensors, fusion, settings, beliefs)):
-        # Of one belief, open names are settled; of several, each would settle them in its own way.
+        # Ambiguous labels are resolved only in a single belief; several beliefs would resolve them differently.
         as_planned = settled_lmb if from_one or len(set(map(id, beliefs))) == 1 else as_lmb
         converted: dict[int, LMB] = {}
         for belief in (state.fused,) if from_one else beliefs:
@@ -191,7 +193,9 @@ def planning_beliefs(
 
 
 def _planned_on_loss(fusion: Fusion, state: State, why: str) -> PlanningBeliefs:
-    """The fused belief as that of all sensors: an LMB, of each label its heaviest Gaussian. why: what a note says."""
+    """Return the fused belief for all sensors: an LMB with the heaviest Gaussian of each label. why: text
+    of the note.
+    """
     fused, num_sensors, notes = state.fused, len(state.local), tuple[str, ...]()
     if _has_glmb((*state.local, fused)):
         fused, fusion, notes = settled_lmb(fused), _of_lmbs(fusion), (_PLANNED_ON_LMBS.format(why),)
@@ -206,7 +210,7 @@ def _of_lmbs(fusion: Fusion) -> Fusion:
 
 @lru_cache(maxsize=100)
 def _clmb(weights: tuple[float, ...]) -> Clmb:
-    """Made once, as its weights were checked."""
+    """Return the fusion with these weights (cached, because the weights are checked)."""
     return Clmb(weights)
 
 
@@ -215,7 +219,7 @@ def _has_glmb(beliefs: Sequence[Labelled]) -> bool:
 
 
 def _why_lmbs(num_sensors: int, fusion: Fusion, settings: PlanningSettings, beliefs: Sequence[Labelled]) -> str:
-    """Why GLMBs are planned on their LMBs; empty where they are not. beliefs: the fused one last."""
+    """Return why GLMBs are planned on as their LMBs; empty if they are not. beliefs: the fused one last."""
     if shares_prediction(fusion):
         return f"{type(fusion).__name__} fuses LMBs"
     if any(belief.is_product for belief in beliefs):
@@ -229,7 +233,7 @@ def _why_lmbs(num_sensors: int, fusion: Fusion, settings: PlanningSettings, beli
 
 
 def _rule_of_lmbs(num_sensors: int, fusion: Fusion, settings: PlanningSettings, reward: AnyReward) -> LinearRule | None:
-    """How densities are summed where they are LMBs; None where the decision is no sum."""
+    """Return how densities are summed if they are LMBs; None if the decision is not a sum."""
     if isinstance(reward, ExpectedLossReward):
         return _PARALLEL.linear_rule(num_sensors)
     if settings.association != "known":

@@ -1,4 +1,4 @@
-"""What a search may ask of a joint decision, and how far from the best its choice can be."""
+"""The search problem of a joint decision, and the upper bound on its reward."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ def searched(
     late: Callable[[], bool] | None = None,
     rng: np.random.Generator,
 ) -> tuple[int, ...]:
-    """The joint action that a search chooses, which the evidence then holds with the lines through it.
+    """Return the joint action that a search chooses; the evidence then contains it with the lines through it.
 
     late: see `JointProblem`.
 
-    Raises `InputError` for what is no joint action.
+    Raises `InputError` for an invalid joint action.
     """
     choice = check_choice(
         "search", search.search(joint_problem(evidence, mask)._replace(late=late), rng=rng), evidence.shape
@@ -47,7 +47,7 @@ def searched(
 
 
 def joint_problem(evidence: Evidence, mask: Mask | None) -> JointProblem:
-    """The search problem of a joint decision; what it evaluates is kept in the evidence."""
+    """Return the search problem of a joint decision; its evaluations are kept in the evidence."""
     evaluator = evidence.evaluator
     stay = cache(lambda: stationary_courses(evaluator.options, mask))
 
@@ -83,7 +83,7 @@ def joint_problem(evidence: Evidence, mask: Mask | None) -> JointProblem:
 
 
 def note_lines(evidence: Evidence, choice: Sequence[int], mask: Mask | None) -> None:
-    """Evaluate a joint action, and with sums over labels all allowed ones that differ in one sensor's action."""
+    """Evaluate a joint action and, with sums over labels, all allowed ones that differ in one sensor's action."""
     evaluator, chosen = evidence.evaluator, np.array(choice, np.int64)
     if evidence.is_complete():
         return
@@ -103,7 +103,7 @@ def _note_line(evidence: Evidence, mask: Mask | None, through: Sequence[int], se
 
 
 def _independent(evidence: Evidence, mask: Mask | None) -> tuple[int, ...]:
-    """The course that is best for each sensor alone (paper, Algorithm 3), of those it may take."""
+    """Return the best feasible course of each sensor alone (paper, Algorithm 3)."""
     evaluator, shape = evidence.evaluator, evidence.shape
     if evaluator.additive is not None:
         means = np.split(evaluator.additive.each_alone().mean(axis=1), np.cumsum(shape)[:-1])
@@ -118,19 +118,19 @@ def _independent(evidence: Evidence, mask: Mask | None) -> tuple[int, ...]:
     return mask.active.kept(best, gains)
 
 
-# Of the targets that are likely to be detected, so many beyond the cutoff are told of. On paper-a they are up to half
+# Fraction of the likely detected targets that are beyond the cutoff, above which a note is given. On paper-a up to half
 # with cutoffs of 20 and 25 m, which cost 2.3 and 2.1 m of OSPA, up to a quarter with 30 m (0.6 m), none with 40 m.
 _SHARE = 0.1
 
 
 def bound_of(evidence: Evidence, choice: Sequence[int]) -> Bound | None:
-    """The bound of a decision on its own samples; None where nothing is known.
+    """Return an upper bound on the best mean reward, computed on the decision's samples; None if no bound is available.
 
-    After every joint action was evaluated, the best of them. Otherwise, for rewards that are sums over targets, each
-    target is given the joint action that is best for it, and what is left of targets that were not found is found by
-    whoever sees it best: no joint action can be better than that for all of them. Every sensor pays its least price.
-    Where more ways to see a target are possible than `PlanningSettings.max_bound_work` allows to try, the expected loss
-    has a bound of its own (see `vedette.kernels.planning.bounds`), and of another reward nothing is known for that
+    If every joint action was evaluated, the bound is the best of them. Otherwise, for rewards that are sums over
+    targets, each target gets the joint action that is best for it, and each sensor finds of the undetected targets in
+    every cell what its best course there finds. No joint action can be better than that for all of them. Every sensor
+    pays its lowest price. If the number of ways to see a target exceeds `PlanningSettings.max_bound_work`, the expected
+    loss has a bound of its own (see `vedette.kernels.planning.bounds`), and other rewards have no bound for that
     target.
     """
     reward = evidence.mean_of(choice)
@@ -141,9 +141,10 @@ def bound_of(evidence: Evidence, choice: Sequence[int]) -> Bound | None:
 
 
 def most_by_target(evidence: Evidence) -> tuple[float, int] | None:
-    """What no joint action has a larger mean reward than, and of how many targets nothing is known; worked out once.
+    """Return an upper bound on the mean reward of any joint action, and the number of targets it does not cover
+    (cached).
 
-    None of rewards that are no sums over targets.
+    None for rewards that are not linear in sums over targets.
     """
     evaluator, known = evidence.evaluator, evidence.most_by_target
     additive = evaluator.additive
@@ -156,9 +157,9 @@ def most_by_target(evidence: Evidence) -> tuple[float, int] | None:
 
 
 def best_values(additive: AdditiveRewards, max_work: int) -> Floats:
-    """(num_labels,) the most that each label can add to the mean reward; inf where that is not known.
+    """Return (num_labels,) upper bounds on the contribution of each label to the mean reward; inf if not known.
 
-    max_work: ways to see a label, times samples, that are tried at most.
+    max_work: maximum number of ways to see a label, times samples, that are tried.
     """
     table, coefficients = additive.table, additive.coefficients
     assert coefficients is not None
@@ -181,7 +182,7 @@ def best_values(additive: AdditiveRewards, max_work: int) -> Floats:
 
 
 def choices_of(table: Table) -> Choices:
-    """Of every label, the sensors that may see it and what each may say."""
+    """Return for each label the sensors that may see it, and the entries of each."""
     num_courses, num_labels = len(table.offsets) - 1, len(table.start)
     sizes = np.diff(table.first_courses)
     courses = np.repeat(np.arange(num_courses), np.diff(table.offsets))
@@ -190,7 +191,7 @@ def choices_of(table: Table) -> Choices:
     order = np.lexsort((entries, sensors, table.labels))
     pairs = table.labels[order] * len(sizes) + sensors[order]
     distinct, starts, counts = np.unique(pairs, return_index=True, return_counts=True)
-    # Courses of the sensor that do not reach the label are one choice more.
+    # Courses of the sensor that do not reach the label are one additional choice.
     spare = (counts < sizes[distinct % len(sizes)]).astype(np.int64)
     offsets = offsets_of(counts + spare)
     found = np.full(offsets[-1], -1)
@@ -200,7 +201,7 @@ def choices_of(table: Table) -> Choices:
 
 
 def _ways(choices: Choices, num_labels: int) -> Floats:
-    """(num_labels,) numbers of joint choices, which may be inf."""
+    """Return the number (num_labels,) of joint choices, which may be inf."""
     logs = np.log(np.diff(choices.entry_offsets))
     of_label = np.repeat(np.arange(num_labels), np.diff(choices.label_offsets))
     with np.errstate(over="ignore"):
@@ -208,7 +209,9 @@ def _ways(choices: Choices, num_labels: int) -> Floats:
 
 
 def _most_found(additive: AdditiveRewards) -> float:
-    """What is found where every sensor sees of every cell what any of its courses sees of it."""
+    """Return the value of undetected targets found if each sensor sees each cell as well as its best course
+    there does.
+    """
     cells, totals = additive.cells, np.zeros(len(additive.cells.worth))
     firsts: Ints = additive.table.first_courses
     for first, last in zip(firsts[:-1].tolist(), firsts[1:].tolist(), strict=True):
@@ -220,10 +223,10 @@ def _most_found(additive: AdditiveRewards) -> float:
 
 
 def beyond_cutoff(evaluator: Evaluator, choice: Sequence[int]) -> Iterator[str]:
-    """What a reader of a decision must know of targets beyond the cutoff, of which the loss counts no more.
+    """Yield a note on targets beyond the cutoff, which no longer count in the loss.
 
-    They are likely to be detected, and though they are, their errors at the end of the horizon are expected to be
-    beyond it: nothing is gained by bringing them nearer to it, and the choice gives them up for others.
+    These targets are likely to be detected, yet their errors at the end of the horizon are expected to exceed the
+    cutoff. Reducing these errors gains nothing, so the choice gives these targets up for others.
 
     choice: the course of each sensor.
     """
@@ -246,7 +249,7 @@ def beyond_cutoff(evaluator: Evaluator, choice: Sequence[int]) -> Iterator[str]:
 
 
 def _errors(additive: AdditiveRewards, choice: Sequence[int]) -> tuple[Floats, Floats]:
-    """(num_labels,) probability that any scan detects each label, and its error then, m."""
+    """Return (num_labels,) the probability that any scan detects each label, and its error in that case, m."""
     valuation, rows = additive.valuation, additive.with_scans(np.array(choice))
     unseen = valuation.covs[:, 0, 0] + valuation.covs[:, 1, 1]
     detected = -np.expm1(rows[:, -1, 0])

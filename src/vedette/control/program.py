@@ -1,4 +1,6 @@
-"""A planner that is a program of its own, in any language: it gets a line of JSON a decision, and answers with one."""
+"""A planner that is an external program, in any language: it receives a line of JSON per decision and
+answers with one.
+"""
 
 from __future__ import annotations
 
@@ -25,24 +27,24 @@ COUNTED = ("filter_steps", "fusions", "rewards")
 
 @dataclass(slots=True, eq=False)
 class ProgramPlanner:
-    """Asks a program where to send the sensors; docs/benchmark.md says what it is told and what it answers.
+    """A planner that runs an external program; docs/benchmark.md describes its input and output.
 
-    The program is started at the first decision of a run, and again where time goes back. Its seed is drawn from the
-    numbers of that decision.
+    The program is started at the first decision of a run, and again if time goes backwards. Its seed is drawn from the
+    generator of that decision.
 
     Attributes:
         sensors: the sensors.
         command: the program and its arguments.
-        scene: what it is told first, as plain data.
-        settings: the horizon, over which courses are told apart.
-        constraints: what the sensors must not do; an answer that does it is refused.
-        estimate: reads the targets off the fused belief.
-        folder: in which the program is started.
-        seconds: that it may take for an answer.
-        start_seconds: that it may take for its first answer, that it is ready.
+        scene: first message to the program, as plain data.
+        settings: the horizon, over which courses are distinguished.
+        constraints: limits on the sensors' courses; an answer that violates them is refused.
+        estimate: estimator that extracts targets from the fused belief.
+        folder: working directory of the program.
+        seconds: time limit for an answer.
+        start_seconds: time limit for its first answer, that it is ready.
 
     Raises:
-        InputError: parts of another kind.
+        InputError: parts of another type.
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -62,11 +64,11 @@ class ProgramPlanner:
         check_steering(self)
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
-        """What the program answers.
+        """Return the program's answer as a plan.
 
         Raises:
-            InputError: inputs that do not fit, or a command that cannot be started.
-            VedetteError: no answer in time, or one that is none; the program is ended.
+            InputError: invalid inputs, or a command that cannot be started.
+            VedetteError: no answer in time, or an invalid one; the program is ended.
         """
         generator(rng)
         instance("state", state, State)
@@ -90,7 +92,7 @@ class ProgramPlanner:
 
 
 def _choices(options: Sequence[Options], mask: Mask | None) -> list[dict[str, Any]]:
-    """Of each sensor where it is and its different courses, each with the action that first takes it."""
+    """Return for each sensor its pose and its distinct courses, each with the first action that leads to it."""
     return [
         {
             "pose": own.pose.tolist(),
@@ -104,7 +106,7 @@ def _choices(options: Sequence[Options], mask: Mask | None) -> list[dict[str, An
 
 
 def _told(belief: Any) -> list[dict[str, Any]]:
-    """Every target of an estimate, or of a density that names them."""
+    """Return the targets of an estimate, or of a labelled density."""
     if not isinstance(belief, Estimate | Labelled):
         return []
     return [
@@ -119,7 +121,7 @@ def _told(belief: Any) -> list[dict[str, Any]]:
 
 
 def _joint(program: Program, answer: dict[str, Any], options: Sequence[Options], mask: Mask | None) -> tuple[int, ...]:
-    """The course of each sensor that the answer names; refuses what is no choice, or a forbidden one."""
+    """Return the course of each sensor in the answer; refuses an invalid choice and a forbidden one."""
     given, num = answer.get("actions"), len(options)
     if not isinstance(given, list) or len(given) != num or any(type(each) is not int for each in given):
         got = repr(given)[:200] if "actions" in answer else f"only {', '.join(answer) or 'an empty object'}"
@@ -140,7 +142,7 @@ def _joint(program: Program, answer: dict[str, Any], options: Sequence[Options],
 
 
 def _counts(program: Program, answer: dict[str, Any]) -> dict[str, int]:
-    """What the program says that it has evaluated."""
+    """Return the evaluation counts that the program reports."""
     counts = answer.get("counts", {})
     known = isinstance(counts, dict) and set(counts) <= set(COUNTED)
     if not known or any(type(each) is not int or not 0 <= each < 2**53 for each in counts.values()):

@@ -1,9 +1,9 @@
-"""Pseudo-updates: what each sensor would believe at the end of the horizon, for each of its actions and each sample.
+"""Pseudo-updates: each sensor's belief at the end of the horizon, for each of its actions and each sample.
 
-A filter keeps a density for each label of each hypothesis. What one hypothesis says of a label differs from what
-another says by how they explain other labels' measurements, which is often nothing to speak of: of the 26 tracks that
-ten label sets of `paper-a` hold under an M-delta-GLMB, each label's are within 1e-3 nats of one another. A planner that
-predicts and updates all of them does the same work six times.
+A filter keeps a density for each label of each hypothesis. The densities of a label in two hypotheses differ by how
+these explain the measurements of other labels, which is often negligible: of the 26 tracks that ten label sets of
+`paper-a` have under an M-delta-GLMB, each label's are within 1e-3 nats of one another. A planner that predicts and
+updates all of them does the same work six times.
 """
 
 from __future__ import annotations
@@ -41,10 +41,10 @@ from vedette.kernels.planning.reach import label_radii, predict_paths
 def draw_futures(
     fused: Belief, sensors: Sequence[MobileSensor], settings: PlanningSettings, *, rng: np.random.Generator
 ) -> tuple[Ints, tuple[SampledTrajectories, ...]]:
-    """Samples of the fused density carried over the horizon without noise; the same states for every sensor.
+    """Return samples of the fused density propagated over the horizon without noise; all sensors share the states.
 
-    Returns the labels (num_targets, 2) of the sampled targets, and the future as each sensor meets it. The random
-    numbers of detections and noise are each sensor's own, and the same for all its actions.
+    Returns the labels (num_targets, 2) of the sampled targets, and the trajectories for each sensor. The random numbers
+    of detections and noise are each sensor's own, and the same for all its actions.
     """
     samples, states = draw_paths(fused, sensors, settings, rng=rng)
     futures = []
@@ -68,7 +68,7 @@ def pseudo_posteriors(
     """Run the sensor's filter over the horizon for every course and sample, without births or deaths.
 
     courses: (num_courses, horizon_steps, pose_dim) poses at the pseudo-updates. labels: of the targets of `futures`.
-    scans: (num_courses, horizon_steps) at which of them it scans. The belief is one of the filter's kind. Raises
+    scans: (num_courses, horizon_steps) whether it scans at each step. The belief has the type of the filter. Raises
     `ModelError` and `NumericalError` as the filter.
     """
     decision = decision_of(sensor, courses, futures, settings, scans)
@@ -141,7 +141,7 @@ def _counts(settings: PlanningSettings) -> dict[str, int]:
 
 
 def heaviest_hypotheses(belief: GLMB, most: int) -> GLMB:
-    """The `most` heaviest hypotheses of positive weight, normalised; of equal weights the first."""
+    """Return the `most` heaviest hypotheses of positive weight, normalised; of equal weights the first."""
     order = np.argsort(-belief.hyp_log_weights, kind="stable")[:most]
     taken = take_hypotheses(belief, order[belief.hyp_log_weights[order] > -np.inf])
     log_weights = taken.hyp_log_weights - log_sum(for_kernel(taken.hyp_log_weights))
@@ -149,11 +149,11 @@ def heaviest_hypotheses(belief: GLMB, most: int) -> GLMB:
 
 
 def share_versions(belief: GLMB, most: float) -> GLMB:
-    """The belief with tracks of one label replaced by one from which they diverge by at most `most` nats.
+    """Return the belief with tracks of a label replaced by a track from which they diverge by at most `most` nats.
 
-    belief: of one Gaussian a track, its hypotheses heaviest first. The tracks of heavier hypotheses stay, and lighter
-    ones' go to the first of them that is near enough. Hypotheses that then hold the same tracks become one, of the sum
-    of their weights. most: 0 leaves everything as it is.
+    belief: one Gaussian per track, its hypotheses heaviest first. The tracks of heavier hypotheses stay, and those of
+    lighter ones are replaced by the first of them that is near enough. Hypotheses that then have the same tracks are
+    merged, and their weights are added. most: 0 leaves everything unchanged.
     """
     if most == 0.0 or len(belief.hyp_tracks) == 0:
         return belief
@@ -161,7 +161,7 @@ def share_versions(belief: GLMB, most: float) -> GLMB:
 
 
 def _divergences(means: Floats, covs: Floats) -> Floats:
-    """(num, num) Kullback-Leibler divergence of Gaussian i from Gaussian j, in nats."""
+    """Return (num, num) the Kullback-Leibler divergence of Gaussian i from Gaussian j, in nats."""
     precisions, log_dets = np.linalg.inv(covs), np.linalg.slogdet(covs)[1]
     offsets = means[:, np.newaxis] - means
     traces = np.einsum("iab,jba->ij", covs, precisions)
@@ -170,7 +170,7 @@ def _divergences(means: Floats, covs: Floats) -> Floats:
 
 
 def _leaders(belief: GLMB, divergences: Floats, most: float) -> Ints:
-    """(num_tracks,) the track that each is replaced by; its own number where it stays, or where nobody holds it."""
+    """Return (num_tracks,) the track that replaces each; its own index if it stays, or if no hypothesis has it."""
     labels, leaders = belief.tracks.labels.tolist(), np.arange(belief.tracks.num_tracks)
     known: dict[tuple[int, ...], list[int]] = {}
     for track in dict.fromkeys(belief.hyp_tracks.tolist()):

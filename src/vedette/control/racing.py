@@ -1,23 +1,22 @@
-"""Races of joint actions: samples are added in rounds, and what is worse with confidence is dropped.
+"""Races of joint actions: samples are added in rounds, and candidates that are worse with confidence are dropped.
 
-All candidates of a round are judged by the same samples, so that what two of them have in common cancels. After round
-k, with n samples in all, candidate a stays as long as the upper confidence bound of its mean difference to the present
-best b,
+All candidates of a round are evaluated on the same samples, so that common errors cancel. After round k, with n samples
+in all, candidate a stays as long as the upper confidence bound of its mean difference to the present best b,
 
     U(a) = mean(d) + t(n - 1, 1 - alpha_k / (K - 1)) std(d) / sqrt(n),    d = reward(a) - reward(b), sample by sample,
 
 is not below 0, with alpha_k = (1 - confidence) / (k (k + 1)) and K candidates at the start. The race is over when one
 is left, or when U(a) of all others is at most the indifference. The alpha_k sum to 1 - confidence over any number of
-rounds, and what can go wrong in a round is one of K - 1 comparisons with the true best (a union bound over both). So
-where Student's t is right, the choice is with `confidence` within the indifference of the best candidate, whenever the
-race is stopped. The differences need not be normal: where they are far from it (a target that is there in every sample
-of the first rounds, and not in one of a hundred), the confidence is only as good as what the samples show.
+rounds, and an error in a round is one of K - 1 comparisons with the true best (a union bound over both). So if
+Student's t is valid, the choice is with `confidence` within the indifference of the best candidate, whenever the
+race is stopped. The differences need not be normal. If they are far from it (a target that exists in every sample of
+the first rounds, and is absent in one of a hundred), the confidence is only as good as the samples.
 
 See O. Maron, A. W. Moore, "The racing algorithm: model selection for lazy learners", 1997 (races, paired differences);
 S.-H. Kim, B. L. Nelson, "A fully sequential procedure for indifference-zone selection in simulation", 2001
 (indifference, common random numbers, the union over candidates); E. Even-Dar, S. Mannor, Y. Mansour, "Action
 elimination and stopping conditions for the multi-armed bandit and reinforcement learning problems", 2006 (a confidence
-that is spent over rounds).
+that is divided over rounds).
 """
 
 from __future__ import annotations
@@ -32,26 +31,26 @@ from vedette.control.evidence import Evidence
 from vedette.control.search import first_best, tie_of
 from vedette.kernels.base.types import Bools, Floats, Ints
 
-# Samples of the first round, and the factor by which each round adds to them (costs: docs/evidence/planning.md).
+# Samples of the first round, and the growth factor of their number per round (docs/evidence/planning.md gives the cost).
 FIRST_ROUND = 8
 _GROWTH = 1.5
 
 
 def next_total(num_samples: int, most: int) -> int:
-    """Samples in all after the next round, when there are so many now."""
+    """Return the total number of samples after the next round, from the present number."""
     return min(most, FIRST_ROUND if num_samples == 0 else math.ceil(_GROWTH * num_samples))
 
 
 @dataclass(slots=True, eq=False)
 class Race:
-    """Candidates with the rewards that they got so far.
+    """Candidates with their rewards so far.
 
     Attributes:
-        actions: (num_candidates, num_sensors) the joint actions that began, in printed order.
+        actions: (num_candidates, num_sensors) the joint actions at the start, in printed order.
         confidence, indifference: as in `PlanningSettings`.
-        sensor: whose actions race alone; None: those of all sensors, fused.
+        sensor: the sensor whose actions race; None: joint actions of all sensors, fused.
         left: (num_left,) rows of `actions` that are not excluded.
-        rewards: (num_left, num_samples) of those.
+        rewards: (num_left, num_samples) their rewards.
         excluded: for each round, the rows that it excluded and their rewards until then.
     """
 
@@ -77,28 +76,28 @@ class Race:
 
     @property
     def num_samples(self) -> int:
-        """Samples of each candidate so far."""
+        """Number of samples of each candidate so far."""
         return int(self.rewards.shape[1])
 
     @property
     def best(self) -> tuple[int, ...]:
-        """The candidate of largest mean reward."""
+        """The candidate with the largest mean reward."""
         return tuple(self.candidates[self._best].tolist())
 
     @property
     def reached(self) -> float:
-        """The confidence with which the best is within the indifference of the best candidate, at most that wanted."""
+        """The confidence that the best is within the indifference of the best candidate, at most the one required."""
         return self.confidence if self.verdict else min(self.confidence, max(0.0, 1.0 - self._doubt))
 
     @property
     def verdict(self) -> Literal["one left", "indifferent"] | None:
-        """Why it is over; None while it is not."""
+        """Why the race is over; None while it is not."""
         if len(self.left) == 1:
             return "one left"
         return "indifferent" if self._near else None
 
     def add(self, rewards: Floats) -> None:
-        """One round: (num_left, num_new) rewards of the candidates on samples that are the same for all.
+        """Add a round: rewards (num_left, num_new) of the candidates, on samples that are the same for all.
 
         A candidate without a finite mean is excluded.
         """
@@ -111,20 +110,20 @@ class Race:
         self._judge(means, finite)
 
     def note(self, evidence: Evidence) -> None:
-        """Keep what the candidates got, each on as many samples as it took part in."""
+        """Store the rewards of the candidates, each on the samples of the rounds that it took part in."""
         for rows, rewards in (*self.excluded, (self.left, self.rewards)):
             if len(rows):
                 evidence.note(self.actions[rows], rewards)
 
     def _judge(self, means: Floats, finite: Bools) -> None:
-        """Drop what is worse, and see how sure one can be of the best."""
+        """Drop candidates that are worse, and update the confidence in the best."""
         from scipy.special import stdtrit
 
         best, num = self._best, self.rewards.shape[1]
         with np.errstate(invalid="ignore"):
             behind = means[best] - means
             errors = np.std(self.rewards - self.rewards[best], axis=1, ddof=1) / math.sqrt(num)
-        # Of what may go wrong in all, each comparison of each round has one part in so many.
+        # Each comparison of each round gets one part in this number of the total error probability.
         parts = max(1, len(self.actions) - 1) * self._round * (self._round + 1)
         reach = -stdtrit(num - 1, (1.0 - self.confidence) / parts) * errors
         tie = tie_of(float(means[best]))
@@ -140,7 +139,9 @@ class Race:
 
 
 def _chance_beyond(distances: Floats, errors: Floats, num_samples: int) -> Floats:
-    """How likely a mean of so many samples is off by more than a distance, which is positive but for ties."""
+    """Return the probability that a mean of `num_samples` samples has an error above a distance, positive
+    except for ties.
+    """
     from scipy.special import stdtr
 
     beyond = np.where(distances >= 0.0, 0.0, 1.0)

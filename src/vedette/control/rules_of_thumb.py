@@ -1,4 +1,4 @@
-"""Rules of thumb: sensors head for the estimated targets, without any reward, as one would steer them by hand."""
+"""Rules of thumb: sensors head for the estimated targets, without any reward, as manual control would."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from vedette.tracking import State
 
 Rule: TypeAlias = Literal["nearest", "assigned", "centroid"]
 
-# Weight of how well it points, relative to distances: above rounding, below what tells places apart.
+# Weight of the pointing error relative to distances: above rounding, below relevant differences of distances.
 _AIM = 1e-6
-# m, added to the distance of a course that goes nowhere, where the path to its place has bends.
+# m, added to the distance of a course that does not move, if the path to its place has bends.
 _WAITING = 1e6
 
 
 def _nearest(gaps: Floats) -> Ints:
-    """The nearest target of each sensor that none before it took; when all are taken, again from all."""
+    """Return each sensor's nearest target not taken by a sensor before it; when all are taken, from all again."""
     taken = np.zeros(gaps.shape[1], np.int64)
     chosen = []
     for own in gaps:
@@ -40,26 +40,28 @@ def _nearest(gaps: Floats) -> Ints:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RulePlanner:
-    """Every sensor heads for a place among the targets that are estimated now, by a rule of thumb.
+    """A planner by a rule of thumb: every sensor heads for a place among the presently estimated targets.
 
-    Of its courses it takes the one that is nearest to that place on the mean over the horizon, which for courses of one
-    speed is the one nearest in heading; a camera that stays where it is turns to it. Where no target is estimated, each
-    takes its first course. Where constraints forbid zones, distances are lengths of shortest paths around them; a place
-    that no such path leads to is approached as near as they do, and plans name the targets that no sensor can see.
+    It takes the course that is nearest to that place in the mean over the horizon, which for courses of one speed is
+    the one nearest in heading; a stationary camera turns to it. If no target is estimated, each sensor takes its first
+    course. If constraints forbid zones, distances are lengths of shortest paths around them. A place that no path
+    reaches is approached as closely as paths allow, and plans name the targets that no sensor can see.
 
     Attributes:
         sensors: the sensors.
-        rule: "nearest": for each sensor, in printed order, its nearest target that none before it took; "assigned": the
-            s-th target, in the order of labels, for the s-th sensor; "centroid": the mean of all, for all sensors.
-        settings: the horizon, over which courses are told apart.
-        constraints: what the sensors must not do; each then takes the best of what it may, and a joint action that is
-            not allowed is moved to one near it. Where only some sensors may scan, those do that come nearest.
-        estimate: reads the targets off the fused belief.
-        targets: of "assigned": the number of each sensor's target instead, counted from 1; those beyond the last begin
-            again.
+        rule: "nearest": for each sensor, in printed order, its nearest target that no sensor before it took;
+            "assigned": the s-th target, in the order of labels, for the s-th sensor; "centroid": the mean of all, for
+            all sensors.
+        settings: the horizon, over which courses are distinguished.
+        constraints: limits on the sensors' courses; each sensor takes its best feasible course, and a joint action that
+            is not allowed is replaced by a feasible one near it. If only some sensors may scan, those that come nearest
+            do.
+        estimate: estimator that extracts targets from the fused belief.
+        targets: for "assigned": the number of each sensor's target instead, counted from 1; numbers beyond the last
+            target start again from the first.
 
     Raises:
-        InputError: parts of another kind, or `targets` of another rule or number of sensors.
+        InputError: parts of another type, or `targets` with another rule or number of sensors.
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -81,13 +83,13 @@ class RulePlanner:
 
     @property
     def name(self) -> str:
-        """The strategy, as of the rule."""
+        """Name of the strategy: the rule."""
         return self.rule
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
-        """The courses that head for the rule's places; of equal ones the first in printed order. Draws nothing.
+        """Return the courses that head for the rule's places; of equal ones the first in printed order. Draws nothing.
 
-        Raises `InputError` for inputs that do not fit, and as the estimator.
+        Raises `InputError` for invalid inputs, and the errors of the estimator.
         """
         generator(rng)
         instance("state", state, State)
@@ -113,7 +115,7 @@ class RulePlanner:
         return Plan(self.name, tuple(own.actions for own in options), chosen, (), {}, notes)
 
     def _goals(self, places: Floats, sensors: Floats, beyond: BeyondHorizon | None) -> Floats:
-        """(num_sensors, 2) m, where the sensors (num_sensors, 2) head for, of the places (num_targets, 2)."""
+        """Return (num_sensors, 2) m, goals of the sensors (num_sensors, 2) among the places (num_targets, 2)."""
         if self.rule == "centroid":
             return np.tile(places.mean(axis=0), (len(sensors), 1))
         if self.rule == "assigned":
@@ -125,14 +127,14 @@ class RulePlanner:
 
 
 def _merits(own: Options, goal: Floats | None, graph: VisibilityGraph | None) -> Floats:
-    """(num_courses,) less the mean distance to a place; of courses that are equal in it, how well a camera points."""
+    """Return (num_courses,) the negative mean distance to a place; ties are broken by how well a camera points."""
     if goal is None:
         return np.zeros(len(own.courses))
     offsets = goal - own.courses[..., :2]
     gaps, waits = np.hypot(offsets[..., 0], offsets[..., 1]), np.zeros(len(own.courses))
     if graph is not None:
         paths, moves = graph.to(goal[np.newaxis], own.pose[:2]), (own.courses[..., :2] != own.pose[:2]).any(axis=(1, 2))
-        if not paths.are_straight(own.pose[np.newaxis, :2].copy())[0, 0]:  # It may have to step aside first.
+        if not paths.are_straight(own.pose[np.newaxis, :2].copy())[0, 0]:  # The sensor may have to step aside first.
             waits[~moves] = _WAITING
         free = moves & ~graph.is_barred(own.pose[:2], own.courses[..., :2])
         around = paths.distances(own.courses[free, :, :2].reshape(-1, 2)).reshape(gaps[free].shape)

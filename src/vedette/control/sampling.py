@@ -1,4 +1,4 @@
-"""Samples of the fused density, and where their targets go over the horizon."""
+"""Samples of the fused density, and their trajectories over the horizon."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from vedette.models import kernel_motion
 def draw_paths(
     fused: Belief, sensors: Sequence[MobileSensor], settings: PlanningSettings, *, rng: np.random.Generator
 ) -> tuple[MultiTargetSamples, Floats]:
-    """Samples of the fused density, and (horizon_steps, num_targets, state_dim) where they go without noise."""
+    """Return samples of the fused density, and their noise-free states (horizon_steps, num_targets, state_dim)."""
     targets = shared_targets([sensor.filter for sensor in sensors])
     samples = sample_labelled(fused, settings.num_samples, rng=rng)
     with model_errors():
@@ -30,7 +30,7 @@ def draw_paths(
 
 
 def targets_of(table: Ints, labels: Ints, offsets: Ints) -> Ints:
-    """(num_labels, num_samples) place of the target of each label of `table` in each sample, -1 where it is not there.
+    """Return (num_labels, num_samples) the index of the target of each label of `table` in each sample, -1 if absent.
 
     labels: of the sampled targets, which are `offsets[i]:offsets[i + 1]` of sample i.
     """

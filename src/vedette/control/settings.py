@@ -1,4 +1,4 @@
-"""What a planner is told beside the models: how far it looks ahead, with how many samples, and at what cost."""
+"""Settings of planners besides the models: the horizon, the number of samples, and limits on the work."""
 
 from __future__ import annotations
 
@@ -30,12 +30,14 @@ from vedette.models.fields import (
 from vedette.platforms import Options, Platform
 from vedette.platforms.base import Abilities, check_platform
 
-Belief: TypeAlias = GLMB | LMB  # that is planned on
+Belief: TypeAlias = GLMB | LMB  # the beliefs that planners accept
 IDEAL_MODES = {"ideal": IDEAL, "expected": EXPECTED, "sampled": SAMPLED}
 
 
 def planning_limits() -> Limits:
-    """Defaults of the pseudo-updates: few hypotheses, one Gaussian a track, and no label ever dropped."""
+    """Return the default limits of the pseudo-updates: few hypotheses, one Gaussian per track, no label
+    ever dropped.
+    """
     return Limits(
         max_hypotheses=10, min_relative_weight=1e-5, min_track_weight=1.0, max_components=1, min_existence=0.0
     )
@@ -49,40 +51,39 @@ class PlanningSettings:
         horizon_steps: pseudo-updates over the horizon, H (paper: 5).
         horizon_period: time between pseudo-updates, T (paper: 2) [s].
         num_samples: multi-target samples of the expected reward, M, the same ones for every action and sensor (paper:
-            40). With `confidence`, as many as it takes, instead.
+            40). With `confidence`, as many as needed instead.
         ideal_measurements: pseudo-measurements of a sample, never with clutter. "ideal": noise-free, of the targets
-            whose detection probability is at least `detection_threshold`; "expected": noise-free, of targets seen by
-            chance with that probability, so that the mean over samples is the expectation over detections; "sampled":
-            seen by chance, with measurement noise.
-        detection_threshold: ideal measurements see a target when its detection is at least so probable (paper-notes
-            12).
-        association: pseudo-updates of LMB beliefs. "known": each pseudo-measurement is of its own target or else
+            whose detection probability is at least `detection_threshold`; "expected": noise-free, of targets detected
+            at random with that probability, so that the mean over samples is the expectation over detections;
+            "sampled": detected at random, with measurement noise.
+        detection_threshold: minimum detection probability of a target in ideal measurements (paper-notes 12).
+        association: pseudo-updates of LMB beliefs. "known": each pseudo-measurement comes from its own target or from
             clutter, so that labels are independent and rewards are sums over them, which is fast for any number of
-            targets and sensors; "full": the filter's own update, which also asks which of several targets was measured.
-        max_glmb_sensors: with more sensors GLMB beliefs are planned on as LMBs, which plans then say.
+            targets and sensors; "full": the filter's own update, with its data association.
+        max_glmb_sensors: with more sensors GLMB beliefs are planned on as LMBs, and plans say so.
         max_glmb_targets: the same with more targets expected.
-        undetected_worth: what finding a target of `undetected` is worth: a factor of what the reward says that a missed
-            target costs (`missed_cost`: of the expected loss, its cutoff to the power of its order); of rewards that do
-            not say it a number in their units; none: 1 of the former, 0 of the latter; 0: nobody is looked for. Targets
-            not found are taken to stay where they are.
-        end: s, time of the last scan, on the clock of `State.time`: no decision after it is planned for; None: none is.
+        undetected_worth: value of finding a target of `undetected`: a factor on the reward's cost of a missed target
+            (`missed_cost`: for the expected loss, its cutoff to the power of its order); for rewards without such a
+            cost, a number in their units; none: 1 for the former, 0 for the latter; 0: undetected targets are ignored.
+            Undetected targets are assumed not to move.
+        end: s, time of the last scan, on the clock of `State.time`: later decisions are not planned for; None: no end.
         max_prior_hypotheses: most hypotheses, the heaviest, of each local posterior at the start of the horizon. An LMB
-            enters whole.
-        max_version_divergence: densities of one label within so many nats of each other are taken as one, the heavier
-            hypothesis's, at the start of the horizon; 0: none are [nats].
-        max_bound_work: ways to see a target, times samples, that are tried for the bound of a plan.
-        confidence: with it, samples are added until the choice is so surely the best of its candidates, whatever
-            `num_samples` says; see `vedette.control.racing`.
-        indifference: with `confidence`: a reward short of the best by this share of it is good enough; 0.01 is one per
-            cent of the magnitude of the best mean reward.
-        max_samples: with `confidence`: samples after which the decision is taken as it stands.
-        max_seconds: time after which it is taken likewise, at the end of a round of samples, the first of which is
-            always made; and after which a search of rounds or restarts ends with the best that it has found, one at
-            the least. What a seed gives then depends on the speed of the machine; none: no limit [s].
-        limits: caps of the pseudo-updates, which are ranked, not Gibbs sampled, whatever the filter does. Every label
-            set of the prior keeps its heaviest hypothesis beyond these caps, and an LMB keeps all its labels. Tracks
-            that are mixtures are replaced by one Gaussian of their moments beforehand.
-        num_threads: threads that share a decision; 0: one a processor. The result does not depend on it.
+            is not reduced.
+        max_version_divergence: densities of one label within this divergence of each other are merged into that of the
+            heavier hypothesis at the start of the horizon; 0: none are [nats].
+        max_bound_work: maximum number of ways to see a target, times samples, that are tried for the bound of a plan.
+        confidence: samples are added until the choice is the best of its candidates with this confidence, regardless of
+            `num_samples`; see `vedette.control.racing`.
+        indifference: with `confidence`: acceptable shortfall from the best mean reward, as a fraction of its magnitude;
+            0.01 is one per cent.
+        max_samples: with `confidence`: number of samples after which the decision is taken as it stands.
+        max_seconds: time after which the decision is taken as it stands, at the end of a round of samples, of which at
+            least one is run; a search with rounds or restarts then ends with the best action found, after at least one.
+            Results of a seed then depend on the speed of the machine; none: no limit [s].
+        limits: caps of the pseudo-updates, whose hypotheses are ranked, not Gibbs sampled, whatever the filter does.
+            Every label set of the prior keeps its heaviest hypothesis beyond these caps, and an LMB keeps all its
+            labels. Tracks that are mixtures are replaced by one Gaussian of their moments beforehand.
+        num_threads: threads that share a decision; 0: one per processor. The result does not depend on it.
 
     Raises:
         InputError: a field out of range.
@@ -118,29 +119,29 @@ class PlanningSettings:
             )
 
     def horizon_times(self) -> Floats:
-        """(horizon_steps,) s from the decision to each pseudo-update."""
+        """Return (horizon_steps,) s, the times from the decision to each pseudo-update."""
         return self.horizon_period * np.arange(1.0, self.horizon_steps + 1)
 
     def threads(self) -> int:
-        """Number of threads to use."""
+        """Return the number of threads to use."""
         return self.num_threads or processors()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MobileSensor:
-    """A sensor that a planner steers.
+    """A sensor that a planner controls.
 
     Attributes:
         filter: its local filter, with the models of the targets and of the sensor. The joint and the independent
-            planner need one that labels its targets: that believes in a `GLMB`, an `LMB` or a `FactoredGLMB`.
-        platform: what it may do, and where that takes it.
-        scan_times: s, increasing, as `State.time`: when it scans; None: whenever a decision looks ahead to. A
-            pseudo-update counts where it scans at least once in the period that ends with it.
-        belief: the kind of labelled density that the filter believes in; None where it does not label its targets.
-        abilities: what the platform has more than it must.
+            planner need a labelled filter, whose belief is a `GLMB`, an `LMB` or a `FactoredGLMB`.
+        platform: its possible actions, and the poses that follow.
+        scan_times: s, increasing, as `State.time`: times of its scans; None: at every pseudo-update. A pseudo-update
+            counts if it scans at least once in the period that ends with it.
+        belief: type of the filter's labelled density; None if it has no labels.
+        abilities: optional members of the platform.
 
     Raises:
-        InputError: something else than a filter, a platform, or times in order.
+        InputError: an object other than a filter, a platform, or times in order.
     """
 
     filter: Filter
@@ -163,11 +164,11 @@ class MobileSensor:
             object.__setattr__(self, "scan_times", times)
 
     def scans(self, now: float | None, settings: PlanningSettings) -> Bools:
-        """(horizon_steps,) the pseudo-updates of a decision at time `now` that count; None: not known, all."""
+        """Return (horizon_steps,) which pseudo-updates of a decision at time `now` count; None: not known, all."""
         num, period = settings.horizon_steps, settings.horizon_period
         if self.scan_times is None or now is None:
             return np.ones(num, np.bool_)
-        # A scan at the very time of a decision has been taken in; sums of periods differ from it in the last digit.
+        # A scan at the time of a decision is already processed; sums of periods may differ from it in the last digit.
         ends = now + period * (np.arange(num + 1.0) + 1e-6)
         return np.asarray(np.diff(np.searchsorted(self.scan_times, ends, "right")) > 0)
 
@@ -175,7 +176,9 @@ class MobileSensor:
 def scans_within(
     sensors: Sequence[MobileSensor], options: Sequence[Options], now: float | None, settings: PlanningSettings
 ) -> tuple[Bools, ...]:
-    """For each sensor (num_courses, horizon_steps) the pseudo-updates at which it scans on each of its courses."""
+    """Return for each sensor (num_courses, horizon_steps) the pseudo-updates at which it scans on each of
+    its courses.
+    """
     found = []
     for sensor, own in zip(sensors, options, strict=True):
         found.append(own.scans if sensor.scan_times is None else own.scans & sensor.scans(now, settings))

@@ -1,4 +1,4 @@
-"""How much a planned update is worth."""
+"""Rewards: the value of a planned update."""
 
 from vedette.control.rewards.base import HasMissedCost, HasUnitVolume, LabelReward, LinearReward, PowerReward, Reward
 from vedette.control.rewards.labels import (

@@ -1,4 +1,4 @@
-"""How much a planned update is worth."""
+"""Protocols of rewards, and the value of a planned update."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ UnitVolume: TypeAlias = float | Literal["reference"]
 
 
 class Reward(Protocol):
-    """Value of an ideally updated density over the predicted one; larger is better, and it must be finite.
+    """A value of an ideally updated density relative to the predicted one; larger is better, and it must be finite.
 
-    The prediction is of the fused density's kind, the update of the fusion's (or, for a sensor alone, of its filter's):
-    a marginalised GLMB or an LMB. Tracks are single Gaussians, but in what a fusion of the user's own makes. A label
-    set of weight zero is left out of the update.
+    The prediction has the type of the fused density, the update that of the fusion's output (or, for a sensor alone, of
+    its filter's): a marginalised GLMB or an LMB. Tracks are single Gaussians, except in the output of a custom fusion.
+    A label set of weight zero is left out of the update.
     """
 
     def __call__(self, predicted: GLMB | LMB, updated: GLMB | LMB) -> float: ...
@@ -34,54 +34,54 @@ class Reward(Protocol):
 
 @runtime_checkable
 class PowerReward(Protocol):
-    """A reward made of power integrals Z(a, b) of prediction and update: then no fused density need be formed.
+    """A reward made of power integrals Z(a, b) of prediction and update; no fused density needs to be formed.
 
-    Z(a, b) is the log of the set integral of K^((a + b - 1) |X|) predicted(X)^a updated(X)^b over the label sets that
-    both have (see `vedette.divergence.power_integral`). The update need not be normalised: exp(Z(0, 1)) is what it
-    integrates to. It may have the members of `HasUnitVolume` and `LinearReward`, too; without the first K is 1.
+    Z(a, b) is the log of the set integral of K^((a + b - 1) |X|) predicted(X)^a updated(X)^b over the label sets of
+    both (see `vedette.divergence.power_integral`). The update need not be normalised: exp(Z(0, 1)) is its integral. The
+    reward may have the members of `HasUnitVolume` and `LinearReward`, too; without the former K is 1.
     """
 
     @property
     def exponents(self) -> Exponents:
-        """The pairs (a, b) that are wanted."""
+        """The required pairs (a, b)."""
         ...
 
     def combine(self, z: Floats) -> Floats:
-        """Rewards (...) of z (..., num_exponents)."""
+        """Return rewards (...) of z (..., num_exponents)."""
         ...
 
 
 @runtime_checkable
 class LabelReward(Protocol):
-    """A reward made of sums over the targets: then each target is valued by itself, and no density need be formed.
+    """A reward made of sums over the targets: each target is evaluated by itself, and no density needs to be formed.
 
-    Each label adds `num_terms` numbers, which `function` makes of its Bernoulli before and after; `combine` makes the
-    reward of their sums.
+    Each label adds `num_terms` numbers, which `function` computes from its Bernoulli before and after; `combine` turns
+    their sums into the reward.
     """
 
     @property
     def function(self) -> ModelFunction:
-        """Of kind `label_reward`: see `vedette.models.model_function`."""
+        """Function of kind `label_reward`: see `vedette.models.model_function`."""
         ...
 
     @property
     def params(self) -> Floats:
-        """The function's own vector."""
+        """Parameter vector of the function."""
         ...
 
     @property
     def num_terms(self) -> int:
-        """How many numbers a label adds."""
+        """Number of terms that a label adds."""
         ...
 
     def combine(self, sums: Floats) -> Floats:
-        """Rewards (...) of sums over the labels (..., num_terms)."""
+        """Return rewards (...) of sums over the labels (..., num_terms)."""
         ...
 
 
 @runtime_checkable
 class HasUnitVolume(Protocol):
-    """A reward of densities that says what their unit of volume is."""
+    """A reward of densities that has a unit of volume."""
 
     @property
     def unit_volume(self) -> UnitVolume:
@@ -91,26 +91,28 @@ class HasUnitVolume(Protocol):
 
 @runtime_checkable
 class HasMissedCost(Protocol):
-    """A reward that says what a missed target costs; finding one that was never detected is worth so much."""
+    """A reward that has a cost of a missed target, which is the value of finding an undetected target."""
 
     @property
     def missed_cost(self) -> float:
-        """In units of the reward, at least 0."""
+        """Cost in units of the reward, at least 0."""
         ...
 
 
 @runtime_checkable
 class LinearReward(Protocol):
-    """A reward whose `combine` is linear: searches then have bounds and compiled ascents, explanations targets."""
+    """A reward whose `combine` is linear, so that searches have bounds and compiled ascents, and explanations have
+    targets.
+    """
 
     @property
     def coefficients(self) -> Sequence[float] | Floats | None:
-        """(num,) of the numbers that are combined; None, as without it: it is not linear."""
+        """Coefficients (num,) of the combined numbers; None, as without this member: the reward is not linear."""
         ...
 
 
 def check_unit_volume(value: Any) -> None:
-    """`InputError` unless K is a finite number above 0, or the word "reference"."""
+    """Raise `InputError` unless K is a finite number above 0, or the word "reference"."""
     if isinstance(value, str) and value == "reference":
         return
     is_number = isinstance(value, numbers.Real) and not isinstance(value, bool)
@@ -119,7 +121,7 @@ def check_unit_volume(value: Any) -> None:
 
 
 def unit_volume_of(reward: Any, predicted: GLMB | LMB) -> float:
-    """K of a reward; "reference" is 1 for a prediction that expects no target, where K has no say."""
+    """Return K of a reward; "reference" is 1 for a prediction without expected targets, for which K has no effect."""
     value = getattr(reward, "unit_volume", 1.0)
     check_unit_volume(value)
     if value != "reference":
@@ -128,7 +130,7 @@ def unit_volume_of(reward: Any, predicted: GLMB | LMB) -> float:
 
 
 def combined(reward: PowerReward, z: Floats) -> Floats:
-    """The rewards (...) of z (..., num_exponents); `InputError` unless `combine` gives a number for each."""
+    """Return the rewards (...) of z (..., num_exponents); `InputError` unless `combine` gives a number for each."""
     try:
         rewards = np.asarray(reward.combine(z), np.float64)
     except (TypeError, ValueError) as fault:
@@ -139,15 +141,15 @@ def combined(reward: PowerReward, z: Floats) -> Floats:
 
 
 def may_replace(thing: Any, method: str, other: str) -> bool:
-    """Whether one method may be asked instead of the other: not where a subclass has changed the other alone."""
+    """Return True if `method` may replace `other`, that is, no subclass overrides only `other`."""
     for owner in type(thing).__mro__:
         if method in vars(owner) or other in vars(owner):
             return method in vars(owner)
-    return True  # methods of the object itself
+    return True  # methods set on the object itself
 
 
 def _of_labels(reward: LabelReward, predicted: GLMB | LMB, updated: GLMB | LMB) -> float:
-    """The reward of two densities, GLMBs taken as their LMBs; a label that the update lacks is not there any more."""
+    """Return the reward of two densities, GLMBs converted to LMBs; a label missing in the update has existence 0."""
     before, after = (as_lmb(density) for density in (predicted, updated))
     places = places_of(before.tracks.labels, after.tracks.labels)
     old, new = track_moments(before.tracks), track_moments(after.tracks)
@@ -162,7 +164,7 @@ def _of_labels(reward: LabelReward, predicted: GLMB | LMB, updated: GLMB | LMB) 
 
 
 def reward_value(reward: Reward | PowerReward | LabelReward, predicted: GLMB | LMB, updated: Any) -> float:
-    """The reward of one update; `InputError` where it is no number."""
+    """Return the reward of one update; `InputError` if it is not a number."""
     value: Any
     if callable(reward) and may_replace(reward, "__call__", "combine"):
         value = reward(predicted, updated)

@@ -1,7 +1,8 @@
-"""Rewards that are sums over targets, each valued by its Bernoulli before and after the scans.
+"""Rewards that are sums over targets, each evaluated by its Bernoulli before and after the scans.
 
-Model functions take existence, mean (state_dim,), covariance (state_dim, state_dim) of the prediction; the same of the
-update; the function's own vector; and the numbers to be written. Positions are the first two components of a state.
+Model functions take existence, mean (state_dim,) and covariance (state_dim, state_dim) of the prediction; the same of
+the update; the parameter vector of the function; and the output numbers. Positions are the first two components of a
+state.
 """
 
 from __future__ import annotations
@@ -17,36 +18,36 @@ from vedette.kernels.gaussian.linalg import cholesky, log_det_from_factor, solve
 from vedette.models.fields import Checked, Positive, Probability, part
 from vedette.models.functions import ModelFunction, model_function
 
-# A probability below this is taken as this in a quotient.
+# Lower limit of probabilities in a quotient.
 _LEAST = 1e-300
 
 
 class _OneSum:
-    """A reward that is one sum over the labels, of a function without parameters unless it says which."""
+    """A reward that is one sum over the labels, of a function without parameters by default."""
 
     __slots__ = ()
     num_terms: ClassVar[int] = 1
-    sign: ClassVar[float] = -1.0  # of the sum in the reward
+    sign: ClassVar[float] = -1.0  # sign of the sum in the reward
 
     @property
     def params(self) -> Floats:
-        """None."""
+        """Empty vector: the function has no parameters."""
         return np.empty(0)
 
     @property
     def coefficients(self) -> Floats:
-        """Of the sums."""
+        """Coefficients of the sums."""
         return np.array([self.sign])
 
     def combine(self, sums: Floats) -> Floats:
-        """The sum, or less the sum where its sign is -1."""
+        """Return the sum times its sign."""
         return np.asarray(self.sign * sums[..., 0])
 
 
 @part("kullback_leibler", "reward")
 @dataclass(frozen=True, slots=True)
 class KullbackLeiblerReward(_OneSum):
-    """Kullback-Leibler divergence of the update from the prediction, label by label: how much is learnt, in nats.
+    """Kullback-Leibler divergence of the update from the prediction, label by label: the information gained, in nats.
 
     With ideal measurements; under `ideal_measurements: sampled` its mean estimates the mutual information of targets
     and measurements.
@@ -64,7 +65,7 @@ class KullbackLeiblerReward(_OneSum):
 @part("cardinality_variance", "reward")
 @dataclass(frozen=True, slots=True)
 class CardinalityVarianceReward(_OneSum):
-    """Less the variance of the number of targets: sum of r (1 - r) over the labels (of a GLMB, of its LMB)."""
+    """Negative variance of the number of targets: the sum of r (1 - r) over the labels (of a GLMB, of its LMB)."""
 
     words: ClassVar[str] = "minus variance of cardinality"
 
@@ -77,9 +78,9 @@ class CardinalityVarianceReward(_OneSum):
 @part("expected_gospa", "reward")
 @dataclass(frozen=True, slots=True)
 class ExpectedGospaReward(_OneSum, Checked):
-    """Less the mean squared GOSPA (alpha = 2, p = 2) that is to be expected of the best estimate after the update.
+    """Negative mean squared GOSPA (alpha = 2, p = 2) expected of the best estimate after the update.
 
-    Label by label a target is reported where that costs less:
+    Label by label a target is reported if that costs less:
     min(r min(tr P, c^2) + (1 - r) c^2 / 2, r c^2 / 2), P the covariance of the position.
 
     Attributes:
@@ -94,7 +95,7 @@ class ExpectedGospaReward(_OneSum, Checked):
 
     @property
     def missed_cost(self) -> float:
-        """Of a target that is not reported, c^2 / 2 [m^2]."""
+        """Cost of a target that is not reported, c^2 / 2 [m^2]."""
         return 0.5 * self.cutoff**2
 
     @property
@@ -111,11 +112,11 @@ class ExpectedGospaReward(_OneSum, Checked):
 @part("peecs", "reward")
 @dataclass(frozen=True, slots=True)
 class PeecsReward(Checked):
-    """Less the posterior expected error of cardinality and states (Gostar, Hoseinnezhad, Bab-Hadiashar 2013, 2015).
+    """Negative posterior expected error of cardinality and states (Gostar, Hoseinnezhad, Bab-Hadiashar 2013, 2015).
 
     share * 4 / n * sum r (1 - r) + (1 - share) * sum r min(tr P / c^2, 1) / sum r over n labels: the variance of the
-    number of targets relative to the largest there is, and the mean error of their positions relative to a cutoff (in
-    the place of the publication's scale, which is that of the particles at hand).
+    number of targets relative to its largest possible value, and the mean error of their positions relative to a cutoff
+    (instead of the publication's scale, which is that of its particles).
 
     Attributes:
         share: weight of the error of the number of targets.
@@ -141,7 +142,7 @@ class PeecsReward(Checked):
         return np.array([self.cutoff**2])
 
     def combine(self, sums: Floats) -> Floats:
-        """Less the weighed errors; 0 where there is no label."""
+        """Return the negative weighted errors; 0 if there is no label."""
         variance, error, existence, num = np.moveaxis(sums, -1, 0)
         with np.errstate(invalid="ignore", divide="ignore"):
             cardinality = np.where(num > 0.0, 4.0 * variance / num, 0.0)
@@ -160,7 +161,7 @@ def kullback_leibler_of_label(
     params: Floats,
     out: Floats,
 ) -> None:
-    """Kullback-Leibler divergence of the update from the prediction, of Bernoulli and Gaussian.
+    """Write the Kullback-Leibler divergence of the update from the prediction, for Bernoulli and Gaussian.
 
     (1 - r') ln((1 - r') / (1 - r)) + r' (ln(r' / r) + (tr(P^-1 P') + d'P^-1 d - n + ln|P| - ln|P'|) / 2), d = m' - m.
     """
@@ -195,7 +196,7 @@ def cardinality_variance_of_label(
     params: Floats,
     out: Floats,
 ) -> None:
-    """r' (1 - r')."""
+    """Write r' (1 - r')."""
     out[0] = new_existence * (1.0 - new_existence)
 
 
@@ -210,9 +211,9 @@ def gospa_of_label(
     params: Floats,
     out: Floats,
 ) -> None:
-    """Mean squared GOSPA (alpha = 2, p = 2) of the better of reporting the target and not; params: squared cutoff.
+    """Write the mean squared GOSPA (alpha = 2, p = 2) of the better choice, to report the target or not.
 
-    min(r' min(tr P', c^2) + (1 - r') c^2 / 2, r' c^2 / 2).
+    min(r' min(tr P', c^2) + (1 - r') c^2 / 2, r' c^2 / 2). params: squared cutoff.
     """
     square = params[0]
     error = min(new_cov[0, 0] + new_cov[1, 1], square)
@@ -231,7 +232,7 @@ def peecs_of_label(
     params: Floats,
     out: Floats,
 ) -> None:
-    """r' (1 - r'); r' times the share of its position's variance in the squared cutoff, params[0]; r'; and 1."""
+    """Write r' (1 - r'); r' times the position variance relative to the squared cutoff, params[0]; r'; and 1."""
     out[0] = new_existence * (1.0 - new_existence)
     out[1] = new_existence * min((new_cov[0, 0] + new_cov[1, 1]) / params[0], 1.0)
     out[2] = new_existence

@@ -1,4 +1,4 @@
-"""Searching the joint actions of all sensors for the one of largest mean reward."""
+"""Searches over the joint actions of all sensors for the largest mean reward."""
 
 from vedette.control.search.ascent import AutomaticSearch, CoordinateAscent
 from vedette.control.search.cross_entropy import CrossEntropy

@@ -1,4 +1,4 @@
-"""One sensor at a time; and the search that suits the number of sensors."""
+"""Coordinate ascent, one sensor at a time, and the automatic choice of a search by the number of sensors."""
 
 from __future__ import annotations
 
@@ -12,27 +12,28 @@ from vedette.control.constraints import Active
 from vedette.control.search.problem import Joint, JointProblem, RewardCache, best_of_all, tie_of
 from vedette.models.fields import Checked, Count, Repeats, part
 
-# Beyond so many sensors, every joint action is more than a decision has time for.
+# Maximum number of sensors for which every joint action is evaluated.
 _MAX_SENSORS = 3
 
-# Restarts: so many at least. Where the bound leaves a larger share than this to be gained, as many as try some thousand
-# courses in their first sweep: 27 of four sensors with nine courses each, 13 of eight. Of 560 problems of four and five
-# sensors (`benchmarks/searches.py`) 2 found the best in 76 %, 8 in 90 %, 23 in 97 %, 31 in 99 %.
+# Minimum number of restarts. If the relative gap to the bound is larger than the fraction below, the restarts evaluate
+# about a thousand courses in their first sweep: 27 restarts with four sensors of nine courses each, 13 with eight. Of
+# 560 problems of four and five sensors (`benchmarks/searches.py`) 2 restarts found the best in 76 %, 8 in 90 %, 23 in
+# 97 %, 31 in 99 %.
 _NUM_RESTARTS, _LEAST_GAP, _FIRST_TRIES = 2, 0.01, 1000
 
 
 @part("coordinate_ascent", "search")
 @dataclass(frozen=True, slots=True)
 class CoordinateAscent(Checked):
-    """One sensor at a time, the others held, until no sensor alone can do better; for many sensors.
+    """A search of one sensor at a time, the others held, until no sensor alone can do better; for many sensors.
 
-    The first ascent starts at the independent decision, so that its end is never worse than that. The end is a local
+    The first ascent starts at the independent decision, so its result is never worse than that. The result is a local
     maximum: no change of one sensor's action improves it, a change of two might. No joint action is evaluated twice.
 
-    With a mask it goes from one allowed joint action to another. A start that is not allowed is first moved to one near
-    it that is; where none is, the mask is opened (`vedette.control.constraints.relaxed`). Where only some sensors may
-    scan, no sensor alone can change which; then exchanges of two are tried from the best end, and ascents go on from
-    there.
+    With a mask it moves from one allowed joint action to another. A start that is not allowed is first replaced by an
+    allowed one near it; if there is none, the mask is relaxed (`vedette.control.constraints.relaxed`). If only some
+    sensors may scan, no sensor alone can change which ones do; then exchanges of two are tried from the best result,
+    and ascents continue from there.
 
     Attributes:
         num_restarts: ascents from random joint actions, after that from the independent decision.
@@ -44,21 +45,21 @@ class CoordinateAscent(Checked):
     num_restarts: Repeats = 2
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
-        """The best of all ascents; of equal ones that were evaluated the first in printed order."""
+        """Return the best result of all ascents; of equal ones that were evaluated the first in printed order."""
         known = RewardCache(problem)
         ascents(known, first_starts(known, self.num_restarts, rng=rng))
         return known.best()
 
 
 def first_starts(known: RewardCache, num_restarts: int, *, rng: np.random.Generator) -> list[Joint]:
-    """The independent decision, and joint actions drawn at random."""
+    """Return the independent decision, and joint actions drawn at random."""
     return [known.allowed(known.problem.independent()), *known.drawn(num_restarts, rng=rng)]
 
 
 def ascents(known: RewardCache, starts: Sequence[Joint]) -> list[Joint]:
-    """The ends of ascents, which are known then, and so is the first start.
+    """Return the results of ascents; they and the first start are then in the cache.
 
-    Where only some sensors may scan, exchanges of two and ascents go on from the best end until none improves it.
+    If only some sensors may scan, exchanges of two and ascents continue from the best result until none improves it.
     """
     ends = list[Joint]()
     for start in starts:
@@ -76,13 +77,13 @@ def ascents(known: RewardCache, starts: Sequence[Joint]) -> list[Joint]:
 
 
 def _climbed(known: RewardCache, start: Joint) -> Joint:
-    """The end of an ascent."""
+    """Return the result of an ascent."""
     climb = known.problem.ascend
     return _ascend(known, start) if climb is None else known.allowed(climb(start))
 
 
 def _exchanged(known: RewardCache, at: Joint, active: Active) -> Joint | None:
-    """The best joint action with another sensor scanning in the place of one; None: no such one is better."""
+    """Return the best joint action in which another sensor scans instead of one; None: no exchange improves it."""
     found, value = [at], known.values.__getitem__
     for s, course in enumerate(at):
         silent = [joint for joint in known.line(at, s) if not active.on[s][joint[s]]]
@@ -97,7 +98,7 @@ def _exchanged(known: RewardCache, at: Joint, active: Active) -> Joint | None:
 
 
 def _ascend(known: RewardCache, start: Joint) -> Joint:
-    """One ascent. Along a line the first of the largest is taken, to the last digit, so that none goes in circles."""
+    """Return the result of one ascent. On each line the first exact maximum is taken, so that no ascent cycles."""
     at, settled, sensor, num_sensors = start, 0, 0, len(start)
     while settled < num_sensors:
         line = known.line(at, sensor)
@@ -110,10 +111,10 @@ def _ascend(known: RewardCache, start: Joint) -> Joint:
 @part("automatic", "search")
 @dataclass(frozen=True, slots=True)
 class AutomaticSearch(Checked):
-    """Every joint action of up to three sensors; coordinate ascent with restarts for more.
+    """A search of every joint action for up to three sensors; coordinate ascent with restarts for more.
 
-    Two restarts, or up to 1000 over the number of all sensors' courses where the problem has a bound that leaves more
-    than 1 % to be gained.
+    The ascent has two restarts, or up to 1000 divided by the number of all sensors' courses if the problem has a bound
+    that leaves a possible gain of more than 1 %.
 
     Attributes:
         max_joint_actions: number above which two or three sensors are searched by coordinate ascent, too.
@@ -125,7 +126,7 @@ class AutomaticSearch(Checked):
     max_joint_actions: Count = 1_000_000
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
-        """As the search that it is."""
+        """Return the result of the search that it selects."""
         if len(problem.shape) <= _MAX_SENSORS and math.prod(problem.shape) <= self.max_joint_actions:
             return best_of_all(problem, self.max_joint_actions)
         known = RewardCache(problem)

@@ -1,4 +1,4 @@
-"""Joint actions drawn from a distribution that is drawn to the best of them."""
+"""Cross-entropy search: joint actions are drawn from a distribution that moves towards the best of them."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ from vedette.control.search.problem import JointProblem, RewardCache
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.fields import Chance, Checked, Count, Portion, part
 
-# A distribution in which every sensor has an action of this probability has nothing more to find.
+# The search ends when every sensor has an action of this probability.
 _DEGENERATE = 0.99
 
 
 @part("cross_entropy", "search")
 @dataclass(frozen=True, slots=True)
 class CrossEntropy(Checked):
-    """Cross-entropy method: joint actions are drawn, each sensor's action by probabilities of its own, and these are
-    drawn to how often the best joint actions of the round have each action (Rubinstein 1999).
+    """A cross-entropy search, which draws joint actions from probabilities of each sensor's actions.
 
-    The first round holds the independent decision, so that the result is never worse. It ends when the probabilities
-    are degenerate (every sensor has an action of 0.99), when a round draws nothing new, or after `max_rounds`. No joint
-    action is evaluated twice: what is drawn again keeps its reward.
+    After each round the probabilities move towards the frequencies of the actions in the best joint actions of the
+    round (Rubinstein 1999). The first round contains the independent decision, so the result is never worse. The search
+    ends when the probabilities are degenerate (every sensor has an action of 0.99), when a round draws nothing new, or
+    after `max_rounds`. No joint action is evaluated twice: one that is drawn again keeps its reward.
 
-    With a mask, each sensor's action is drawn from those that go with the sensors before it; where there are none, the
-    joint action is moved to one near it that is allowed (`vedette.control.constraints.nearest_feasible`, `relaxed`).
+    With a mask, each sensor's action is drawn from those compatible with the sensors before it; if there are none, the
+    joint action is replaced by an allowed one near it (`vedette.control.constraints.nearest_feasible`, `relaxed`).
 
     Attributes:
         num_samples: joint actions drawn in a round.
-        elite_share: share of these that the probabilities are drawn to, in (0, 1).
-        smoothing: how far they are drawn there in a round, in (0, 1]; 1: all the way.
-        max_rounds: most rounds.
+        elite_share: fraction of these that the probabilities move towards, in (0, 1).
+        smoothing: step size of the probabilities in a round, in (0, 1]; 1: a full step.
+        max_rounds: maximum number of rounds.
 
     Raises:
         InputError: a field out of range.
@@ -45,7 +45,7 @@ class CrossEntropy(Checked):
     max_rounds: Count = 50
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
-        """The best of all that were drawn; of equal ones the first in printed order."""
+        """Return the best joint action drawn; of equal ones the first in printed order."""
         known = RewardCache(problem)
         probabilities = _uniform(known)
         num_elite = math.ceil(self.elite_share * self.num_samples)
@@ -65,7 +65,7 @@ class CrossEntropy(Checked):
 
 
 def _uniform(known: RewardCache) -> Floats:
-    """(num_sensors, most courses) the same probability for all that a sensor may do; 0 elsewhere."""
+    """Return (num_sensors, most courses) equal probabilities for all feasible courses of a sensor; 0 elsewhere."""
     shape = known.problem.shape
     found = np.zeros((len(shape), max(shape)))
     for s in range(len(shape)):
@@ -74,7 +74,7 @@ def _uniform(known: RewardCache) -> Floats:
 
 
 def _draw(mask: Mask | None, probabilities: Floats, num: int, rng: np.random.Generator) -> Ints:
-    """(num, num_sensors) drawn sensor by sensor, of what goes with those before it, if anything does."""
+    """Return (num, num_sensors) drawn sensor by sensor, compatible with the sensors before if possible."""
     at = np.empty((num, len(probabilities)), np.int64)
     for s, own in enumerate(probabilities):
         weights = np.tile(own, (num, 1))
@@ -83,7 +83,7 @@ def _draw(mask: Mask | None, probabilities: Floats, num: int, rng: np.random.Gen
                 weights[:, : clash.shape[1]] *= clash[at[:, other]] == 0
         weights[weights.sum(axis=1) == 0.0] = own
         ends = weights.cumsum(axis=1)
-        # Below the last end, so that what cannot be drawn is not, whatever the rounding.
+        # Below the last cumulative probability, so that actions of probability 0 are never drawn, despite rounding.
         drawn = np.minimum(rng.random(num) * ends[:, -1], np.nextafter(ends[:, -1], 0.0))
         at[:, s] = (drawn[:, np.newaxis] >= ends).sum(axis=1)
     return at

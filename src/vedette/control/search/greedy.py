@@ -1,4 +1,4 @@
-"""One sensor after the other, once."""
+"""Sequential greedy search: one sensor after the other, once."""
 
 from __future__ import annotations
 
@@ -18,18 +18,19 @@ from vedette.models.fields import Checked, part
 @part("sequential_greedy", "search")
 @dataclass(frozen=True, slots=True)
 class SequentialGreedy(Checked):
-    """Sensors are decided one after the other, each by the reward of all; the undecided are presumed to stay.
+    """A search that decides sensors one after the other, each by the reward of all; the undecided are assumed to stay.
 
-    These go on as they are (`vedette.control.inputs.stationary_courses`), so that what they see is not looked at again.
-    The joint action found is never worse than that in which all sensors stay, where that is allowed.
+    The undecided sensors continue as they are (`vedette.control.inputs.stationary_courses`), so that targets that they
+    see are not covered twice. The joint action found is never worse than the one in which all sensors stay, if that is
+    allowed.
 
-    With a mask a sensor takes only what goes with those decided; sensors that are left without anything are decided in
+    With a mask a sensor takes only courses compatible with those decided. Sensors without such a course are decided at
     the end, by the fewest changes found (`vedette.control.constraints.nearest_feasible`, `relaxed`).
 
     Attributes:
-        order: "printed": as the sensors stand. "best_first": always the sensor that adds most; what it adds is taken to
-            shrink as others are decided, which saves most of the evaluations (lazy greedy; Minoux 1978). It may grow,
-            where another sensor leaves a target; such a sensor is looked at again later than it should.
+        order: "printed": in the order of the sensors. "best_first": always the sensor that adds most; its gain is
+            assumed to shrink as others are decided, which saves most of the evaluations (lazy greedy; Minoux 1978). The
+            gain may grow if another sensor leaves a target; such a sensor is then evaluated later than it should be.
 
     Raises:
         InputError: another order.
@@ -38,7 +39,7 @@ class SequentialGreedy(Checked):
     order: Literal["printed", "best_first"] = "printed"
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
-        """The joint action that is decided so; nothing is drawn.
+        """Return the joint action decided in this way; nothing is drawn.
 
         Raises `InputError` for a problem without rewards of sensors that have not decided (`JointProblem.partial`).
         """
@@ -56,7 +57,7 @@ class SequentialGreedy(Checked):
 
 
 class _Steps:
-    """What has been decided, with its reward; -1: not decided."""
+    """The decided sensors' actions with their reward; -1: not decided."""
 
     def __init__(self, known: RewardCache, partial: Callable[[Ints], Floats]) -> None:
         self.known, self.partial = known, partial
@@ -64,7 +65,7 @@ class _Steps:
         self.reward = 0.0
 
     def best(self, sensor: int) -> tuple[float, int] | None:
-        """The largest reward with one more sensor, and its action; None where it may do nothing."""
+        """Return the largest reward with one more sensor, and its action; None if it has no feasible action."""
         actions = self.known.actions(self.at, sensor)
         if not actions:
             return None
@@ -75,20 +76,22 @@ class _Steps:
         return float(rewards[best]), actions[best]
 
     def take(self, sensor: int, best: tuple[float, int] | None) -> None:
-        """Decide a sensor, unless it may do nothing."""
+        """Decide a sensor, unless it has no feasible action."""
         if best is not None:
             self.reward, self.at[sensor] = best
 
     def completed(self) -> Joint:
-        """With an action for the sensors that may do nothing."""
+        """Return the joint action with an action for the sensors without a feasible one."""
         return tuple(max(action, 0) for action in self.at)
 
 
 def _best_first(steps: _Steps) -> None:
-    """Lazy greedy: who seems to add most is looked at again, until that one is known to add most in this round."""
+    """Decide by lazy greedy: the sensor with the largest expected gain is evaluated again, until that gain
+    is current.
+    """
     steps.reward = float(steps.partial(np.array([steps.at], np.int64))[0])
     num_sensors = len(steps.at)
-    # What each is expected to add, negative; the sensor; in which round it was last looked at; its best action then.
+    # Expected gain, negated; the sensor; the round of its last evaluation; its best action then.
     waiting: list[tuple[float, int, int, tuple[float, int] | None]] = [
         (-np.inf, s, -1, None) for s in range(num_sensors)
     ]

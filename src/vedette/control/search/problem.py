@@ -1,4 +1,4 @@
-"""Joint actions of a problem: what a search is given and has to find, with the mean rewards found so far."""
+"""The search problem over joint actions, with the mean rewards found so far."""
 
 from __future__ import annotations
 
@@ -14,43 +14,45 @@ from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.fields import Checked, Count, part
 
-# Rewards nearer than this, relative to the best or to 1, are equal: rounding tells them apart, not what they are worth.
+# Rewards closer than this, relative to the best or to 1, are equal: they differ only by rounding.
 _TIE = 1e-9
 
 Joint = tuple[int, ...]
 
 
 def first_best(rewards: Floats) -> int:
-    """The first of the largest rewards; those within 1e-9 of the largest, relative to it or to 1, are equal to it.
+    """Return the index of the first of the largest rewards, equal within 1e-9 relative to the largest or to 1.
 
-    In a symmetric layout mirrored actions differ by rounding only; the decision must not hang on that (paper-notes 18).
+    In a symmetric layout mirrored actions differ by rounding only; the decision must not depend on that (paper-notes
+    18).
     """
     best = float(rewards.max())
     return int(np.argmax(rewards >= best - tie_of(best)))
 
 
 def tie_of(reward: float) -> float:
-    """Rewards that differ from one by no more than this are equal to it."""
+    """Return the difference up to which rewards are equal to this one."""
     return _TIE * max(1.0, abs(reward))
 
 
 class JointProblem(NamedTuple):
-    """What a search may ask for. An action is a number, in printed order, among a sensor's different courses.
+    """The problem given to a search. An action is the index of a course among a sensor's distinct courses, in printed
+    order.
 
-    shape: number of different courses of each sensor.
-    evaluate: mean joint rewards (num,) of joint actions (num, num_sensors), each row one action a sensor; the same row
-        gives the same number again, at its price.
-    independent: the joint action in which every sensor takes what is best for it alone, of what it may take.
-    mask: which courses and pairs of courses are allowed; None: all.
-    line: mean joint rewards (num_courses,) of all courses of a sensor where the others are held as in a joint action;
-        cheaper than to evaluate them. None: they are evaluated.
-    ascend: the end of a coordinate ascent from a joint action, where it is compiled; it keeps to `mask` if what it
-        starts from does. None: the search ascends itself.
-    partial: as `evaluate`, where -1 says that a sensor has not decided and is presumed to stay as it is. Any joint
-        action may be asked for, allowed or not; nothing is kept as evidence. None: not to be had.
-    bound: what no joint action has a larger mean reward than; inf where that is not known. None: not to be had.
-    late: whether the time for the decision is over: a search of rounds or restarts ends then, with the best that it has
-        found, one ascent or round at the least. None: it never is.
+    shape: number of distinct courses of each sensor.
+    evaluate: returns mean joint rewards (num,) of joint actions (num, num_sensors), each row one action per sensor; the
+        same row gives the same number again, at the same cost.
+    independent: the joint action in which every sensor takes its own best feasible course.
+    mask: allowed courses and pairs of courses; None: all.
+    line: returns mean joint rewards (num_courses,) of all courses of a sensor with the others as in a joint action;
+        cheaper than their evaluation. None: they are evaluated.
+    ascend: returns the result of a compiled coordinate ascent from a joint action; it respects `mask` if its start
+        does. None: the search ascends itself.
+    partial: as `evaluate`, with -1 for a sensor that has not decided and is assumed to stay as it is. It accepts any
+        joint action, allowed or not; nothing is kept as evidence. None: not available.
+    bound: returns an upper bound on the mean reward of any joint action; inf if not known. None: not available.
+    late: returns whether the time for the decision is over. A search with rounds or restarts then ends with the best
+        action it has found, after one ascent or round at least. None: no time limit.
     """
 
     shape: tuple[int, ...]
@@ -66,15 +68,15 @@ class JointProblem(NamedTuple):
 
 @runtime_checkable
 class JointSearch(Protocol):
-    """Finds a joint action of large mean reward."""
+    """A search for a joint action with a large mean reward."""
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
-        """The joint action to take, one action a sensor; of equally good ones the first in printed order."""
+        """Return the joint action to take, one action per sensor; of equally good ones the first in printed order."""
         ...
 
 
 def all_joint_actions(shape: tuple[int, ...]) -> Ints:
-    """(num_joint, num_sensors) every joint action, the last sensor's action fastest."""
+    """Return (num_joint, num_sensors) every joint action, the last sensor's action fastest."""
     number = np.arange(math.prod(shape), dtype=np.int64)
     actions = np.empty((len(number), len(shape)), np.int64)
     for s in reversed(range(len(shape))):
@@ -83,10 +85,10 @@ def all_joint_actions(shape: tuple[int, ...]) -> Ints:
 
 
 class RewardCache:
-    """Rewards of a problem's joint actions, each asked for once.
+    """Rewards of a problem's joint actions, each evaluated once.
 
-    Only joint actions that the problem's mask allows are evaluated. Where none was found that it allows, the mask is
-    opened first (`vedette.control.constraints.relaxed`): to those with the fewest violations that were found.
+    Only joint actions that the problem's mask allows are evaluated. If none was found that it allows, the mask is first
+    relaxed (`vedette.control.constraints.relaxed`) to those with the fewest violations found.
     """
 
     def __init__(self, problem: JointProblem) -> None:
@@ -98,11 +100,11 @@ class RewardCache:
             self.mask, self._allowed = relaxed(problem.mask)
 
     def is_late(self) -> bool:
-        """Whether a search is to end."""
+        """Return True if the search has to end."""
         return self.problem.late is not None and self.problem.late()
 
     def rewards(self, joint_actions: Sequence[Joint]) -> Floats:
-        """(num,) of joint actions; those not yet known are evaluated, all at once."""
+        """Return rewards (num,) of joint actions; those not yet known are evaluated together."""
         new = [joint for joint in dict.fromkeys(joint_actions) if joint not in self.values]
         if new:
             rewards = self.problem.evaluate(np.array(new, np.int64))
@@ -110,7 +112,9 @@ class RewardCache:
         return np.array([self.values[joint] for joint in joint_actions])
 
     def line(self, through: Joint, sensor: int) -> list[Joint]:
-        """The allowed joint actions that differ from one in this sensor's action at most; they become known."""
+        """Return the allowed joint actions that differ at most in this sensor's action; their rewards are
+        then known.
+        """
         ahead, behind = through[:sensor], through[sensor + 1 :]
         joint_actions = [(*ahead, action, *behind) for action in self.actions(through, sensor)]
         if self.problem.line is None:
@@ -121,17 +125,17 @@ class RewardCache:
         return joint_actions
 
     def actions(self, at: Sequence[int], sensor: int) -> list[int]:
-        """What one sensor may do where the others are as in `at`; below 0: not decided yet."""
+        """Return the feasible actions of one sensor, given the others in `at`; below 0: not decided yet."""
         if self.mask is None:
             return list(range(self.problem.shape[sensor]))
         return np.flatnonzero(self.mask.clashes(at, sensor) == 0).tolist()
 
     def allowed(self, joint: Sequence[int]) -> Joint:
-        """A joint action itself where it is allowed; else one near it that is."""
+        """Return a joint action itself if it is allowed, otherwise an allowed one near it."""
         return self.all_allowed(np.array([joint], np.int64))[0]
 
     def all_allowed(self, actions: Ints) -> list[Joint]:
-        """Joint actions (num, num_sensors), each itself where it is allowed; else one near it that is."""
+        """Return joint actions (num, num_sensors), each itself if it is allowed, otherwise an allowed one near it."""
         joints: list[Joint] = list(map(tuple, actions.tolist()))
         if self.mask is None or self._allowed is None:
             return joints
@@ -141,11 +145,11 @@ class RewardCache:
         return joints
 
     def drawn(self, num: int, *, rng: np.random.Generator) -> list[Joint]:
-        """`num` joint actions, drawn uniformly, and those that are not allowed moved to near ones that are."""
+        """Return `num` joint actions drawn uniformly; those not allowed are replaced by allowed ones near them."""
         return self.all_allowed(rng.integers(self.problem.shape, size=(num, len(self.problem.shape))))
 
     def best(self) -> Joint:
-        """The best of all that are known; of equal ones the first in printed order."""
+        """Return the best known joint action; of equal ones the first in printed order."""
         best = max(self.values.values())
         least = best - tie_of(best)
         return min(joint for joint, value in self.values.items() if value >= least)
@@ -154,27 +158,27 @@ class RewardCache:
 @part("exhaustive", "search")
 @dataclass(frozen=True, slots=True)
 class ExhaustiveSearch(Checked):
-    """Every joint action (paper, Algorithm 2): the best there is, and the oracle for all other searches.
+    """A search of every joint action (paper, Algorithm 2): the optimum, and the reference for all other searches.
 
-    With a mask only the joint actions that it allows are formed; if there is none, the mask is opened first
+    With a mask only the joint actions that it allows are formed; if there is none, the mask is first relaxed
     (`vedette.control.constraints.relaxed`).
 
     Attributes:
-        max_joint_actions: bound on their number, which grows as a power of the number of sensors.
+        max_joint_actions: limit on their number, which grows as a power of the number of sensors.
 
     Raises:
-        InputError: a bound below 1.
+        InputError: a limit below 1.
     """
 
     max_joint_actions: Count = 1_000_000
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
-        """The best of all; nothing is drawn. Raises `InputError` for more joint actions than `max_joint_actions`."""
+        """Return the best joint action; nothing is drawn. Raises `InputError` for more than `max_joint_actions`."""
         return best_of_all(problem, self.max_joint_actions)
 
 
 def best_of_all(problem: JointProblem, most: int) -> Joint:
-    """The best of all joint actions that are allowed; raises `InputError` for more than `most`."""
+    """Return the best of all allowed joint actions; raises `InputError` for more than `most`."""
     if problem.mask is None:
         num_joint = math.prod(problem.shape)
         if num_joint > most:
@@ -188,7 +192,7 @@ def best_of_all(problem: JointProblem, most: int) -> Joint:
 
 
 def _allowed(mask: Mask, most: int) -> Ints:
-    """(num_allowed, num_sensors) in printed order, sensor by sensor those that what went before allows."""
+    """Return (num_allowed, num_sensors) in printed order, formed sensor by sensor from compatible courses."""
     found = np.empty((1, 0), np.int64)
     for s, own in enumerate(mask.single):
         courses = np.flatnonzero(own)
