@@ -143,24 +143,24 @@ def _lower(i: int, j: int) -> int:
 
 @borrowing
 def _predict_linear(
-    forms: ModelForms, means: Floats, covs: Floats, num: int, lanes: BatchedGaussians, work: BatchWork
+    forms: ModelForms, means: Floats, covs: Floats, num: int, batch: BatchedGaussians, work: BatchWork
 ) -> int:
     """m <- F m, P <- F P F' + Q; returns how many are not finite or not positive on the diagonal."""
     dim, transition, noise, wrong = means.shape[0], forms.transition, forms.motion_noise, 0
     for i in range(dim):
-        _set(0.0, num, lanes.means[i])
+        _set(0.0, num, batch.means[i])
         for k in range(dim):
-            _add_scaled(transition[i, k], means[k], num, lanes.means[i])
+            _add_scaled(transition[i, k], means[k], num, batch.means[i])
             _set(0.0, num, work.product[i * dim + k])
             for j in range(dim):
                 _add_scaled(transition[i, j], covs[_lower(j, k)], num, work.product[i * dim + k])
     for i in range(dim):
         for j in range(i + 1):
-            out = lanes.covs[place(i, j)]
+            out = batch.covs[place(i, j)]
             _set(0.5 * (noise[i, j] + noise[j, i]), num, out)
             for k in range(dim):
                 _add_scaled(transition[j, k], work.product[i * dim + k], num, out)
-        mean, variance = lanes.means[i], lanes.covs[place(i, i)]
+        mean, variance = batch.means[i], batch.covs[place(i, i)]
         for s in range(num):
             wrong += 0 if 0.0 < variance[s] < math.inf and abs(mean[s]) < math.inf else 1
     return wrong
@@ -174,54 +174,54 @@ def predict_batch(
     means: Floats,
     covs: Floats,
     num: int,
-    lanes: BatchedGaussians,
+    batch: BatchedGaussians,
     work: BatchWork,
 ) -> None:
-    """Predict the first `num` Gaussians of means (state_dim, room) and covs into the lanes, as `prediction.predict`."""
-    if forms.is_linear == 1 and _predict_linear(forms, means, covs, num, lanes, work) == 0:
+    """Predict the first `num` Gaussians of means (state_dim, room) and covs into the batch, as `prediction.predict`."""
+    if forms.is_linear == 1 and _predict_linear(forms, means, covs, num, batch, work) == 0:
         return
     for s in range(num):
         take_state(means, s, work.mean)
         take_matrix(covs, s, work.cov)
         predict(motion, dt, work.mean, work.cov, work.out_mean, work.out_cov, work.scratch)
         for i in range(len(work.mean)):
-            lanes.means[i, s] = work.out_mean[i]
+            batch.means[i, s] = work.out_mean[i]
             for j in range(i + 1):
-                lanes.covs[place(i, j), s] = work.out_cov[i, j]
+                batch.covs[place(i, j), s] = work.out_cov[i, j]
 
 
 @inlined
-def _project(width: int, num: int, lanes: BatchedGaussians, work: BatchWork) -> None:
+def _project(width: int, num: int, batch: BatchedGaussians, work: BatchWork) -> None:
     """W = H P, and the lower triangle of H P H' + R to the factor."""
-    dim, meas_dim = lanes.means.shape[0], lanes.predicted.shape[0]
+    dim, meas_dim = batch.means.shape[0], batch.predicted.shape[0]
     for a in range(meas_dim):
         for j in range(dim):
-            cross = lanes.whitened_cross[a * dim + j]
+            cross = batch.whitened_cross[a * dim + j]
             _set(0.0, num, cross)
             for k in range(width):
-                _add_product(work.jacobian[a * dim + k], lanes.covs[_lower(k, j)], num, cross)
+                _add_product(work.jacobian[a * dim + k], batch.covs[_lower(k, j)], num, cross)
         for b in range(a + 1):
-            entries, noise = lanes.factor[place(a, b)], work.noise[place(a, b)]
+            entries, noise = batch.factor[place(a, b)], work.noise[place(a, b)]
             _set(0.0, num, entries)
             for k in range(width):
-                _add_product(lanes.whitened_cross[a * dim + k], work.jacobian[b * dim + k], num, entries)
+                _add_product(batch.whitened_cross[a * dim + k], work.jacobian[b * dim + k], num, entries)
             for s in range(num):
                 entries[s] += noise[s]
 
 
 @inlined
-def _condition(num: int, lanes: BatchedGaussians, work: BatchWork) -> None:
+def _condition(num: int, batch: BatchedGaussians, work: BatchWork) -> None:
     """Factor the innovation covariances, whiten the cross, and take the posterior covariances."""
-    dim, meas_dim, volume = lanes.means.shape[0], lanes.predicted.shape[0], work.volume
+    dim, meas_dim, volume = batch.means.shape[0], batch.predicted.shape[0], work.volume
     _set(1.0, num, volume)
     for a in range(meas_dim):
-        pivots = lanes.factor[place(a, a)]
+        pivots = batch.factor[place(a, a)]
         for b in range(a + 1):
-            entries = lanes.factor[place(a, b)]
+            entries = batch.factor[place(a, b)]
             for k in range(b):
-                _subtract_product(lanes.factor[place(a, k)], lanes.factor[place(b, k)], num, entries)
+                _subtract_product(batch.factor[place(a, k)], batch.factor[place(b, k)], num, entries)
             if b < a:
-                divisors = lanes.factor[place(b, b)]
+                divisors = batch.factor[place(b, b)]
                 for s in range(num):
                     entries[s] /= divisors[s]
         for s in range(num):
@@ -230,40 +230,40 @@ def _condition(num: int, lanes: BatchedGaussians, work: BatchWork) -> None:
         for s in range(num):
             pivots[s] = math.sqrt(pivots[s] if pivots[s] > 0.0 else math.nan)
         for j in range(dim):
-            cross = lanes.whitened_cross[a * dim + j]
+            cross = batch.whitened_cross[a * dim + j]
             for k in range(a):
-                _subtract_product(lanes.factor[place(a, k)], lanes.whitened_cross[k * dim + j], num, cross)
+                _subtract_product(batch.factor[place(a, k)], batch.whitened_cross[k * dim + j], num, cross)
             for s in range(num):
                 cross[s] /= pivots[s]
     for i in range(dim):
         for j in range(i + 1):
-            given, out = lanes.covs[place(i, j)], lanes.posterior[place(i, j)]
+            given, out = batch.covs[place(i, j)], batch.posterior[place(i, j)]
             for s in range(num):
                 out[s] = given[s]
             for a in range(meas_dim):
-                _subtract_product(lanes.whitened_cross[a * dim + i], lanes.whitened_cross[a * dim + j], num, out)
+                _subtract_product(batch.whitened_cross[a * dim + i], batch.whitened_cross[a * dim + j], num, out)
 
 
 @inlined
-def _mark_bent(width: int, num: int, lanes: BatchedGaussians, work: BatchWork) -> None:
+def _mark_bent(width: int, num: int, batch: BatchedGaussians, work: BatchWork) -> None:
     """Make NaN the volumes of Gaussians over which measurements bend, see `innovation`."""
-    volume, squares, first, second = work.volume, work.offsets.squares, lanes.covs[0], lanes.covs[place(1, 1)]
-    dim, scale = lanes.means.shape[0], 4.0 * LARGEST_BEND * LARGEST_BEND
-    for a in range(lanes.predicted.shape[0]):
+    volume, squares, first, second = work.volume, work.offsets.squares, batch.covs[0], batch.covs[place(1, 1)]
+    dim, scale = batch.means.shape[0], 4.0 * LARGEST_BEND * LARGEST_BEND
+    for a in range(batch.predicted.shape[0]):
         along, across, noise = work.jacobian[a * dim], work.jacobian[a * dim + 1], work.noise[place(a, a)]
         for s in range(num):
             variance = first[s] + second[s]
             slope = (along[s] * along[s] + across[s] * across[s]) * variance
             for j in range(2, width):
-                slope += 4.0 * work.jacobian[a * dim + j, s] ** 2 * lanes.covs[place(j, j), s]
+                slope += 4.0 * work.jacobian[a * dim + j, s] ** 2 * batch.covs[place(j, j), s]
             volume[s] = math.nan if variance * slope > scale * squares[s] * noise[s] else volume[s]
 
 
 @inlined
-def _mark_cancelled(num: int, lanes: BatchedGaussians, work: BatchWork) -> int:
+def _mark_cancelled(num: int, batch: BatchedGaussians, work: BatchWork) -> int:
     """Make NaN the volumes of Gaussians that must go by themselves, see `innovation`; returns their number."""
     volume, noise, wrong = work.volume, work.noise, 0
-    if lanes.predicted.shape[0] == 1:
+    if batch.predicted.shape[0] == 1:
         own = noise[0]
         for s in range(num):
             volume[s] = volume[s] if LEAST_SHRINKAGE * volume[s] < own[s] else math.nan
@@ -278,63 +278,63 @@ def _mark_cancelled(num: int, lanes: BatchedGaussians, work: BatchWork) -> int:
 
 
 @inlined
-def _put_innovation(s: int, lanes: BatchedGaussians, work: BatchWork) -> None:
+def _put_innovation(s: int, batch: BatchedGaussians, work: BatchWork) -> None:
     """Write what one Gaussian expects to its lane, all except the probability of detection."""
-    dim, innovation = lanes.means.shape[0], work.innovation
-    for a in range(lanes.predicted.shape[0]):
-        lanes.predicted[a, s] = innovation.predicted[0, a]
+    dim, innovation = batch.means.shape[0], work.innovation
+    for a in range(batch.predicted.shape[0]):
+        batch.predicted[a, s] = innovation.predicted[0, a]
         for b in range(a + 1):
-            lanes.factor[place(a, b), s] = innovation.factor[0, a, b]
+            batch.factor[place(a, b), s] = innovation.factor[0, a, b]
         for j in range(dim):
-            lanes.whitened_cross[a * dim + j, s] = innovation.whitened_cross[0, a, j]
+            batch.whitened_cross[a * dim + j, s] = innovation.whitened_cross[0, a, j]
     for i in range(dim):
         for j in range(i + 1):
-            lanes.posterior[place(i, j), s] = innovation.covs[0, i, j]
-    lanes.log_norm[s] = innovation.log_norm[0]
+            batch.posterior[place(i, j), s] = innovation.covs[0, i, j]
+    batch.log_norm[s] = innovation.log_norm[0]
 
 
 @borrowing
-def _expect_alone(sensor: Sensor, pose: Floats, s: int, lanes: BatchedGaussians, work: BatchWork) -> None:
-    take_state(lanes.means, s, work.mean)
-    take_matrix(lanes.covs, s, work.cov)
+def _expect_alone(sensor: Sensor, pose: Floats, s: int, batch: BatchedGaussians, work: BatchWork) -> None:
+    take_state(batch.means, s, work.mean)
+    take_matrix(batch.covs, s, work.cov)
     expect(sensor, pose, work.mean, work.cov, 0, work.innovation, work.scratch)
-    _put_innovation(s, lanes, work)
-    lanes.prob_detection[s], work.bends[s] = work.innovation.prob_detection[0], work.innovation.bends[0]
+    _put_innovation(s, batch, work)
+    batch.prob_detection[s], work.bends[s] = work.innovation.prob_detection[0], work.innovation.bends[0]
 
 
 @borrowing
 def expect_batch(
-    sensor: Sensor, forms: ModelForms, pose: Floats, num: int, lanes: BatchedGaussians, work: BatchWork
+    sensor: Sensor, forms: ModelForms, pose: Floats, num: int, batch: BatchedGaussians, work: BatchWork
 ) -> None:
     """Fill in what the first `num` predicted Gaussians expect of a scan from a pose, as `innovation.expect`."""
-    meas_dim, scratch, offsets = lanes.predicted.shape[0], work.scratch, work.offsets
+    meas_dim, scratch, offsets = batch.predicted.shape[0], work.scratch, work.offsets
     for s in range(num):
         work.bends[s] = False
     if sensor.method not in (LINEARISED, SWITCHED) or meas_dim > 2:
         for s in range(num):
-            _expect_alone(sensor, pose, s, lanes, work)
+            _expect_alone(sensor, pose, s, batch, work)
         return
-    means = lanes.means
+    means = batch.means
     find_offsets(pose, means, num, offsets)
-    fill_measurements(sensor, forms.measurement, pose, means, offsets, num, scratch, lanes.predicted)
+    fill_measurements(sensor, forms.measurement, pose, means, offsets, num, scratch, batch.predicted)
     fill_jacobians(sensor, forms.measurement, pose, means, offsets, num, scratch, work.jacobian)
     fill_noise(sensor, forms.noise, pose, means, offsets, num, scratch, work.noise)
     width = jacobian_width(forms.measurement, means.shape[0])
-    _project(width, num, lanes, work)
-    _condition(num, lanes, work)
+    _project(width, num, batch, work)
+    _condition(num, batch, work)
     if sensor.method == SWITCHED:
-        _mark_bent(width, num, lanes, work)
-    wrong = _mark_cancelled(num, lanes, work)
+        _mark_bent(width, num, batch, work)
+    wrong = _mark_cancelled(num, batch, work)
     for s in range(num):
-        lanes.log_norm[s] = work.volume[s]
-    logs(lanes.log_norm[:num], offsets.bits, offsets.more_bits)
+        batch.log_norm[s] = work.volume[s]
+    logs(batch.log_norm[:num], offsets.bits, offsets.more_bits)
     for s in range(num):
-        lanes.log_norm[s] = -0.5 * (lanes.log_norm[s] + meas_dim * LOG_2PI)
-    fill_detection_of_gaussians(sensor, forms, pose, means, lanes.covs, offsets, num, scratch, lanes.prob_detection)
+        batch.log_norm[s] = -0.5 * (batch.log_norm[s] + meas_dim * LOG_2PI)
+    fill_detection_of_gaussians(sensor, forms, pose, means, batch.covs, offsets, num, scratch, batch.prob_detection)
     if wrong > 0:
         for s in range(num):
             if not 1e-290 < work.volume[s] < 1e290:
-                _expect_alone(sensor, pose, s, lanes, work)
+                _expect_alone(sensor, pose, s, batch, work)
 
 
 @borrowing
@@ -344,7 +344,7 @@ def relinearise_batch(
     measurements: Floats,
     is_seen: Bools,
     num: int,
-    lanes: BatchedGaussians,
+    batch: BatchedGaussians,
     work: BatchWork,
 ) -> None:
     """Replace what Gaussians that bend expect by what they expect near their measurements, where these are seen.
@@ -355,14 +355,14 @@ def relinearise_batch(
     for s in range(num):
         if not (work.bends[s] and is_seen[s]):
             continue
-        take_state(lanes.means, s, work.mean)
-        take_matrix(lanes.covs, s, work.cov)
+        take_state(batch.means, s, work.mean)
+        take_matrix(batch.covs, s, work.cov)
         take_state(measurements, s, work.measurement)
         expect_measurement(sensor, pose, work.mean, work.cov, 0, work.innovation, work.scratch)
         pair = Pair(pose, work.mean, work.cov, work.measurement)
         relinearise(sensor, pair, PairWork(work.innovation, work.scratch))
-        _put_innovation(s, lanes, work)
+        _put_innovation(s, batch, work)
         for a in range(len(work.measurement)):
-            measurements[a, s], lanes.predicted[a, s] = work.scratch.residual[a], 0.0
+            measurements[a, s], batch.predicted[a, s] = work.scratch.residual[a], 0.0
             for b in range(a + 1):
-                lanes.factor[place(a, b), s] = 1.0 if a == b else 0.0
+                batch.factor[place(a, b), s] = 1.0 if a == b else 0.0

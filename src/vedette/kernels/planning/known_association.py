@@ -73,7 +73,7 @@ class Followed(NamedTuple):
 class Work(NamedTuple):
     """Arrays in which samples are followed."""
 
-    lanes: BatchedGaussians
+    batch: BatchedGaussians
     own: BatchWork
     targets: Floats  # (state_dim, room) the label's targets; its own predicted mean where it is not there
     measurements: Floats  # (meas_dim, room) of the targets, and then the whitened residuals
@@ -104,15 +104,15 @@ def _make_work(dim: int, meas_dim: int, room: int) -> Work:
 
 
 @inlined
-def _take_path(belief: Belief, label: int, step: int, num: int, lanes: BatchedGaussians) -> None:
+def _take_path(belief: Belief, label: int, step: int, num: int, batch: BatchedGaussians) -> None:
     """As the label is without any scan."""
     mean, cov = belief.paths.means[label, step], belief.paths.covs[label, step]
     for i in range(len(mean)):
         for j in range(i + 1):
-            entries = lanes.covs[place(i, j)]
+            entries = batch.covs[place(i, j)]
             for s in range(num):
                 entries[s] = cov[i, j]
-        entries = lanes.means[i]
+        entries = batch.means[i]
         for s in range(num):
             entries[s] = mean[i]
 
@@ -127,7 +127,7 @@ def _look(
     for s in range(num):
         target = belief.targets[label, first + s]
         for j in range(targets.shape[0]):
-            targets[j, s] = futures.states[step, target, j] if target >= 0 else work.lanes.means[j, s]
+            targets[j, s] = futures.states[step, target, j] if target >= 0 else work.batch.means[j, s]
     find_offsets(pose, targets, num, offsets)
     fill_detection(sensor, forms, pose, targets, offsets, num, scratch, work.detection)
     count = 0
@@ -168,11 +168,11 @@ def _take_clutter(decision: Decision, pose: Floats, num: int, work: Work) -> Non
 @inlined
 def _whiten(decision: Decision, num: int, work: Work) -> None:
     """Measurements become whitened residuals, and levels + log N(z; h(m), S) the levels."""
-    lanes, levels = work.lanes, work.levels
+    batch, levels = work.batch, work.levels
     for s in range(num):
-        levels[s] += lanes.log_norm[s]
-    for a in range(lanes.predicted.shape[0]):
-        residuals, predicted, away = work.measurements[a], lanes.predicted[a], 0
+        levels[s] += batch.log_norm[s]
+    for a in range(batch.predicted.shape[0]):
+        residuals, predicted, away = work.measurements[a], batch.predicted[a], 0
         for s in range(num):
             residuals[s] -= predicted[s]
         if decision.sensor.angular[a]:
@@ -182,10 +182,10 @@ def _whiten(decision: Decision, num: int, work: Work) -> None:
                 for s in range(num):
                     residuals[s] = residuals[s] if work.own.bends[s] else wrap_angle(residuals[s])
         for k in range(a):
-            factors, others = lanes.factor[place(a, k)], work.measurements[k]
+            factors, others = batch.factor[place(a, k)], work.measurements[k]
             for s in range(num):
                 residuals[s] -= factors[s] * others[s]
-        divisors = lanes.factor[place(a, a)]
+        divisors = batch.factor[place(a, a)]
         for s in range(num):
             residuals[s] /= divisors[s]
         for s in range(num):
@@ -195,7 +195,7 @@ def _whiten(decision: Decision, num: int, work: Work) -> None:
 @inlined
 def _weigh(num: int, work: Work, out: Followed) -> None:
     """Multiply the odds: log (1 - P_D + P_D N / kappa) = log (1 - P_D) + log (1 + P_D exp(levels - log (1 - P_D)))."""
-    detection, levels, missed, rest = work.lanes.prob_detection, work.levels, work.missed, work.detection
+    detection, levels, missed, rest = work.batch.prob_detection, work.levels, work.missed, work.detection
     for s in range(num):
         relative = levels[s] - missed[s]
         # Beyond the largest exponent the 1 is lost beside the rest.
@@ -213,17 +213,17 @@ def _weigh(num: int, work: Work, out: Followed) -> None:
 @inlined
 def _update(num: int, work: Work, out: Followed) -> None:
     """Means and covariances of the samples that are seen are updated, of the others predicted."""
-    lanes, seen, dim = work.lanes, work.is_seen, out.means.shape[0]
+    batch, seen, dim = work.batch, work.is_seen, out.means.shape[0]
     for i in range(dim):
-        given, means = lanes.means[i], out.means[i]
+        given, means = batch.means[i], out.means[i]
         for s in range(num):
             means[s] = given[s]
-        for a in range(lanes.predicted.shape[0]):
-            whitened, cross = work.measurements[a], lanes.whitened_cross[a * dim + i]
+        for a in range(batch.predicted.shape[0]):
+            whitened, cross = work.measurements[a], batch.whitened_cross[a * dim + i]
             for s in range(num):
                 means[s] += cross[s] * whitened[s] if seen[s] else 0.0
     for k in range(out.covs.shape[0]):
-        predicted, updated, covs = lanes.covs[k], lanes.posterior[k], out.covs[k]
+        predicted, updated, covs = batch.covs[k], batch.posterior[k], out.covs[k]
         for s in range(num):
             covs[s] = updated[s] if seen[s] else predicted[s]
     for s in range(num):
@@ -231,13 +231,13 @@ def _update(num: int, work: Work, out: Followed) -> None:
 
 
 @borrowing
-def _keep_predicted(num: int, lanes: BatchedGaussians, out: Followed) -> None:
+def _keep_predicted(num: int, batch: BatchedGaussians, out: Followed) -> None:
     for i in range(out.means.shape[0]):
-        given, means = lanes.means[i], out.means[i]
+        given, means = batch.means[i], out.means[i]
         for s in range(num):
             means[s] = given[s]
     for k in range(out.covs.shape[0]):
-        given, covs = lanes.covs[k], out.covs[k]
+        given, covs = batch.covs[k], out.covs[k]
         for s in range(num):
             covs[s] = given[s]
 
@@ -248,35 +248,35 @@ def _follow(
 ) -> None:
     """Follow a label over a course, with `num` samples from `first` on."""
     sensor, forms, horizon, is_path = decision.sensor, decision.forms, decision.horizon, True
-    lanes, own, missed = work.lanes, work.own, work.missed
+    batch, own, missed = work.batch, work.own, work.missed
     for s in range(num):
         out.log_odds[s], out.log_miss[s], out.is_measured[s] = 0.0, 0.0, False
     for step in range(horizon.poses.shape[1]):
         pose = horizon.poses[course, step]
         # Until a first measurement all samples have the same label.
         if is_path:
-            _take_path(belief, label, step, num, lanes)
+            _take_path(belief, label, step, num, batch)
         else:
-            predict_batch(decision.motion, forms, horizon.dt, out.means, out.covs, num, lanes, own)
+            predict_batch(decision.motion, forms, horizon.dt, out.means, out.covs, num, batch, own)
         if not horizon.scans[course, step]:
-            _keep_predicted(num, lanes, out)
+            _keep_predicted(num, batch, out)
             continue
-        expect_batch(sensor, forms, pose, num, lanes, own)
+        expect_batch(sensor, forms, pose, num, batch, own)
         for s in range(num):
-            missed[s] = max(1.0 - lanes.prob_detection[s], LEAST_MISS)
+            missed[s] = max(1.0 - batch.prob_detection[s], LEAST_MISS)
         logs(missed[:num], own.offsets.bits, own.offsets.more_bits)
         for s in range(num):
             out.log_miss[s] += missed[s]
             out.log_odds[s] += missed[s]
         if _look(belief, decision, course, label, step, first, num, work) > 0:
             _take_clutter(decision, pose, num, work)
-            relinearise_batch(sensor, pose, work.measurements, work.is_seen, num, lanes, own)
+            relinearise_batch(sensor, pose, work.measurements, work.is_seen, num, batch, own)
             _whiten(decision, num, work)
             _weigh(num, work, out)
             _update(num, work, out)
             is_path = False
         else:
-            _keep_predicted(num, lanes, out)
+            _keep_predicted(num, batch, out)
 
 
 @kernel
