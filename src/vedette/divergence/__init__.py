@@ -1,4 +1,4 @@
-"""How far apart two beliefs are: Cauchy-Schwarz and Renyi divergences, and the power integrals they are made of."""
+"""Divergences between two beliefs: Cauchy-Schwarz and Renyi, and the power integrals that they are made of."""
 
 from vedette.divergence.closed_form import Density, Support, cauchy_schwarz, log_inner_product
 from vedette.divergence.power import power_integral, power_integrals, reference_unit_volume, renyi

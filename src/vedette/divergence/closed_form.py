@@ -23,33 +23,33 @@ Support = Literal["full", "common"]
 
 MAX_PRODUCTS = 100_000
 
-# Of the magnitude of the logs: rounding of sums over a million pairs of hypotheses stays below.
+# Tolerance relative to the magnitude of the logs: rounding of sums over a million pairs of hypotheses stays below.
 _ROUNDING = 1e-11
 
 
 def cauchy_schwarz(a: Density, b: Density, *, unit_volume: float = 1.0, support: Support = "full") -> float:
-    """Cauchy-Schwarz divergence of two densities (paper eqs. 5, 8 and 9), at least 0, symmetric.
+    """Return the Cauchy-Schwarz divergence of two densities (paper eqs. 5, 8 and 9), at least 0, symmetric.
 
-    It is 0 for equal ones, to rounding, and exactly for a density and itself.
+    It is 0 for equal densities, up to rounding, and exactly for a density and itself.
 
     GLMB (Beard et al. 2017, "Void probabilities and Cauchy-Schwarz divergence for generalized labeled multi-Bernoulli
-    models"): all pairs of hypotheses that share a label set. LMB: the sum over labels of the Bernoulli divergences.
-    An LMB and a GLMB: the LMB is taken on the GLMB's label sets. Products of GLMBs: the sum over the smallest groups of
-    labels of which neither density has a factor that spans two; labels that are alone in both are compared as LMBs, the
-    others on all products of their factors. Two Poisson densities (Hoang et al. 2015): K / 2
+    models"): all pairs of hypotheses that share a label set. LMB: the sum over labels of the Bernoulli divergences. An
+    LMB and a GLMB: the LMB is evaluated on the GLMB's label sets. Products of GLMBs: the sum over the smallest groups
+    of labels such that no factor of either density spans two groups; labels that form factors of their own in both are
+    compared as LMBs, the others on all products of their factors. Two Poisson densities (Hoang et al. 2015): K / 2
     times the squared L2 distance of the intensities.
 
     unit_volume: K, the unit of hyper-volume of a state (units of the state multiplied), which weighs cardinalities
         against each other; see `reference_unit_volume`.
     support: "full" as in the paper. "common" leaves out, in all three terms, the label sets that one of the densities
-        lacks (two LMBs, and labels that are alone in both: the labels), because a set that was only cut off by a cap is
-        no difference of belief; with it, the divergence is 0 too for densities that are proportional on what they
-        share.
+        lacks (two LMBs, and labels that form factors of their own in both: the labels), because a set that was only
+        removed by a cap is not a difference of the beliefs; the divergence is then 0 too for densities that are
+        proportional on their common label sets.
 
-    Infinite where the densities have no label set in common. A result below 0 by rounding (1e-11 of the logs'
-    magnitude) is 0. Raises `InputError` for densities that cannot be compared (labelled with unlabelled, other state
-    dimensions, support "common" for Poisson or with nothing in common) or are not valid, and `NumericalError` where
-    the inner products contradict the Cauchy-Schwarz inequality.
+    Infinite if the densities have no label set in common. A result below 0 by rounding (1e-11 of the logs' magnitude)
+    is 0. Raises `InputError` for densities that cannot be compared (labelled with unlabelled, other state dimensions,
+    support "common" for Poisson or with nothing in common) or are not valid, and `NumericalError` if the inner products
+    contradict the Cauchy-Schwarz inequality.
     """
     log_unit_volume = check_densities({"a": a, "b": b}, unit_volume)
     check_support(support)
@@ -65,12 +65,12 @@ def cauchy_schwarz(a: Density, b: Density, *, unit_volume: float = 1.0, support:
     if cross == -math.inf:
         return math.inf
     if a is b:
-        cross = own_a  # the same terms, which the sums add up in different orders
+        cross = own_a  # the same terms, which the sums add in different orders
     return at_least_zero(0.5 * (own_a + own_b) - cross, max(abs(own_a), abs(own_b)))
 
 
 def log_inner_product(a: Density, b: Density, *, unit_volume: float = 1.0) -> float:
-    """log zeta(a, b), zeta the set integral of K^|X| a(X) b(X) (paper eq. 9); -inf where nothing is shared.
+    """Return log zeta(a, b), with zeta the set integral of K^|X| a(X) b(X) (paper eq. 9); -inf if nothing is shared.
 
     Raises `InputError` for densities that cannot be compared or are not valid.
     """
@@ -84,7 +84,7 @@ def log_inner_product(a: Density, b: Density, *, unit_volume: float = 1.0) -> fl
 
 
 def check_densities(densities: dict[str, Density], unit_volume: float) -> float:
-    """Raise `InputError` for two densities that cannot be compared; returns the log of the unit volume."""
+    """Return the log of the unit volume; raise `InputError` for two densities that cannot be compared."""
     positive("unit_volume", unit_volume)
     for name, density in densities.items():
         if not isinstance(density, Density):
@@ -103,7 +103,7 @@ def check_densities(densities: dict[str, Density], unit_volume: float) -> float:
 
 
 def check_support(support: str) -> None:
-    """Raise `InputError` for another word."""
+    """Raise `InputError` unless the support is "full" or "common"."""
     if support not in ("full", "common"):
         raise InputError(f"support: expected 'full' or 'common'; got {support!r}")
 
@@ -111,18 +111,20 @@ def check_support(support: str) -> None:
 def log_inner_products(
     a: Labelled, b: Labelled, log_unit_volume: float, common: bool, *, self_terms: bool
 ) -> tuple[float, float, float]:
-    """log zeta(a, b), zeta(a, a), zeta(b, b) of labelled densities; the last two may be -inf unless `self_terms`."""
+    """Return log zeta(a, b), zeta(a, a), zeta(b, b) of labelled densities; the last two may be -inf unless
+    `self_terms`.
+    """
     parts = [_of_parts(p, q, log_unit_volume, common, self_terms) for p, q in paired_parts(a, b)]
     cross, own_a, own_b = (sum(logs) for logs in zip((0.0, 0.0, 0.0), *parts, strict=True))
     return cross, own_a, own_b
 
 
 def paired_parts(p: Labelled, q: Labelled) -> list[tuple[Labelled, Labelled]]:
-    """Parts of which p and q are the products, pair by pair of the same labels, no two pairs sharing one.
+    """Return parts whose products are p and q, as pairs with the same labels; no two pairs share a label.
 
-    The densities themselves where neither is a product. Labels that are alone in both come together in one pair of
-    LMBs. The parts of the other pairs are GLMBs of all products of their factors, or LMBs where each factor is of one
-    label.
+    If neither is a product, the only pair is the densities themselves. Labels that form factors of their own in both
+    are combined in one pair of LMBs. The parts of the other pairs are GLMBs of all products of their factors, or LMBs
+    if each factor has one label.
 
     Raises `InputError` for more than `MAX_PRODUCTS` products of factors of one density in one pair.
     """
@@ -182,7 +184,7 @@ def _lmbs(a: LMB, b: LMB, log_unit_volume: float, common: bool) -> tuple[float, 
 
 
 def _intensities(a: Poisson, b: Poisson) -> Tracks:
-    """The two intensities as tracks 0 and 1."""
+    """Return the two intensities as tracks 0 and 1."""
     sizes = [len(a.log_weights), len(b.log_weights)]
     components = joined_components([a.to_kernel(), b.to_kernel()])
     return Tracks(np.zeros((2, 2), np.int64), np.cumsum([0, *sizes]), components)
@@ -195,7 +197,7 @@ def _poisson(a: Poisson, b: Poisson, log_unit_volume: float) -> float:
 
 
 def _overlap(tracks: Tracks, i: int, j: int, log_unit_volume: float) -> float:
-    """K times the integral of the product of two intensities; `NumericalError` where it is no number."""
+    """Return K times the integral of the product of two intensities; `NumericalError` if it is not a number."""
     try:
         return math.exp(log_unit_volume + log_tracks(tracks, i, j))
     except OverflowError:
@@ -203,7 +205,7 @@ def _overlap(tracks: Tracks, i: int, j: int, log_unit_volume: float) -> float:
 
 
 def at_least_zero(divergence: float, magnitude: float, name: str = "Cauchy-Schwarz") -> float:
-    """`divergence`, or 0 where it is below by rounding. Raises `NumericalError` where it is further below or NaN."""
+    """Return `divergence`, or 0 if it is below by rounding. Raises `NumericalError` if it is further below or NaN."""
     if not divergence >= -_ROUNDING * max(1.0, magnitude):
         raise NumericalError(f"{name} divergence: expected at least 0; got {divergence}")
     return max(divergence, 0.0) + 0.0  # no -0

@@ -25,7 +25,7 @@ from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import real, reject
 
-# Of mixtures, too: the inner products are in closed form, the other two are sums of weights.
+# Exponents that mixtures allow, too: inner products are in closed form, the other two are sums of weights.
 _INNER_PRODUCTS = {(1.0, 1.0): 0, (2.0, 0.0): 1, (0.0, 2.0): 2}
 _MASSES = ((1.0, 0.0), (0.0, 1.0))
 
@@ -33,25 +33,25 @@ _MASSES = ((1.0, 0.0), (0.0, 1.0))
 def power_integral(
     p: Labelled, q: Labelled, a: float, b: float, *, unit_volume: float = 1.0, support: Support = "full"
 ) -> float:
-    """Z(a, b): the log of the set integral of K^((a + b - 1) |X|) p(X)^a q(X)^b; dimensionless.
+    """Return Z(a, b): the log of the set integral of K^((a + b - 1) |X|) p(X)^a q(X)^b; dimensionless.
 
-    What divergences of the power family are made of: Cauchy-Schwarz is (Z(2, 0) + Z(0, 2)) / 2 - Z(1, 1), Renyi of an
+    Divergences of the power family are made of these: Cauchy-Schwarz is (Z(2, 0) + Z(0, 2)) / 2 - Z(1, 1), Renyi of an
     order (Z(order, 1 - order) - order Z(1, 0) - (1 - order) Z(0, 1)) / (order - 1).
 
     Args:
-        p, q: GLMBs, LMBs or products of GLMBs. With an LMB and a GLMB, the LMB is taken on the GLMB's label sets; with
-            products, Z is the sum over groups of labels, as in `cauchy_schwarz`.
-        a, b: exponents; one of them may be negative, or 0 where the other is above 0. A density to the power of 0 is 1.
-        unit_volume: K, as of `cauchy_schwarz`.
-        support: "full", or "common": only the label sets that both densities have (two LMBs, and labels that are alone
-            in products: the labels).
+        p, q: GLMBs, LMBs or products of GLMBs. With an LMB and a GLMB, the LMB is evaluated on the GLMB's label sets;
+            with products, Z is the sum over groups of labels, as in `cauchy_schwarz`.
+        a, b: exponents; one of them may be negative, or 0 if the other is above 0. A density to the power of 0 is 1.
+        unit_volume: K, as in `cauchy_schwarz`.
+        support: "full", or "common": only the label sets that both densities have (two LMBs, and labels that form
+            factors of their own in products: the labels).
 
-    It is -inf where nothing is shared, and inf where a negative power makes the integral infinite.
+    It is -inf if nothing is shared, and inf if a negative power makes the integral infinite.
 
-    Raises `InputError` for exponents or densities that do not fit (unlabelled ones, other state dimensions, support
-    "common" with nothing in common), and for mixtures, of which only the exponents (1, 1), (2, 0), (0, 2), (1, 0) and
-    (0, 1) are in closed form: in a GLMB, a track of several components or a label set of several hypotheses
-    (`marginalise` makes one Gaussian of them).
+    Raises `InputError` for invalid exponents or densities (unlabelled ones, other state dimensions, support "common"
+    with nothing in common), and for mixtures, for which only the exponents (1, 1), (2, 0), (0, 2), (1, 0) and (0, 1)
+    are in closed form: in a GLMB, a track of several components or a label set of several hypotheses (`marginalise`
+    makes one Gaussian of them).
     """
     return float(power_integrals(p, q, ((a, b),), unit_volume=unit_volume, support=support)[0])
 
@@ -64,7 +64,7 @@ def power_integrals(
     unit_volume: float = 1.0,
     support: Support = "full",
 ) -> Floats:
-    """(num_exponents,) `power_integral` of each pair (a, b)."""
+    """Return (num_exponents,) the `power_integral` of each pair (a, b)."""
     check_densities({"p": p, "q": q}, unit_volume)
     check_support(support)
     if not isinstance(p, Labelled):
@@ -94,19 +94,20 @@ def _of_parts(
 
 
 def renyi(p: Labelled, q: Labelled, order: float, *, support: Support = "full") -> float:
-    """Renyi divergence of p from q: log(integral of p^order q^(1 - order)) / (order - 1), of normalised densities.
+    """Return the Renyi divergence of p from q: log(integral of p^order q^(1 - order)) / (order - 1), both normalised.
 
-    At least 0, and 0 for equal ones. Order 1/2 is symmetric and twice the Bhattacharyya distance; in general it is
-    order / (1 - order) times that of q from p of order 1 - order. Towards 1 it becomes the Kullback-Leibler divergence.
-    Above 1 it is infinite where p is not small enough against q, as for a p much wider than q.
+    At least 0, and 0 for equal densities. Order 1/2 is symmetric and twice the Bhattacharyya distance; in general it is
+    order / (1 - order) times that of q from p of order 1 - order. As the order approaches 1 it becomes the
+    Kullback-Leibler divergence. Above 1 it is infinite if p is not small enough relative to q, as for a p much wider
+    than q.
 
     Args:
-        p, q: GLMBs, LMBs or products of GLMBs, of single Gaussians, as of `power_integral`.
+        p, q: GLMBs, LMBs or products of GLMBs, of single Gaussians, as in `power_integral`.
         order: above 0 and not 1.
         support: "full"; or "common", and then both are normalised on the label sets (labels) that both have.
 
-    Infinite where they share none. A result below 0 by rounding is 0. Raises `InputError` as `power_integral` and for
-    another order, and `NumericalError` where rounding leaves it further below.
+    Infinite if they share none. A result below 0 by rounding is 0. Raises `InputError` as `power_integral` and for
+    another order, and `NumericalError` if rounding leaves it further below.
     """
     if real("order", order) <= 0.0 or order == 1.0:
         raise reject("order", "a finite number above 0 other than 1", order)
@@ -145,7 +146,7 @@ def _of_singles(
 
 
 def _has_more_sets(lmb: LMB, on_sets: GLMB) -> bool:
-    """Whether the LMB has label sets of positive weight beyond these."""
+    """Return True if the LMB has label sets of positive weight beyond those of the GLMB."""
     num_sets = int(2 ** np.count_nonzero(np.isfinite(lmb.existence_logit)))
     return bool(num_sets > np.count_nonzero(on_sets.hyp_log_weights > -math.inf))
 
@@ -163,7 +164,7 @@ def _of_one_kind(
 
 
 def _extended(own: LabelledCases, other: LabelledCases) -> LabelledCases:
-    """`own` with the label sets (labels) that only `other` has, at weight zero."""
+    """Return `own` with the label sets (labels) that only `other` has, at weight zero."""
     known, starts = set(own.places), other.set_offsets
     lacking = [i for i, place in enumerate(other.places) if place not in known]
     members = np.array([m for i in lacking for m in range(starts[i], starts[i + 1])], np.int64)
@@ -180,12 +181,12 @@ def _extended(own: LabelledCases, other: LabelledCases) -> LabelledCases:
 
 
 def reference_unit_volume(density: Labelled | Poisson) -> float:
-    """(4 pi)^(d / 2) sqrt(det P_ref): the K under which K <p, p> is 1 for a Gaussian p of covariance P_ref.
+    """Return (4 pi)^(d / 2) sqrt(det P_ref): the K for which K <p, p> is 1 for a Gaussian p of covariance P_ref.
 
-    P_ref is the arithmetic mean of the track covariances (of a mixture's moments), each weighted by the probability
-    of its track: GLMB, the weights of the hypotheses that hold it; LMB, its existence. Poisson: of the components'
+    P_ref is the arithmetic mean of the track covariances (of a mixture's moments), each weighted by the probability of
+    its track: GLMB, the weights of the hypotheses that have it; LMB, its existence. Poisson: of the components'
     covariances, weighted by their expected numbers. With K = 1 in SI units K <p, p> is 1e-6 to 1e-8 for a 4-D state,
-    and a divergence is then about whether targets exist more than about where they are.
+    and a divergence then depends more on whether targets exist than on where they are.
 
     Raises `InputError` for a density that is not valid or expects no target.
     """
