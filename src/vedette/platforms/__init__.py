@@ -1,4 +1,4 @@
-"""What a sensor may do, as rows of named numbers, and the poses that follow."""
+"""Platforms: the actions of a sensor, as rows of named numbers, and the poses that follow."""
 
 from vedette.platforms.base import Actions, Options, Platform, options_at
 from vedette.platforms.by_compass import ByCompass

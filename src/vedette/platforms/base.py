@@ -1,6 +1,6 @@
 """The protocol of platforms, their actions as rows of named numbers, and the options of a sensor at a decision.
 
-Here is the one place where a platform's answers are checked.
+This is the only place where results of platforms are validated.
 """
 
 from __future__ import annotations
@@ -17,14 +17,16 @@ from vedette.internal.text import pluralise
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models.arguments import as_array, float_array, provides, reject, sequence
 
-# Poses nearer than this, relative to their size, are one: rounding of degrees to radians and back stays below.
+# Poses closer than this, relative to their size, are the same: rounding of degrees to radians and back stays below.
 _SAME_POSE = 1e-9
 
-SWITCH = "on"  # the column of actions that says whether the sensor scans: 1, or 0 where it is off
+SWITCH = "on"  # the column of actions for the switch of the sensor: 1: on, 0: off
 
 
 def switch_words(column: str, value: float) -> str:
-    """`on` or `off`, of the column `on`, or `off at decision 2`, of `on_2` of a sequence; empty for other columns."""
+    """Return `on` or `off` for the column `on`, `off at decision 2` for `on_2` of a sequence, and "" for
+    other columns.
+    """
     name, _, decision = column.partition("_")
     if name != SWITCH or (column != name and not decision.isdigit()):
         return ""
@@ -32,11 +34,14 @@ def switch_words(column: str, value: float) -> str:
 
 
 class Options(NamedTuple):
-    """What one sensor may do at a decision.
+    """The options of one sensor at a decision.
 
-    actions: all of them, in the order of tables. courses: (num_courses, num_times, pose_dim) the different courses that
-    they lead to, each in the place of its first action. which: (num_actions,) which course each action takes. pose:
-    (pose_dim,) where it is now. prices: (num_courses,) in units of the reward; actions of one course have one price.
+    actions: all actions, in the order of tables.
+    courses: (num_courses, num_times, pose_dim) the distinct courses that they lead to, in the order of their first
+        actions.
+    which: (num_actions,) the course of each action.
+    pose: (pose_dim,) present pose.
+    prices: (num_courses,) in units of the reward; all actions of a course have the same price.
     scans: (num_courses, num_times) whether the actions of each course let the sensor scan.
     """
 
@@ -48,12 +53,12 @@ class Options(NamedTuple):
     scans: Bools
 
     def first_action(self, course: int) -> int:
-        """The first action that takes a course."""
+        """Return the first action that leads to a course."""
         return int(np.flatnonzero(self.which == course)[0])
 
 
 class Abilities(NamedTuple):
-    """What a platform has more than a `Platform` must."""
+    """The optional members that a platform has beyond those of `Platform`."""
 
     takes_many_actions: bool
     has_prices: bool
@@ -61,17 +66,17 @@ class Abilities(NamedTuple):
 
     @classmethod
     def of(cls, platform: Platform) -> Abilities:
-        """Find it out."""
+        """Return the abilities of a platform."""
         return cls(*[provides(platform, more) for more in (SupportsManyActions, HasPrices, HasScans)])
 
 
 def options_at(
     field: str, platform: Platform, pose: Floats, times: Floats, abilities: Abilities | None = None
 ) -> Options:
-    """The options of a platform at a pose, distinguished by price, poses and scans at `times`, in seconds from now.
+    """Return the options of a platform at a pose, distinguished by price, poses and scans at `times`, in s from now.
 
-    abilities: of the platform, where they are known. Raises `InputError`, with the name of the platform, for actions,
-    courses, prices or scans that are none.
+    abilities: of the platform, if known. Raises `InputError`, with the name of the platform, for invalid actions,
+    courses, prices or scans.
     """
     can, actions = abilities or Abilities.of(platform), actions_at(field, platform, pose)
     num = len(actions.values)
@@ -81,12 +86,14 @@ def options_at(
     if can.has_scans:
         scans = scans_of(field, platform, pose, actions.values, times)
     same = _same(courses) & (prices[:, np.newaxis] == prices) & (scans[:, np.newaxis] == scans).all(axis=2)
-    own, which = np.unique(same.argmax(axis=1), return_inverse=True)  # itself, if none before it
+    own, which = np.unique(same.argmax(axis=1), return_inverse=True)  # the course itself, if none before it is equal
     return Options(actions, courses[own], which, pose, prices[own], scans[own])
 
 
 def _same(courses: Floats) -> Bools:
-    """(num, num) which courses are equal up to rounding, headings up to whole turns; the second is compared to."""
+    """Return (num, num) whether courses are equal up to rounding, and headings up to full turns, relative
+    to the second.
+    """
     num = len(courses)
     equal = np.ones((num, num), np.bool_)
     for component in range(courses.shape[2]):
@@ -100,15 +107,15 @@ def _same(courses: Floats) -> Bools:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Actions(SummaryRepr):
-    """What one sensor may do, one action a row.
+    """The possible actions of one sensor, one per row.
 
     Attributes:
-        columns: what the numbers of an action are: `heading_deg`, an absolute heading counter-clockwise from +x, or
-            whatever the platform calls them; units other than SI's in the name.
+        columns: names of the numbers of an action: `heading_deg`, an absolute heading counter-clockwise from +x, or the
+            names that the platform gives; units other than SI units are part of the name.
         values: (num_actions, num_columns), in the order of tables.
 
     Raises:
-        InputError: no action, or numbers that are not finite or not as many as columns.
+        InputError: no action, or numbers that are not finite or not one per column.
     """
 
     columns: tuple[str, ...]
@@ -123,7 +130,7 @@ class Actions(SummaryRepr):
 
     @classmethod
     def of(cls, **numbers: float) -> Actions:
-        """A single action, as in `Actions.of(heading_deg=30.0)`."""
+        """Return a single action, as in `Actions.of(heading_deg=30.0)`."""
         return cls(tuple(numbers), np.array([list(numbers.values())]))
 
     def __len__(self) -> int:
@@ -133,17 +140,19 @@ class Actions(SummaryRepr):
         return f"of {pluralise(len(self), 'choice')}: {', '.join(self.columns)}"
 
     def text(self, index: int) -> str:
-        """One action in words: `heading_deg 30, speed 5`; a switch is `on` or `off`, in sequences at which decision."""
+        """Return one action as text: `heading_deg 30, speed 5`; a switch is `on` or `off`, in sequences
+        with the decision.
+        """
         numbers = zip(self.columns, self.values[index].tolist(), strict=True)
         return ", ".join(switch_words(name, value) or f"{name} {round(value, 6):g}" for name, value in numbers)
 
 
 @runtime_checkable
 class Platform(Protocol):
-    """What carries a sensor: what it may do, and where that takes it.
+    """The carrier of a sensor: its possible actions, and the poses that follow.
 
-    A pose is [px, py, heading_rad, ...]. All sensors of a run have poses of one length, the longest of any; components
-    that are not a platform's own are 0. A platform gets them too, and need not give them back.
+    A pose is [px, py, heading_rad, ...]. All sensors of a run have poses of the same length, the largest of any;
+    components that a platform does not use are 0. A platform receives them too, and need not return them.
     """
 
     @property
@@ -152,11 +161,11 @@ class Platform(Protocol):
         ...
 
     def actions(self, pose: Floats) -> Floats:
-        """(num_actions, num_columns) what it may do at `pose`, at least one thing, in the order of tables."""
+        """Return (num_actions, num_columns) the possible actions at `pose`, at least one, in the order of tables."""
         ...
 
     def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
-        """(num_times, 3 or more) its poses `times` seconds after it began `action` at `pose`.
+        """Return (num_times, 3 or more) the poses `times` seconds after it began `action` at `pose`.
 
         action: one row of `actions`. Components of the pose beyond those returned stay as they are.
         """
@@ -165,51 +174,53 @@ class Platform(Protocol):
 
 @runtime_checkable
 class SupportsManyActions(Protocol):
-    """A platform that gives the courses of many actions at once, equal to those of `Platform.course`."""
+    """A platform that computes the courses of many actions at once, equal to those of `Platform.course`."""
 
     def courses(self, pose: Floats, actions: Floats, times: Floats) -> Floats:
-        """(num_actions, num_times, 3 or more) for actions (num_actions, num_columns)."""
+        """Return (num_actions, num_times, 3 or more) poses for actions (num_actions, num_columns)."""
         ...
 
 
 @runtime_checkable
 class HasPrices(Protocol):
-    """A platform whose actions have prices, which planners subtract from rewards; those of others cost nothing."""
+    """A platform whose actions have prices, which planners subtract from rewards; actions of others cost nothing."""
 
     def prices(self, actions: Floats) -> Floats:
-        """(num_actions,) in units of the reward, of actions (num_actions, num_columns)."""
+        """Return prices (num_actions,) in units of the reward, of actions (num_actions, num_columns)."""
         ...
 
 
 @runtime_checkable
 class HasScans(Protocol):
-    """A platform some of whose actions keep its sensor from scanning; under those of others it always scans."""
+    """A platform whose actions may keep its sensor from scanning; sensors of other platforms always scan."""
 
     def scans(self, pose: Floats, actions: Floats, times: Floats) -> Bools:
-        """(num_actions, num_times) whether the sensor scans `times` seconds after it began each action at `pose`."""
+        """Return (num_actions, num_times) whether the sensor scans `times` seconds after it began each
+        action at `pose`.
+        """
         ...
 
 
 def check_platform(field: str, platform: Any) -> None:
-    """`InputError` for what lacks a member of `Platform`."""
+    """Raise `InputError` for an object that lacks a member of `Platform`."""
     if isinstance(platform, type) or not isinstance(platform, Platform):
         raise reject(field, "a platform, with columns, actions(pose) and course(pose, action, times)", platform)
 
 
 def actions_at(field: str, platform: Platform, pose: Floats) -> Actions:
-    """What a platform may do at a pose; `InputError`, with the name of the platform, for what are no actions."""
+    """Return the actions of a platform at a pose; `InputError`, with the name of the platform, for invalid actions."""
     columns = tuple(platform.columns)
     values = float_array(f"{field}.actions", platform.actions(pose.copy()), (None, len(columns)))
     if len(values) == 0:
         raise reject(f"{field}.actions", "at least one action", "none")
-    actions = object.__new__(Actions)  # of what was just checked, under the platform's name
+    actions = object.__new__(Actions)  # the values are already validated, with the platform's name in errors
     object.__setattr__(actions, "columns", columns)
     object.__setattr__(actions, "values", values)
     return actions
 
 
 def course_of(field: str, platform: Platform, pose: Floats, action: Floats, times: Floats) -> Floats:
-    """(num_times, pose_dim) poses after an action; `InputError`, with the name of the platform, for what are none."""
+    """Return (num_times, pose_dim) poses after an action; `InputError`, with the platform's name, for invalid poses."""
     course = platform.course(pose.copy(), action.copy(), times.copy())
     return _checked(f"{field}.course", course, (len(times),), pose)
 
@@ -217,7 +228,7 @@ def course_of(field: str, platform: Platform, pose: Floats, action: Floats, time
 def courses_of(
     field: str, platform: Any, pose: Floats, actions: Floats, times: Floats, abilities: Abilities | None = None
 ) -> Floats:
-    """(num_actions, num_times, pose_dim) poses after each action; `InputError` as `course_of`."""
+    """Return (num_actions, num_times, pose_dim) poses after each action; `InputError` as `course_of`."""
     if (abilities or Abilities.of(platform)).takes_many_actions:
         courses = platform.courses(pose.copy(), actions.copy(), times.copy())
         return _checked(f"{field}.courses", courses, (len(actions), len(times)), pose)
@@ -225,14 +236,14 @@ def courses_of(
 
 
 def prices_of(field: str, platform: Platform, actions: Floats) -> Floats:
-    """(num_actions,) what actions cost, in units of the reward; `InputError` for what are no prices."""
+    """Return prices (num_actions,) of actions, in units of the reward; `InputError` for invalid prices."""
     if not provides(platform, HasPrices):
         return np.zeros(len(actions))
     return float_array(f"{field}.prices", platform.prices(actions.copy()), (len(actions),))
 
 
 def scans_of(field: str, platform: Platform, pose: Floats, actions: Floats, times: Floats) -> Bools:
-    """(num_actions, num_times) whether each action lets its sensor scan; `InputError` for what is no such table."""
+    """Return (num_actions, num_times) whether each action lets its sensor scan; `InputError` for an invalid table."""
     shape = len(actions), len(times)
     if not provides(platform, HasScans):
         return np.ones(shape, np.bool_)
@@ -243,7 +254,7 @@ def scans_of(field: str, platform: Platform, pose: Floats, actions: Floats, time
 
 
 def _checked(field: str, given: Any, shape: tuple[int, ...], pose: Floats) -> Floats:
-    """Poses of this shape, with the components of `pose` where they are not given."""
+    """Return poses of this shape, completed with the components of `pose` that are not given."""
     array = as_array(field, given, "fiu", "numbers")
     fits = array.shape[:-1] == shape and 3 <= array.shape[-1] <= len(pose)
     if not fits or not np.isfinite(array).all():

@@ -1,4 +1,4 @@
-"""Platforms whose actions are given by compass: courses clockwise from true north, with speeds in m/s."""
+"""Platforms whose actions are given as compass courses: clockwise from true north, with speeds in m/s."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from vedette.platforms.steps import GridPlatform, Waypoints
 
 _COURSES = {"heading_deg": "course_deg", "pointing_deg": "azimuth_deg"}
 _NAMES = {**_COURSES, "speed": "speed_mps"}
-_AT_ONCE = 1e-3  # s after a decision, when a platform is under way
-_DIGITS = 9  # of degrees and metres, so that a course of 60 degrees reads 60
+_AT_ONCE = 1e-3  # s after a decision, when the motion of a platform is evaluated
+_DIGITS = 9  # decimals of degrees and metres, so that a course of 60 degrees is shown as 60
 
 
 @dataclass(frozen=True, slots=True)
 class ByCompass:
-    """A platform whose directions are counted clockwise from true north instead of counter-clockwise from east.
+    """A platform whose directions are clockwise from true north instead of counter-clockwise from east.
 
     `heading_deg` becomes `course_deg`, from 0 to 360, with `speed_mps`; `pointing_deg` becomes `azimuth_deg`. A step is
-    `course_deg`, `speed_mps` and `distance_m`; a waypoint has the course and the speed at which it is headed for.
-    The fixed directions of `HeadingPlatform`, `GridPlatform` and `Pointing` are relative to true north at any position.
-    Angles given by the pose or by a custom platform are angles in the plane, converted at the position of the platform.
+    `course_deg`, `speed_mps` and `distance_m`; a waypoint has the course and the speed towards it. The fixed directions
+    of `HeadingPlatform`, `GridPlatform` and `Pointing` are relative to true north at any position. Angles given by the
+    pose or by a custom platform are angles in the plane, converted at the position of the platform.
 
     Attributes:
-        platform: what moves.
-        compass: where true north is, such as a `vedette.recorded.Origin`.
+        platform: the platform whose directions are converted.
+        compass: direction of true north, such as a `vedette.recorded.Origin`.
 
     Raises:
         InputError: no platform.
@@ -46,27 +46,27 @@ class ByCompass:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Those of the platform under the names of the compass."""
+        """Columns of the platform under their compass names."""
         return tuple(name for part in self._parts for name in _columns(part))
 
     def actions(self, pose: Floats) -> Floats:
-        """(num_actions, num_columns) those of the platform, in its order."""
+        """Return (num_actions, num_columns) the actions of the platform, in its order."""
         return self._given(actions_at("platform", self.platform, pose).values, pose, fixed=True)
 
     def of_plane(self, rows: Floats, pose: Floats) -> Floats:
-        """(num_rows, num_columns) of rows of the platform's own columns, all of whose angles are of the plane."""
+        """Return (num_rows, num_columns) rows of the platform's own columns, converted from angles in the plane."""
         return self._given(rows, pose, fixed=False)
 
     def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
-        """That of the platform."""
+        """Return the course of the platform."""
         return np.asarray(self.courses(pose, action[np.newaxis], times)[0])
 
     def courses(self, pose: Floats, actions: Floats, times: Floats) -> Floats:
-        """Those of many actions at once."""
+        """Return the courses of many actions at once."""
         return courses_of("platform", self.platform, pose, self._own(actions, pose), times)
 
     def scans(self, pose: Floats, actions: Floats, times: Floats) -> Bools:
-        """Those of the platform."""
+        """Return whether the platform's actions let the sensor scan."""
         return scans_of("platform", self.platform, pose, self._own(actions, pose), times)
 
     @property
@@ -75,7 +75,9 @@ class ByCompass:
         return (found.carrier, found.pointing) if isinstance(found, MountedPlatform) else (found,)
 
     def _given(self, rows: Floats, pose: Floats, *, fixed: bool) -> Floats:
-        """(num_rows, num_columns) of rows of the platform's own columns; fixed directions may be true ones."""
+        """Return (num_rows, num_columns) converted rows of the platform's own columns; fixed directions may be compass
+        ones.
+        """
         found, place = [], 0
         for part in self._parts:
             own = rows[:, place : place + len(part.columns)]
@@ -85,7 +87,7 @@ class ByCompass:
         return np.hstack(found)
 
     def _own(self, actions: Floats, pose: Floats) -> Floats:
-        """(num_actions, num_columns of the platform) the platform's own rows of actions."""
+        """Return (num_actions, num_columns of the platform) the platform's own rows of actions."""
         found, place = [], 0
         for part in self._parts:
             own = actions[:, place : place + len(_columns(part))]
@@ -94,13 +96,13 @@ class ByCompass:
         return np.hstack(found)
 
     def _pose_of(self, part: Platform, pose: Floats) -> Floats:
-        """What `MountedPlatform` passes on: a carrier gets place and heading alone."""
+        """Return the pose that `MountedPlatform` passes on: a carrier gets position and heading only."""
         is_carrier = isinstance(self.platform, MountedPlatform) and part is self.platform.carrier
         return pose[:3] if is_carrier else pose
 
 
 def _is_fixed(part: Platform) -> bool:
-    """Whether its directions are the same at every pose."""
+    """Return True if its directions are the same at every pose."""
     return isinstance(part, GridPlatform) or (isinstance(part, HeadingPlatform | Pointing) and not part.relative)
 
 
@@ -110,13 +112,13 @@ def _columns(part: Platform) -> tuple[str, ...]:
     if isinstance(part, Waypoints):
         return (*part.columns, "course_deg", "speed_mps")
     names = tuple(_NAMES.get(name, name) for name in part.columns)
-    if len(set(names)) < len(names):  # a custom platform that has a course beside its heading
+    if len(set(names)) < len(names):  # a custom platform that has a course besides its heading
         return tuple(part.columns)
     return (*names, "speed_mps") if "heading_deg" in part.columns and "speed_mps" not in names else names
 
 
 def _given(part: Platform, rows: Floats, pose: Floats, compass: Compass) -> Floats:
-    """Rows of a platform under the columns of the compass."""
+    """Return rows of a platform converted to compass columns."""
     if isinstance(part, GridPlatform):
         lengths = np.hypot(rows[:, 0], rows[:, 1])
         courses = np.where(lengths > 0.0, _course(compass, np.arctan2(rows[:, 1], rows[:, 0]), pose), 0.0)
@@ -138,15 +140,15 @@ def _given(part: Platform, rows: Floats, pose: Floats, compass: Compass) -> Floa
 
 
 def _under_way(part: Platform, rows: Floats, pose: Floats, compass: Compass) -> Floats:
-    """(num_rows, 2) course, deg, and speed, m/s, just after each action began; 0 and 0 of one that stays."""
+    """Return (num_rows, 2) course, deg, and speed, m/s, just after each action began; 0 and 0 if it stays."""
     poses = courses_of("platform", part, pose, rows, np.array([_AT_ONCE]))[:, 0]
     away = np.hypot(*(poses[:, :2] - pose[:2]).T) / _AT_ONCE
-    speeds = np.round(away, 6)  # a metre in a million m of a place has no more digits
+    speeds = np.round(away, 6)  # at coordinates of a million m there are no more digits
     return np.column_stack([np.where(speeds > 0.0, _course(compass, poses[:, 2], pose), 0.0), speeds])
 
 
 def _own(part: Platform, actions: Floats, pose: Floats, compass: Compass) -> Floats:
-    """The rows of a platform that actions under the columns of the compass are."""
+    """Return the rows of a platform from actions in compass columns."""
     if isinstance(part, Waypoints):
         return actions[:, :1]
     if isinstance(part, GridPlatform):
@@ -158,7 +160,7 @@ def _own(part: Platform, actions: Floats, pose: Floats, compass: Compass) -> Flo
             found[:, i] = np.degrees(compass.angle(np.radians(actions[:, i]), pose))
     if _is_fixed(part) or not len(part.columns):
         return found
-    # A custom platform gets its own row back, to the last bit.
+    # A custom platform receives its own row unchanged, to the last bit.
     own = np.asarray(part.actions(pose.copy()), np.float64)
     same = (_given(part, own, pose, compass) == actions[:, np.newaxis]).all(axis=2)
     return np.where(same.any(axis=1)[:, np.newaxis], own[same.argmax(axis=1)], found)

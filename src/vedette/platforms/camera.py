@@ -1,4 +1,4 @@
-"""Cameras that turn and zoom, on the spot or carried; pose [px, py, heading_rad, pointing_rad, half_width_rad]."""
+"""Cameras that turn and zoom, fixed or mounted; pose [px, py, heading_rad, pointing_rad, half_width_rad]."""
 
 from __future__ import annotations
 
@@ -16,34 +16,34 @@ from vedette.models.measurement import wrap_angles
 from vedette.platforms.base import Platform, check_platform, prices_of, scans_of
 
 POSE_DIM = 5
-_ARRIVED = 1e-9  # rad off where it is to point
-# Of its pose; sensors that are no cameras have no half width, or one of 0.
+_ARRIVED = 1e-9  # rad, pointing error at which a turn is complete
+# Component of the pose; sensors other than cameras have no half width, or one of 0.
 POINTING, HALF_WIDTH = 3, 4
 
 
 def is_camera(pose: Floats) -> bool:
-    """Whether a pose says where a camera points."""
+    """Return True if a pose has the pointing of a camera."""
     return len(pose) > HALF_WIDTH and bool(pose[HALF_WIDTH] > 0.0)
 
 
 def line_of_sight(pose: Floats) -> float:
-    """rad, along which a sensor looks: where a camera points, the heading of any other."""
+    """Return the direction in rad that a sensor looks in: the pointing of a camera, the heading of any other sensor."""
     return float(pose[POINTING] if is_camera(pose) else pose[2])
 
 
 @dataclass(frozen=True, slots=True)
 class Pointing:
-    """A camera on the spot that is pointed, and may zoom. Where it points does not depend on its heading.
+    """A fixed camera that can be pointed and may zoom. Its pointing does not depend on its heading.
 
-    `vedette.models.camera` looks along the pointing, as far to either side as the half width.
+    `vedette.models.camera` looks along the pointing, with the half width to either side.
 
     Attributes:
-        pointings_deg: where it may point, counter-clockwise from east [deg].
-        relative: whether these are changes of its pointing, added to it; actions are absolute all the same.
-        half_widths_deg: half widths that it may zoom to at once; none: it does not zoom [deg].
-        turn_rate_deg: how fast it turns, the shorter way, counter-clockwise where both are as long; none: at once
+        pointings_deg: possible pointings, counter-clockwise from east [deg].
+        relative: whether these are changes of its pointing, added to it; actions are absolute in either case.
+        half_widths_deg: half widths that it may zoom to instantly; none: it does not zoom [deg].
+        turn_rate_deg: turn rate, the shorter way, counter-clockwise if both are as long; none: it turns instantly
             [deg/s].
-        blind_while_turning: whether it makes no scan before it points where it is to point.
+        blind_while_turning: whether it makes no scan until its turn is complete.
 
     Raises:
         InputError: no pointing, or one that is not finite; half widths outside (0, 180]; a rate that is not above 0.
@@ -67,11 +67,11 @@ class Pointing:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """`pointing_deg`, and `half_width_deg` where it zooms."""
+        """`pointing_deg`, and `half_width_deg` if it zooms."""
         return ("pointing_deg", "half_width_deg") if self.half_widths_deg else ("pointing_deg",)
 
     def actions(self, pose: Floats) -> Floats:
-        """(num_actions, num_columns) absolute pointings, each at every width; 180 and -180 stay apart as printed."""
+        """Return (num_actions, num_columns) absolute pointings, each at every width; 180 and -180 remain distinct."""
         _check(pose)
         degrees = np.array(self.pointings_deg)
         if self.relative:
@@ -82,7 +82,7 @@ class Pointing:
         return np.column_stack([np.repeat(degrees, num), np.tile(self.half_widths_deg, len(degrees))])
 
     def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
-        """Position and heading stay."""
+        """Return poses with constant position and heading."""
         _check(pose)
         poses = np.tile(pose, (len(times), 1))
         turn = float(wrap_angles(np.radians(action[0]) - pose[POINTING]))
@@ -96,7 +96,7 @@ class Pointing:
         return poses
 
     def scans(self, pose: Floats, actions: Floats, times: Floats) -> Bools:
-        """(num_actions, num_times) False where it turns and is blind; no turn takes time where it turns at once."""
+        """Return (num_actions, num_times) False while it turns and is blind; True if it turns instantly."""
         if not self.blind_while_turning or self.turn_rate_deg is None:
             return np.ones((len(actions), len(times)), np.bool_)
         turns = np.abs(wrap_angles(np.radians(actions[:, :1]) - pose[POINTING]))
@@ -112,14 +112,14 @@ def _check(pose: Floats) -> None:
 
 @dataclass(frozen=True, slots=True)
 class MountedPlatform:
-    """What points, on what moves: every action of the one with every action of the other, columns side by side.
+    """A pointing sensor mounted on a moving platform; the actions are all combinations of both, columns side by side.
 
     Attributes:
-        carrier: moves position and heading, and gets a pose of these three.
-        pointing: moves all other components of the pose.
+        carrier: controls position and heading, and receives a pose of these three.
+        pointing: controls all other components of the pose.
 
     Raises:
-        InputError: one of them is no platform, or a column of both has the same name.
+        InputError: one of them is not a platform, or both have a column of the same name.
     """
 
     carrier: Platform
@@ -133,30 +133,30 @@ class MountedPlatform:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Those of the carrier, then those of the pointing."""
+        """Columns of the carrier, then those of the pointing."""
         return (*self.carrier.columns, *self.pointing.columns)
 
     def actions(self, pose: Floats) -> Floats:
-        """(num_actions, num_columns), the pointing's fastest."""
+        """Return (num_actions, num_columns), the pointing's actions fastest."""
         moves = np.asarray(self.carrier.actions(pose[:3].copy()), np.float64)
         turns = np.asarray(self.pointing.actions(pose), np.float64)
         return np.hstack([np.repeat(moves, len(turns), axis=0), np.tile(turns, (len(moves), 1))])
 
     def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
-        """Each its own components."""
+        """Return poses composed of the components of both."""
         num = len(self.carrier.columns)
         poses = np.array(self.pointing.course(pose.copy(), action[num:], times), np.float64)
         poses[:, :3] = np.asarray(self.carrier.course(pose[:3].copy(), action[:num], times))[:, :3]
         return poses
 
     def prices(self, actions: Floats) -> Floats:
-        """(num_actions,) of both together."""
+        """Return prices (num_actions,), the sums of both."""
         num = len(self.carrier.columns)
         carried = prices_of("carrier", self.carrier, actions[:, :num])
         return carried + prices_of("pointing", self.pointing, actions[:, num:])
 
     def scans(self, pose: Floats, actions: Floats, times: Floats) -> Bools:
-        """(num_actions, num_times) where both let the sensor scan."""
+        """Return (num_actions, num_times) whether both let the sensor scan."""
         num = len(self.carrier.columns)
         carried = scans_of("carrier", self.carrier, pose[:3], actions[:, :num], times)
         return carried & scans_of("pointing", self.pointing, pose, actions[:, num:], times)

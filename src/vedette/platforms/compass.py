@@ -1,7 +1,7 @@
-"""Directions by compass: azimuths clockwise from true north, and the angles of the plane that they are.
+"""Compass directions: azimuths clockwise from true north, and their conversion to angles in the plane.
 
-The library counts angles counter-clockwise from the x axis of the plane. On charts and in messages of ships they are
-counted clockwise from true north at the place of the sensor, which is not the y axis away from the origin.
+The library measures angles counter-clockwise from the x axis of the plane. Charts and ship reports measure them
+clockwise from true north at the position of the sensor, which differs from the y axis away from the origin.
 """
 
 from __future__ import annotations
@@ -18,30 +18,30 @@ from vedette.kernels.base.types import Floats
 
 @runtime_checkable
 class Compass(Protocol):
-    """Where true north is, at a place of the plane."""
+    """The direction of true north at a position in the plane."""
 
     def angle(self, azimuth: ArrayLike, place: ArrayLike) -> Floats:
-        """Return angles of the plane, rad in [-pi, pi], of azimuths, rad clockwise from true north at `place`, (2,) m.
+        """Return angles in the plane, rad in [-pi, pi], of azimuths, rad clockwise from true north at `place`, (2,) m.
 
-        `place` may also be one of many poses, of which the first two numbers count.
+        `place` may also be an array of poses, whose first two components are used.
         """
         ...
 
     def azimuth(self, angle: ArrayLike, place: ArrayLike) -> Floats:
-        """Return azimuths, rad in [-pi, pi], of angles of the plane: the inverse of `angle`."""
+        """Return azimuths, rad in [-pi, pi], of angles in the plane: the inverse of `angle`."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class PlaneCompass:
-    """The compass of a plane that lies nowhere on the Earth: north is along y everywhere."""
+    """The compass of a plane without a position on the Earth: north is along y everywhere."""
 
     def angle(self, azimuth: ArrayLike, place: ArrayLike) -> Floats:
-        """Return pi / 2 less the azimuth."""
+        """Return pi / 2 minus the azimuth."""
         return wrapped(math.pi / 2.0 - np.asarray(azimuth, np.float64))
 
     def azimuth(self, angle: ArrayLike, place: ArrayLike) -> Floats:
-        """Return pi / 2 less the angle."""
+        """Return pi / 2 minus the angle."""
         return self.angle(angle, place)
 
 
@@ -52,7 +52,7 @@ def wrapped(angles: ArrayLike) -> Floats:
 
 
 def course_deg(compass: Compass, angle: ArrayLike, place: ArrayLike) -> Floats:
-    """Return courses, degrees in [0, 360) clockwise from true north at `place`, of angles of the plane, rad."""
+    """Return courses, degrees in [0, 360) clockwise from true north at `place`, of angles in the plane, rad."""
     return np.asarray(np.degrees(compass.azimuth(angle, place)) % 360.0)
 
 

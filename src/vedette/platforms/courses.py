@@ -1,4 +1,4 @@
-"""Courses at a speed: the platform turns at once and keeps its heading (paper section IV)."""
+"""Motion at constant speed: the platform turns instantly and keeps its heading (paper section IV)."""
 
 from __future__ import annotations
 
@@ -16,12 +16,14 @@ PAPER_HEADINGS_DEG = tuple(float(angle) for angle in range(-180, 181, 30))
 
 @dataclass(frozen=True, slots=True)
 class HeadingPlatform:
-    """Courses from a list of headings, or of changes of heading, kept until the next decision; no border stops them.
+    """A platform with a list of headings, or of changes of heading, kept until the next decision; there is no boundary.
 
     Attributes:
-        speed: m/s; or several, of which an action chooses one.
-        headings_deg: degrees, counter-clockwise from +x (the paper's 13 by default, of which -180 and 180 are one).
-        relative: whether they are changes of heading, added to it (paper-notes 14); actions are absolute all the same.
+        speed: m/s; or several speeds, of which an action chooses one.
+        headings_deg: degrees, counter-clockwise from +x (the paper's 13 by default, of which -180 and 180 are the
+            same).
+        relative: whether they are changes of heading, added to it (paper-notes 14); actions are absolute in either
+            case.
 
     Raises:
         InputError: no heading or speed, one that is not finite, a speed below 0.
@@ -44,11 +46,11 @@ class HeadingPlatform:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """`heading_deg`, and `speed` where there are several."""
+        """`heading_deg`, and `speed` if there are several."""
         return ("heading_deg",) if isinstance(self.speed, float) else ("heading_deg", "speed")
 
     def actions(self, pose: Floats) -> Floats:
-        """(num_actions, num_columns) absolute headings, each at every speed; 180 and -180 stay apart as printed."""
+        """Return (num_actions, num_columns) absolute headings, each at every speed; 180 and -180 remain distinct."""
         degrees = np.array(self.headings_deg)
         if self.relative:
             degrees = np.degrees(wrap_angles(pose[2] + np.radians(degrees)))
@@ -57,11 +59,11 @@ class HeadingPlatform:
         return np.column_stack([np.repeat(degrees, len(self.speed)), np.tile(self.speed, len(degrees))])
 
     def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
-        """Straight on; headings of -180 and 180 lead to the same poses, bit for bit."""
+        """Return poses on a straight line; headings of -180 and 180 lead to the same poses, bit for bit."""
         return np.asarray(self.courses(pose, action[np.newaxis], times)[0])
 
     def courses(self, pose: Floats, actions: Floats, times: Floats) -> Floats:
-        """Those of many actions at once."""
+        """Return the courses of many actions at once."""
         headings = wrap_angles(np.radians(actions[:, 0]))
         speeds = self.speed if isinstance(self.speed, float) else actions[:, 1]
         poses = np.empty((len(actions), len(times), len(pose)))

@@ -1,4 +1,4 @@
-"""The platforms of a run on their ways."""
+"""The moving platforms of a run."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from vedette.platforms.base import HasScans, Platform, course_of, scans_of
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fleet:
-    """Platforms, the action that each is under, and since when.
+    """Platforms, the present action of each, and the time at which it began.
 
     Attributes:
-        platforms: one a sensor.
-        starts: (num_sensors, pose_dim) where each was when it began its action.
-        actions: the row of its action, one a sensor; None: it lies still.
-        since: s, when they began.
+        platforms: one per sensor.
+        starts: (num_sensors, pose_dim) pose of each when it began its action.
+        actions: the row of its action, one per sensor; None: it does not move.
+        since: s, time when they began.
 
     Raises:
         InputError: another number of poses or actions than of platforms, or actions of other columns.
@@ -31,7 +31,7 @@ class Fleet:
     starts: Floats
     actions: tuple[Floats | None, ...]
     since: float
-    _switched: tuple[int, ...] = field(init=False, default=())  # places of those whose action may keep them off
+    _switched: tuple[int, ...] = field(init=False, default=())  # indices of sensors whose action may keep them off
 
     def __post_init__(self) -> None:
         num = len(self.platforms)
@@ -45,7 +45,7 @@ class Fleet:
         object.__setattr__(self, "_switched", switched)
 
     def poses(self, time: float) -> Floats:
-        """(num_sensors, pose_dim) where all are at `time`, s, which is no earlier than `since`."""
+        """Return (num_sensors, pose_dim) the poses of all at `time`, s, which is no earlier than `since`."""
         seconds = np.array([time - self.since])
         at = self.starts.copy()
         for s, (platform, action) in enumerate(zip(self.platforms, self.actions, strict=True)):
@@ -54,7 +54,7 @@ class Fleet:
         return at
 
     def off(self, time: float) -> Bools:
-        """(num_sensors,) whether the action of each keeps its sensor from scanning at `time`, s."""
+        """Return (num_sensors,) whether the action of each keeps its sensor from scanning at `time`, s."""
         seconds, off = np.array([time - self.since]), np.zeros(len(self.platforms), np.bool_)
         for s in self._switched:
             platform, rows = self.platforms[s], np.array([self.actions[s]])
@@ -62,5 +62,5 @@ class Fleet:
         return off
 
     def follow(self, actions: Sequence[Floats | None], time: float) -> Fleet:
-        """All on their ways from where they are at `time`, each under its new action."""
+        """Return the fleet that begins new actions at `time`, s, from its poses then."""
         return replace(self, starts=self.poses(time), actions=tuple(actions), since=time)

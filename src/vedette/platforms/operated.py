@@ -1,4 +1,4 @@
-"""Platforms whose actions have prices, and whose sensors can be switched off or have a budget of scanning time."""
+"""Platforms whose actions have prices, and whose sensors can be switched off or have a limited scanning time."""
 
 from __future__ import annotations
 
@@ -21,31 +21,31 @@ from vedette.platforms.base import (
 )
 from vedette.platforms.camera import POSE_DIM
 
-# Component of a pose: seconds of scanning that are left; after those of a camera.
+# Component of a pose: remaining seconds of scanning; after the components of a camera.
 LEFT = POSE_DIM
-_SLACK = 1e-9  # of rounding, relative to a time
+_SLACK = 1e-9  # tolerance for rounding, relative to a time
 
 
 @dataclass(frozen=True, slots=True)
 class Operated:
     """A platform whose actions have a price, in units of the reward, and whose sensor may be switched off.
 
-    An action of a sensor that can be switched has one number more, `on`: 1, or 0 of the same action with the sensor
+    An action of a sensor that can be switched has one more number, `on`: 1, or 0 for the same action with the sensor
     off, which makes no measurement and no clutter, and costs nothing.
 
     Attributes:
-        platform: what it may do.
-        price: of every action; or the name of the column of its actions that has the price of each; None: that of the
+        platform: the platform that moves the sensor.
+        price: of every action; or the name of the column of its actions with the price of each; None: that of the
             platform.
         switchable: whether each action is listed a second time, with the sensor off, after all those with it on.
-        budget: largest number of seconds of scanning in store; the pose has those left as its component 5. The sensor
-            scans until none is left, and then no more before its next action. None: without limit.
-        refill: seconds of scanning that the store gains each second, up to `budget`. A sensor that always scans under a
+        budget: largest number of seconds of scanning in store; component 5 of the pose is the remaining number. The
+            sensor scans until none is left, and then no more before its next action. None: without limit.
+        refill: seconds of scanning that the store gains each second, up to `budget`. A sensor that always scans with a
             refill of 0.1 is on for a tenth of the time.
 
     Raises:
-        InputError: no platform, a price that is not finite, no such column, a switch beside a column `on`, a budget
-            that is not above 0, or a refill that is negative or without a budget.
+        InputError: no platform, a price that is not finite, no such column, a switch in addition to a column `on`, a
+            budget that is not above 0, or a refill that is negative or without a budget.
     """
 
     platform: Platform
@@ -69,32 +69,32 @@ class Operated:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Those of the platform, and `on` where the sensor can be switched."""
+        """Columns of the platform, and `on` if the sensor can be switched."""
         return (*self.platform.columns, SWITCH) if self.switchable else tuple(self.platform.columns)
 
     def actions(self, pose: Floats) -> Floats:
-        """(num_actions, num_columns) those of the platform; then those with the sensor off."""
+        """Return (num_actions, num_columns) the actions of the platform; then the same with the sensor off."""
         return self.switched_on_and_off(actions_at("platform", self.platform, pose).values)
 
     def switched_on_and_off(self, rows: Floats) -> Floats:
-        """The platform's own actions as this one's: with the sensor on, and then off where it can be switched."""
+        """Return the platform's rows with the sensor on, and then with it off if it can be switched."""
         if not self.switchable:
             return rows
         return np.column_stack([np.tile(rows, (2, 1)), np.repeat([1.0, 0.0], len(rows))])
 
     def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
-        """That of the platform."""
+        """Return the course of the platform."""
         return np.asarray(self.courses(pose, action[np.newaxis], times)[0])
 
     def courses(self, pose: Floats, actions: Floats, times: Floats) -> Floats:
-        """Those of the platform, with the seconds of scanning that are left."""
+        """Return the courses of the platform, with the remaining seconds of scanning."""
         courses = courses_of("platform", self.platform, pose, self._own(actions), times)
         if self.budget is not None:
             courses[..., LEFT] = self._left(pose, actions, times)
         return courses
 
     def prices(self, actions: Floats) -> Floats:
-        """(num_actions,) of each; none of those with the sensor off."""
+        """Return prices (num_actions,); 0 with the sensor off."""
         if self.price is None:
             prices = prices_of("platform", self.platform, self._own(actions))
         elif isinstance(self.price, str):
@@ -104,20 +104,20 @@ class Operated:
         return np.where(self._is_on(actions), prices, 0.0)
 
     def scans(self, pose: Floats, actions: Floats, times: Floats) -> Bools:
-        """(num_actions, num_times) those of the platform, where the sensor is on."""
+        """Return (num_actions, num_times) the scans of the platform while the sensor is on."""
         scans = scans_of("platform", self.platform, pose, self._own(actions), times)
         scans &= self._is_on(actions)[:, np.newaxis]
         return scans if self.budget is None else scans & (times <= self._lasts(pose) * (1.0 + _SLACK))
 
     def _lasts(self, pose: Floats) -> float:
-        """Seconds after which a sensor that scans has none left."""
+        """Return the time in s after which a scanning sensor has no scanning time left."""
         if len(pose) <= LEFT:
             wanted = f"{LEFT + 1} components, the last of them the seconds left to scan"
             raise InputError(f"pose: expected {wanted}; got {len(pose)}")
         return float(pose[LEFT]) / (1.0 - self.refill) if self.refill < 1.0 else math.inf
 
     def _left(self, pose: Floats, actions: Floats, times: Floats) -> Floats:
-        """(num_actions, num_times) seconds of scanning left `times` seconds after each action began."""
+        """Return (num_actions, num_times) the seconds of scanning left `times` seconds after each action began."""
         lasts, on = self._lasts(pose), self._is_on(actions)[:, np.newaxis]
         scanning = pose[LEFT] - (1.0 - self.refill) * times
         empty = self.refill * (times - min(lasts, times[-1]))

@@ -1,4 +1,4 @@
-"""Platforms that keep the time since they were last at each of some places."""
+"""Platforms that track the time since they last visited each of several places."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from vedette.kernels.base.types import OWN_HEIGHT, Bools, Floats
 from vedette.models.arguments import float_array, positive
 from vedette.platforms.base import Platform, check_platform, courses_of, prices_of, scans_of
 
-# Component of a pose: seconds since the platform was last at the first place; those of the other places follow.
+# Component of a pose: seconds since the last visit of the first place; those of the other places follow.
 CLOCKS = OWN_HEIGHT + 1
 _PARTS = 16  # straight segments that approximate a course, up to the last requested time
 
 
 @dataclass(frozen=True, slots=True)
 class Patrolling:
-    """A platform whose pose has the seconds since it was last within a radius of each place, from component 10 on.
+    """A platform whose pose has the seconds since it last visited each place, from component 10 on.
 
-    Between the places that it is asked about and sixteen more, a course is taken as straight.
+    A course is assumed to be straight between the requested times and sixteen more.
 
     Attributes:
-        platform: what it may do.
+        platform: the platform that moves.
         places: (num_places, 2) m.
-        radius: m, within which it is at a place.
+        radius: m, distance within which it is at a place.
 
     Raises:
         InputError: no platform, places of another shape, or a radius that is not above 0.
@@ -45,19 +45,19 @@ class Patrolling:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Those of the platform."""
+        """Columns of the platform."""
         return tuple(self.platform.columns)
 
     def actions(self, pose: Floats) -> Floats:
-        """Those of the platform."""
+        """Return the actions of the platform."""
         return np.asarray(self.platform.actions(pose))
 
     def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
-        """That of the platform, with the seconds since it was at each place."""
+        """Return the course of the platform, with the seconds since each place was visited."""
         return np.asarray(self.courses(pose, action[np.newaxis], times)[0])
 
     def courses(self, pose: Floats, actions: Floats, times: Floats) -> Floats:
-        """Those of the platform, with the seconds since it was at each place."""
+        """Return the courses of the platform, with the seconds since each place was visited."""
         if len(pose) < CLOCKS + len(self.places):
             wanted = f"{CLOCKS + len(self.places)} components, the last of them the seconds since it was at each place"
             raise InputError(f"pose: expected {wanted}; got {len(pose)}")
@@ -71,16 +71,16 @@ class Patrolling:
         return courses[:, np.searchsorted(nodes, times)]
 
     def prices(self, actions: Floats) -> Floats:
-        """Those of the platform."""
+        """Return the prices of the platform."""
         return prices_of("platform", self.platform, actions)
 
     def scans(self, pose: Floats, actions: Floats, times: Floats) -> Bools:
-        """Those of the platform."""
+        """Return the scans of the platform."""
         return scans_of("platform", self.platform, pose, actions, times)
 
 
 def _last_inside(ways: Floats, at: Floats, place: Floats, radius: float) -> Floats:
-    """(num, num_legs) last time of each straight leg within a radius of a place; -1: never.
+    """Return (num, num_legs) the last time of each straight leg within a radius of a place; -1: never.
 
     ways: (num, num_legs + 1, 2) m, at: (num_legs + 1,) s.
     """

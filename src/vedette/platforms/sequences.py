@@ -1,4 +1,4 @@
-"""Sequences of actions: what a platform does over several decisions, as one action."""
+"""Sequences of actions: the actions of a platform over several decisions, as one action."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models.arguments import dimension, positive
 from vedette.platforms.base import Platform, actions_at, check_platform, course_of, prices_of, scans_of
 
-# More sequences are not listed: they are a power of the number of actions.
+# Maximum number of sequences listed; it grows as a power of the number of actions.
 MAX_SEQUENCES = 1_000_000
 
-# A time this share of a period after a decision is the time of the decision: sums of periods are rounded.
+# Tolerance for the time of a decision, as a fraction of a period, because sums of periods are rounded.
 _AT_ONCE = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
 class Sequences:
-    """Several actions of another platform, one after the other, as one action.
+    """Several successive actions of another platform, as one action.
 
-    At the very moment of a later decision the platform is where, and as, the action before has taken it. After the last
-    the action goes on.
+    At the time of a later decision the platform has the pose that its previous action led to. After the last one the
+    action continues.
 
     Attributes:
-        platform: whose actions they are. What it may do later is what it may do at the pose where it then is, so
-            sequences are the ways through a tree.
+        platform: the platform whose actions are combined. Its later actions are those at the pose where it then is, so
+            sequences are the paths through a tree.
         period: s, from the beginning of an action to that of the next.
         depth: number of actions.
 
@@ -46,13 +46,13 @@ class Sequences:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Those of the platform for each stage, counted from 1: `heading_deg_1`, `heading_deg_2`, ..."""
+        """Columns of the platform for each stage, counted from 1: `heading_deg_1`, `heading_deg_2`, ..."""
         return tuple(f"{name}_{stage}" for stage in range(1, self.depth + 1) for name in self.platform.columns)
 
     def actions(self, pose: Floats) -> Floats:
-        """(num_sequences, depth * num_columns of the platform), the last stage fastest.
+        """Return (num_sequences, depth * num_columns of the platform), the last stage fastest.
 
-        Raises `InputError` for more than a million sequences, and for actions or poses that are none.
+        Raises `InputError` for more than a million sequences, and for invalid actions or poses.
         """
         rows, poses = np.empty((1, 0)), pose[np.newaxis]
         own: list[Floats] = []
@@ -69,21 +69,21 @@ class Sequences:
         return rows
 
     def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
-        """The courses of the actions one after the other, each from where the one before ended."""
+        """Return the courses of the actions one after the other, each from the end of the one before."""
         return self._followed(pose, action, times)[0]
 
     def prices(self, actions: Floats) -> Floats:
-        """(num_sequences,) of all their actions together."""
+        """Return prices (num_sequences,), the sums over their actions."""
         num = len(self.platform.columns)
         stages = [actions[:, stage * num : (stage + 1) * num] for stage in range(self.depth)]
         return np.asarray(sum(prices_of("platform", self.platform, rows) for rows in stages))
 
     def scans(self, pose: Floats, actions: Floats, times: Floats) -> Bools:
-        """(num_sequences, num_times) as their actions let the sensor scan, one after the other."""
+        """Return (num_sequences, num_times) whether their successive actions let the sensor scan."""
         return np.array([self._followed(pose, action, times)[1] for action in actions])
 
     def _followed(self, pose: Floats, action: Floats, times: Floats) -> tuple[Floats, Bools]:
-        """Poses (num_times, pose_dim) of a sequence, and (num_times,) whether the sensor scans."""
+        """Return poses (num_times, pose_dim) of a sequence, and (num_times,) whether the sensor scans."""
         poses, stages, num = np.tile(pose, (len(times), 1)), self._stages(times), len(self.platform.columns)
         scans, at = np.ones(len(times), np.bool_), pose
         for stage in range(self.depth):
@@ -95,12 +95,12 @@ class Sequences:
         return poses, scans
 
     def _ends(self, poses: Floats, actions: list[Floats]) -> Floats:
-        """Where the actions from each pose have taken it when the next one begins."""
+        """Return the poses at the end of the actions from each pose, when the next ones begin."""
         end, pairs = np.array([self.period]), zip(poses, actions, strict=True)
         ends = [course_of("platform", self.platform, at, row, end)[0] for at, own in pairs for row in own]
         return np.array(ends)
 
     def _stages(self, times: Floats) -> Ints:
-        """(num_times,) the action that the platform is under, counted from 0."""
+        """Return (num_times,) the index of the present action, counted from 0."""
         begun = np.ceil(times / self.period - _AT_ONCE) - 1.0
         return np.asarray(np.clip(begun, 0, self.depth - 1).astype(np.int64))

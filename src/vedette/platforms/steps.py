@@ -1,4 +1,4 @@
-"""Platforms that move by the step, along a path, or not at all."""
+"""Platforms that move by steps, along a path, or not at all."""
 
 from __future__ import annotations
 
@@ -14,29 +14,29 @@ from vedette.models.fields import Positive, check_fields
 
 @dataclass(frozen=True, slots=True)
 class Stationary:
-    """Stays where it is, as it is."""
+    """A platform that stays where it is."""
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """None."""
+        """Empty: its action has no numbers."""
         return ()
 
     def actions(self, pose: Floats) -> Floats:
-        """(1, 0): the one thing it can do."""
+        """Return (1, 0): its only action."""
         return np.empty((1, 0))
 
     def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
-        """The pose, at every time."""
+        """Return the same pose at every time."""
         return np.tile(pose, (len(times), 1))
 
 
 @dataclass(frozen=True, slots=True)
 class GridPlatform:
-    """Steps of one length, each made at a speed and followed by waiting.
+    """A platform that moves by steps of equal length, each made at a speed and followed by waiting.
 
     Attributes:
         length: length of a step [m].
-        speed: speed on the way [m/s].
+        speed: speed during a step [m/s].
         directions_deg: directions, counter-clockwise from east [deg].
         stay: whether staying is an action, too, the last one.
 
@@ -62,18 +62,18 @@ class GridPlatform:
         return ("dx", "dy")
 
     def actions(self, pose: Floats) -> Floats:
-        """(num_actions, 2) the step in each direction."""
+        """Return (num_actions, 2) the step in each direction."""
         angles = np.radians(self.directions_deg)
         steps = self.length * np.column_stack([np.cos(angles), np.sin(angles)])
-        steps[np.abs(steps) < 1e-12 * self.length] = 0.0  # due north is not a hair east
+        steps[np.abs(steps) < 1e-12 * self.length] = 0.0  # no rounding errors in steps due north
         return np.concatenate([steps, np.zeros((1, 2))]) if self.stay else steps
 
     def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
-        """On the way, then at its end; the heading is that of the step, and stays while it stays."""
+        """Return poses during the step, then at its end; the heading is that of the step, and is kept if it stays."""
         return np.asarray(self.courses(pose, action[np.newaxis], times)[0])
 
     def courses(self, pose: Floats, actions: Floats, times: Floats) -> Floats:
-        """Those of many actions at once."""
+        """Return the courses of many actions at once."""
         lengths = np.hypot(actions[:, 0], actions[:, 1])
         moves = lengths > 0.0
         shares = np.minimum(times * self.speed / np.where(moves, lengths, 1.0)[:, np.newaxis], 1.0)
@@ -87,12 +87,12 @@ class GridPlatform:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Waypoints:
-    """A path through waypoints: an action chooses the one to head for, and the path is followed from there on.
+    """A platform that follows a path through waypoints from the one that its action chooses.
 
     Attributes:
         points: (num_points, 2) m.
         speed: m/s.
-        closed: whether the first follows the last, round and round; else it waits there.
+        closed: whether the first follows the last, round and round; otherwise it waits there.
 
     Raises:
         InputError: no point, or one that is not finite; a speed below 0.
@@ -115,11 +115,11 @@ class Waypoints:
         return ("waypoint",)
 
     def actions(self, pose: Floats) -> Floats:
-        """(num_points, 1) every waypoint."""
+        """Return (num_points, 1) every waypoint."""
         return np.arange(1.0, len(self.points) + 1)[:, np.newaxis]
 
     def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
-        """Straight to the waypoint, then from one to the next; the heading is that of the leg."""
+        """Return poses straight to the waypoint, then from one to the next; the heading is that of the leg."""
         first = int(action[0]) - 1
         points = np.asarray(self.points)
         ahead = np.concatenate([points[first:], points[: first + 1]]) if self.closed else points[first:]

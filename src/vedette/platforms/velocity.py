@@ -9,17 +9,17 @@ import numpy as np
 from vedette.kernels.base.types import OWN_VELOCITY, Bools, Floats
 from vedette.platforms.base import Platform, check_platform, courses_of, prices_of, scans_of
 
-_STEP = 1e-3  # s, of the differences that velocities are taken from
+_STEP = 1e-3  # s, time step of the differences that give velocities
 
 
 @dataclass(frozen=True, slots=True)
 class WithVelocity:
     """A platform whose poses have its velocity, m/s, as components 6 and 7; poses need 8 components.
 
-    The velocity at a time is the mean one over the millisecond before it.
+    The velocity at a time is the mean over the millisecond before it.
 
     Attributes:
-        platform: what it may do.
+        platform: the platform that moves.
 
     Raises:
         InputError: no platform.
@@ -32,19 +32,19 @@ class WithVelocity:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Those of the platform."""
+        """Columns of the platform."""
         return tuple(self.platform.columns)
 
     def actions(self, pose: Floats) -> Floats:
-        """(num_actions, num_columns) those of the platform."""
+        """Return (num_actions, num_columns) the actions of the platform."""
         return self.platform.actions(pose)
 
     def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
-        """That of the platform, with its velocity."""
+        """Return the course of the platform, with its velocity."""
         return np.asarray(self.courses(pose, action[np.newaxis], times)[0])
 
     def courses(self, pose: Floats, actions: Floats, times: Floats) -> Floats:
-        """Those of the platform, with its velocity."""
+        """Return the courses of the platform, with its velocity."""
         before = np.maximum(times - _STEP, 0.0)
         courses = courses_of("platform", self.platform, pose, actions, times)
         moved = courses[..., :2] - courses_of("platform", self.platform, pose, actions, before)[..., :2]
@@ -53,9 +53,9 @@ class WithVelocity:
         return courses
 
     def prices(self, actions: Floats) -> Floats:
-        """(num_actions,) those of the platform."""
+        """Return prices (num_actions,) of the platform."""
         return prices_of("platform", self.platform, actions)
 
     def scans(self, pose: Floats, actions: Floats, times: Floats) -> Bools:
-        """(num_actions, num_times) those of the platform."""
+        """Return (num_actions, num_times) the scans of the platform."""
         return scans_of("platform", self.platform, pose, actions, times)
