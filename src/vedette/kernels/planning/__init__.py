@@ -1,1 +1,1 @@
-"""Ideal scans, pseudo-updates and prediction of a decision."""
+"""Kernels of planning: ideal scans, pseudo-updates and predictions of a decision."""

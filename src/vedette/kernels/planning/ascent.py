@@ -1,4 +1,4 @@
-"""Coordinate ascent on rewards that are sums over labels: a line costs what its sensor can reach, not more."""
+"""Coordinate ascent on rewards that are sums over labels; a line costs only what its sensor can reach."""
 
 from __future__ import annotations
 
@@ -13,46 +13,46 @@ from vedette.kernels.planning.bernoulli_rows import Table
 from vedette.kernels.planning.joint_values import add_course, start_totals, value_changed, value_rows
 from vedette.kernels.planning.label_values import Valuation, ValueWork, make_value_work
 
-# Of equal courses the one that is taken stays: rounding must not lead an ascent in circles.
+# Of equal courses the present one is kept, so that rounding cannot make an ascent cycle.
 _SAME = 1e-9
 
 
 class Cells(NamedTuple):
-    """Where targets may be that were not found yet; of the reward the expected number that is found."""
+    """The cells of undetected targets that each course sees, and the value of each cell."""
 
-    offsets: Ints  # (num_courses + 1,) into the entries
+    offsets: Ints  # (num_courses + 1,) first entry of each course
     cells: Ints  # (num_entries,)
     log_miss: Floats  # (num_entries,) log of the mean of 1 - P_D over the course
-    worth: Floats  # (num_cells,) expected number of targets times what one is worth
+    worth: Floats  # (num_cells,) expected number of targets times the value of one
 
 
 class Allowed(NamedTuple):
-    """Which courses may be taken."""
+    """The courses that may be taken."""
 
     single: Bools  # (num_courses,)
-    together: Bools  # (num_courses, num_courses) which go together; (0, 0) where all do
-    on: Bools  # (num_courses,) which count among those of which only so many sensors may take one
-    most: int  # so many
+    together: Bools  # (num_courses, num_courses) compatible courses; (0, 0) if all are
+    on: Bools  # (num_courses,) courses that count towards the limit `most`
+    most: int  # maximum number of sensors on courses that count
 
 
 class Ascent(NamedTuple):
-    """Where an ascent is; written as it goes."""
+    """The present state of an ascent, updated in place."""
 
-    chosen: Ints  # (num_sensors,) number of the course of each sensor
+    chosen: Ints  # (num_sensors,) index of the course of each sensor
     totals: Floats  # (num_labels, bernoulli_size, num_samples) joint rows
     cell_totals: Floats  # (num_cells,) sums of log_miss
 
 
 class Trace(NamedTuple):
-    """What an ascent evaluated."""
+    """The evaluations of an ascent."""
 
-    evaluations: Ints  # (num_lines + 1,) so many joint actions by the end of each line; 1 at the start
+    evaluations: Ints  # (num_lines + 1,) joint actions evaluated by the end of each line; 1 at the start
     best: Floats  # (num_lines + 1,) the reward reached by then
 
 
 @borrowing
 def label_mean(values: Floats, coefficients: Floats) -> float:
-    """Mean over samples of the weighted sum of values (num, num_samples)."""
+    """Return the mean over samples of the weighted sum of values (num, num_samples)."""
     total = 0.0
     for sample in range(values.shape[1]):
         weighted = 0.0
@@ -64,7 +64,7 @@ def label_mean(values: Floats, coefficients: Floats) -> float:
 
 @inlined
 def _found(cells: Cells, course: int, totals: Floats) -> float:
-    """What a course finds that nobody else does."""
+    """Return the value of the undetected targets that only this course finds."""
     total = 0.0
     for entry in range(cells.offsets[course], cells.offsets[course + 1]):
         cell = cells.cells[entry]
@@ -109,7 +109,9 @@ def _line(
     work: ValueWork,
     gains: Floats,
 ) -> None:
-    """Gain of each course of a sensor over its not scanning, the others as chosen, whose rows alone are in `at`."""
+    """Write the gain of each course of a sensor over its not scanning, given the joint rows `at` of the
+    other sensors.
+    """
     first, last = table.first_courses[sensor], table.first_courses[sensor + 1]
     for entry in range(table.offsets[first], table.offsets[last]):
         before[table.labels[entry]] = math.inf
@@ -127,7 +129,7 @@ def _line(
 
 @borrowing
 def _best(table: Table, allowed: Allowed, chosen: Ints, sensor: int, gains: Floats, reward: float) -> int:
-    """The best allowed course of a line: the present one if no other is better, else the first of equal ones."""
+    """Return the best allowed course of a line: the present one if no other is better, else the first of equal ones."""
     first, num = table.first_courses[sensor], table.first_courses[sensor + 1] - table.first_courses[sensor]
     best = -math.inf
     for a in range(num):
@@ -148,7 +150,7 @@ def _best(table: Table, allowed: Allowed, chosen: Ints, sensor: int, gains: Floa
 def _start(
     table: Table, valuation: Valuation, coefficients: Floats, cells: Cells, prices: Floats, chosen: Ints
 ) -> tuple[Ascent, float]:
-    """Where the ascent begins, and the mean reward there."""
+    """Return the start of the ascent, and its mean reward."""
     num_labels, num_samples = len(table.start), table.changes.shape[2]
     at, price = Ascent(chosen.copy(), start_totals(table), np.zeros(len(cells.worth))), 0.0
     for s in range(len(chosen)):
@@ -174,10 +176,10 @@ def ascend(
     start: Ints,
     max_lines: int,
 ) -> tuple[Ints, float, Trace]:
-    """One ascent from a joint action: one sensor after the other, until none alone can do better.
+    """Run one ascent from a joint action: one sensor after the other, until none alone can improve the reward.
 
-    coefficients: (num,) of a label's numbers in the reward. prices: (num_courses,) of each course. max_lines: an end,
-    for which no ascent is known to have had need. Returns the joint action, its mean reward, and the trace.
+    coefficients: (num,) of a label's numbers in the reward. prices: (num_courses,) of each course. max_lines: limit
+    that no known ascent has reached. Returns the joint action, its mean reward, and the trace.
     """
     at, reward = _start(table, valuation, coefficients, cells, prices, start)
     num_samples = table.changes.shape[2]

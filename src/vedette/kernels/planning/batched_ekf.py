@@ -1,8 +1,8 @@
 """Extended Kalman steps of many Gaussians side by side, in loops that the compiler vectorises.
 
 The formulas are those of `vedette.kernels.gaussian.prediction` and `innovation`; entry (i, j) of all matrices is one
-row of numbers, one a Gaussian. Where a number is not as it should be (a matrix that is not definite, a difference that
-cancels), and for sigma points, a Gaussian goes by those kernels by itself, which have the last word.
+row of numbers, one per Gaussian. If a number is not valid (a matrix that is not definite, a difference that cancels),
+and for sigma points, a Gaussian is processed alone by those kernels, whose result is final.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from vedette.kernels.planning.batched_models import (
 
 
 class BatchedGaussians(NamedTuple):
-    """Predicted Gaussians and what each expects of a scan, as `Innovation` has it; of matrices the lower triangles."""
+    """Predicted Gaussians and their expected measurements, as in `Innovation`; lower triangles of the matrices."""
 
     means: Floats  # (state_dim, room)
     covs: Floats  # (state_dim (state_dim + 1) / 2, room)
@@ -58,16 +58,16 @@ class BatchedGaussians(NamedTuple):
 
 
 class BatchWork(NamedTuple):
-    """Arrays to work in."""
+    """Working arrays."""
 
     offsets: Offsets
     product: Floats  # (state_dim * state_dim, room) Jacobian of the motion times covariance
-    jacobian: Floats  # (meas_dim * state_dim, room) of the measurement
+    jacobian: Floats  # (meas_dim * state_dim, room) Jacobian of the measurement
     noise: Floats  # (meas_dim (meas_dim + 1) / 2, room)
-    volume: Floats  # (room,) determinant of the innovation covariance; NaN where a Gaussian goes by itself
+    volume: Floats  # (room,) determinant of the innovation covariance; NaN if processed alone
     bends: Bools  # (room,) see `innovation`
     scratch: Scratch
-    measurement: Floats  # (meas_dim,) of one Gaussian, as the rest
+    measurement: Floats  # (meas_dim,) of one Gaussian, like the following arrays
     mean: Floats  # (state_dim,)
     cov: Floats  # (state_dim, state_dim)
     out_mean: Floats  # (state_dim,)
@@ -117,7 +117,7 @@ def _set(value: float, num: int, out: Floats) -> None:
 
 @inlined
 def _add_scaled(scale: float, row: Floats, num: int, out: Floats) -> None:
-    # Jacobians of motions are mostly zeros.
+    # Jacobians of motion models are mostly zero.
     if scale != 0.0:
         for s in range(num):
             out[s] += scale * row[s]
@@ -137,7 +137,7 @@ def _subtract_product(a: Floats, b: Floats, num: int, out: Floats) -> None:
 
 @inlined
 def _lower(i: int, j: int) -> int:
-    """Place of entry (i, j) of a symmetric matrix."""
+    """Return the index of entry (i, j) of a symmetric matrix."""
     return place(i, j) if i >= j else place(j, i)
 
 
@@ -145,7 +145,7 @@ def _lower(i: int, j: int) -> int:
 def _predict_linear(
     forms: ModelForms, means: Floats, covs: Floats, num: int, batch: BatchedGaussians, work: BatchWork
 ) -> int:
-    """m <- F m, P <- F P F' + Q; returns how many are not finite or not positive on the diagonal."""
+    """Apply m <- F m, P <- F P F' + Q; returns how many are not finite or not positive on the diagonal."""
     dim, transition, noise, wrong = means.shape[0], forms.transition, forms.motion_noise, 0
     for i in range(dim):
         _set(0.0, num, batch.means[i])
@@ -192,7 +192,7 @@ def predict_batch(
 
 @inlined
 def _project(width: int, num: int, batch: BatchedGaussians, work: BatchWork) -> None:
-    """W = H P, and the lower triangle of H P H' + R to the factor."""
+    """Write W = H P, and the lower triangle of H P H' + R into the factor."""
     dim, meas_dim = batch.means.shape[0], batch.predicted.shape[0]
     for a in range(meas_dim):
         for j in range(dim):
@@ -211,7 +211,7 @@ def _project(width: int, num: int, batch: BatchedGaussians, work: BatchWork) -> 
 
 @inlined
 def _condition(num: int, batch: BatchedGaussians, work: BatchWork) -> None:
-    """Factor the innovation covariances, whiten the cross, and take the posterior covariances."""
+    """Factor the innovation covariances, whiten the cross-covariances, and write the posterior covariances."""
     dim, meas_dim, volume = batch.means.shape[0], batch.predicted.shape[0], work.volume
     _set(1.0, num, volume)
     for a in range(meas_dim):
@@ -225,7 +225,7 @@ def _condition(num: int, batch: BatchedGaussians, work: BatchWork) -> None:
                 for s in range(num):
                     entries[s] /= divisors[s]
         for s in range(num):
-            # NaN from the first pivot on that is not above zero.
+            # NaN from the first pivot that is not above zero.
             volume[s] *= pivots[s] if pivots[s] > 0.0 else math.nan
         for s in range(num):
             pivots[s] = math.sqrt(pivots[s] if pivots[s] > 0.0 else math.nan)
@@ -246,7 +246,7 @@ def _condition(num: int, batch: BatchedGaussians, work: BatchWork) -> None:
 
 @inlined
 def _mark_bent(width: int, num: int, batch: BatchedGaussians, work: BatchWork) -> None:
-    """Make NaN the volumes of Gaussians over which measurements bend, see `innovation`."""
+    """Set the volumes of Gaussians with too nonlinear measurements to NaN, see `innovation`."""
     volume, squares, first, second = work.volume, work.offsets.squares, batch.covs[0], batch.covs[place(1, 1)]
     dim, scale = batch.means.shape[0], 4.0 * LARGEST_BEND * LARGEST_BEND
     for a in range(batch.predicted.shape[0]):
@@ -261,7 +261,7 @@ def _mark_bent(width: int, num: int, batch: BatchedGaussians, work: BatchWork) -
 
 @inlined
 def _mark_cancelled(num: int, batch: BatchedGaussians, work: BatchWork) -> int:
-    """Make NaN the volumes of Gaussians that must go by themselves, see `innovation`; returns their number."""
+    """Set the volumes of Gaussians that must be processed alone to NaN, see `innovation`; returns their number."""
     volume, noise, wrong = work.volume, work.noise, 0
     if batch.predicted.shape[0] == 1:
         own = noise[0]
@@ -279,7 +279,7 @@ def _mark_cancelled(num: int, batch: BatchedGaussians, work: BatchWork) -> int:
 
 @inlined
 def _put_innovation(s: int, batch: BatchedGaussians, work: BatchWork) -> None:
-    """Write what one Gaussian expects to its lane, all except the probability of detection."""
+    """Write the innovation of one Gaussian into the batch, except its detection probability."""
     dim, innovation = batch.means.shape[0], work.innovation
     for a in range(batch.predicted.shape[0]):
         batch.predicted[a, s] = innovation.predicted[0, a]
@@ -306,7 +306,7 @@ def _expect_alone(sensor: Sensor, pose: Floats, s: int, batch: BatchedGaussians,
 def expect_batch(
     sensor: Sensor, forms: ModelForms, pose: Floats, num: int, batch: BatchedGaussians, work: BatchWork
 ) -> None:
-    """Fill in what the first `num` predicted Gaussians expect of a scan from a pose, as `innovation.expect`."""
+    """Write the innovations of the first `num` predicted Gaussians for a scan from a pose, as `innovation.expect`."""
     meas_dim, scratch, offsets = batch.predicted.shape[0], work.scratch, work.offsets
     for s in range(num):
         work.bends[s] = False
@@ -347,10 +347,10 @@ def relinearise_batch(
     batch: BatchedGaussians,
     work: BatchWork,
 ) -> None:
-    """Replace what Gaussians that bend expect by what they expect near their measurements, where these are seen.
+    """Replace innovations of strongly nonlinear Gaussians by those near their measurements, if these are detected.
 
-    measurements: (meas_dim, room); those of Gaussians that bend become whitened residuals, which are expected to be
-    zero with unit covariance.
+    measurements: (meas_dim, room); those of such Gaussians become whitened residuals, whose expectation is zero with
+    unit covariance.
     """
     for s in range(num):
         if not (work.bends[s] and is_seen[s]):

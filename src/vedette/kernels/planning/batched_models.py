@@ -1,8 +1,8 @@
-"""Models at many states side by side: built-in ones in loops that the compiler vectorises, any other state by state.
+"""Models at many states side by side: built-in ones in loops that the compiler vectorises, others state by state.
 
-A model is a function of one state. Of the built-in ones that decisions ask most often, the same formulas stand here
-over an index of states; which of them a decision has, its `ModelForms` say. All arrays have the states along their last
-axis. A loop writes one array: the compiler gives up on vectorising where many of them might overlap.
+A model is a function of one state. For the built-in models most used in decisions, the same formulas are implemented
+here over an index of states; `ModelForms` selects them for a decision. All arrays have the states along their last
+axis. Each loop writes one array, because the compiler does not vectorise loops over many arrays that might overlap.
 """
 
 from __future__ import annotations
@@ -21,24 +21,24 @@ from vedette.kernels.gaussian.scratch import Scratch
 ANY = 0  # a function of one state
 
 BEARING_RANGE, POSITION = 1, 2  # measurements
-GROWING, CONSTANT = 1, 2  # noise: of bearing and range, growing with the distance; independent, the same everywhere
-GAUSSIAN, SAME = 1, 2  # detection: less with the distance, as exp(-d^2 / (2 sigma^2)); the same everywhere
+GROWING, CONSTANT = 1, 2  # noise: of bearing and range, growing with the distance; constant and independent
+GAUSSIAN, SAME = 1, 2  # detection: decreasing with the distance, as exp(-d^2 / (2 sigma^2)); constant
 
 
 class ModelForms(NamedTuple):
-    """The forms of a decision's models."""
+    """The closed forms of a decision's models."""
 
-    is_linear: int  # 1 where the motion is x -> F x with the same noise everywhere, else 0
+    is_linear: int  # 1 if the motion is x -> F x with constant noise, else 0
     transition: Floats  # (state_dim, state_dim) F over a step of the horizon
     motion_noise: Floats  # (state_dim, state_dim)
     measurement: int
     noise: int
     detection: int
-    most_detection: float  # at which GAUSSIAN is cut off
+    most_detection: float  # upper limit of GAUSSIAN
 
 
 class Offsets(NamedTuple):
-    """Where states are from the sensor, and working arrays."""
+    """Positions of states relative to the sensor, and working arrays."""
 
     dx: Floats  # (room,) m
     dy: Floats  # (room,) m
@@ -55,20 +55,20 @@ def make_offsets(room: int) -> Offsets:
 
 @inlined
 def place(row: int, column: int) -> int:
-    """Place of an entry in the lower triangle of a matrix, row by row."""
+    """Return the index of an entry in the lower triangle of a matrix, row by row."""
     return row * (row + 1) // 2 + column
 
 
 @inlined
 def take_state(states: Floats, s: int, out: Floats) -> None:
-    """out (state_dim,) = the state at place s of (state_dim, room)."""
+    """Write out (state_dim,) = the state at index s of (state_dim, room)."""
     for j in range(len(out)):
         out[j] = states[j, s]
 
 
 @inlined
 def take_matrix(lower: Floats, s: int, out: Floats) -> None:
-    """out = the symmetric matrix at place s of lower triangles."""
+    """Write out = the symmetric matrix at index s of lower triangles."""
     for i in range(out.shape[0]):
         for j in range(i + 1):
             out[i, j] = lower[place(i, j), s]
@@ -77,7 +77,7 @@ def take_matrix(lower: Floats, s: int, out: Floats) -> None:
 
 @borrowing
 def find_offsets(pose: Floats, states: Floats, num: int, out: Offsets) -> None:
-    """Offsets of the first `num` states (state_dim, room) from the pose."""
+    """Write the offsets of the first `num` states (state_dim, room) from the pose."""
     x, y, dx, dy, squares, distances = states[0], states[1], out.dx, out.dy, out.squares, out.distances
     px, py = pose[0], pose[1]
     for s in range(num):
@@ -94,7 +94,7 @@ def find_offsets(pose: Floats, states: Floats, num: int, out: Offsets) -> None:
 def fill_measurements(
     sensor: Sensor, form: int, pose: Floats, states: Floats, offsets: Offsets, num: int, scratch: Scratch, out: Floats
 ) -> None:
-    """out (meas_dim, room): measurements of states (state_dim, room), whose offsets have been found."""
+    """Write out (meas_dim, room): measurements of states (state_dim, room) with known offsets."""
     if form == BEARING_RANGE:
         directions(offsets.dy[:num], offsets.dx[:num], out[0, :num])
         ranges = out[1]
@@ -118,12 +118,12 @@ def fill_measurements(
 def fill_jacobians(
     sensor: Sensor, form: int, pose: Floats, states: Floats, offsets: Offsets, num: int, scratch: Scratch, out: Floats
 ) -> None:
-    """out (meas_dim * state_dim, room): Jacobians of the measurement, row by row; see `jacobian_width`."""
+    """Write out (meas_dim * state_dim, room): Jacobians of the measurement, row by row; see `jacobian_width`."""
     dim = states.shape[0]
     if form == BEARING_RANGE:
         across, along, right, up = out[0], out[1], out[dim], out[dim + 1]
         dx, dy, squares, distances = offsets.dx, offsets.dy, offsets.squares, offsets.distances
-        # At the sensor itself there is no direction: whatever is divided by infinity is zero.
+        # At the position of the sensor there is no direction; a quotient by infinity is zero.
         for s in range(num):
             across[s] = -dy[s] / (squares[s] if squares[s] > 0.0 else math.inf)
         for s in range(num):
@@ -150,7 +150,7 @@ def fill_jacobians(
 
 @inlined
 def jacobian_width(form: int, state_dim: int) -> int:
-    """How many columns of a measurement's Jacobian are filled in; the others are zero."""
+    """Return the number of columns of a measurement's Jacobian that are filled in; the others are zero."""
     return state_dim if form == ANY else 2
 
 
@@ -158,7 +158,7 @@ def jacobian_width(form: int, state_dim: int) -> int:
 def fill_noise(
     sensor: Sensor, form: int, pose: Floats, states: Floats, offsets: Offsets, num: int, scratch: Scratch, out: Floats
 ) -> None:
-    """out (meas_dim (meas_dim + 1) / 2, room): lower triangles of the measurement noise, made symmetric."""
+    """Write out (meas_dim (meas_dim + 1) / 2, room): lower triangles of the measurement noise, made symmetric."""
     params, noise = sensor.noise_params, scratch.measurement_noise
     if form == GROWING:
         bearings, between, ranges, squares, distances = out[0], out[1], out[2], offsets.squares, offsets.distances
@@ -195,7 +195,7 @@ def _detect_by_form(sensor: Sensor, forms: ModelForms, offsets: Offsets, num: in
         return
     spread = sensor.detection_params[0] * sensor.detection_params[0]
     for s in range(num):
-        # Beyond the least exponent it is 0 but for 1e-304.
+        # Below the least exponent the result is 0, up to 1e-304.
         out[s] = max(-0.5 * offsets.squares[s] / spread, -700.0)
     exponentials(out[:num], offsets.bits)
     for s in range(num):
@@ -213,7 +213,7 @@ def fill_detection(
     scratch: Scratch,
     out: Floats,
 ) -> None:
-    """out (room,): probabilities of detection of targets at states (state_dim, room)."""
+    """Write out (room,): detection probabilities of targets at states (state_dim, room)."""
     if forms.detection != ANY:
         _detect_by_form(sensor, forms, offsets, num, out)
         return
@@ -235,7 +235,7 @@ def fill_detection_of_gaussians(
     scratch: Scratch,
     out: Floats,
 ) -> None:
-    """out (room,): probabilities of detection of Gaussians, by the sensor's `detection_rule`.
+    """Write out (room,): detection probabilities of Gaussians, by the sensor's `detection_rule`.
 
     means: (state_dim, room). covs: (state_dim (state_dim + 1) / 2, room) lower triangles.
     """

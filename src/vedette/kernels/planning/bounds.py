@@ -1,7 +1,7 @@
-"""The best that each label can hope for: the joint actions of the sensors that may see it, tried one after the other.
+"""Upper bounds on the contribution of each label, by trying the joint actions of the sensors that may see it.
 
-Where they are too many, the expected loss -r (q min(tr P+, c^2)^h + (1 - q) min(tr P, c^2)^h) of a label has a bound
-that takes as long as the sensors have actions: q is at most 1 - prod_s (1 - max_a q_sa), and as q >= q_s for every
+If these are too many, the expected loss -r (q min(tr P+, c^2)^h + (1 - q) min(tr P, c^2)^h) of a label has a bound
+whose cost is linear in the number of actions: q is at most 1 - prod_s (1 - max_a q_sa), and as q >= q_s for every
 sensor,
 
     sum_s Y_s / q <= sum_s Y_s / q_s <= sum_s J_s,
@@ -28,21 +28,21 @@ from vedette.kernels.planning.label_values import Valuation, make_value_work
 
 
 class Choices(NamedTuple):
-    """For every label the sensors that may see it, and what each of them may say of it."""
+    """For each label the sensors that may see it, and the entries of each sensor."""
 
-    label_offsets: Ints  # (num_labels + 1,) into the sensors
+    label_offsets: Ints  # (num_labels + 1,) first sensor of each label
     sensors: Ints  # (num,) a sensor that may see the label
-    entry_offsets: Ints  # (num + 1,) into the entries
-    entries: Ints  # of the table that differ; -1 for courses of the sensor that do not reach the label
+    entry_offsets: Ints  # (num + 1,) first entry of each sensor
+    entries: Ints  # distinct entries of the table; -1 for courses that do not reach the label
 
 
 @kernel
 def best_of_labels(
     table: Table, valuation: Valuation, coefficients: Floats, choices: Choices, first: int, last: int, out: Floats
 ) -> None:
-    """out[label] = the largest mean value over all that the sensors may say of the label, of labels `first:last`.
+    """Write out[label] = the largest mean value over all joint entries of the label's sensors, for labels `first:last`.
 
-    Each label's sensors choose for it alone. Labels of which `out` is NaN beforehand are left so.
+    The sensors choose for each label independently. Labels for which `out` is NaN beforehand are skipped.
     """
     num_samples, size = table.changes.shape[2], table.start.shape[1]
     most = np.max(np.diff(choices.label_offsets))
@@ -55,7 +55,7 @@ def best_of_labels(
         spread_row(table.start[label], rows[0])
         level, best = 0, -math.inf
         at[0] = choices.entry_offsets[begin] if depth > 0 else 0
-        # Depth first over the sensors' choices; the rows of a level are the sums over the sensors above it.
+        # Depth-first search over the sensors' choices; the rows of a level are the sums over the sensors above it.
         while level >= 0:
             if level == depth:
                 value_rows(valuation, label, rows[level], work, values)
@@ -79,8 +79,8 @@ class _Join(NamedTuple):
 
     factor: Floats  # L of the prior information L L'
     own: Floats  # L^-1 Y L^-T / q of an entry
-    joined: Floats  # upper bound of those of a sensor
-    total: Floats  # identity and the bounds of all sensors
+    joined: Floats  # upper bound of the entries of a sensor
+    total: Floats  # identity plus the bounds of all sensors
     root: Floats
     rotated: Floats
     vectors: Floats
@@ -89,7 +89,7 @@ class _Join(NamedTuple):
 
 @inlined
 def _whiten(factor: Floats, matrix: Floats, work: Floats, out: Floats) -> None:
-    """out = L^-1 matrix L^-T, of a symmetric matrix."""
+    """Write out = L^-1 matrix L^-T, for a symmetric matrix."""
     n = factor.shape[0]
     for j in range(n):
         for i in range(n):
@@ -107,7 +107,7 @@ def _whiten(factor: Floats, matrix: Floats, work: Floats, out: Floats) -> None:
 
 @borrowing
 def _join(join: _Join) -> bool:
-    """joined = R V max(1, D) V'R' - I with I + joined = R R' and R^-1 (I + own) R^-T = V D V': at least both."""
+    """Write joined = R V max(1, D) V'R' - I with I + joined = R R' and R^-1 (I + own) R^-T = V D V': at least both."""
     n, root, rotated = join.own.shape[0], join.root, join.rotated
     for i in range(n):
         join.joined[i, i] += 1.0
@@ -133,7 +133,7 @@ def _join(join: _Join) -> bool:
 
 @borrowing
 def _read_entry(table: Table, entry: int, join: _Join) -> float:
-    """Write the whitened information of an entry, given detection, into `own`; returns log (1 - q) of it."""
+    """Write the whitened information of an entry, given detection, into `own`; returns its log (1 - q)."""
     row, at, n = table.changes[entry], 0, join.own.shape[0]
     missed = row[row.shape[0] - 1, 0]
     scale = -1.0 / math.expm1(missed)
@@ -148,7 +148,7 @@ def _read_entry(table: Table, entry: int, join: _Join) -> float:
 
 @borrowing
 def _trace_at_least(join: _Join) -> float:
-    """Trace of the position's part of L^-T total^-1 L^-1; -inf where `total` has lost its shape."""
+    """Return the trace of the position's part of L^-T total^-1 L^-1; -inf if `total` is not positive definite."""
     n, trace = join.own.shape[0], 0.0
     if not cholesky(join.total, join.root):
         return -math.inf
@@ -166,7 +166,9 @@ def _trace_at_least(join: _Join) -> float:
 
 @kernel
 def losses_at_least(table: Table, valuation: Valuation, choices: Choices, out: Floats) -> None:
-    """out[label] = no more than this can a label add under the expected loss; inf where the arithmetic fails."""
+    """Write out[label] = an upper bound on the label's contribution to the expected loss reward; inf if
+    arithmetic fails.
+    """
     n, num_labels, last = valuation.references.shape[1], len(table.start), valuation.prior.shape[1]
     square = np.empty((8, n, n))
     join = _Join(square[0], square[1], square[2], square[3], square[4], square[5], square[6], square[7])

@@ -1,7 +1,7 @@
-"""The arrays in which the pseudo-updates of a GLMB are worked on, made once and grown when a case needs more.
+"""Working arrays of the pseudo-updates of a GLMB, allocated once and grown when a case needs more.
 
-Kept from case to case, they cost nothing: a decision is some five thousand filter steps of 5 to 20 microseconds, and a
-step that made its own arrays would spend more on them than on the filter.
+They are kept from case to case: a decision is about five thousand filter steps of 5 to 20 microseconds, and a step that
+allocated its own arrays would spend more time on them than on the filter.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from vedette.kernels.steps.assembly import Naming, make_naming
 
 
 class CaseBelief(NamedTuple):
-    """A GLMB of one Gaussian a track whose hypotheses are in groups of one label set each."""
+    """A GLMB with one Gaussian per track, whose hypotheses are grouped by label set."""
 
     tracks: Tracks
     hyps: Parents
@@ -33,21 +33,21 @@ class CaseBelief(NamedTuple):
 
 
 class GlmbWork(NamedTuple):
-    """Arrays in which a case is worked on."""
+    """Working arrays of a case."""
 
-    needed: Ints  # (1,) tracks that a case has asked for
-    pair: PairWork  # and scratch
+    needed: Ints  # (1,) number of tracks that a case needs
+    pair: PairWork  # and scratch arrays
     measurements: Floats  # (most_measurements, meas_dim)
     log_clutter: Floats  # (most_measurements,)
     first_rows: Rows  # of the prior, for all samples of an action
     rows: Rows  # of a later belief
-    near: Near  # every measurement to every row: ideal scans are small
+    near: Near  # every measurement with every row: ideal scans are small
     options: Options
     search: Search
     children: Children
     naming: Naming
-    all_children: Ints  # 0, 1, 2, ...: all of them are kept
-    even: CaseBelief  # after steps 0, 2, ...; the beliefs take turns, as one is read while the next is written
+    all_children: Ints  # 0, 1, 2, ...: all children are kept
+    even: CaseBelief  # after steps 0, 2, ...; the two beliefs alternate: one is read, the other written
     odd: CaseBelief  # after steps 1, 3, ...
     seen: Ints  # (num_sets,)
     heads: Ints  # (num_sets,) first hypothesis of each label set
@@ -58,7 +58,7 @@ class GlmbWork(NamedTuple):
 
 @inlined
 def has_rows(work: GlmbWork, num: int) -> bool:
-    """Whether there is room for `num` tracks."""
+    """Return True if there is capacity for `num` tracks."""
     return num <= len(work.rows.log_absent)
 
 
@@ -72,7 +72,7 @@ def _make_belief(num_tracks: int, num_hyps: int, num_entries: int, dim: int) -> 
 
 @inlined
 def view_belief(belief: CaseBelief, num_tracks: int, num_hyps: int, num_entries: int) -> CaseBelief:
-    """The part of the arrays that is filled."""
+    """Return the part of the arrays that is filled."""
     tracks, hyps = belief.tracks, belief.hyps
     return CaseBelief(
         Tracks(
@@ -87,11 +87,11 @@ def view_belief(belief: CaseBelief, num_tracks: int, num_hyps: int, num_entries:
 
 @kernel
 def grown_work(work: GlmbWork) -> GlmbWork:
-    """Room for `needed` tracks, and for more children than there are."""
+    """Return arrays with capacity for `needed` tracks, and for more children than now."""
     most_measurements, meas_dim = work.measurements.shape
     dim = work.rows.components.means.shape[1]
     rows, options, num = work.rows, work.options, work.needed[0]
-    # Doubled, as a longer horizon will ask for more tracks yet.
+    # Doubled, because a longer horizon will need still more tracks.
     if not has_rows(work, num):
         rows = make_rows(2 * num, 2 * num, dim, meas_dim)
         options = make_options(2 * num, 2 * num, most_measurements, dim, meas_dim)
@@ -122,7 +122,7 @@ def grown_work(work: GlmbWork) -> GlmbWork:
 
 @kernel
 def make_work(num_tracks: int, num_sets: int, dim: int, meas_dim: int, most_measurements: int) -> GlmbWork:
-    """Room to begin with, for a prior of so many tracks and label sets."""
+    """Return arrays for the start, with the sizes of a prior with `num_tracks` tracks and `num_sets` label sets."""
     none, belief = np.empty(0, np.int64), _make_belief(0, 0, 0, dim)
     work = GlmbWork(
         filled_ints(1, 2 * num_tracks),

@@ -14,10 +14,10 @@ from vedette.kernels.steps.undetected import mean_detection
 
 
 class _Cells(NamedTuple):
-    """A grid as its nodes."""
+    """A grid as the nodes of its cells."""
 
     states: Floats  # (num_cells, num_nodes, state_dim) targets at the nodes of each cell
-    node_weights: Floats  # (num_nodes,) of the mean over a cell
+    node_weights: Floats  # (num_nodes,) weights of the mean over a cell
     bounds: Floats  # (num_cells, 4) least and greatest x, least and greatest y of its nodes
 
 
@@ -34,7 +34,7 @@ def _write_bounds(states: Floats, bounds: Floats) -> None:
 
 @inlined
 def _out_of_reach(bounds: Floats, c: int, pose: Floats, reach: float) -> bool:
-    """Whether all nodes of a cell are farther than `reach`."""
+    """Return True if all nodes of a cell are farther than `reach`."""
     dx = max(bounds[c, 0] - pose[0], pose[0] - bounds[c, 1], 0.0)
     dy = max(bounds[c, 2] - pose[1], pose[1] - bounds[c, 3], 0.0)
     return dx * dx + dy * dy > reach * reach
@@ -51,7 +51,7 @@ def _write_view(
     cells: Ints,
     log_miss: Floats,
 ) -> int:
-    """Write the cells in view on one course, and what `cells_in_view` says of them; returns their number."""
+    """Write the cells in view on one course, with their values as in `cells_in_view`; returns their number."""
     count = 0
     for c in range(len(grid.states)):
         most, total = 0.0, 0.0
@@ -71,22 +71,22 @@ def _write_view(
 def cells_in_view(
     sensor: Sensor, courses: Floats, scans: Bools, states: Floats, node_weights: Floats, least: float, reach: float
 ) -> tuple[Ints, Ints, Floats]:
-    """For each course the cells that are seen on it, and the log probability of missing a target in them all along.
+    """Return for each course the cells that it sees, and the log probability of missing a target in them throughout.
 
-    P_D of a cell is the mean over its nodes. A cell is seen where that is `least` or more at one time at least.
+    P_D of a cell is the mean over its nodes. A cell is seen if that is at least `least` at some time.
 
     Args:
-        sensor: which.
-        courses: (num_courses, num_times, pose_dim) where it is.
-        scans: (num_courses, num_times) whether it scans there.
+        sensor: the sensor in kernel form.
+        courses: (num_courses, num_times, pose_dim) poses.
+        scans: (num_courses, num_times) whether it scans at each pose.
         states: (num_cells, num_nodes, state_dim) targets at the nodes of each cell.
-        node_weights: (num_nodes,) of the mean; sum 1.
-        least: probability of detection from which a cell is seen; with 0 all are.
-        reach: m; at nodes farther than this P_D is known to be 0, so that it need not be asked; inf: nothing is known.
+        node_weights: (num_nodes,) weights of the mean; sum 1.
+        least: minimum detection probability of a cell that is seen; with 0 all are.
+        reach: m; P_D is known to be 0 at nodes farther than this, so it is not evaluated there; inf: not known.
 
     Returns:
-        entry_offsets (num_courses + 1,); and for each entry the cell, increasing within a course, and the sum of
-        log(1 - P_D) over all times of the course; -inf where a detection is certain.
+        entry_offsets (num_courses + 1,); and for each entry the cell, increasing within a course, and the sum of log(1
+            - P_D) over all times of the course; -inf if a detection is certain.
     """
     num_cells, count = len(states), 0
     grid = _Cells(states, node_weights, np.empty((num_cells, 4)))

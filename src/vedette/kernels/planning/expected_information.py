@@ -1,8 +1,8 @@
-"""What scans are expected to teach of each label, without samples: information weighed by the chance of detection.
+"""Expected information of scans about each label, without samples: information weighted by detection probability.
 
-Along the predicted path of a label, a scan that detects with probability P_D adds P_D times the information of a
+Along the predicted path of a label, a scan with detection probability P_D adds P_D times the information of a
 measurement, and the label is missed by all scans with the product of the 1 - P_D. P_D is the mean over the predicted
-Gaussian. As a change of a Bernoulli row: the information matrix and log (1 - q) alone.
+Gaussian. As a change of a Bernoulli row, only the information matrix and log (1 - q) are set.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from vedette.kernels.planning.reach import Belief, is_beyond
 
 
 class _Work(NamedTuple):
-    """Arrays in which one label is followed over the horizon."""
+    """Working arrays in which one label is followed over the horizon."""
 
     scratch: Scratch
     seen: Innovation  # of one entry
@@ -65,7 +65,7 @@ def _invert(matrix: Floats, factor: Floats, out: Floats) -> None:
 def _learn(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, detection: float, work: _Work, out: Floats) -> None:
     """Write the covariance after `detection` times the information of a measurement.
 
-    Where the measurement bends, it is that of a target at the mean.
+    If the measurement is too nonlinear, the information is that of a target at the mean.
     """
     n, prior, updated = len(mean), work.inverse, work.predicted_cov
     if sensor.method == LINEARISED or sensor.method == SWITCHED:
@@ -95,7 +95,7 @@ def _is_seen(
     work: _Work,
     detections: Floats,
 ) -> bool:
-    """Whether a label is detected with probability `least` or more at some step; the probabilities are written."""
+    """Return True if a label's detection probability is at least `least` at some step; writes the probabilities."""
     paths, seen = belief.paths, False
     for h in range(len(detections)):
         pose, state, detections[h] = decision.horizon.poses[course, h], work.scratch.points[0], 0.0
@@ -119,7 +119,7 @@ def _expected_cov(
 ) -> float:
     """Write the expected covariance at the end of the horizon; returns the log probability of never being detected.
 
-    A scan that detects with a probability below `least` teaches nothing of the state.
+    A scan with a detection probability below `least` gives no information about the state.
     """
     paths, horizon, n = belief.paths, decision.horizon, out.shape[0]
     missed, was_seen = 0.0, False
@@ -154,10 +154,10 @@ def fill_expected_changes(
     last: int,
     changes: Floats,
 ) -> None:
-    """Changes (num_entries, bernoulli_size, 1) for courses `first:last` of a sensor; see `known.fill_changes`.
+    """Write changes (num_entries, bernoulli_size, 1) for courses `first:last`; see `known_association.fill_changes`.
 
-    Zeros for a label that is detected with a probability below `least` at every step, as where all of it lies beyond
-    `reach`, m. P_D is that of the prediction, also where earlier scans of the horizon are expected to have narrowed it.
+    They are zero for a label whose detection probability is below `least` at every step, for example beyond `reach`, m.
+    P_D is that of the prediction, even if earlier scans of the horizon are expected to have reduced its covariance.
     """
     dim, size = belief.paths.means.shape[2], bases.shape[1]
     work = _make_work(dim, len(decision.sensor.angular))

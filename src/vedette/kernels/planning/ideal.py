@@ -1,4 +1,4 @@
-"""Predicted ideal measurements: the scan that a sensor would take of a sampled multi-target state (Mahler 2004)."""
+"""Predicted ideal measurements: the scan of a sampled multi-target state by a sensor (Mahler 2004)."""
 
 from __future__ import annotations
 
@@ -23,51 +23,51 @@ SAMPLED = 2
 class SampledTrajectories(NamedTuple):
     """Sampled multi-target states over the horizon, and the random numbers of their measurements."""
 
-    offsets: Ints  # (num_samples + 1,) into the targets
+    offsets: Ints  # (num_samples + 1,) first target of each sample
     states: Floats  # (horizon_steps, num_targets, state_dim)
-    uniforms: Floats  # (horizon_steps, num_targets) decide detection
-    normals: Floats  # (horizon_steps, num_targets, meas_dim) make the noise
+    uniforms: Floats  # (horizon_steps, num_targets) for detections
+    normals: Floats  # (horizon_steps, num_targets, meas_dim) for the noise
 
 
 @kernel
 def propagate_samples(motion: Motion, states: Floats, dt: float, horizon_steps: int) -> Floats:
-    """(horizon_steps, num_targets, state_dim) noise-free future of the sampled states."""
+    """Return (horizon_steps, num_targets, state_dim) the noise-free future of the sampled states."""
     num, dim = states.shape
     out = np.empty((horizon_steps, num, dim))
     for h in range(horizon_steps):
         for i in range(num):
-            # Without process noise: the future is the sample's, and the spread of futures that of the samples.
+            # Without process noise: the spread of the trajectories is that of the samples.
             before = states[i] if h == 0 else out[h - 1, i]
             motion.transition(before, dt, motion.transition_params, out[h, i])
     return out
 
 
 class Horizon(NamedTuple):
-    """Where and how a sensor will scan."""
+    """The poses and times at which a sensor will scan."""
 
-    poses: Floats  # (num_actions, horizon_steps, pose_dim) where each action takes the sensor
-    scans: Bools  # (num_actions, horizon_steps) whether it scans then
-    dt: float  # seconds a step
+    poses: Floats  # (num_actions, horizon_steps, pose_dim) poses of each action
+    scans: Bools  # (num_actions, horizon_steps) whether it scans at each step
+    dt: float  # seconds per step
     mode: int  # IDEAL, EXPECTED or SAMPLED measurements
-    threshold: float  # detection probability from which a target is measured, where IDEAL
+    threshold: float  # minimum detection probability of a measured target, for IDEAL
 
 
 @typed_by_fields
 class Decision(NamedTuple):
-    """What the pseudo-updates of one sensor depend on besides its prior."""
+    """The inputs of one sensor's pseudo-updates besides its prior."""
 
-    birth: Lmb  # none: over the horizon nobody is born
-    motion: Motion  # all survive
+    birth: Lmb  # empty: no births over the horizon
+    motion: Motion  # no deaths
     sensor: Sensor
     forms: ModelForms
     horizon: Horizon
-    futures: SampledTrajectories  # as this sensor sees them
+    futures: SampledTrajectories  # with the random numbers of this sensor
     truncation: Truncation
 
 
 @borrowing
 def most_targets(futures: SampledTrajectories) -> int:
-    """Number of targets of the sample that has most."""
+    """Return the number of targets of the largest sample."""
     most = 0
     for sample in range(len(futures.offsets) - 1):
         most = max(most, futures.offsets[sample + 1] - futures.offsets[sample])
@@ -76,7 +76,7 @@ def most_targets(futures: SampledTrajectories) -> int:
 
 @inlined
 def add_noise(sensor: Sensor, state: Floats, pose: Floats, normals: Floats, scratch: Scratch, out: Floats) -> None:
-    """Add measurement noise, of standard deviates `normals`, to the measurement of a state."""
+    """Add measurement noise, from standard deviates `normals`, to the measurement of a state."""
     noise, factor = scratch.measurement_noise, scratch.innovation_cov
     sensor.measurement_noise_cov(state, pose, sensor.noise_params, noise)
     if not cholesky(noise, factor):
@@ -90,15 +90,16 @@ def add_noise(sensor: Sensor, state: Floats, pose: Floats, normals: Floats, scra
 
 @inlined
 def ideal_measurement(decision: Decision, action: int, target: int, step: int, scratch: Scratch, out: Floats) -> bool:
-    """Write the ideal measurement of a sampled target at a step of an action into `out`; false where there is none.
+    """Write the ideal measurement of a sampled target at a step of an action into `out`; returns False if there is
+    none.
 
     IDEAL: without noise, of a target whose detection probability is at least the threshold. EXPECTED: without noise, of
-    a target seen with its detection probability. SAMPLED: seen likewise, with measurement noise.
+    a target detected at random with its detection probability. SAMPLED: detected likewise, with measurement noise.
     """
     sensor, horizon, futures = decision.sensor, decision.horizon, decision.futures
     state, pose = futures.states[step, target], horizon.poses[action, step]
     detection = sensor.prob_detection(state, pose, sensor.detection_params)
-    # The uniforms are the same for all actions, so that actions are compared on common random numbers.
+    # The uniforms are the same for all actions, so actions are compared on common random numbers.
     seen = detection >= horizon.threshold if horizon.mode == IDEAL else futures.uniforms[step, target] < detection
     seen = seen and horizon.scans[action, step]
     if seen:

@@ -1,6 +1,6 @@
 """Rewards of joint actions as sums over labels: the changes of the chosen courses are added, label by label.
 
-A label that no chosen course reaches keeps its value without scans, which is taken once.
+A label that no chosen course reaches keeps its value without scans, which is computed once.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from vedette.kernels.planning.label_values import Valuation, ValueWork, make_val
 
 @inlined
 def add_rows(rows: Floats, power: float, changes: Floats, out: Floats) -> None:
-    """out = rows + power * changes, each (bernoulli_size, num_samples); `out` may be `rows`."""
-    if rows.shape[1] == 1:  # as the expected loss has them: no loop within the loop
+    """Write out = rows + power * changes, each (bernoulli_size, num_samples); `out` may be `rows`."""
+    if rows.shape[1] == 1:  # one sample, as for the expected loss: no inner loop
         for k in range(rows.shape[0]):
             out[k, 0] = rows[k, 0] + power * changes[k, 0]
         return
@@ -31,7 +31,7 @@ def add_rows(rows: Floats, power: float, changes: Floats, out: Floats) -> None:
 
 @inlined
 def spread_row(row: Floats, out: Floats) -> None:
-    """out (bernoulli_size, num_samples) = the same row (bernoulli_size,) for all samples."""
+    """Write out (bernoulli_size, num_samples) = the same row (bernoulli_size,) for all samples."""
     for k in range(out.shape[0]):
         for sample in range(out.shape[1]):
             out[k, sample] = row[k]
@@ -39,7 +39,9 @@ def spread_row(row: Floats, out: Floats) -> None:
 
 @borrowing
 def add_course(table: Table, sensor: int, course: int, sign: float, totals: Floats) -> None:
-    """Add, or with sign -1 take away, the changes of a course in totals (num_labels, bernoulli_size, num_samples)."""
+    """Add the changes of a course, or subtract them with sign -1, in totals (num_labels, bernoulli_size,
+    num_samples).
+    """
     power = sign * table.powers[sensor]
     for entry in range(table.offsets[course], table.offsets[course + 1]):
         total = totals[table.labels[entry]]
@@ -48,7 +50,7 @@ def add_course(table: Table, sensor: int, course: int, sign: float, totals: Floa
 
 @borrowing
 def value_rows(valuation: Valuation, label: int, rows: Floats, work: ValueWork, out: Floats) -> None:
-    """Values (num, num_samples) of a label's joint rows (bernoulli_size, num_samples)."""
+    """Write values (num, num_samples) of a label's joint rows (bernoulli_size, num_samples)."""
     for k in range(rows.shape[0]):
         for sample in range(rows.shape[1]):
             work.total[k, sample] = rows[k, sample]
@@ -57,7 +59,9 @@ def value_rows(valuation: Valuation, label: int, rows: Floats, work: ValueWork, 
 
 @kernel
 def label_values(rows: Floats, valuation: Valuation) -> Floats:
-    """(num_labels, num, num_samples) values of rows (num_labels, bernoulli_size, num_samples), label by label."""
+    """Return values (num_labels, num, num_samples) of rows (num_labels, bernoulli_size, num_samples), label
+    by label.
+    """
     num_labels, _, num_samples = rows.shape
     work, out = make_value_work(valuation, num_samples), np.empty((num_labels, valuation.num, num_samples))
     for label in range(num_labels):
@@ -67,13 +71,13 @@ def label_values(rows: Floats, valuation: Valuation) -> Floats:
 
 @kernel
 def values_without_scans(rows: Floats, valuation: Valuation) -> Floats:
-    """(num_labels, num) values of rows (num_labels, bernoulli_size)."""
+    """Return values (num_labels, num) of rows (num_labels, bernoulli_size)."""
     return label_values(rows.reshape((rows.shape[0], rows.shape[1], 1)), valuation)[:, :, 0].copy()
 
 
 @kernel
 def existence_logits(rows: Floats, dim: int) -> Floats:
-    """(num_labels, num_samples) of the existence that rows stand for; 0 where nobody who counts knows the label."""
+    """Return existence logits (num_labels, num_samples) of rows; 0 if no sensor with a positive power has the label."""
     num_labels, size, num_samples = rows.shape
     out, integrals = np.zeros((num_labels, num_samples)), make_integrals(num_samples)
     for label in range(num_labels):
@@ -88,7 +92,7 @@ def existence_logits(rows: Floats, dim: int) -> Floats:
 
 @kernel
 def start_totals(table: Table) -> Floats:
-    """(num_labels, bernoulli_size, num_samples) joint rows without any scan."""
+    """Return joint rows (num_labels, bernoulli_size, num_samples) without any scan."""
     num_labels, size = table.start.shape
     totals = np.empty((num_labels, size, table.changes.shape[2]))
     for label in range(num_labels):
@@ -98,7 +102,7 @@ def start_totals(table: Table) -> Floats:
 
 @inlined
 def _start_again(table: Table, course: int, totals: Floats, stale: Bools) -> None:
-    """The labels in reach of a course have other scans than in the joint action before: their rows start again."""
+    """Reset the rows of the labels in reach of a course, whose scans differ from the joint action before."""
     for entry in range(table.offsets[course], table.offsets[course + 1]):
         label = table.labels[entry]
         if not stale[label]:
@@ -108,7 +112,7 @@ def _start_again(table: Table, course: int, totals: Floats, stale: Bools) -> Non
 
 @borrowing
 def _gather(table: Table, actions: Ints, stale: Bools, touched: Bools, totals: Floats) -> None:
-    """Add what the scans of a joint action (num_sensors,) say of stale labels, and note which labels they reach."""
+    """Add the changes by a joint action (num_sensors,) to stale labels, and mark the labels that it reaches."""
     touched[:] = False
     for s in range(len(actions)):
         if actions[s] >= 0:
@@ -122,11 +126,11 @@ def _gather(table: Table, actions: Ints, stale: Bools, touched: Bools, totals: F
 
 @kernel
 def joint_values(table: Table, valuation: Valuation, actions: Ints, first: int, last: int, out: Floats) -> None:
-    """Sums over labels (num_joint, num, num_samples), of joint actions `first:last`.
+    """Write sums over labels (num_joint, num, num_samples) of joint actions `first:last`.
 
-    actions: (num_joint, num_sensors) number of the course of each sensor; -1 for a sensor that does not scan. A label
-    of which no scan is another than in the joint action before keeps its values: rows that differ in one sensor cost
-    what that one can reach.
+    actions: (num_joint, num_sensors) index of the course of each sensor; -1 for a sensor that does not scan. A label
+    whose scans are those of the joint action before keeps its values, so joint actions that differ in one sensor cost
+    only what that sensor can reach.
     """
     totals, unseen = start_totals(table), values_without_scans(table.start, valuation)
     num_labels, num_samples = totals.shape[0], totals.shape[2]
@@ -156,16 +160,18 @@ def joint_values(table: Table, valuation: Valuation, actions: Ints, first: int, 
 def value_changed(
     table: Table, valuation: Valuation, sensor: int, entry: int, rows: Floats, work: ValueWork, out: Floats
 ) -> None:
-    """Values (num, num_samples) of the label of an entry, with its change added to the joint rows of the others."""
+    """Write values (num, num_samples) of the label of an entry, with its change added to the joint rows of
+    the others.
+    """
     add_rows(rows, table.powers[sensor], table.changes[entry], work.total)
     value_label(valuation, table.labels[entry], work, out)
 
 
 @kernel
 def line_values(table: Table, valuation: Valuation, chosen: Ints, first: int, last: int, out: Floats) -> None:
-    """Sums over labels (num_courses, num, num_samples) of each course of sensors `first:last`, the others as chosen.
+    """Write sums over labels (num_courses, num, num_samples) of each course of sensors `first:last`, others as chosen.
 
-    chosen: (num_sensors,) as a row of `joint_values`; of a sensor's own courses its entry is not read. out: of the
+    chosen: (num_sensors,) as a row of `joint_values`; for a sensor's own courses its entry is not read. out: for the
     courses of all sensors.
     """
     totals, num_labels = start_totals(table), len(table.start)
@@ -173,7 +179,7 @@ def line_values(table: Table, valuation: Valuation, chosen: Ints, first: int, la
     for s in range(len(chosen)):
         if chosen[s] >= 0:
             add_course(table, s, table.first_courses[s] + chosen[s], 1.0, totals)
-    # Put back as they were after each sensor: what is subtracted and added again is not the same to the last bit.
+    # Restored by copying after each sensor: subtracting and adding again is not exact to the last bit.
     full = totals.copy()
     work, values = make_value_work(valuation, num_samples), np.empty((num_labels, num, num_samples))
     whole, rest, before = np.zeros((num, num_samples)), np.empty((num, num_samples)), np.empty_like(values)
@@ -206,10 +212,10 @@ def line_values(table: Table, valuation: Valuation, chosen: Ints, first: int, la
 def alone_values(
     table: Table, valuation: Valuation, bases: Floats, which: Ints, first: int, last: int, out: Floats
 ) -> None:
-    """Sums over labels (num_courses, num, num_samples) of each course of sensors `first:last` by themselves.
+    """Write sums over labels (num_courses, num, num_samples) of each course of sensors `first:last` alone.
 
     bases: (num_bases, num_labels, bernoulli_size) rows of sensors' own beliefs without scans. which: (num_sensors,)
-    those of each sensor. out: of the courses of all sensors.
+    index of each sensor's base. out: for the courses of all sensors.
     """
     num_samples, work = table.changes.shape[2], make_value_work(valuation, table.changes.shape[2])
     values, unseen, taken = np.empty((valuation.num, num_samples)), np.empty((bases.shape[1], valuation.num)), -1

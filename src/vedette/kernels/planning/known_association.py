@@ -1,11 +1,11 @@
-"""Pseudo-updates with known association: each ideal measurement is of its own label, or else clutter.
+"""Pseudo-updates with known association: each ideal measurement comes from its own label, or from clutter.
 
-Labels are then independent, no joint choice is ranked, and one label costs the same whatever the number of others. Of a
-label predicted as N(m, P) with existence odds o, an ideal measurement z of the sampled target makes
+Labels are then independent, no joint associations are ranked, and the cost of a label does not depend on the number of
+others. For a label predicted as N(m, P) with existence odds o, an ideal measurement z of the sampled target makes
 
     odds o (1 - P_D + P_D N(z; h(m), S) / kappa(z)),   density N(m + K (z - h(m)), P - K S K'),
 
-and a scan in which the sampled target is not seen, or not there, odds o (1 - P_D) and the density as it was. A label is
+and a scan in which the sampled target is not detected, or absent, odds o (1 - P_D) and an unchanged density. A label is
 followed with all samples side by side.
 """
 
@@ -45,40 +45,40 @@ from vedette.kernels.planning.ideal import IDEAL, SAMPLED, Decision, add_noise
 from vedette.kernels.planning.pseudo_lmb import LmbResults
 from vedette.kernels.planning.reach import Belief
 
-# Samples followed at a time: their numbers stay in the fastest memory.
+# Samples followed at a time: their numbers stay in the fastest cache.
 _MOST_LANES = 64
 
-# Of a likelihood relative to a miss: its exponential is a double, and far beyond 1e16.
+# Upper limit of the log likelihood relative to a miss: its exponential is a double, and far beyond 1e16.
 _LARGEST_EXPONENT = 600.0
 
 
 class Entries(NamedTuple):
-    """Which of a sensor's own labels each of its courses reaches."""
+    """The sensor's own labels that each of its courses reaches."""
 
-    first: Ints  # (num_courses,) its first entry
-    last: Ints  # (num_courses,) the one after its last
-    own: Ints  # (num_entries,) place among the sensor's labels
+    first: Ints  # (num_courses,) first entry of each course
+    last: Ints  # (num_courses,) the entry after the last of each course
+    own: Ints  # (num_entries,) index among the sensor's labels
 
 
 class Followed(NamedTuple):
-    """A label with some samples, side by side: what became of it so far."""
+    """The present state of a label for some samples, side by side."""
 
     means: Floats  # (state_dim, room)
     covs: Floats  # (state_dim (state_dim + 1) / 2, room) lower triangles
     log_odds: Floats  # (room,) factor on the odds of its existence
-    log_miss: Floats  # (room,) of the probability that no scan detects it
-    is_measured: Bools  # (room,) by some scan
+    log_miss: Floats  # (room,) log probability that no scan detects it
+    is_measured: Bools  # (room,) whether some scan has measured it
 
 
 class Work(NamedTuple):
-    """Arrays in which samples are followed."""
+    """Working arrays in which samples are followed."""
 
     batch: BatchedGaussians
     own: BatchWork
-    targets: Floats  # (state_dim, room) the label's targets; its own predicted mean where it is not there
-    measurements: Floats  # (meas_dim, room) of the targets, and then the whitened residuals
+    targets: Floats  # (state_dim, room) the label's targets; its predicted mean if it is absent
+    measurements: Floats  # (meas_dim, room) of the targets, then the whitened residuals
     is_seen: Bools  # (room,) the targets that are measured
-    detection: Floats  # (room,) of the targets
+    detection: Floats  # (room,) detection probabilities of the targets
     levels: Floats  # (room,) log weights of a detection
     missed: Floats  # (room,) log (1 - P_D)
 
@@ -105,7 +105,7 @@ def _make_work(dim: int, meas_dim: int, room: int) -> Work:
 
 @inlined
 def _take_path(belief: Belief, label: int, step: int, num: int, batch: BatchedGaussians) -> None:
-    """As the label is without any scan."""
+    """Copy the label's predicted path, without any scan, at a step."""
     mean, cov = belief.paths.means[label, step], belief.paths.covs[label, step]
     for i in range(len(mean)):
         for j in range(i + 1):
@@ -121,7 +121,7 @@ def _take_path(belief: Belief, label: int, step: int, num: int, batch: BatchedGa
 def _look(
     belief: Belief, decision: Decision, course: int, label: int, step: int, first: int, num: int, work: Work
 ) -> int:
-    """Which of the samples' targets are seen, and their ideal measurements; returns how many are."""
+    """Write which of the samples' targets are detected, and their ideal measurements; returns the number detected."""
     sensor, forms, horizon, futures = decision.sensor, decision.forms, decision.horizon, decision.futures
     pose, scratch, offsets, targets = horizon.poses[course, step], work.own.scratch, work.own.offsets, work.targets
     for s in range(num):
@@ -155,7 +155,7 @@ def _look(
 
 @inlined
 def _take_clutter(decision: Decision, pose: Floats, num: int, work: Work) -> None:
-    """levels = - log clutter intensity at the measurements."""
+    """Write levels = - log clutter intensity at the measurements."""
     measurement = work.own.scratch.residual
     for s in range(num):
         level = 0.0
@@ -167,7 +167,7 @@ def _take_clutter(decision: Decision, pose: Floats, num: int, work: Work) -> Non
 
 @inlined
 def _whiten(decision: Decision, num: int, work: Work) -> None:
-    """Measurements become whitened residuals, and levels + log N(z; h(m), S) the levels."""
+    """Replace measurements by whitened residuals, and add log N(z; h(m), S) to the levels."""
     batch, levels = work.batch, work.levels
     for s in range(num):
         levels[s] += batch.log_norm[s]
@@ -198,7 +198,7 @@ def _weigh(num: int, work: Work, out: Followed) -> None:
     detection, levels, missed, rest = work.batch.prob_detection, work.levels, work.missed, work.detection
     for s in range(num):
         relative = levels[s] - missed[s]
-        # Beyond the largest exponent the 1 is lost beside the rest.
+        # Beyond the largest exponent the 1 is negligible.
         kept = min(max(relative, -_LARGEST_EXPONENT), _LARGEST_EXPONENT)
         rest[s] = relative - kept if relative > kept and detection[s] > 0.0 else 0.0
         levels[s] = kept
@@ -212,7 +212,7 @@ def _weigh(num: int, work: Work, out: Followed) -> None:
 
 @inlined
 def _update(num: int, work: Work, out: Followed) -> None:
-    """Means and covariances of the samples that are seen are updated, of the others predicted."""
+    """Write updated means and covariances of the detected samples, and predicted ones of the others."""
     batch, seen, dim = work.batch, work.is_seen, out.means.shape[0]
     for i in range(dim):
         given, means = batch.means[i], out.means[i]
@@ -253,7 +253,7 @@ def _follow(
         out.log_odds[s], out.log_miss[s], out.is_measured[s] = 0.0, 0.0, False
     for step in range(horizon.poses.shape[1]):
         pose = horizon.poses[course, step]
-        # Until a first measurement all samples have the same label.
+        # Until the first measurement the label is the same in all samples.
         if is_path:
             _take_path(belief, label, step, num, batch)
         else:
@@ -281,7 +281,9 @@ def _follow(
 
 @kernel
 def rows_without_scans(means: Floats, covs: Floats, logits: Floats, references: Floats) -> Floats:
-    """(num, bernoulli_size) Bernoulli rows of labels of one Gaussian each; certain ones as all but that."""
+    """Return (num, bernoulli_size) Bernoulli rows of labels with one Gaussian each; logits of certain ones
+    are limited.
+    """
     num, dim = means.shape
     rows, factor, inverse = np.empty((num, bernoulli_size(dim))), np.empty((dim, dim)), np.empty((dim, dim))
     for i in range(num):
@@ -296,7 +298,7 @@ def rows_without_scans(means: Floats, covs: Floats, logits: Floats, references: 
 def _write_changes(
     found: Followed, first: int, num: int, reference: Floats, base: Floats, own: BatchWork, row: Floats, changes: Floats
 ) -> None:
-    """Changes (bernoulli_size, num_samples) of a label, of `num` samples from `first` on."""
+    """Write changes (bernoulli_size, num_samples) of a label, for `num` samples from `first` on."""
     size = len(base)
     for s in range(num):
         for k in range(size - 2):
@@ -325,9 +327,9 @@ def fill_changes(
     last: int,
     changes: Floats,
 ) -> None:
-    """Changes (num_entries, bernoulli_size, num_samples) of the Bernoulli rows, for courses `first:last` of a sensor.
+    """Write changes (num_entries, bernoulli_size, num_samples) of Bernoulli rows, for courses `first:last` of a sensor.
 
-    references: (num_labels, state_dim) about which the rows are taken. bases: (num_labels, bernoulli_size) the sensor's
+    references: (num_labels, state_dim) reference points of the rows. bases: (num_labels, bernoulli_size) the sensor's
     rows without scans. Both in the order of the sensor's own labels.
     """
     dim, meas_dim, num_samples = references.shape[1], len(decision.sensor.angular), belief.targets.shape[1]
@@ -344,7 +346,7 @@ def fill_changes(
 
 @kernel
 def pseudo_update_known(belief: Belief, decision: Decision, first: int, last: int, results: LmbResults) -> None:
-    """Densities of courses `first:last` of one sensor, for every sample: case `course * num_samples + sample`."""
+    """Write densities of courses `first:last` of one sensor for every sample: case `course * num_samples + sample`."""
     tracks, num_samples = belief.prior.tracks, belief.targets.shape[1]
     dim, room = tracks.components.means.shape[1], min(num_samples, _MOST_LANES)
     work, found = _make_work(dim, len(decision.sensor.angular), room), _make_followed(dim, room)

@@ -1,11 +1,11 @@
-"""What one label contributes to a reward: a function of its Bernoulli before and after the scans.
+"""The contribution of one label to a reward: a function of its Bernoulli before and after the scans.
 
-Three kinds. Power integrals of the prediction p and the update q, of which the log of
+There are three kinds. Power integrals of the prediction p and the update q, for which the log of
 
     (1 - r_p)^a (1 + K^(a + b - 1) integral of (o_p p)^a (o_q q)^b),   o = r / (1 - r),
 
-is the part of Z(a, b) that the label has (q unnormalised by (1 - r_q)^b, the same for every reward that is one). The
-expected loss of `vedette.control.ExpectedLoss`. And a model function of the two Bernoullis.
+is the label's part of Z(a, b) (q unnormalised by (1 - r_q)^b, the same for every reward of this kind). The expected
+loss of `vedette.control.ExpectedLossReward`. And a model function of the two Bernoullis.
 """
 
 from __future__ import annotations
@@ -30,22 +30,22 @@ FUNCTION = 2
 
 @typed_by_fields
 class Valuation(NamedTuple):
-    """How a label is valued."""
+    """The rule by which a label is valued."""
 
     kind: int  # POWER_INTEGRALS, EXPECTED_LOSS or FUNCTION
     num: int  # numbers that a label contributes
     prior: Floats  # (num_labels, bernoulli_size) rows of the prediction
-    own: Floats  # (num_labels, num) what of a number depends on the prediction alone
+    own: Floats  # (num_labels, num) terms that depend on the prediction alone
     exponents: Floats  # (num, 2) pairs (a, b) of power integrals
     log_volume: float  # log K
-    params: Floats  # of the function; of the expected loss the squared cutoff c^2, half the order p, and a factor
-    function: Any  # of FUNCTION: see `vedette.models.model_function`, kind `label_reward`
-    references: Floats  # (num_labels, state_dim) means of the prediction, about which rows are taken
+    params: Floats  # of the function; for the expected loss: squared cutoff c^2, half the order p, and a factor
+    function: Any  # for FUNCTION: see `vedette.models.model_function`, kind `label_reward`
+    references: Floats  # (num_labels, state_dim) means of the prediction, reference points of the rows
     covs: Floats  # (num_labels, state_dim, state_dim) of the prediction
 
 
 class ValueWork(NamedTuple):
-    """Working arrays of one label and all samples, which are side by side."""
+    """Working arrays of one label and all samples, side by side."""
 
     total: Floats  # (bernoulli_size, num_samples)
     joint: Floats  # (bernoulli_size, num_samples)
@@ -74,7 +74,7 @@ def make_value_work(valuation: Valuation, num_samples: int) -> ValueWork:
 
 @borrowing
 def _power_integral(valuation: Valuation, label: int, e: int, work: ValueWork, out: Floats) -> None:
-    """out (num_samples,) of one pair of exponents."""
+    """Write out (num_samples,) for one pair of exponents."""
     total, joint, prior, dim = work.total, work.joint, valuation.prior[label], valuation.references.shape[1]
     size, num_samples = total.shape
     a, b, own = valuation.exponents[e, 0], valuation.exponents[e, 1], valuation.own[label, e]
@@ -82,7 +82,7 @@ def _power_integral(valuation: Valuation, label: int, e: int, work: ValueWork, o
         for s in range(num_samples):
             out[s] = own
         return
-    # Of q alone the row is taken as it is, of which log integral q^b = log integral q - (b - 1) rest / 2 - d log(b) / 2
+    # For q alone the row is used as it is, with log integral q^b = log integral q - (b - 1) rest / 2 - d log(b) / 2
     # with the rest s - y'Y^-1 y that the elimination leaves.
     power = 1.0 if a == 0.0 else b
     for k in range(size - 3):
@@ -105,7 +105,7 @@ def _power_integral(valuation: Valuation, label: int, e: int, work: ValueWork, o
 
 @inlined
 def _position_trace(total: Floats, sample: int, prior: Floats, share: float, work: ValueWork) -> float:
-    """Trace of the position's covariance where the information is that of `prior` and `share` times what is added."""
+    """Return the trace of the position's covariance for the information of `prior` plus `share` times the increment."""
     n, at = work.cov.shape[0], 0
     for i in range(n):
         for j in range(i + 1):
@@ -126,7 +126,7 @@ def _position_trace(total: Floats, sample: int, prior: Floats, share: float, wor
 
 @inlined
 def _expected_loss(valuation: Valuation, label: int, sample: int, work: ValueWork) -> float:
-    """Less r (q min(tr P+, c^2)^(p/2) + (1 - q) min(tr P, c^2)^(p/2)), times the factor."""
+    """Return -r (q min(tr P+, c^2)^(p/2) + (1 - q) min(tr P, c^2)^(p/2)), times the factor."""
     size, unseen = work.total.shape[0], valuation.own[label, 0]
     prior = valuation.prior[label]
     existence = 1.0 / (1.0 + math.exp(-prior[size - 2]))
@@ -140,7 +140,7 @@ def _expected_loss(valuation: Valuation, label: int, sample: int, work: ValueWor
 
 @borrowing
 def _of_functions(valuation: Valuation, label: int, work: ValueWork, out: Floats) -> None:
-    """out (num, num_samples) as the model function says."""
+    """Write out (num, num_samples) by the model function."""
     total, joint, row, dim = work.total, work.joint, work.row, valuation.references.shape[1]
     size, num_samples = total.shape
     for k in range(size - 2):
@@ -173,9 +173,9 @@ def _of_functions(valuation: Valuation, label: int, work: ValueWork, out: Floats
 
 @inlined
 def value_label(valuation: Valuation, label: int, work: ValueWork, out: Floats) -> None:
-    """Write the numbers (num, num_samples) of a label whose joint rows stand in `work.total`, which are used up.
+    """Write the numbers (num, num_samples) of a label whose joint rows are in `work.total`, which are overwritten.
 
-    NaN where a joint row is none.
+    NaN if a joint row is not a valid Bernoulli.
     """
     unscale(work.total)
     if valuation.kind == POWER_INTEGRALS:
@@ -190,4 +190,4 @@ def value_label(valuation: Valuation, label: int, work: ValueWork, out: Floats) 
     for sample in range(out.shape[1]):
         if not powers[sample] > 0.0:
             for e in range(valuation.num):
-                out[e, sample] = 0.0  # nobody who counts knows the label
+                out[e, sample] = 0.0  # no sensor with a positive power has the label

@@ -1,4 +1,4 @@
-"""Straight lines in the plane against the edges of zones."""
+"""Straight lines in the plane and their intersections with edges of zones."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ class Edges(NamedTuple):
 
     starts: Floats  # (num_edges, 2)
     ends: Floats  # (num_edges, 2)
-    zones: Ints  # (num_edges,) the zone that each belongs to
+    zones: Ints  # (num_edges,) zone of each edge
 
 
 @inlined
 def _side(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> float:
-    """Above 0 where c is to the left of the line from a to b, below 0 to the right."""
+    """Return a number above 0 if c is to the left of the line from a to b, below 0 if to the right."""
     return (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
 
 
 @inlined
 def _touched_at(ax: float, ay: float, bx: float, by: float, edges: Edges, e: int) -> float:
-    """Share of the line from a to b at which it touches an edge; inf where it does not."""
+    """Return the fraction of the line from a to b at which it touches an edge; inf if it does not."""
     cx, cy, dx, dy = edges.starts[e, 0], edges.starts[e, 1], edges.ends[e, 0], edges.ends[e, 1]
     if max(ax, bx) < min(cx, dx) or max(cx, dx) < min(ax, bx) or max(ay, by) < min(cy, dy) or max(cy, dy) < min(ay, by):
         return math.inf
@@ -40,7 +40,7 @@ def _touched_at(ax: float, ay: float, bx: float, by: float, edges: Edges, e: int
 
 @kernel
 def clear_lengths(starts: Floats, ends: Floats, edges: Edges) -> Floats:
-    """(num_starts, num_ends) m, lengths of straight lines; inf for those that touch an edge."""
+    """Return lengths (num_starts, num_ends) m of straight lines; inf for those that touch an edge."""
     found = np.empty((len(starts), len(ends)))
     for i in range(len(starts)):
         for j in range(len(ends)):
@@ -55,7 +55,7 @@ def clear_lengths(starts: Floats, ends: Floats, edges: Edges) -> Floats:
 
 @kernel
 def first_touches(starts: Floats, ends: Floats, edges: Edges, ignored: Bools) -> Floats:
-    """(num,) share of the line from each start to its end at which it first touches an edge; inf: it touches none.
+    """Return the fraction (num,) of the line from each start to its end at which it first touches an edge; inf: never.
 
     ignored: (num, num_zones) zones whose edges do not count for a line.
     """

@@ -1,9 +1,9 @@
 """Pseudo-updates of a GLMB: the filter's own step for every action and sample of a decision (paper, Algorithm 2).
 
 A case is one action of one sensor with one sample; case `action * num_samples + sample`. The kernels are those of
-`vedette.kernels.steps.glmb`, in arrays that are kept from case to case. What differs: no target is born or dies, so
-that every joint choice is a hypothesis of its own; the samples of an action share the first prediction; and every case
-keeps all label sets of the prior, so that all cases and the prediction are compared on one support.
+`vedette.kernels.steps.glmb`, in arrays that are kept from case to case. The differences: no target is born or dies, so
+that every joint association is a separate hypothesis; the samples of an action share the first prediction; and every
+case keeps all label sets of the prior, so that all cases and the prediction have the same support.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ from vedette.kernels.steps.assembly import name_tracks, update_tracks
 
 
 class GlmbResults(NamedTuple):
-    """Updated densities. Members `set_offsets[g]:set_offsets[g + 1]` are the labels of label set `g`."""
+    """Updated densities. `set_offsets[g]:set_offsets[g + 1]` are the members of label set `g`."""
 
-    set_offsets: Ints  # (num_sets + 1,) into the members
+    set_offsets: Ints  # (num_sets + 1,) first member of each set
     log_weights: Floats  # (num_cases, num_sets)
-    means: Floats  # (num_cases, num_members, state_dim) of one Gaussian each; a set of log weight -inf is left as it is
+    means: Floats  # (num_cases, num_members, state_dim), one Gaussian each; not written for log weight -inf
     covs: Floats  # (num_cases, num_members, state_dim, state_dim)
 
 
 @inlined
 def _find_children(options: Options, belief: CaseBelief, caps: SearchCaps, work: GlmbWork) -> bool:
-    """Write the heaviest children, and the best of each label set; false where there is no room for them."""
+    """Write the heaviest children, and the best of each label set; returns False if the capacity is too small."""
     return (
         start_search(options, belief.hyps, work.search, work.children)
         and run_search(options, belief.hyps, caps, work.search, work.children)
@@ -49,7 +49,7 @@ def _find_children(options: Options, belief: CaseBelief, caps: SearchCaps, work:
 
 @inlined
 def _posterior(options: Options, belief: CaseBelief, rows: Rows, work: GlmbWork, out: CaseBelief) -> CaseBelief:
-    """The posterior of all children, in the arrays of `out`."""
+    """Return the posterior of all children, in the arrays of `out`."""
     children = work.children
     num_hyps = children.filled[0]
     kept = work.all_children[:num_hyps]
@@ -64,7 +64,7 @@ def _posterior(options: Options, belief: CaseBelief, rows: Rows, work: GlmbWork,
 def _update_cases(
     prior: CaseBelief, decision: Decision, first: int, last: int, results: GlmbResults, work: GlmbWork
 ) -> int:
-    """Cases `first:last`; returns `last`, or the case before which `work` must be grown."""
+    """Update cases `first:last`; returns `last`, or the case before which `work` must be grown."""
     sensor, horizon, caps = decision.sensor, decision.horizon, decision.truncation
     num_samples, prepared = len(decision.futures.offsets) - 1, -1
     for case in range(first, last):
@@ -77,7 +77,7 @@ def _update_cases(
                 return case
             num = ideal_scan(decision, action, sample, step, work.pair.scratch, work.measurements)
             scan = ScanInput(decision.birth, work.measurements[:num], horizon.poses[action, step], horizon.dt)
-            # The first prediction depends on neither sample nor measurements: it is taken once an action.
+            # The first prediction depends on neither sample nor measurements: it is computed once per action.
             rows = work.first_rows if step == 0 else view_rows(work.rows, num_tracks)
             if step > 0 or action != prepared:
                 predict_rows(belief.tracks, scan, decision.motion, sensor, rows, work.pair.scratch)
@@ -92,7 +92,7 @@ def _update_cases(
                 raise NumericalError(
                     "pseudo-update: no hypothesis has positive weight; do the models forbid the ideal scan?"
                 )
-            # Read from one belief, written to the other.
+            # One belief is read, the other written.
             belief = _posterior(options, belief, rows, work, work.even if step % 2 == 0 else work.odd)
         _write_marginal(belief, results, case, work)
     return last
@@ -100,9 +100,10 @@ def _update_cases(
 
 @inlined
 def _write_marginal(belief: CaseBelief, results: GlmbResults, case: int, work: GlmbWork) -> None:
-    """The belief marginalised over association histories: a log weight a label set, one Gaussian a member.
+    """Write the belief marginalised over association histories: a log weight per label set, one Gaussian per member.
 
-    Paper eq. 10: w(L) = sum of the weights of L's hypotheses; each member is the mixture of its tracks weighed by them.
+    Paper eq. 10: w(L) = sum of the weights of L's hypotheses; each member is the mixture of its tracks, with these
+    weights.
     """
     set_offsets, log_weights, hyps, groups = results.set_offsets, results.log_weights[case], belief.hyps, belief.groups
     means, covs = results.means[case], results.covs[case]
@@ -110,7 +111,7 @@ def _write_marginal(belief: CaseBelief, results: GlmbResults, case: int, work: G
     slot_of, pool, weights = work.naming.track_of, work.naming.options, work.pool_weights
     for at in range(len(log_weights)):
         log_weights[at], heads[at] = -math.inf, -1
-    # Backwards, so that each chain is in the order of its hypotheses.
+    # In reverse, so that each chain is in the order of its hypotheses.
     for h in range(len(groups) - 1, -1, -1):
         following[h] = heads[groups[h]]
         heads[groups[h]] = h
@@ -142,9 +143,9 @@ def _write_marginal(belief: CaseBelief, results: GlmbResults, case: int, work: G
 def pseudo_update_glmb(
     prior: Glmb, groups: Ints, decision: Decision, first: int, last: int, results: GlmbResults
 ) -> None:
-    """Cases `first:last` of one sensor, into `results`.
+    """Write the results of cases `first:last` of one sensor into `results`.
 
-    prior: of one Gaussian a track. groups: label set of each of its hypotheses.
+    prior: one Gaussian per track. groups: label set of each of its hypotheses.
     """
     belief = CaseBelief(prior.tracks, Parents(prior.hyp_offsets, prior.hyp_tracks, prior.hyp_log_weights), groups)
     num_tracks, dim = prior.tracks.components.means.shape

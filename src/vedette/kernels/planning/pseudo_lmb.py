@@ -1,7 +1,7 @@
 """Pseudo-updates of an LMB: the filter's own step for every action and sample of a decision.
 
 A case is one action of one sensor with one sample; case `action * num_samples + sample`. The kernels are those of
-`vedette.kernels.steps.lmb`, in arrays that are kept from case to case. What differs: no label is born, dies or is
+`vedette.kernels.steps.lmb`, in arrays that are kept from case to case. The differences: no label is born, dies or is
 dropped, and the samples of an action share the first prediction.
 """
 
@@ -32,25 +32,25 @@ from vedette.kernels.steps.matching import MixtureRoom, make_mixture, match_rows
 class LmbResults(NamedTuple):
     """Updated densities."""
 
-    logits: Floats  # (num_cases, num_labels) of existence
-    means: Floats  # (num_cases, num_labels, state_dim) of one Gaussian a label
+    logits: Floats  # (num_cases, num_labels) logits of existence
+    means: Floats  # (num_cases, num_labels, state_dim), one Gaussian per label
     covs: Floats  # (num_cases, num_labels, state_dim, state_dim)
 
 
 class LmbWork(NamedTuple):
-    """Arrays in which a case is worked on; there is one row a label of the prior."""
+    """Working arrays of a case, with one row per label of the prior."""
 
-    pair: PairWork  # and scratch
+    pair: PairWork  # and scratch arrays
     measurements: Floats  # (most_measurements, meas_dim)
     log_clutter: Floats  # (most_measurements,)
     first_rows: Rows  # of the prior, for all samples of an action
     rows: Rows  # of a later belief
-    near: Near  # every measurement to every row: ideal scans are small
+    near: Near  # every measurement with every row: ideal scans are small
     options: Options
     marginals: Floats  # (num_options,)
     clusters: MarginalWork
-    belief: Lmb  # after the latest step, one Gaussian a label
-    all_rows: Ints  # 0, 1, 2, ...: all of them are kept
+    belief: Lmb  # after the latest step, one Gaussian per label
+    all_rows: Ints  # 0, 1, 2, ...: all rows are kept
     mixture: MixtureRoom  # of one row
 
 
@@ -106,7 +106,7 @@ def _update_cases(
     results: LmbResults,
     work: LmbWork,
 ) -> int:
-    """Cases `first:last`; returns `last`, or the case before which `work` must be grown."""
+    """Update cases `first:last`; returns `last`, or the case before which `work` must be grown."""
     sensor, horizon, caps, belief = decision.sensor, decision.horizon, decision.truncation, work.belief
     num_samples, prepared, updated = len(decision.futures.offsets) - 1, -1, belief.tracks.components
     for case in range(first, last):
@@ -114,7 +114,7 @@ def _update_cases(
         for step in range(horizon.poses.shape[1]):
             num = ideal_scan(decision, action, sample, step, work.pair.scratch, work.measurements)
             scan = ScanInput(decision.birth, work.measurements[:num], horizon.poses[action, step], horizon.dt)
-            # The first prediction depends on neither sample nor measurements: it is taken once an action.
+            # The first prediction depends on neither sample nor measurements: it is computed once per action.
             rows, current = (work.first_rows, prior) if step == 0 else (work.rows, belief)
             if step > 0 or action != prepared:
                 predict_rows(current.tracks, scan, decision.motion, sensor, rows, work.pair.scratch)
@@ -143,9 +143,9 @@ def _update_cases(
 def pseudo_update_lmb(
     prior: Lmb, decision: Decision, association: Association | None, first: int, last: int, results: LmbResults
 ) -> None:
-    """Cases `first:last` of one sensor, into `results`.
+    """Write the results of cases `first:last` of one sensor into `results`.
 
-    prior: of one Gaussian a track. association: in place of the sums over clusters.
+    prior: one Gaussian per track. association: used instead of the sums over clusters.
     """
     work = _make_work(prior, len(decision.sensor.angular), most_targets(decision.futures))
     while first < last:

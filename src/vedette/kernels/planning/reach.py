@@ -1,4 +1,4 @@
-"""Labels carried over the horizon without scans, and which of them a course may detect."""
+"""Labels predicted over the horizon without scans, and the labels that a course may detect."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from vedette.kernels.planning.ideal import Decision, Horizon
 
 
 class Paths(NamedTuple):
-    """Labels carried over the horizon without scans."""
+    """Labels predicted over the horizon without scans."""
 
     means: Floats  # (num_labels, horizon_steps, state_dim)
     covs: Floats  # (num_labels, horizon_steps, state_dim, state_dim)
 
 
 class Belief(NamedTuple):
-    """What a sensor believes of its labels before the decision, and where they are among those of the samples."""
+    """A sensor's labels before the decision, and their indices among the sampled targets."""
 
-    prior: Lmb  # one Gaussian a label
+    prior: Lmb  # one Gaussian per label
     paths: Paths
-    targets: Ints  # (num_labels, num_samples) place of the label's target in the samples, -1 where it is not there
-    radii: Floats  # (num_labels, horizon_steps) m, about the paths' means, within which the label is
+    targets: Ints  # (num_labels, num_samples) index of the label's sampled target, -1 if absent
+    radii: Floats  # (num_labels, horizon_steps) m, radii about the paths' means that contain the label
 
 
 @kernel
 def predict_paths(motion: Motion, dt: float, num_steps: int, means: Floats, covs: Floats) -> Paths:
-    """Gaussians of means (num, state_dim) after each of so many steps, without births or deaths."""
+    """Return the Gaussians of means (num, state_dim) after each of `num_steps` steps, without births or deaths."""
     num, dim = means.shape
     scratch, paths = (
         make_scratch(dim, dim),
@@ -49,7 +49,7 @@ def predict_paths(motion: Motion, dt: float, num_steps: int, means: Floats, covs
 
 @kernel
 def label_radii(paths: Paths, targets: Ints, states: Floats) -> Floats:
-    """(num_labels, horizon_steps) distance from a label's predicted mean beyond which none of its samples is.
+    """Return (num_labels, horizon_steps) distances from a label's predicted mean that contain all of its samples.
 
     At least 5.3 standard deviations of its position along its longest axis, beyond which is less than 1e-6 of its
     Gaussian. states: (horizon_steps, num_targets, state_dim) of the samples.
@@ -71,7 +71,7 @@ def label_radii(paths: Paths, targets: Ints, states: Floats) -> Floats:
 
 @inlined
 def is_beyond(paths: Paths, radii: Floats, horizon: Horizon, course: int, label: int, step: int, reach: float) -> bool:
-    """Whether a label is, at a step of a course, where a sensor of this reach detects nothing, or does not scan."""
+    """Return True if, at a step of a course, a label is beyond the sensor's reach, or the sensor does not scan."""
     if not horizon.scans[course, step]:
         return True
     pose, mean = horizon.poses[course, step], paths.means[label, step]
@@ -82,7 +82,7 @@ def is_beyond(paths: Paths, radii: Floats, horizon: Horizon, course: int, label:
 def _detects(
     belief: Belief, decision: Decision, course: int, label: int, step: int, least: float, state: Floats
 ) -> bool:
-    """Whether a label, or one of its samples, is detected with probability `least` or more at a step of a course."""
+    """Return True if the detection probability of a label or of a sample is at least `least` at a step of a course."""
     sensor, pose = decision.sensor, decision.horizon.poses[course, step]
     mean, cov = belief.paths.means[label, step], belief.paths.covs[label, step]
     if detection_probability(sensor, pose, mean, cov, state) >= least:
@@ -100,9 +100,9 @@ def _detects(
 def fill_reach(
     belief: Belief, decision: Decision, least: float, reach: float, first: int, last: int, out: Ints
 ) -> None:
-    """Set out[course, label] to 1 where a course may detect a label with probability `least` or more, else to 0.
+    """Set out[course, label] to 1 if a course may detect a label with probability `least` or more, else to 0.
 
-    Judged by the samples and by the prediction, at every step. reach: m, beyond which the sensor detects nothing.
+    Evaluated for the samples and for the prediction, at every step. reach: m, maximum detection range of the sensor.
     """
     state = np.empty(belief.prior.tracks.components.means.shape[1])
     for course in range(first, last):
@@ -118,7 +118,7 @@ def fill_reach(
 
 @kernel
 def fill_within(paths: Paths, radii: Floats, horizon: Horizon, reach: float, first: int, last: int, out: Ints) -> None:
-    """As `fill_reach`, by distance alone."""
+    """Set the same entries as `fill_reach`, by distance alone."""
     for course in range(first, last):
         for label in range(out.shape[1]):
             out[course, label] = 0
