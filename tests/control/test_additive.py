@@ -30,7 +30,7 @@ from control.examples import (
 from control.known_association import followed, updated
 from vedette import models
 from vedette.control import CauchySchwarzReward, Evaluator, RenyiReward
-from vedette.control.problem import best_values
+from vedette.control.problem import label_upper_bounds
 from vedette.control.pseudo_updates import draw_futures
 from vedette.control.rewards import (
     CardinalityVarianceReward,
@@ -206,9 +206,9 @@ def test_no_joint_action_is_better_than_the_bound(reward: Any) -> None:
     for seed in range(8):
         additive = sums_of(additive_of(shared(3, seed), reward))
         best = additive(all_joint_actions((3, 3, 3))).mean(axis=1).max()
-        tried = best_values(additive, 10**6)
+        tried = label_upper_bounds(additive, 10**6)
         assert best <= tried.sum() + 1e-9 * abs(best)
-        untried = best_values(additive, 0)
+        untried = label_upper_bounds(additive, 0)
         if isinstance(reward, ExpectedLossReward):
             assert (tried <= untried + 1e-9 * np.abs(untried)).all()
         else:

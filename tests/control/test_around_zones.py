@@ -162,10 +162,10 @@ def test_continued_courses_stay_outside(scene: str) -> None:
     pose = np.array([*graph.outside(np.array([start]))[0], 0.0])
     options = options_of(sensors, pose[np.newaxis], ONCE)
     times = np.arange(1.0, 40.0)
-    [later] = BeyondHorizon.of(sensors, options, *attracting_targets(belief), graph, None).continued(
+    [later] = BeyondHorizon.of(sensors, options, *attracting_targets(belief), graph, None).extrapolated(
         ONCE.horizon_times(), times
     )
-    allowed = ~graph.is_barred(pose[:2], options[0].courses[:, :, :2])
+    allowed = ~graph.is_blocked(pose[:2], options[0].courses[:, :, :2])
     distances = graph.to(np.array([goal]), pose[:2]).distances
     ends = [options[0].courses[c, -1, :2] for c in np.flatnonzero(allowed)]
     best = int(np.flatnonzero(allowed)[distances(np.array(ends))[:, 0].argmin()])
@@ -189,7 +189,7 @@ def test_sensors_without_courses_have_none_beyond() -> None:
     first, second = options_of(sensors, poses, ONCE)
     options = first, second._replace(courses=second.courses[:0])
     beyond = BeyondHorizon.of(sensors, options, *attracting_targets(targets([85.0, 10.0])), graph, None)
-    found = beyond.continued(ONCE.horizon_times(), np.arange(1.0, 9.0))
+    found = beyond.extrapolated(ONCE.horizon_times(), np.arange(1.0, 9.0))
     assert [own.courses.shape for own in found] == [(9, 8, 3), (0, 8, 3)]
 
 

@@ -26,7 +26,7 @@ from vedette.control.evaluator import mean_over_horizons
 from vedette.control.evidence import Evidence
 from vedette.control.extrapolation import extrapolated
 from vedette.control.inputs import options_of
-from vedette.control.problem import best_values, bound_of
+from vedette.control.problem import label_upper_bounds, upper_bound
 from vedette.control.search import all_joint_actions
 from vedette.densities import LMB, UndetectedIntensity
 from vedette.filters import LmbFilter
@@ -280,11 +280,11 @@ def test_the_bound_stays_one(hidden: bool) -> None:
         every = evaluator.joint()(all_joint_actions((3, 3, 3))).mean(axis=1)
         evidence = Evidence(evaluator, (0, 1, 2), evaluator.joint())
         evidence.evaluate(np.array([[0, 0, 0]]))
-        bound = bound_of(evidence, (0, 0, 0))
+        bound = upper_bound(evidence, (0, 0, 0))
         assert bound is not None
         assert (bound.kind, bound.unbounded) == ("by target", 0)
         assert every.max() <= bound.upper + 1e-9
-        tried, untried = (best_values(sums_of(evaluator), work) for work in (10**6, 0))
+        tried, untried = (label_upper_bounds(sums_of(evaluator), work) for work in (10**6, 0))
         assert (tried <= untried + 1e-9).all()
 
 

@@ -270,8 +270,8 @@ def test_a_hundred_sensors(search: JointSearch) -> None:
         partial=lambda actions: np.where(actions < 0, 0.0, values[np.arange(100), actions]).sum(axis=1),
     )
     assert search.search(problem, rng=draw) == tuple(values.argmax(axis=1).tolist())
-    clashes = {(s, s + 1): ~np.eye(12, dtype=bool) for s in range(99)}  # no two neighbours the same
-    mask = Mask(tuple(draw.random(12) < 0.8 for _ in range(100)), clashes)
+    conflicts = {(s, s + 1): ~np.eye(12, dtype=bool) for s in range(99)}  # no two neighbours the same
+    mask = Mask(tuple(draw.random(12) < 0.8 for _ in range(100)), conflicts)
     found = search.search(problem._replace(mask=mask), rng=draw)
     assert mask.allows(np.array([found]))[0]
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from control.examples import SETTINGS, A, B, Situation, evaluator_of, glmb, sample_rewards, situation
-from vedette.control.pseudo_updates import share_versions
+from vedette.control.pseudo_updates import merge_similar_tracks
 from vedette.densities import GLMB, TrackTable, existence_probabilities
 
 SETS = [(A, B), (A, B), (A,), (B,), ()]
@@ -34,7 +34,7 @@ def nearly_alike(divergence: float, seed: int = 0) -> GLMB:
 
 def test_versions_within_the_divergence_become_one_and_equal_hypotheses_with_them() -> None:
     belief = nearly_alike(0.9e-3)
-    shared = share_versions(belief, 1e-3)
+    shared = merge_similar_tracks(belief, 1e-3)
     shared.validate()
     assert shared.tracks.num_tracks == 2
     # The two hypotheses of both targets are one, of the sum of their weights.
@@ -50,7 +50,7 @@ def test_versions_within_the_divergence_become_one_and_equal_hypotheses_with_the
 @pytest.mark.parametrize(("divergence", "most"), [(1.1e-3, 1e-3), (1e-12, 0.0)])
 def test_others_stay_as_they_are(divergence: float, most: float) -> None:
     belief = nearly_alike(divergence)
-    shared = share_versions(belief, most)
+    shared = merge_similar_tracks(belief, most)
     np.testing.assert_array_equal(shared.hyp_log_weights, belief.hyp_log_weights)
     for part in ("labels", "means", "covs"):
         mine, theirs = getattr(shared.tracks, part), getattr(belief.tracks, part)
@@ -58,7 +58,7 @@ def test_others_stay_as_they_are(divergence: float, most: float) -> None:
 
 
 def test_an_empty_belief_has_no_versions() -> None:
-    assert share_versions(GLMB.empty(4), 1e-3).tracks.num_tracks == 0
+    assert merge_similar_tracks(GLMB.empty(4), 1e-3).tracks.num_tracks == 0
 
 
 @pytest.mark.parametrize(("divergence", "change"), [(1e-12, 1e-4), (1e-5, 0.3)])

@@ -1,6 +1,4 @@
-"""The planner protocol, and planners without rewards: random, fixed, and a wrapper that reports constraint
-violations.
-"""
+"""The planner protocol, planners without rewards (random, fixed), and a wrapper that reports violations."""
 
 from __future__ import annotations
 
@@ -10,7 +8,7 @@ from typing import Any, ClassVar, Protocol, runtime_checkable
 import numpy as np
 
 from vedette.control.constraints import Constraint, ConstraintContext, nearest_feasible, violation_notes
-from vedette.control.inputs import beliefs_ahead, check_poses, check_steering, mask_of_decision, options_of
+from vedette.control.inputs import check_control_inputs, check_poses, mask_of_decision, options_of, predicted_beliefs
 from vedette.control.plan import Plan
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.filters import labels_targets
@@ -63,7 +61,7 @@ class RandomPlanner:
     name: ClassVar[str] = "random"
 
     def __post_init__(self) -> None:
-        check_steering(self)
+        check_control_inputs(self)
         asking = [own.name for own in self.constraints if own.needs_beliefs]
         if asking and not all(labels_targets(sensor.filter) for sensor in self.sensors):
             raise reject("constraints", "none that asks where targets will be, as filters have no labels", asking[0])
@@ -129,7 +127,7 @@ class ConstraintReportingPlanner:
     constraints: tuple[Constraint, ...]
 
     def __post_init__(self) -> None:
-        check_steering(self)
+        check_control_inputs(self)
 
     @property
     def name(self) -> str:
@@ -152,6 +150,6 @@ class ConstraintReportingPlanner:
         ]
         courses, scans = tuple(courses_of(*way) for way in ways), tuple(scans_of(*way) for way in ways)
         fused = getattr(state, "fused", None)
-        beliefs = beliefs_ahead(self.constraints, self.sensors, fused, settings, 1, settings.horizon_steps)
+        beliefs = predicted_beliefs(self.constraints, self.sensors, fused, settings, 1, settings.horizon_steps)
         told = violation_notes(self.constraints, ConstraintContext(courses, times, beliefs, at, scans))
         return replace(plan, notes=(*plan.notes, *told))

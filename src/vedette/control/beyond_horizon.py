@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vedette.control.camera_turning import seconds_to_search, seconds_to_turn, turn_rate, views_a_second
+from vedette.control.camera_turning import seconds_to_search, seconds_to_turn, turn_rate, views_per_second
 from vedette.control.constraints import Paths, VisibilityGraph
-from vedette.control.extrapolation import extrapolated, follow
+from vedette.control.extrapolation import extrapolated, write_path
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import LMB, UndetectedIntensity
 from vedette.kernels.base.types import Bools, Floats, Ints
@@ -67,8 +67,7 @@ class BeyondHorizon:
         return cls(tuple(options), reaches, labels, places, paths, undetected)
 
     def horizons(self, settings: PlanningSettings) -> tuple[PlanningSettings, ...]:
-        """Return settings of further horizons, halfway and at the end; none if every sensor can already reach its
-        targets.
+        """Return settings of further horizons, halfway and at the end; none if every sensor can reach its targets.
 
         Within the horizon, a sensor with a detection range of 250 m that moves 20 m gains nothing from a target 300 m
         away, and of courses with equal rewards the first is taken. Therefore all sensors are assumed to continue as
@@ -87,13 +86,13 @@ class BeyondHorizon:
             beyond = max(beyond, horizon)
         if beyond == 0.0:
             return ()
-        views = map(views_a_second, self.options, turns.tolist())
+        views = map(views_per_second, self.options, turns.tolist())
         rate = max(float((speeds / self.reaches).max()), *views)
         total = min(horizon + beyond, max(_MOST_STEPS / rate if rate > 0.0 else math.inf, 2.0 * horizon))
         num = min(max(_LEAST_STEPS, math.ceil(total * rate)), _MOST_STEPS)
         return tuple(replace(settings, horizon_steps=steps, horizon_period=total / num) for steps in (num // 2, num))
 
-    def continued(self, horizon: Floats, times: Floats) -> tuple[Options, ...]:
+    def extrapolated(self, horizon: Floats, times: Floats) -> tuple[Options, ...]:
         """Return the options with courses at `times` (num_times,) s, around forbidden zones. See `extrapolated`."""
         later = tuple(extrapolated(own, horizon, times) for own in self.options)
         if self.paths is None:
@@ -112,17 +111,13 @@ class BeyondHorizon:
         )
 
     def distances(self) -> Floats:
-        """Return distances (num_sensors, num_targets) m from the sensors to the targets by feasible paths;
-        needs zones.
-        """
+        """Return distances (num_sensors, num_targets) m from sensors to targets by feasible paths; needs zones."""
         assert self.paths is not None
         rows = zip(self.paths, self.options, strict=True)
         return np.concatenate([paths.distances(own.pose[np.newaxis, :2]) for paths, own in rows])
 
     def _rates(self, horizon: float) -> tuple[Floats, Floats]:
-        """Return (num_sensors,) speed in m/s of each sensor's farthest course, and turn rate in rad/s of
-        its largest turn.
-        """
+        """Return (num_sensors,) the speed, m/s, of each sensor's farthest course, and its largest turn rate, rad/s."""
         speeds, turns = np.empty(len(self.options)), np.zeros(len(self.options))
         for s, own in enumerate(self.options):
             offsets = own.courses[:, -1, :2] - own.pose[:2]
@@ -131,9 +126,7 @@ class BeyondHorizon:
         return speeds, turns
 
     def _seconds_to_targets(self, speeds: Floats, turns: Floats) -> float:
-        """Return the time in s until each sensor may have reached a target, and each target may be reached
-        by a sensor.
-        """
+        """Return the time, s, until each sensor may have reached a target and each target may be reached."""
         if len(self.places) == 0:
             return 0.0
         seconds = np.full((len(self.options), len(self.places)), np.inf)
@@ -148,7 +141,7 @@ class BeyondHorizon:
         return float(np.where(np.isfinite(longest), longest, 0.0).max())
 
     def _seconds_to_search(self, turns: Floats) -> float:
-        """Return the time in s until cameras have searched for undetected targets; 0 if none turns or none
+        """Return the time, s, until cameras have searched for undetected targets; 0 if none turns or none
         are modelled.
         """
         if self.undetected is None or not turns.any():
@@ -156,23 +149,19 @@ class BeyondHorizon:
         return seconds_to_search(self.options, turns.tolist(), self.reaches, self.undetected, _LEAST_EXISTENCE)
 
     def _gaps(self, s: int) -> Floats:
-        """Return the distance (num_targets,) m from the best course's end to each target; straight if it is
-        in range.
-        """
+        """Return the distance (num_targets,) m from the best course's end to each target; straight if in range."""
         own = self.options[s]
         ends = np.ascontiguousarray(own.courses[:, -1, :2])
         straight = np.hypot(*(ends[:, np.newaxis] - self.places).transpose(2, 0, 1))
         if self.paths is None:
             return np.asarray(straight.min(axis=0))
-        barred = self.paths[s].graph.is_barred(own.pose[:2], own.courses[:, :, :2])
+        barred = self.paths[s].graph.is_blocked(own.pose[:2], own.courses[:, :, :2])
         allowed = np.ones_like(barred) if barred.all() else ~barred
         around = np.where(self._is_attainable(s), self.paths[s].distances(ends), np.inf)
         return np.asarray(np.where(straight <= self.reaches[s], straight, around)[allowed].min(axis=0))
 
     def _in_sight(self, s: int) -> Bools:
-        """Return (num_targets,) whether each target is within the detection range of a sensor at its
-        present position.
-        """
+        """Return (num_targets,) whether each target is within a sensor's detection range at its present position."""
         return np.asarray(np.hypot(*(self.places - self.options[s].pose[:2]).T) <= self.reaches[s])
 
     def _is_attainable(self, s: int) -> Bools:
@@ -192,15 +181,15 @@ class BeyondHorizon:
         own, paths = self.options[s], self.paths[s]
         here, ends = own.pose[np.newaxis, :2].copy(), np.ascontiguousarray(own.courses[:, -1, :2])
         steps, rounds = ends - here, np.maximum(times - horizon[-1], 0.0) / horizon[-1]
-        open_share = paths.graph.until_barred(ends, ends + rounds[-1] * steps)
-        allowed = ~paths.graph.is_barred(own.pose[:2], own.courses[:, :, :2])
+        open_share = paths.graph.free_fraction(ends, ends + rounds[-1] * steps)
+        allowed = ~paths.graph.is_blocked(own.pose[:2], own.courses[:, :, :2])
         goals, advances = self._leads_to(s, ends, np.hypot(steps[:, 0], steps[:, 1]), allowed)
         straight = paths.are_straight(ends) & paths.are_straight(here)
         courses, after = later.courses.copy(), rounds > 0.0
         for c in np.flatnonzero(steps.any(axis=1) & allowed).tolist():
             if goals[c] >= 0 and not (straight[c, goals[c]] and open_share[c] == 1.0):
                 path = paths.path(ends[c], int(goals[c]))
-                follow(courses[c], path, rounds * advances[c], own.courses[c, -1], steps[c])
+                write_path(courses[c], path, rounds * advances[c], own.courses[c, -1], steps[c])
             elif open_share[c] < 1.0:
                 share = np.minimum(rounds, open_share[c] * rounds[-1])[after, np.newaxis]
                 courses[c, after, :2] = ends[c] + share * steps[c]
@@ -233,9 +222,7 @@ class BeyondHorizon:
 
 
 def attracting_targets(prediction: LMB) -> tuple[Ints, Floats]:
-    """Return labels (num, 2) and positions (num, 2), m, of the targets that sensors approach from beyond
-    the horizon.
-    """
+    """Return labels (num, 2) and positions (num, 2), m, of targets that sensors approach from beyond the horizon."""
     draws = prediction.existence >= _LEAST_EXISTENCE
     return prediction.tracks.labels[draws], np.ascontiguousarray(prediction.tracks.means[draws, :2])
 

@@ -24,7 +24,7 @@ def turn_rate(own: Options, horizon: float) -> float:
     return float(np.abs(wrap_angles(own.courses[:, -1, POINTING] - own.pose[POINTING])).max()) / horizon
 
 
-def views_a_second(own: Options, rate: float) -> float:
+def views_per_second(own: Options, rate: float) -> float:
     """Return how many fields of view a camera sweeps in a second, at `rate` rad/s."""
     return rate / float(2.0 * own.pose[HALF_WIDTH]) if rate > 0.0 else 0.0
 

@@ -18,7 +18,7 @@ from vedette.control.explanation import Bound
 from vedette.control.inputs import single_mask, stationary_courses
 from vedette.control.plan import Plan, RewardTable, SamplingOutcome
 from vedette.control.preparation import Preparation
-from vedette.control.problem import beyond_cutoff, bound_of, searched
+from vedette.control.problem import beyond_cutoff, searched, upper_bound
 from vedette.control.racing import FIRST_ROUND, Race, next_total
 from vedette.control.search import JointSearch, all_joint_actions, first_best
 from vedette.kernels.base.types import Floats, Ints
@@ -162,16 +162,16 @@ def decide_jointly(
         notes = (*notes, f"the search ended with the best that it had found, as {settings.max_seconds:g} s were over")
     curve = evidence.curve()
     if not races:
-        parts, bound = (Part.together(evidence, best),), bound_of(evidence, best)
-        return plan_of(name, parts, notes, curve=curve, bound=bound, certainty=preparation.certainty)
+        parts, bound = (Part.together(evidence, best),), upper_bound(evidence, best)
+        return combine_parts(name, parts, notes, curve=curve, bound=bound, certainty=preparation.certainty)
     samples = evidence.samples() if mask is None else None
-    candidates = evidence.foremost(best, _MOST_OF_SEARCH) if samples is None else all_joint_actions(evidence.shape)
+    candidates = evidence.top_actions(best, _MOST_OF_SEARCH) if samples is None else all_joint_actions(evidence.shape)
     race = Race(candidates, float(settings.confidence or 0.0), settings.indifference)
     if samples is not None:
         race.add(samples)
     certainty = rounds.certainty([race])
     if samples is None:
-        bound = bound_of(evidence, race.best)
+        bound = upper_bound(evidence, race.best)
         race.note(evidence)
     else:
         evidence = Evidence(evaluator, evidence.which, evidence.rewards)
@@ -181,7 +181,7 @@ def decide_jointly(
     return _raced_plan(name, (Part.together(evidence, race.best),), notes, certainty, curve=curve, bound=bound)
 
 
-def decide_alone(
+def decide_independently(
     name: str, preparation: Preparation, presume: Presumption, notes: Sequence[str], *, rng: np.random.Generator
 ) -> Plan:
     """Return the plan with the best feasible course of each sensor; the confidence is that all of them are best.
@@ -202,7 +202,7 @@ def decide_alone(
         best = 0 if races else int(allowed[first_best(evidence.evaluate(allowed)), 0])
         parts.append(Part.alone(evidence, best, others))
     if not races:
-        return plan_of(name, _active(parts, preparation.mask), notes, certainty=preparation.certainty)
+        return combine_parts(name, _active(parts, preparation.mask), notes, certainty=preparation.certainty)
     certainty = rounds.certainty(entered)
     for s, race in enumerate(entered):
         race.note(parts[s].evidence)
@@ -228,10 +228,10 @@ def _raced_plan(
     """Return the plan of a race. It cannot be explained: candidates that left early have other samples than
     the choice.
     """
-    return replace(plan_of(name, parts, notes, (str(certainty),), certainty=certainty, **fields), questions=None)
+    return replace(combine_parts(name, parts, notes, (str(certainty),), certainty=certainty, **fields), questions=None)
 
 
-def plan_of(
+def combine_parts(
     name: str, parts: Sequence[Part], notes: Sequence[str], more_notes: Sequence[str] = (), **fields: Any
 ) -> Plan:
     """Return the plan of decisions made together or sensor by sensor, in the order of the sensors.

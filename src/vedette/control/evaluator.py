@@ -98,7 +98,7 @@ class Evaluator:
         found = [first]
         for own in horizons:
             assert beyond is not None
-            later = beyond.continued(settings.horizon_times(), own.horizon_times())
+            later = beyond.extrapolated(settings.horizon_times(), own.horizon_times())
             found.append(lay_out(sensors, later, rule, own, reward, state, rng=rng)[0])
         counts = {"filter_steps": 0, "rewards": 0}
         for each, own in zip(found, (settings, *horizons), strict=True):

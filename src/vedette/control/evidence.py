@@ -37,7 +37,7 @@ class Evidence:
         rewards: function that returns their sample rewards.
         shape: number of distinct courses of each of the sensors.
         keeps: whether `evaluate` keeps the rewards of all samples.
-        most_by_target: cached result of `vedette.control.problem.most_by_target`.
+        upper_bound_by_target: cached result of `vedette.control.problem.upper_bound_by_target`.
     """
 
     evaluator: Evaluator
@@ -49,7 +49,7 @@ class Evidence:
     _samples: list[tuple[Ints, Floats]] = field(default_factory=list)
     _evaluations: list[int] = field(default_factory=list)
     _best: list[float] = field(default_factory=list)
-    most_by_target: list[tuple[float, int]] = field(default_factory=list)
+    upper_bound_by_target: list[tuple[float, int]] = field(default_factory=list)
     _is_complete: bool = False
 
     def __post_init__(self) -> None:
@@ -151,7 +151,7 @@ class Evidence:
         at = int(np.argmax(others))
         return (tuple(actions[at].tolist()), float(others[at])) if others[at] > -math.inf else None
 
-    def foremost(self, choice: Sequence[int], most: int) -> Ints:
+    def top_actions(self, choice: Sequence[int], most: int) -> Ints:
         """Return (num, num_sensors) up to `most` joint actions with the largest means, the choice first among equals.
 
         They are in printed order, without joint actions that have no finite mean, except the choice.

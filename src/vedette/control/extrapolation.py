@@ -37,7 +37,7 @@ def extrapolated(own: Options, horizon: Floats, times: Floats) -> Options:
     return own._replace(courses=np.ascontiguousarray(courses), scans=scans)
 
 
-def follow(course: Floats, corners: Floats, run: Floats, end: Floats, step: Floats) -> None:
+def write_path(course: Floats, corners: Floats, run: Floats, end: Floats, step: Floats) -> None:
     """Write poses along a path into a course (num_times, pose_dim).
 
     corners: (num_corners, 2) m, corners of the path.

@@ -34,7 +34,7 @@ def check_sensors(sensors: Sequence[MobileSensor]) -> TargetModel:
     return shared_targets([sensor.filter for sensor in sensors])
 
 
-def check_steering(planner: Any) -> None:
+def check_control_inputs(planner: Any) -> None:
     """Store sensors and constraints of a planner as tuples; `InputError` if they or the settings are invalid."""
     for name, expected in (("sensors", "at least one MobileSensor"), ("constraints", "constraints in a tuple")):
         object.__setattr__(planner, name, sequence(name, getattr(planner, name), expected))
@@ -44,7 +44,7 @@ def check_steering(planner: Any) -> None:
         instance(f"constraints[{i}]", constraint, Constraint)
 
 
-def check_valuing(fusion: Any, reward: Any, notes: Any = ()) -> None:
+def check_reward_inputs(fusion: Any, reward: Any, notes: Any = ()) -> None:
     """Raise `InputError` for an invalid fusion, reward or notes of a planner."""
     if not all(isinstance(note, str) for note in sequence("notes", notes, "texts in a tuple")):
         raise reject("notes", "texts in a tuple", notes)
@@ -135,13 +135,13 @@ def mask_of_decision(
     """
     if not constraints:
         return None
-    beliefs = beliefs_ahead(constraints, sensors, fused, settings, 1, settings.horizon_steps)
+    beliefs = predicted_beliefs(constraints, sensors, fused, settings, 1, settings.horizon_steps)
     courses, scans = tuple(own.courses for own in options), tuple(own.scans for own in options)
     situation = ConstraintContext(courses, settings.horizon_times(), beliefs, poses, scans)
     return feasible_action_mask(constraints, situation)
 
 
-def beliefs_ahead(
+def predicted_beliefs(
     constraints: Sequence[Constraint],
     sensors: Sequence[MobileSensor],
     fused: Any,
@@ -200,7 +200,7 @@ def _silent(joint: Sequence[int], active: Active) -> tuple[int, ...]:
     return tuple(int(off[course]) for course, off in zip(joint, active.off, strict=True))
 
 
-def allowed_of(mask: Mask | None, shape: Sequence[int]) -> Allowed | None:
+def compiled_mask(mask: Mask | None, shape: Sequence[int]) -> Allowed | None:
     """Return the mask in the form of the compiled ascent; None if it would be too large."""
     none, num = np.ones((0, 0), np.bool_), sum(shape)
     on, most = np.zeros(num, np.bool_), len(shape)

@@ -8,8 +8,8 @@ from typing import ClassVar
 import numpy as np
 
 from vedette.control.constraints import Constraint
-from vedette.control.decisions import Presumption, decide_alone, decide_jointly
-from vedette.control.inputs import check_steering, check_valuing
+from vedette.control.decisions import Presumption, decide_independently, decide_jointly
+from vedette.control.inputs import check_control_inputs, check_reward_inputs
 from vedette.control.plan import Plan
 from vedette.control.preparation import AnyReward, Preparation
 from vedette.control.rewards import ExpectedLossReward
@@ -48,8 +48,8 @@ class JointPlanner:
     name: ClassVar[str] = "jdm"
 
     def __post_init__(self) -> None:
-        check_steering(self)
-        check_valuing(self.fusion, self.reward, self.notes)
+        check_control_inputs(self)
+        check_reward_inputs(self.fusion, self.reward, self.notes)
         instance("search", self.search, JointSearch)
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
@@ -101,8 +101,8 @@ class IndependentPlanner:
     name: ClassVar[str] = "idm"
 
     def __post_init__(self) -> None:
-        check_steering(self)
-        check_valuing(self.fusion, self.reward, self.notes)
+        check_control_inputs(self)
+        check_reward_inputs(self.fusion, self.reward, self.notes)
         one_of("others", self.others, ("stay", "absent"))
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
@@ -111,4 +111,4 @@ class IndependentPlanner:
         """
         generator(rng)
         prepared = Preparation.of(self.sensors, self.fusion, self.settings, self.reward, state, poses, self.constraints)
-        return decide_alone(self.name, prepared, self.others, self.notes, rng=rng)
+        return decide_independently(self.name, prepared, self.others, self.notes, rng=rng)

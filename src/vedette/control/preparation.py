@@ -111,7 +111,7 @@ class Preparation:
                 sensors, own, rule, settings, reward, state, horizons=None, graph=self.graph, rng=rng
             )
         told = (
-            *notes_of_state(sensors, settings, state, sums=rule is not None),
+            *state_notes(sensors, settings, state, sums=rule is not None),
             *(self.mask.notes if self.mask is not None else ()),
             *notes,
         )
@@ -119,7 +119,7 @@ class Preparation:
         return evaluator
 
 
-def notes_of_state(
+def state_notes(
     sensors: Sequence[MobileSensor], settings: PlanningSettings, state: State, *, sums: bool
 ) -> tuple[str, ...]:
     """Return why undetected targets are not included, though requested, and which sensors do not scan.

@@ -13,14 +13,14 @@ from vedette.control.constraints import Mask
 from vedette.control.evaluator import Evaluator
 from vedette.control.evidence import Evidence
 from vedette.control.explanation import Bound
-from vedette.control.inputs import allowed_of, check_choice, single_mask, stationary_courses
+from vedette.control.inputs import check_choice, compiled_mask, single_mask, stationary_courses
 from vedette.control.search import JointProblem, JointSearch, all_joint_actions, first_best
 from vedette.densities.checks import offsets_of
 from vedette.internal.probabilities import expit
 from vedette.internal.threads import run_chunks
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.planning.bernoulli_rows import Table
-from vedette.kernels.planning.bounds import Choices, best_of_labels, losses_at_least
+from vedette.kernels.planning.bounds import Choices, best_of_labels, loss_reward_bounds
 from vedette.kernels.planning.joint_values import label_values
 from vedette.kernels.planning.label_values import EXPECTED_LOSS
 
@@ -56,7 +56,7 @@ def joint_problem(evidence: Evidence, mask: Mask | None) -> JointProblem:
         return np.where(np.isnan(means), -np.inf, means)
 
     plain = JointProblem(evidence.shape, evidence.evaluate, lambda: _independent(evidence, mask), mask, partial=partial)
-    additive, allowed = evaluator.additive, allowed_of(mask, evidence.shape)
+    additive, allowed = evaluator.additive, compiled_mask(mask, evidence.shape)
     if additive is None:
         return plain
 
@@ -75,7 +75,7 @@ def joint_problem(evidence: Evidence, mask: Mask | None) -> JointProblem:
         return tuple(chosen.tolist())
 
     def bound() -> float:
-        most = most_by_target(evidence)
+        most = upper_bound_by_target(evidence)
         return np.inf if most is None else most[0]
 
     compiled = additive.coefficients is not None and allowed is not None
@@ -123,7 +123,7 @@ def _independent(evidence: Evidence, mask: Mask | None) -> tuple[int, ...]:
 _SHARE = 0.1
 
 
-def bound_of(evidence: Evidence, choice: Sequence[int]) -> Bound | None:
+def upper_bound(evidence: Evidence, choice: Sequence[int]) -> Bound | None:
     """Return an upper bound on the best mean reward, computed on the decision's samples; None if no bound is available.
 
     If every joint action was evaluated, the bound is the best of them. Otherwise, for rewards that are sums over
@@ -136,27 +136,27 @@ def bound_of(evidence: Evidence, choice: Sequence[int]) -> Bound | None:
     reward = evidence.mean_of(choice)
     if evidence.is_complete():
         return Bound(evidence.best, reward, "exhaustive")
-    most = most_by_target(evidence)
+    most = upper_bound_by_target(evidence)
     return None if most is None else Bound(most[0], reward, "by target", most[1])
 
 
-def most_by_target(evidence: Evidence) -> tuple[float, int] | None:
+def upper_bound_by_target(evidence: Evidence) -> tuple[float, int] | None:
     """Return an upper bound on the mean reward of any joint action, and the number of targets it does not cover
     (cached).
 
     None for rewards that are not linear in sums over targets.
     """
-    evaluator, known = evidence.evaluator, evidence.most_by_target
+    evaluator, known = evidence.evaluator, evidence.upper_bound_by_target
     additive = evaluator.additive
     if not known and additive is not None and additive.coefficients is not None:
-        best = best_values(additive, evaluator.settings.max_bound_work)
+        best = label_upper_bounds(additive, evaluator.settings.max_bound_work)
         unknown = np.isinf(best).reshape(additive.num_horizons, -1).any(axis=0)
         cheapest = np.minimum.reduceat(additive.prices, additive.table.first_courses[:-1]).sum()
         known.append((float(best.sum()) + _most_found(additive) - float(cheapest), int(unknown.sum())))
     return known[0] if known else None
 
 
-def best_values(additive: AdditiveRewards, max_work: int) -> Floats:
+def label_upper_bounds(additive: AdditiveRewards, max_work: int) -> Floats:
     """Return (num_labels,) upper bounds on the contribution of each label to the mean reward; inf if not known.
 
     max_work: maximum number of ways to see a label, times samples, that are tried.
@@ -176,7 +176,7 @@ def best_values(additive: AdditiveRewards, max_work: int) -> Floats:
     if np.isnan(best).any():
         others = np.full(len(best), math.inf)
         if additive.valuation.kind == EXPECTED_LOSS:
-            losses_at_least(table, additive.valuation, choices, others)
+            loss_reward_bounds(table, additive.valuation, choices, others)
         best = np.where(np.isnan(best), others, best)
     return best
 

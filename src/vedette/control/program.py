@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from vedette.control.constraints import Constraint, Mask
-from vedette.control.inputs import check_poses, check_steering, mask_of_decision, options_of, single_mask
+from vedette.control.inputs import check_control_inputs, check_poses, mask_of_decision, options_of, single_mask
 from vedette.control.plan import Plan
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import Estimate, Estimator, Labelled, best_estimate
@@ -61,7 +61,7 @@ class ProgramPlanner:
     name: ClassVar[str] = "program"
 
     def __post_init__(self) -> None:
-        check_steering(self)
+        check_control_inputs(self)
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """Return the program's answer as a plan.
@@ -84,7 +84,7 @@ class ProgramPlanner:
         if mask is not None and mask.active is not None:
             question["max_active"] = mask.active.most
         estimate = self.estimate(state.fused, state.step)
-        question |= {"estimates": _told(estimate), "tracks": _told(state.fused)}
+        question |= {"estimates": _target_list(estimate), "tracks": _target_list(state.fused)}
         answer = self._program.ask(question, self.seconds)
         joint, counts = _joint(self._program, answer, options, mask), _counts(self._program, answer)
         chosen = tuple(own.first_action(course) for own, course in zip(options, joint, strict=True))
@@ -105,7 +105,7 @@ def _choices(options: Sequence[Options], mask: Mask | None) -> list[dict[str, An
     ]
 
 
-def _told(belief: Any) -> list[dict[str, Any]]:
+def _target_list(belief: Any) -> list[dict[str, Any]]:
     """Return the targets of an estimate, or of a labelled density."""
     if not isinstance(belief, Estimate | Labelled):
         return []

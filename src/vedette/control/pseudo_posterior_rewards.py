@@ -127,9 +127,7 @@ class PseudoPosteriorRewards:
         return PlainRewards(posteriors, self.prediction, fusion, self.reward, self.settings.num_samples, self.views)
 
     def views(self, chosen: Sequence[int]) -> Views:
-        """Return the fields of view at the ends of the chosen courses, with the prediction that all updates
-        start from.
-        """
+        """Return the fields of view at the ends of the chosen courses, with the prediction before the updates."""
         models = tuple(sensor.filter.sensor for sensor in self.sensors)
         poses = np.stack([own.courses[course, -1] for own, course in zip(self.options, chosen, strict=True)])
         scanned = tuple(bool(own[course]) for own, course in zip(self.scanned, chosen, strict=True))

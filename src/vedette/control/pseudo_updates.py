@@ -82,7 +82,7 @@ def pseudo_posteriors(
 def _run_glmb(belief: GLMB, decision: Decision, settings: PlanningSettings, num_cases: int) -> LabelledCases:
     heaviest = heaviest_hypotheses(belief, settings.max_prior_hypotheses)
     single = heaviest.with_fields(tracks=single_gaussians(heaviest.tracks))
-    prior = share_versions(single, settings.max_version_divergence)
+    prior = merge_similar_tracks(single, settings.max_version_divergence)
     found, dim = label_sets(prior), prior.tracks.state_dim
     set_offsets = offsets_of([len(labels) for labels in found.sets])
     results = GlmbResults(
@@ -148,7 +148,7 @@ def heaviest_hypotheses(belief: GLMB, most: int) -> GLMB:
     return taken.with_fields(hyp_log_weights=log_weights)
 
 
-def share_versions(belief: GLMB, most: float) -> GLMB:
+def merge_similar_tracks(belief: GLMB, most: float) -> GLMB:
     """Return the belief with tracks of a label replaced by a track from which they diverge by at most `most` nats.
 
     belief: one Gaussian per track, its hypotheses heaviest first. The tracks of heavier hypotheses stay, and those of

@@ -28,7 +28,7 @@ from typing import Literal
 import numpy as np
 
 from vedette.control.evidence import Evidence
-from vedette.control.search import first_best, tie_of
+from vedette.control.search import first_best, tie_tolerance
 from vedette.kernels.base.types import Bools, Floats, Ints
 
 # Samples of the first round, and the growth factor of their number per round (docs/evidence/planning.md gives the cost).
@@ -126,7 +126,7 @@ class Race:
         # Each comparison of each round gets one part in this number of the total error probability.
         parts = max(1, len(self.actions) - 1) * self._round * (self._round + 1)
         reach = -stdtrit(num - 1, (1.0 - self.confidence) / parts) * errors
-        tie = tie_of(float(means[best]))
+        tie = tie_tolerance(float(means[best]))
         near = max(tie, self.indifference * abs(means[best]))
         stays = finite & (behind - reach <= tie)
         stays[best] = False  # the others

@@ -9,7 +9,7 @@ import numpy as np
 
 from vedette.control.beyond_horizon import BeyondHorizon
 from vedette.control.constraints import Constraint, VisibilityGraph, nearest_feasible, visibility_graph
-from vedette.control.inputs import check_steering, mask_of_decision, options_of, single_mask
+from vedette.control.inputs import check_control_inputs, mask_of_decision, options_of, single_mask
 from vedette.control.plan import Plan
 from vedette.control.search import first_best
 from vedette.control.settings import MobileSensor, PlanningSettings
@@ -72,7 +72,7 @@ class RulePlanner:
     targets: tuple[int, ...] | None = None
 
     def __post_init__(self) -> None:
-        check_steering(self)
+        check_control_inputs(self)
         one_of("rule", self.rule, get_args(Rule))
         if self.targets is not None:
             given = sequence("targets", self.targets, f"{len(self.sensors)} numbers of targets, one a sensor")
@@ -136,7 +136,7 @@ def _merits(own: Options, goal: Floats | None, graph: VisibilityGraph | None) ->
         paths, moves = graph.to(goal[np.newaxis], own.pose[:2]), (own.courses[..., :2] != own.pose[:2]).any(axis=(1, 2))
         if not paths.are_straight(own.pose[np.newaxis, :2].copy())[0, 0]:  # The sensor may have to step aside first.
             waits[~moves] = _WAITING
-        free = moves & ~graph.is_barred(own.pose[:2], own.courses[..., :2])
+        free = moves & ~graph.is_blocked(own.pose[:2], own.courses[..., :2])
         around = paths.distances(own.courses[free, :, :2].reshape(-1, 2)).reshape(gaps[free].shape)
         gaps[free] = np.where(np.isfinite(around), around, gaps[free])
     near: Floats = -gaps.mean(axis=1)

@@ -17,7 +17,7 @@ from vedette.control import (
     PlanningSettings,
 )
 from vedette.control.constraints import Mask, nearest_feasible
-from vedette.control.inputs import check_poses, check_steering, mask_of_decision, options_of
+from vedette.control.inputs import check_control_inputs, check_poses, mask_of_decision, options_of
 from vedette.densities import Estimator, best_estimate
 from vedette.errors import InputError
 from vedette.filters import shared_targets
@@ -96,7 +96,7 @@ class OraclePlanner:
     name: ClassVar[str] = "oracle"
 
     def __post_init__(self) -> None:
-        check_steering(self)
+        check_control_inputs(self)
         positive("cutoff", self.cutoff)
         dimension("depth", self.depth)
         dimension("beam_width", self.beam_width)

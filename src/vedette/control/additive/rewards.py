@@ -82,8 +82,9 @@ class AdditiveRewards:
         return replace(self, table=own, bases=(self.bases[sensor],), cells=cells, prices=self.prices[first:last])
 
     def __call__(self, actions: Ints) -> Floats:
-        """Return rewards (num_joint, num_samples) of joint actions (num_joint, num_sensors); -1: the sensor
-        does not scan.
+        """Return rewards (num_joint, num_samples) of joint actions (num_joint, num_sensors).
+
+        -1: the sensor does not scan.
         """
         sums = np.empty((len(actions), self.valuation.num, self.num_samples))
 
@@ -92,11 +93,10 @@ class AdditiveRewards:
 
         quick = max(8, _QUICK // max(1, sums.shape[2] * len(self.table.start)))
         run_chunks(work, len(actions), self.num_threads, first_piece=quick)
-        return np.asarray(self.of_sums(sums) + self._beside(actions))
+        return np.asarray(self.of_sums(sums) + self._other_terms(actions))
 
     def with_scans(self, chosen: Ints) -> Floats:
-        """Return the joint rows (num_labels, bernoulli_size, num_samples) with the scans of a joint action
-        (num_sensors,).
+        """Return joint rows (num_labels, bernoulli_size, num_samples) with the scans of a joint action (num_sensors,).
 
         -1: the sensor does not scan.
         """
@@ -112,9 +112,7 @@ class AdditiveRewards:
         return self._lines(chosen, sensor, sensor + 1)
 
     def lines(self, chosen: Ints) -> Floats:
-        """Return rewards (num_courses, num_samples) of the lines of all sensors through a joint action,
-        sensor by sensor.
-        """
+        """Return rewards (num_courses, num_samples) of the lines of all sensors through a joint action."""
         return self._lines(chosen, 0, len(chosen))
 
     def _lines(self, chosen: Ints, first: int, last: int) -> Floats:
@@ -131,7 +129,7 @@ class AdditiveRewards:
                 begin, end = (self.table.first_courses[s : s + 2] - start).tolist()
                 joint = np.tile(chosen, (end - begin, 1))
                 joint[:, s] = np.arange(end - begin)
-                rewards[begin:end] += self._beside(joint)
+                rewards[begin:end] += self._other_terms(joint)
         return rewards
 
     def each_alone(self) -> Floats:
@@ -162,16 +160,14 @@ class AdditiveRewards:
         return sums[..., 0] if self.reward is None else combined(self.reward, sums)
 
     def price(self, actions: Ints) -> Floats:
-        """Return the prices (num_joint,) of joint actions (num_joint, num_sensors); -1: the sensor does not scan, at no
-        price.
+        """Return prices (num_joint,) of joint actions (num_joint, num_sensors); -1: the sensor does not
+        scan, no price.
         """
         prices = self.prices[np.maximum(actions, 0) + self.table.first_courses[:-1]]
         return np.asarray(np.where(actions >= 0, prices, 0.0).sum(axis=1))
 
-    def _beside(self, actions: Ints) -> Floats:
-        """Return the terms of the rewards other than sums over labels, (num_joint, 1): undetected targets
-        less prices.
-        """
+    def _other_terms(self, actions: Ints) -> Floats:
+        """Return (num_joint, 1) the terms of the rewards besides sums over labels: undetected targets less prices."""
         found = np.array([self.found(joint) for joint in actions]) if len(self.cells.worth) else 0.0
         return np.asarray(found - self.price(actions))[:, np.newaxis]
 

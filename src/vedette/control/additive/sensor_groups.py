@@ -80,7 +80,7 @@ class SensorGroup(NamedTuple):
     reach: float  # m, maximum detection range of these sensors
 
 
-class Start(NamedTuple):
+class SensorGroups(NamedTuple):
     """All sensor groups, and the rows of the prediction."""
 
     groups: tuple[SensorGroup, ...]
@@ -90,9 +90,10 @@ class Start(NamedTuple):
     num_samples: int
 
 
-def starts_of(task: Task, missing_existence: float, *, rng: np.random.Generator) -> Start:
-    """Return the table's rows without any scan. missing_existence: existence assumed for a label that a
-    sensor lacks.
+def prepare_groups(task: Task, missing_existence: float, *, rng: np.random.Generator) -> SensorGroups:
+    """Return the sensor groups with their rows before any scan.
+
+    missing_existence: existence assumed for a label that a sensor lacks.
     """
     settings, given = task.settings, task.prediction.end.to_kernel()
     if task.sampled:
@@ -110,7 +111,7 @@ def starts_of(task: Task, missing_existence: float, *, rng: np.random.Generator)
         for s in members:
             bases[s] = row
         groups.append(group)
-    return Start(tuple(groups), references, prior, tuple(bases), samples.targets.shape[1])
+    return SensorGroups(tuple(groups), references, prior, tuple(bases), samples.targets.shape[1])
 
 
 def _alike(task: Task, *, shared: bool) -> list[tuple[int, ...]]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from vedette.control.additive.rewards import AdditiveRewards, valuation_of
-from vedette.control.additive.sensor_groups import SensorGroup, Start, Task, starts_of
+from vedette.control.additive.sensor_groups import SensorGroup, SensorGroups, Task, prepare_groups
 from vedette.control.prediction import Prediction
 from vedette.control.rewards.base import HasMissedCost
 from vedette.control.rewards.power import ExpectedLossReward
@@ -53,15 +53,16 @@ def lay_out(
     *,
     rng: np.random.Generator,
 ) -> tuple[AdditiveRewards, LMB]:
-    """Return the rewards at the end of the horizon, with each label followed over each course in reach, and the
-    prediction.
+    """Return the rewards at the end of the horizon, and the prediction.
+
+    Each label is followed over every course that reaches it.
     """
     fused: Any = state.fused
     num_threads, undetected, motion = settings.threads(), state.undetected, sensors[0].filter.targets.motion
     with model_errors():
         ahead = Prediction.of(fused, motion, settings.horizon_steps, settings.horizon_period)
         task = Task(sensors, options, settings, state, ahead, sampled=not isinstance(reward, ExpectedLossReward))
-        start = starts_of(task, rule.missing_existence, rng=rng)
+        start = prepare_groups(task, rule.missing_existence, rng=rng)
         table = lay_out_changes(start, rule, num_threads, sampled=task.sampled)
     prediction = ahead.end
     valuation = valuation_of(reward, prediction, start.prior)
@@ -73,7 +74,7 @@ def lay_out(
     return AdditiveRewards(table, valuation, start.bases, own, cells, prices, num_threads), prediction
 
 
-def lay_out_changes(start: Start, rule: LinearRule, num_threads: int, *, sampled: bool) -> Table:
+def lay_out_changes(start: SensorGroups, rule: LinearRule, num_threads: int, *, sampled: bool) -> Table:
     """Return the changes of all sensors' courses, by samples or, without samples, their expectation.
 
     Raises:
@@ -150,7 +151,7 @@ def places_of_courses(group: SensorGroup, first_courses: Ints) -> Ints:
 
 
 def _filling(
-    group: SensorGroup, entries: Entries, start: Start, changes: Floats, sampled: bool
+    group: SensorGroup, entries: Entries, start: SensorGroups, changes: Floats, sampled: bool
 ) -> Callable[[int, int], None]:
     if not sampled:
         return lambda first, last: fill_expected_changes(
@@ -176,7 +177,9 @@ def no_cells(num_courses: int) -> Cells:
     return Cells(np.zeros(num_courses + 1, np.int64), np.empty(0, np.int64), none, none)
 
 
-def cells_of(start: Start, undetected: UndetectedIntensity, worth: float, first_courses: Ints, state_dim: int) -> Cells:
+def cells_of(
+    start: SensorGroups, undetected: UndetectedIntensity, worth: float, first_courses: Ints, state_dim: int
+) -> Cells:
     """Return the cells that each course sees, from a grid of undetected targets that are assumed not to move.
 
     worth: value of finding a target, in units of the reward. first_courses: (num_sensors + 1,) first course of each

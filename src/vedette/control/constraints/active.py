@@ -71,9 +71,7 @@ class Active(NamedTuple):
         return np.maximum(num - self.most, 0)
 
     def is_full(self, at: Sequence[int], sensor: int) -> bool:
-        """Return True if no further sensor may scan besides the others of a joint action; below 0:
-        undecided, and off.
-        """
+        """Return True if no further sensor may scan, given the other sensors' courses; below 0: undecided, and off."""
         return sum(bool(self.on[s][own]) for s, own in enumerate(at) if s != sensor and own >= 0) >= self.most
 
     def kept(self, at: Sequence[int], gains: Sequence[float] | None = None) -> tuple[int, ...]:

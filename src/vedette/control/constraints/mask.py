@@ -43,10 +43,10 @@ class Mask:
     together: Mapping[tuple[int, int], Bools] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     active: Active | None = None
-    _beside: tuple[Mapping[int, Ints], ...] = field(init=False)
+    _conflicts: tuple[Mapping[int, Ints], ...] = field(init=False)
 
     def __post_init__(self) -> None:
-        beside: tuple[dict[int, Ints], ...] = tuple({} for _ in self.single)
+        conflicts: tuple[dict[int, Ints], ...] = tuple({} for _ in self.single)
         shape = self.shape
         for (first, second), table in self.together.items():
             if not 0 <= first < second < len(shape):
@@ -56,9 +56,9 @@ class Mask:
                 raise InputError(f"mask of sensors {first, second}: expected shape {wanted}; got {table.shape}")
             clash = np.asarray(~table, np.int64)
             # One row per course of the other sensor, so that a look-up reads one contiguous row.
-            beside[first][second] = np.ascontiguousarray(clash.T)
-            beside[second][first] = clash
-        object.__setattr__(self, "_beside", beside)
+            conflicts[first][second] = np.ascontiguousarray(clash.T)
+            conflicts[second][first] = clash
+        object.__setattr__(self, "_conflicts", conflicts)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -83,13 +83,14 @@ class Mask:
         return np.asarray(self.violations(actions) == 0)
 
     def others(self, sensor: int) -> Mapping[int, Ints]:
-        """Return the sensors that `sensor` may conflict with, each with (its num_courses, num_courses of `sensor`): 1:
-        conflict.
-        """
-        return self._beside[sensor]
+        """Return the sensors that `sensor` may conflict with, each with its table of conflicts.
 
-    def clashes(self, at: Sequence[int], sensor: int) -> Ints:
-        """Return the number of violations (num_courses,) that involve each course of one sensor, given the other
+        A table has shape (num_courses of the other, num_courses of `sensor`); 1: conflict.
+        """
+        return self._conflicts[sensor]
+
+    def conflicts(self, at: Sequence[int], sensor: int) -> Ints:
+        """Return (num_courses,) the number of violations that each course of one sensor causes with the others'
         courses.
 
         at: courses; negative ones belong to undecided sensors, which cause no conflict.
@@ -100,9 +101,9 @@ class Mask:
         return found
 
     def forbidden(self, at: Sequence[int], sensor: int) -> Ints:
-        """Return the same numbers as `clashes`, without the limit on the number of sensors that scan."""
+        """Return the same numbers as `conflicts`, without the limit on the number of sensors that scan."""
         found = (~self.single[sensor]).astype(np.int64)
-        for other, clash in self._beside[sensor].items():
+        for other, clash in self._conflicts[sensor].items():
             if at[other] >= 0:
                 found += clash[at[other]]
         return found
@@ -168,9 +169,9 @@ def _descend(mask: Mask, at: list[int]) -> None:
     while moved:
         moved = False
         for s in range(len(at)):
-            clashes = mask.forbidden(at, s)
-            best = int(clashes.argmin())
-            if clashes[best] < clashes[at[s]]:
+            conflicts = mask.forbidden(at, s)
+            best = int(conflicts.argmin())
+            if conflicts[best] < conflicts[at[s]]:
                 at[s], moved = best, True
 
 

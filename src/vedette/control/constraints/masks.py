@@ -52,7 +52,7 @@ def infeasible_note(constraints: Sequence[Constraint]) -> str:
 def courses_allowed(
     constraints: Sequence[Constraint], situation: ConstraintContext
 ) -> tuple[tuple[Bools, ...], tuple[int, ...]]:
-    """Return (num_courses,) the allowed courses of each sensor, and the sensors that no course of which is feasible.
+    """Return (num_courses,) the allowed courses of each sensor, and the sensors without a feasible course.
 
     The latter may take the courses with the least violation. Raises as `feasible_action_mask`.
     """
@@ -99,9 +99,7 @@ def _answers(constraint: Constraint, situation: ConstraintContext) -> list[Bools
 
 
 def _violations(constraint: Constraint, situation: ConstraintContext, answers: Sequence[Bools]) -> Sequence[Floats]:
-    """Return (num_courses,) the violation of each course; 1 for a forbidden course if the constraint gives
-    no amount.
-    """
+    """Return (num_courses,) the violation of each course; 1 for a forbidden course if the amount is not given."""
     if not provides(constraint, QuantifiedConstraint):
         return [np.asarray(~own, np.float64) for own in answers]
     given = [np.asarray(own, np.float64) for own in constraint.violations(situation)]

@@ -50,7 +50,7 @@ class VisibilityGraph:
         pairs = [edges_of(rings) for rings in zones]
         starts, ends = (np.concatenate(each) for each in zip(*pairs, strict=True))
         edges = Edges(starts, ends, np.repeat(np.arange(len(pairs)), [len(own) for own, _ in pairs]))
-        sides = [_beside_corners(ring) for rings in zones for ring in rings]
+        sides = [_near_corners(ring) for rings in zones for ring in rings]
         outer, inner = (np.concatenate(each) for each in zip(*sides, strict=True))
         nodes, coast = (own[_is_free(edges, own)] for own in (outer, np.concatenate([inner, _crossings(edges)])))
         straight = clear_lengths(nodes, nodes, edges)
@@ -77,7 +77,7 @@ class VisibilityGraph:
             return Paths(self, points, left, np.empty((0, len(points))), np.empty((0, len(points)), np.int64))
         return Paths(self, points, left, through.min(axis=2), through.argmin(axis=2))
 
-    def is_barred(self, start: Floats, courses: Floats) -> Bools:
+    def is_blocked(self, start: Floats, courses: Floats) -> Bools:
         """Return (num_courses,) whether courses (num_courses, num_times, 2) from `start` (2,) touch a zone.
 
         Zones that contain the start do not count: a sensor may leave them.
@@ -88,9 +88,9 @@ class VisibilityGraph:
         touched = np.isfinite(first_touches(starts, ends, self.edges, ignored))
         return np.asarray(touched.reshape(courses.shape[:2]).any(axis=1))
 
-    def until_barred(self, starts: Floats, ends: Floats) -> Floats:
-        """Return the fraction (num,) of the line from each start to its end (num, 2) that is outside zones;
-        1: all of it.
+    def free_fraction(self, starts: Floats, ends: Floats) -> Floats:
+        """Return the fraction (num,) of the line from each start to its end (num, 2) before it touches a
+        zone; 1: all.
         """
         shares = first_touches(starts, ends, self.edges, _inside(self.edges, starts))
         length = np.maximum(np.hypot(*(ends - starts).T), MARGIN)
@@ -143,9 +143,7 @@ class Paths:
     last: Ints
 
     def are_straight(self, starts: Floats) -> Bools:
-        """Return (num_starts, num_goals) whether the straight line from each start (num_starts, 2) to each
-        point is free.
-        """
+        """Return (num_starts, num_goals) whether the line from each start (num_starts, 2) to each point is free."""
         return np.isfinite(clear_lengths(starts, self.points, self.graph.edges))
 
     def distances(self, starts: Floats) -> Floats:
@@ -214,7 +212,7 @@ def _distinct(ring: Floats) -> Floats:
     return ring[np.any(ring != np.roll(ring, 1, axis=0), axis=1)]
 
 
-def _beside_corners(corners: Floats) -> tuple[Floats, Floats]:
+def _near_corners(corners: Floats) -> tuple[Floats, Floats]:
     """Return points (num, 2) at `MARGIN` from the corners of a polygon: outside convex corners, and in reflex ones."""
     to, on = np.roll(corners, 1, axis=0) - corners, np.roll(corners, -1, axis=0) - corners
     middle = to / np.hypot(*to.T)[:, np.newaxis] + on / np.hypot(*on.T)[:, np.newaxis]

@@ -33,8 +33,8 @@ class ConstraintContext(NamedTuple):
     scans: tuple[Bools, ...] = ()
 
     def ways(self, sensor: int) -> Floats:
-        """Return the corners (num_courses, num_points, 2) of the ways of one sensor: its present position, if known,
-        and later.
+        """Return (num_courses, num_points, 2) the corners of one sensor's ways: its present position, if
+        known, and later.
         """
         if self.poses is None:
             return self.courses[sensor][:, :, :2]
@@ -91,9 +91,7 @@ class RangeLimitedConstraint(Protocol):
 
     @property
     def interaction_range(self) -> float:
-        """Distance in m within which courses may be incompatible; 0: never. A constraint without this
-        member has no limit.
-        """
+        """Distance in m within which courses may be incompatible; 0: never. Without this member there is no limit."""
         ...
 
 
@@ -145,9 +143,7 @@ def interaction_range_of(constraint: Constraint) -> float:
 
 
 class PerSensorConstraint:
-    """A constraint on each sensor alone, so that all pairs of courses are compatible. A violation above 0
-    is forbidden.
-    """
+    """A constraint on each sensor alone: a violation above 0 is forbidden, and all pairs of courses are compatible."""
 
     __slots__ = ()
     reach = 0.0

@@ -46,8 +46,8 @@ class StayInside(PerSensorConstraint):
         return inner + _BEYOND * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]), inner
 
     def violations(self, situation: ConstraintContext) -> tuple[Floats, ...]:
-        """Return the distance in m from the rectangle, averaged over the times; straight ways inside it
-        need no test.
+        """Return the distance, m, from the rectangle, averaged over the times; ways between two points
+        inside are inside.
         """
         places = np.concatenate([own[:, :, :2] for own in situation.courses])
         low, high = self.region.corners.min(axis=0), self.region.corners.max(axis=0)

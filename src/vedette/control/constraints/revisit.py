@@ -48,9 +48,7 @@ class Revisit(PerSensorConstraint):
         positive("every", self.every)
 
     def violations(self, situation: ConstraintContext) -> tuple[Floats, ...]:
-        """Return (num_courses,) m, the distance of each course from its sensor's place beyond that of the
-        nearest course.
-        """
+        """Return (num_courses,) m, the distance of each course from its sensor's place, less that of the nearest."""
         found = [np.zeros(len(own)) for own in situation.courses]
         poses = situation.poses
         if poses is None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from vedette.control.lookahead.courses import Sequence
 from vedette.control.lookahead.problem import JointSequence, SequenceProblem
-from vedette.control.search import tie_of
+from vedette.control.search import tie_tolerance
 from vedette.models.arguments import dimension
 
 
@@ -124,11 +124,11 @@ class BeamSearch:
 
 
 def _is_better(value: float, than: float) -> bool:
-    return value > than + tie_of(than) if math.isfinite(than) else value > than
+    return value > than + tie_tolerance(than) if math.isfinite(than) else value > than
 
 
 def _ranked(values: list[float], rng: np.random.Generator) -> list[int]:
     """Return the indices of the values, the largest first; equal ones in random order."""
-    scale = tie_of(max(map(abs, filter(math.isfinite, values)), default=1.0))
+    scale = tie_tolerance(max(map(abs, filter(math.isfinite, values)), default=1.0))
     order = np.lexsort((rng.random(len(values)), -np.round(np.array(values) / scale)))
     return [int(place) for place in order]

@@ -20,7 +20,7 @@ from vedette.control.constraints import (
     interaction_range_of,
     pairs_allowed,
 )
-from vedette.control.inputs import beliefs_ahead
+from vedette.control.inputs import predicted_beliefs
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import Labelled
 from vedette.kernels.base.types import Bools, Floats
@@ -116,7 +116,7 @@ class MultiStepConstraints:
     def _situation(self, stage: int, places: Mapping[int, Place]) -> ConstraintContext:
         done, num = (stage - 1) * self.stages.stride, len(self.stages.times(stage))
         if stage not in self._beliefs:
-            ahead = beliefs_ahead(self.constraints, self.sensors, self.fused, self.settings, done + 1, done + num)
+            ahead = predicted_beliefs(self.constraints, self.sensors, self.fused, self.settings, done + 1, done + num)
             self._beliefs[stage] = ahead
         poses = self.poses.copy()
         courses = [np.empty((0, num, self.poses.shape[1]))] * len(poses)

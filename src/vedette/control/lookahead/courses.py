@@ -39,7 +39,7 @@ class CourseTree:
         stages: the decisions.
         ahead: the constraints; None: there are none.
         now: (num_courses,) which courses are allowed at the first decision, at least one.
-        far_sighted: whether dead ends are left out.
+        omits_dead_ends: whether dead ends are left out.
     """
 
     sensor: int
@@ -48,7 +48,7 @@ class CourseTree:
     stages: Stages
     ahead: MultiStepConstraints | None = None
     now: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
-    far_sighted: bool = True
+    omits_dead_ends: bool = True
     _found: dict[Sequence, Options] = field(default_factory=dict)
     _at_poses: dict[tuple[bytes, int], Options] = field(default_factory=dict)
     _spots: dict[Sequence, bytes] = field(default_factory=dict)
@@ -56,9 +56,9 @@ class CourseTree:
     _open: dict[tuple[bytes, int], tuple[Sequence, bool]] = field(default_factory=dict)
     _blocked: dict[tuple[bytes, int], int] = field(default_factory=dict)
 
-    def short_sighted(self) -> CourseTree:
+    def with_dead_ends(self) -> CourseTree:
         """Return the tree that includes dead ends."""
-        return replace(self, far_sighted=False, _allowed={})
+        return replace(self, omits_dead_ends=False, _allowed={})
 
     def place(self, taken: Sequence) -> Place:
         """Return the pose and the courses of the decision after the courses taken so far."""
@@ -75,7 +75,7 @@ class CourseTree:
             at = self.pose_after(taken)
             times = self.stages.times(len(taken) + 1)
             # Many ways lead to the same pose, up to rounding; the options there are the same.
-            key = _spot_of(at), len(times)
+            key = _pose_key(at), len(times)
             if key not in self._at_poses:
                 self._at_poses[key] = options_at(f"sensors[{self.sensor}].platform", self.platform, at, times)
             self._found[taken] = self._at_poses[key]
@@ -85,10 +85,10 @@ class CourseTree:
         """Return the distinct courses that it may take after those taken so far, at least one."""
         if self.ahead is None:
             return tuple(range(len(self.options(taken).courses)))
-        key = self.spot(taken), len(taken)
+        key = self.pose_key(taken), len(taken)
         if key not in self._allowed:
             found, _ = self._open_after(taken)
-            if self.far_sighted and len(found) > 1 and len(taken) + 1 < self.stages.depth:
+            if self.omits_dead_ends and len(found) > 1 and len(taken) + 1 < self.stages.depth:
                 blocked = [self._least_blocked((*taken, course)) for course in found]
                 found = tuple(course for course, num in zip(found, blocked, strict=True) if num == min(blocked))
             self._allowed[key] = found
@@ -156,16 +156,16 @@ class CourseTree:
         """Return the decisions of a sequence except the first, counted from 1, at which no course is allowed."""
         return [k + 1 for k in range(1, len(sequence)) if not self._open_after(sequence[:k])[1]]
 
-    def spot(self, taken: Sequence) -> bytes:
+    def pose_key(self, taken: Sequence) -> bytes:
         """Return a key that is equal for decisions at the same pose, where the options are the same."""
         if taken not in self._spots:
-            self._spots[taken] = _spot_of(self.pose_after(taken))
+            self._spots[taken] = _pose_key(self.pose_after(taken))
         return self._spots[taken]
 
     def _moment(self, taken: Sequence) -> tuple[bytes, int]:
         """Return a key that is equal where constraints allow the same courses."""
         assert self.ahead is not None
-        return self.spot(taken), self.ahead.moment(len(taken) + 1)
+        return self.pose_key(taken), self.ahead.moment(len(taken) + 1)
 
     def _open_after(self, taken: Sequence) -> tuple[Sequence, bool]:
         """Return the feasible courses, or those with the least violation, and whether they are feasible."""
@@ -181,7 +181,7 @@ class CourseTree:
         """Return the least number of decisions from here on at which no course is allowed."""
         if len(taken) == self.stages.depth:
             return 0
-        key = self.spot(taken), len(taken)
+        key = self.pose_key(taken), len(taken)
         if key not in self._blocked:
             if len(self._blocked) >= _MOST_PLACES:
                 return 0
@@ -200,7 +200,7 @@ class CourseTree:
         return self._blocked[key]
 
 
-def _spot_of(pose: Floats) -> bytes:
+def _pose_key(pose: Floats) -> bytes:
     """Return a key that is equal for poses that are the same up to rounding."""
     return (np.round(pose, _SAME_DIGITS) + 0.0).tobytes()  # -0 is 0
 

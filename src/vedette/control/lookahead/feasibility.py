@@ -55,7 +55,7 @@ class FeasibleSequences:
         bound = tuple(replace(tree, ahead=ahead, now=own) for tree, own in zip(trees, mask.single, strict=True))
         found = _furthest(bound, ahead, mask)
         if not found[0]:
-            bound = tuple(tree.short_sighted() for tree in bound)
+            bound = tuple(tree.with_dead_ends() for tree in bound)
             found = _furthest(bound, ahead, mask)
         start = tuple(tree.kept(taken) for tree, taken in zip(bound, found, strict=True))
         return cls(bound, ahead, mask, len(found[0]), start)
@@ -71,7 +71,9 @@ class FeasibleSequences:
         """Return True if the sequences are allowed together; None: the sensor is not tested."""
         known = [(s, own) for s, own in enumerate(joint) if own is not None]
         pairs = combinations(known, 2) if self.ahead.on_pairs else ()
-        if not all(self._alone(*each) for each in known) or not all(self._beside(*one, *two) for one, two in pairs):
+        if not all(self._alone(*each) for each in known) or not all(
+            self._are_compatible(*one, *two) for one, two in pairs
+        ):
             return False
         return all(self._num_active(joint, stage) <= self.most_active for stage in range(1, self._depth + 1))
 
@@ -144,7 +146,7 @@ class FeasibleSequences:
             self._single[key] = all(course in tree.allowed(sequence[:k]) for k, course in enumerate(sequence))
         return self._single[key]
 
-    def _beside(self, first: int, one: Sequence, second: int, other: Sequence) -> bool:
+    def _are_compatible(self, first: int, one: Sequence, second: int, other: Sequence) -> bool:
         key = (first, second, one, other)
         if key not in self._together:
             stages = range(min(len(one), len(other)))
@@ -163,7 +165,7 @@ class FeasibleSequences:
         if stage == 1:
             return self.mask.together.get((first, second))
         mine, its = self.trees[first], self.trees[second]
-        key = (first, second, mine.spot(one), its.spot(other), self.ahead.moment(stage))
+        key = (first, second, mine.pose_key(one), its.pose_key(other), self.ahead.moment(stage))
         if key not in self._tables:
             places = {first: mine.place(one), second: its.place(other)}
             self._tables[key] = self.ahead.pairs(stage, places).get((first, second))
@@ -207,8 +209,8 @@ def _furthest(trees: tuple[CourseTree, ...], ahead: MultiStepConstraints, mask: 
         if len(node.at) == num:
             node = begun(joined(node))
         sensor = len(node.at)
-        clashes = node.mask.clashes((*node.at, *[-1] * (num - sensor)), sensor)
-        return (node._replace(at=(*node.at, k)) if clashes[k] == 0 else None for k in node.orders[sensor])
+        conflicts = node.mask.conflicts((*node.at, *[-1] * (num - sensor)), sensor)
+        return (node._replace(at=(*node.at, k)) if conflicts[k] == 0 else None for k in node.orders[sensor])
 
     def joined(node: _Begun) -> tuple[Sequence, ...]:
         return tuple((*own, course) for own, course in zip(node.joint, node.at, strict=True))

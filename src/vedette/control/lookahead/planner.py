@@ -12,18 +12,18 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from vedette.control.constraints import Constraint, visibility_graph
-from vedette.control.decisions import plan_of
+from vedette.control.decisions import combine_parts
 from vedette.control.evaluator import Evaluator
 from vedette.control.evidence import Evidence, Part
-from vedette.control.inputs import check_poses, check_steering, check_valuing
+from vedette.control.inputs import check_control_inputs, check_poses, check_reward_inputs
 from vedette.control.lookahead.beam import BeamSearch
 from vedette.control.lookahead.constraints import MultiStepConstraints, Stages
 from vedette.control.lookahead.courses import CourseTree
 from vedette.control.lookahead.feasibility import FeasibleSequences
-from vedette.control.lookahead.problem import Best, JointSequence, LaidCourses, SequenceProblem, SequenceSearch
+from vedette.control.lookahead.problem import Best, JointSequence, PrecomputedCourses, SequenceProblem, SequenceSearch
 from vedette.control.plan import Plan
-from vedette.control.preparation import AnyReward, PlanningBeliefs, check_sums, notes_of_state, planning_beliefs
-from vedette.control.problem import bound_of, searched
+from vedette.control.preparation import AnyReward, PlanningBeliefs, check_sums, planning_beliefs, state_notes
+from vedette.control.problem import searched, upper_bound
 from vedette.control.rewards import ExpectedLossReward
 from vedette.control.search import AutomaticSearch
 from vedette.control.settings import MobileSensor, PlanningSettings
@@ -95,8 +95,8 @@ class HorizonPlanner:
     name: ClassVar[str] = "lookahead"
 
     def __post_init__(self) -> None:
-        check_steering(self)
-        check_valuing(self.fusion, self.reward, self.notes)
+        check_control_inputs(self)
+        check_reward_inputs(self.fusion, self.reward, self.notes)
         instance("search", self.search, SequenceSearch)
         if dimension("depth", self.depth) > MOST_DECISIONS:
             raise reject("depth", f"at most {MOST_DECISIONS} decisions", self.depth)
@@ -177,14 +177,14 @@ class HorizonPlanner:
         """Return the search problem. samples: generator of the samples. first: evaluator whose counts are continued."""
         depth = given.stages.depth
 
-        def part(weight: float, stage: int) -> LaidCourses:
+        def part(weight: float, stage: int) -> PrecomputedCourses:
             # Each call starts from the same generator state, so the samples are the same.
             def lay_out(options: tuple[Options, ...]) -> Evaluator:
                 horizons = first.horizons if stage == 1 else ()
                 return self._lay_out(given, stage, horizons, options, copy.deepcopy(samples))
 
             begin = 0 if self.discount is None else stage - 1
-            return LaidCourses(given.trees, stage, lay_out, weight, begin, first.counts)
+            return PrecomputedCourses(given.trees, stage, lay_out, weight, begin, first.counts)
 
         if self.discount is None:
             parts = [part(1.0, depth)]
@@ -220,23 +220,23 @@ class HorizonPlanner:
         stages, (state, *_, formed) = given.stages, given.planned
         courses = tuple(own[0] for own in sequence)
         ahead = replace(self.settings, horizon_steps=stages.num_steps(stages.depth))
-        plan = plan_of(
+        plan = combine_parts(
             self.name,
             (Part.together(evidence, courses),),
             (
                 *self.notes,
                 *(() if given.rules is None else given.rules.notes(sequence)),
                 *formed,
-                *notes_of_state(self.sensors, ahead, state, sums=True),
+                *state_notes(self.sensors, ahead, state, sums=True),
             ),
-            tuple(self._told(choice, courses, stages.depth)),
+            tuple(self._notes(choice, courses, stages.depth)),
             curve=evidence.curve() if problem is None else problem.curve(),
-            bound=bound_of(evidence, courses) if problem is None else problem.bound(),
+            bound=upper_bound(evidence, courses) if problem is None else problem.bound(),
             sequence=tuple(tree.rows(own) for tree, own in zip(given.trees, sequence, strict=True)),
         )
         return plan if problem is None else replace(plan, questions=None)
 
-    def _told(self, choice: tuple[int, ...], courses: tuple[int, ...], depth: int) -> Iterator[str]:
+    def _notes(self, choice: tuple[int, ...], courses: tuple[int, ...], depth: int) -> Iterator[str]:
         """Yield notes on the depth and on the samples."""
         if depth < self.depth:
             yield f"depth {depth} in place of {self.depth}: no more decisions come before the end"

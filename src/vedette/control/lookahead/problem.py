@@ -53,7 +53,7 @@ class _Lists:
 
 
 @dataclass(slots=True, eq=False)
-class LaidCourses:
+class PrecomputedCourses:
     """Rewards at the end of the horizon of one decision, the `stage`-th from now.
 
     Attributes:
@@ -146,7 +146,7 @@ class SequenceProblem:
 
     trees: tuple[CourseTree, ...]
     depth: int
-    parts: tuple[LaidCourses, ...]
+    parts: tuple[PrecomputedCourses, ...]
     budget: int
     rules: FeasibleSequences | None = None
     found: dict[tuple[int, ...], Best] = field(default_factory=dict)
@@ -217,7 +217,11 @@ class SequenceProblem:
                 continue
             first = tuple(taken[0] for taken in whole)
             old = self.found.get(first)
-            if old is None or value > old.value or (value == old.value and printed(whole) < printed(old.sequence)):
+            if (
+                old is None
+                or value > old.value
+                or (value == old.value and printed_order(whole) < printed_order(old.sequence))
+            ):
                 self.found[first] = Best(value, whole, own)
         self._evaluations.append(len(self._values))
         self._best.append(max((best.value for best in self.found.values()), default=-math.inf))
@@ -235,7 +239,7 @@ class SequenceProblem:
 
     def best(self) -> Best:
         """Return the best sequence; of those that are equal up to rounding the first in printed order."""
-        each = sorted(self.found.values(), key=lambda best: printed(best.sequence))
+        each = sorted(self.found.values(), key=lambda best: printed_order(best.sequence))
         return each[first_best(np.array([best.value for best in each]))]
 
     def bound(self) -> Bound | None:
@@ -251,7 +255,7 @@ class SequenceProblem:
         return SearchCurve(np.array(self._evaluations, np.int64)[known], np.array(self._best)[known])
 
 
-def printed(sequence: JointSequence) -> tuple[int, ...]:
+def printed_order(sequence: JointSequence) -> tuple[int, ...]:
     """Return the sort key of printed tables: the first courses of all sensors, then the second ones."""
     return tuple(course for stage in zip(*sequence, strict=True) for course in stage)
 

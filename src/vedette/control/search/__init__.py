@@ -9,7 +9,7 @@ from vedette.control.search.problem import (
     JointSearch,
     all_joint_actions,
     first_best,
-    tie_of,
+    tie_tolerance,
 )
 
 __all__ = [
@@ -22,5 +22,5 @@ __all__ = [
     "SequentialGreedy",
     "all_joint_actions",
     "first_best",
-    "tie_of",
+    "tie_tolerance",
 ]

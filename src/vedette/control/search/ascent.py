@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vedette.control.constraints import Active
-from vedette.control.search.problem import Joint, JointProblem, RewardCache, best_of_all, tie_of
+from vedette.control.search.problem import Joint, JointProblem, RewardCache, best_of_all, tie_tolerance
 from vedette.models.fields import Checked, Count, Repeats, part
 
 # Maximum number of sensors for which every joint action is evaluated.
@@ -94,7 +94,7 @@ def _exchanged(known: RewardCache, at: Joint, active: Active) -> Joint | None:
             if other != s and not active.on[other][at[other]]:
                 found += known.line(without, other)
     best = max(found, key=value)
-    return best if value(best) > value(at) + tie_of(value(at)) else None
+    return best if value(best) > value(at) + tie_tolerance(value(at)) else None
 
 
 def _ascend(known: RewardCache, start: Joint) -> Joint:

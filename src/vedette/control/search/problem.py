@@ -27,10 +27,10 @@ def first_best(rewards: Floats) -> int:
     18).
     """
     best = float(rewards.max())
-    return int(np.argmax(rewards >= best - tie_of(best)))
+    return int(np.argmax(rewards >= best - tie_tolerance(best)))
 
 
-def tie_of(reward: float) -> float:
+def tie_tolerance(reward: float) -> float:
     """Return the difference up to which rewards are equal to this one."""
     return _TIE * max(1.0, abs(reward))
 
@@ -128,7 +128,7 @@ class RewardCache:
         """Return the feasible actions of one sensor, given the others in `at`; below 0: not decided yet."""
         if self.mask is None:
             return list(range(self.problem.shape[sensor]))
-        return np.flatnonzero(self.mask.clashes(at, sensor) == 0).tolist()
+        return np.flatnonzero(self.mask.conflicts(at, sensor) == 0).tolist()
 
     def allowed(self, joint: Sequence[int]) -> Joint:
         """Return a joint action itself if it is allowed, otherwise an allowed one near it."""
@@ -151,7 +151,7 @@ class RewardCache:
     def best(self) -> Joint:
         """Return the best known joint action; of equal ones the first in printed order."""
         best = max(self.values.values())
-        least = best - tie_of(best)
+        least = best - tie_tolerance(best)
         return min(joint for joint, value in self.values.items() if value >= least)
 
 

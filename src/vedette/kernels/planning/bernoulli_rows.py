@@ -53,7 +53,7 @@ def log_miss(detection: float) -> float:
 
 
 @inlined
-def unscale(rows: Floats) -> None:
+def normalise_powers(rows: Floats) -> None:
     """Rescale rows whose powers do not sum to one, because some sensors do not have the label.
 
     rows: (bernoulli_size, num_samples).

@@ -165,7 +165,7 @@ def _trace_at_least(join: _Join) -> float:
 
 
 @kernel
-def losses_at_least(table: Table, valuation: Valuation, choices: Choices, out: Floats) -> None:
+def loss_reward_bounds(table: Table, valuation: Valuation, choices: Choices, out: Floats) -> None:
     """Write out[label] = an upper bound on the label's contribution to the expected loss reward; inf if
     arithmetic fails.
     """

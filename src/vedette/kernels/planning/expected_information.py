@@ -62,7 +62,9 @@ def _invert(matrix: Floats, factor: Floats, out: Floats) -> None:
 
 
 @inlined
-def _learn(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, detection: float, work: _Work, out: Floats) -> None:
+def _update_cov(
+    sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, detection: float, work: _Work, out: Floats
+) -> None:
     """Write the covariance after `detection` times the information of a measurement.
 
     If the measurement is too nonlinear, the information is that of a target at the mean.
@@ -138,7 +140,7 @@ def _expected_cov(
                         out[i, j] = cov[i, j]
             continue
         was_seen = True
-        _learn(decision.sensor, horizon.poses[course, h], mean, cov, detection, work, out)
+        _update_cov(decision.sensor, horizon.poses[course, h], mean, cov, detection, work, out)
     return missed
 
 

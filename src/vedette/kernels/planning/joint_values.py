@@ -12,7 +12,7 @@ import numpy as np
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.gaussian.integrals import integrate_rows, make_integrals
-from vedette.kernels.planning.bernoulli_rows import Table, unscale
+from vedette.kernels.planning.bernoulli_rows import Table, normalise_powers
 from vedette.kernels.planning.label_values import Valuation, ValueWork, make_value_work, value_label
 
 
@@ -82,7 +82,7 @@ def existence_logits(rows: Floats, dim: int) -> Floats:
     out, integrals = np.zeros((num_labels, num_samples)), make_integrals(num_samples)
     for label in range(num_labels):
         total = rows[label].copy()
-        unscale(total)
+        normalise_powers(total)
         integrate_rows(total, dim, integrals)
         for s in range(num_samples):
             if total[size - 3, s] > 0.0:

@@ -118,7 +118,7 @@ def _take_path(belief: Belief, label: int, step: int, num: int, batch: BatchedGa
 
 
 @borrowing
-def _look(
+def _detect(
     belief: Belief, decision: Decision, course: int, label: int, step: int, first: int, num: int, work: Work
 ) -> int:
     """Write which of the samples' targets are detected, and their ideal measurements; returns the number detected."""
@@ -193,7 +193,7 @@ def _whiten(decision: Decision, num: int, work: Work) -> None:
 
 
 @inlined
-def _weigh(num: int, work: Work, out: Followed) -> None:
+def _update_odds(num: int, work: Work, out: Followed) -> None:
     """Multiply the odds: log (1 - P_D + P_D N / kappa) = log (1 - P_D) + log (1 + P_D exp(levels - log (1 - P_D)))."""
     detection, levels, missed, rest = work.batch.prob_detection, work.levels, work.missed, work.detection
     for s in range(num):
@@ -268,11 +268,11 @@ def _follow(
         for s in range(num):
             out.log_miss[s] += missed[s]
             out.log_odds[s] += missed[s]
-        if _look(belief, decision, course, label, step, first, num, work) > 0:
+        if _detect(belief, decision, course, label, step, first, num, work) > 0:
             _take_clutter(decision, pose, num, work)
             relinearise_batch(sensor, pose, work.measurements, work.is_seen, num, batch, own)
             _whiten(decision, num, work)
-            _weigh(num, work, out)
+            _update_odds(num, work, out)
             _update(num, work, out)
             is_path = False
         else:

@@ -21,7 +21,7 @@ from vedette.kernels.base.types import Floats
 from vedette.kernels.gaussian.information import to_moments
 from vedette.kernels.gaussian.integrals import Integrals, integrate_rows, logs_of_one_and_integrals, make_integrals
 from vedette.kernels.gaussian.linalg import cholesky
-from vedette.kernels.planning.bernoulli_rows import unscale
+from vedette.kernels.planning.bernoulli_rows import normalise_powers
 
 POWER_INTEGRALS = 0
 EXPECTED_LOSS = 1
@@ -177,7 +177,7 @@ def value_label(valuation: Valuation, label: int, work: ValueWork, out: Floats) 
 
     NaN if a joint row is not a valid Bernoulli.
     """
-    unscale(work.total)
+    normalise_powers(work.total)
     if valuation.kind == POWER_INTEGRALS:
         for e in range(valuation.num):
             _power_integral(valuation, label, e, work, out[e])
