@@ -141,9 +141,7 @@ class BeyondHorizon:
         return float(np.where(np.isfinite(longest), longest, 0.0).max())
 
     def _seconds_to_search(self, turns: Floats) -> float:
-        """Return the time, s, until cameras have searched for undetected targets; 0 if none turns or none
-        are modelled.
-        """
+        """Return the time, s, until cameras have searched for undetected targets; 0 without such cameras or targets."""
         if self.undetected is None or not turns.any():
             return 0.0
         return seconds_to_search(self.options, turns.tolist(), self.reaches, self.undetected, _LEAST_EXISTENCE)

@@ -88,9 +88,7 @@ class Rounds:
         return cls(preparation, preparation.evaluator(num_samples, rng=rng), num_samples, rng, deadline, others)
 
     def _run(self, races: Sequence[Race]) -> Literal["max_samples", "max_seconds"] | None:
-        """Run rounds until all races are over; return the reason if they were stopped before. At least one
-        round is run.
-        """
+        """Run rounds, at least one, until all races are over; return the reason if they were stopped before."""
         settings = self.preparation.settings
         most = settings.max_samples - self.num_samples + races[0].num_samples
         while going := [race for race in races if race.verdict is None or race.num_samples == 0]:
@@ -225,8 +223,9 @@ def _active(parts: Sequence[Part], mask: Mask | None) -> Sequence[Part]:
 def _raced_plan(
     name: str, parts: Sequence[Part], notes: Sequence[str], certainty: SamplingOutcome, **fields: Any
 ) -> Plan:
-    """Return the plan of a race. It cannot be explained: candidates that left early have other samples than
-    the choice.
+    """Return the plan of a race, which cannot be explained.
+
+    Candidates that left the race early have other samples than the choice.
     """
     return replace(combine_parts(name, parts, notes, (str(certainty),), certainty=certainty, **fields), questions=None)
 

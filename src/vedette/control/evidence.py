@@ -77,9 +77,7 @@ class Evidence:
         return np.asarray(np.concatenate(means))
 
     def samples(self) -> Floats | None:
-        """Return kept rewards (num_joint, num_samples) in printed order; None unless each was evaluated
-        exactly once.
-        """
+        """Return kept rewards (num_joint, num_samples) in printed order; None unless each was evaluated once."""
         num = sum(len(actions) for actions, _ in self._samples)
         if num != math.prod(self.shape) or not self.is_complete():
             return None
@@ -103,9 +101,7 @@ class Evidence:
         return ranked
 
     def progress(self, num_evaluated: int, best: float) -> None:
-        """Add a step to the search curve: `num_evaluated` further joint actions, the best of them with
-        reward `best`.
-        """
+        """Add a step to the search curve: `num_evaluated` more joint actions, the best with reward `best`."""
         self._evaluations.append(num_evaluated + (self._evaluations[-1] if self._evaluations else 0))
         self._best.append(max(best, self._best[-1] if self._best else -math.inf))
 
@@ -182,10 +178,9 @@ class Evidence:
         return bool(noted) and bool((np.concatenate(noted) == np.array(choice)).all(axis=1).any())
 
     def tables(self, choice: Sequence[int]) -> tuple[RewardTable, ...]:
-        """Return one table of all evaluated rewards, with gaps elsewhere; if it would be too large, one line per
-        sensor.
+        """Return one table of all evaluated rewards, with gaps elsewhere.
 
-        A line contains one sensor's actions, with the others at their `choice`.
+        If it would be too large, return one line per sensor: its actions, with the others at their `choice`.
         """
         num_entries = math.prod([len(self.evaluator.options[s].which) for s in self.which])
         actions, means, errors = self._all()

@@ -194,9 +194,7 @@ def _ratio(difference: float, error: float | None) -> float | None:
 
 
 def text_of(explanation: Explanation) -> str:
-    """Return the reward, the margin to the runner-up, and the ten largest contributions of targets and
-    sensors, as text.
-    """
+    """Return a text of the reward, the margin to the runner-up, and the ten largest contributions."""
     lines = [*_of_choice(explanation), *_of_targets(explanation), *_of_sensors(explanation)]
     reasons: dict[str, list[str]] = {}
     for name, why in explanation.missing.items():

@@ -54,9 +54,7 @@ def check_reward_inputs(fusion: Any, reward: Any, notes: Any = ()) -> None:
 
 
 def check_poses(poses: Any, num_sensors: int) -> Floats:
-    """Return the poses as an array (num_sensors, 3 or more); `InputError` for another shape or values that
-    are not finite.
-    """
+    """Return the poses as an array (num_sensors, 3 or more); `InputError` for other shapes or non-finite values."""
     checked = float_array("poses", poses, (num_sensors, None))
     if checked.shape[1] < 3:
         raise reject("poses", f"an array of shape ({num_sensors}, 3 or more)", f"shape {checked.shape}")

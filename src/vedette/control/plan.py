@@ -34,9 +34,7 @@ class RewardTable(SummaryRepr):
     standard_error: Floats
 
     def validate(self) -> None:
-        """Raise `InputError` unless there is one axis per sensor, and every entry is a reward with its
-        error or a gap.
-        """
+        """Raise `InputError` unless there is one axis per sensor, and each entry is a reward with error or a gap."""
         if self.mean.ndim != len(self.sensors) or self.mean.shape != self.standard_error.shape:
             raise InputError(
                 f"reward table: expected one axis for each of the sensors {self.sensors}; got a mean of shape "
@@ -161,8 +159,7 @@ class Plan(TabularRepr):
         return len(self.actions)
 
     def to_table(self) -> dict[str, list[Any]]:
-        """Return one row per sensor: `sensor` (from 0), `action`, of `num_actions`, and the numbers of the action by
-        name.
+        """Return one row per sensor: `sensor` (from 0), `action`, `num_actions`, and the numbers of the action.
 
         A number that a sensor's actions do not have is None.
         """
@@ -192,9 +189,7 @@ class Plan(TabularRepr):
 
     @property
     def expected_rewards(self) -> tuple[tuple[float, float], ...]:
-        """Mean reward of the choice and its standard error for each table: one per sensor, or one for a
-        joint decision.
-        """
+        """Mean reward and standard error of the choice in each table: one per sensor, or one if joint."""
         at = [tuple(self.chosen[sensor] for sensor in table.sensors) for table in self.tables]
         return tuple(
             (float(table.mean[index]), float(table.standard_error[index]))

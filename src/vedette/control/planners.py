@@ -106,8 +106,9 @@ class IndependentPlanner:
         one_of("others", self.others, ("stay", "absent"))
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
-        """Return each sensor's action with the largest mean reward; arguments, ties and errors as in
-        `JointPlanner.plan`.
+        """Return each sensor's action with the largest mean reward.
+
+        Arguments, ties and errors are as in `JointPlanner.plan`.
         """
         generator(rng)
         prepared = Preparation.of(self.sensors, self.fusion, self.settings, self.reward, state, poses, self.constraints)

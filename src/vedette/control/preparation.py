@@ -162,10 +162,9 @@ def planning_beliefs(
     state: State,
     why: str = "",
 ) -> PlanningBeliefs:
-    """Return the beliefs in the form that they are planned on. why: GLMBs are converted to LMBs in any case, for this
-    reason.
+    """Return the beliefs in the form that they are planned on.
 
-    Raises `InputError` for an invalid state.
+    why: reason to convert GLMBs to LMBs in any case. Raises `InputError` for an invalid state.
     """
     check_state(sensors, state)
     if isinstance(reward, ExpectedLossReward):
@@ -193,8 +192,9 @@ def planning_beliefs(
 
 
 def _planned_on_loss(fusion: Fusion, state: State, why: str) -> PlanningBeliefs:
-    """Return the fused belief for all sensors: an LMB with the heaviest Gaussian of each label. why: text
-    of the note.
+    """Return the fused belief for all sensors: an LMB with the heaviest Gaussian of each label.
+
+    why: text of the note.
     """
     fused, num_sensors, notes = state.fused, len(state.local), tuple[str, ...]()
     if _has_glmb((*state.local, fused)):

@@ -141,10 +141,9 @@ def upper_bound(evidence: Evidence, choice: Sequence[int]) -> Bound | None:
 
 
 def upper_bound_by_target(evidence: Evidence) -> tuple[float, int] | None:
-    """Return an upper bound on the mean reward of any joint action, and the number of targets it does not cover
-    (cached).
+    """Return an upper bound on the mean reward, and the number of targets it does not cover (cached).
 
-    None for rewards that are not linear in sums over targets.
+    No joint action has a larger mean reward. None for rewards that are not linear in sums over targets.
     """
     evaluator, known = evidence.evaluator, evidence.upper_bound_by_target
     additive = evaluator.additive
@@ -209,9 +208,7 @@ def _ways(choices: Choices, num_labels: int) -> Floats:
 
 
 def _most_found(additive: AdditiveRewards) -> float:
-    """Return the value of undetected targets found if each sensor sees each cell as well as its best course
-    there does.
-    """
+    """Return the value of undetected targets found if each sensor sees each cell as its best course there does."""
     cells, totals = additive.cells, np.zeros(len(additive.cells.worth))
     firsts: Ints = additive.table.first_courses
     for first, last in zip(firsts[:-1].tolist(), firsts[1:].tolist(), strict=True):

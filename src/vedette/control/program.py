@@ -1,6 +1,4 @@
-"""A planner that is an external program, in any language: it receives a line of JSON per decision and
-answers with one.
-"""
+"""A planner that is an external program, in any language, which answers a line of JSON per decision."""
 
 from __future__ import annotations
 

@@ -139,8 +139,9 @@ class Race:
 
 
 def _chance_beyond(distances: Floats, errors: Floats, num_samples: int) -> Floats:
-    """Return the probability that a mean of `num_samples` samples has an error above a distance, positive
-    except for ties.
+    """Return the probability that the error of a mean of `num_samples` samples exceeds a distance.
+
+    It is positive except for ties.
     """
     from scipy.special import stdtr
 

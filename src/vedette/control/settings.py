@@ -35,9 +35,7 @@ IDEAL_MODES = {"ideal": IDEAL, "expected": EXPECTED, "sampled": SAMPLED}
 
 
 def planning_limits() -> Limits:
-    """Return the default limits of the pseudo-updates: few hypotheses, one Gaussian per track, no label
-    ever dropped.
-    """
+    """Return the default limits of pseudo-updates: few hypotheses, one Gaussian per track, no dropped labels."""
     return Limits(
         max_hypotheses=10, min_relative_weight=1e-5, min_track_weight=1.0, max_components=1, min_existence=0.0
     )
@@ -176,9 +174,7 @@ class MobileSensor:
 def scans_within(
     sensors: Sequence[MobileSensor], options: Sequence[Options], now: float | None, settings: PlanningSettings
 ) -> tuple[Bools, ...]:
-    """Return for each sensor (num_courses, horizon_steps) the pseudo-updates at which it scans on each of
-    its courses.
-    """
+    """Return for each sensor (num_courses, horizon_steps) the pseudo-updates at which it scans."""
     found = []
     for sensor, own in zip(sensors, options, strict=True):
         found.append(own.scans if sensor.scan_times is None else own.scans & sensor.scans(now, settings))

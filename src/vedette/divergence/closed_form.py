@@ -111,8 +111,9 @@ def check_support(support: str) -> None:
 def log_inner_products(
     a: Labelled, b: Labelled, log_unit_volume: float, common: bool, *, self_terms: bool
 ) -> tuple[float, float, float]:
-    """Return log zeta(a, b), zeta(a, a), zeta(b, b) of labelled densities; the last two may be -inf unless
-    `self_terms`.
+    """Return log zeta(a, b), zeta(a, a), zeta(b, b) of labelled densities.
+
+    The last two may be -inf unless `self_terms`.
     """
     parts = [_of_parts(p, q, log_unit_volume, common, self_terms) for p, q in paired_parts(a, b)]
     cross, own_a, own_b = (sum(logs) for logs in zip((0.0, 0.0, 0.0), *parts, strict=True))

@@ -24,9 +24,7 @@ SWITCH = "on"  # the column of actions for the switch of the sensor: 1: on, 0: o
 
 
 def switch_words(column: str, value: float) -> str:
-    """Return `on` or `off` for the column `on`, `off at decision 2` for `on_2` of a sequence, and "" for
-    other columns.
-    """
+    """Return `on` or `off` for the column `on`, or `off at decision 2` for `on_2`; empty for other columns."""
     name, _, decision = column.partition("_")
     if name != SWITCH or (column != name and not decision.isdigit()):
         return ""
@@ -91,8 +89,9 @@ def options_at(
 
 
 def _same(courses: Floats) -> Bools:
-    """Return (num, num) whether courses are equal up to rounding, and headings up to full turns, relative
-    to the second.
+    """Return (num, num) whether courses are equal up to rounding and headings up to full turns.
+
+    Tolerances are relative to the second course.
     """
     num = len(courses)
     equal = np.ones((num, num), np.bool_)
@@ -140,8 +139,9 @@ class Actions(SummaryRepr):
         return f"of {pluralise(len(self), 'choice')}: {', '.join(self.columns)}"
 
     def text(self, index: int) -> str:
-        """Return one action as text: `heading_deg 30, speed 5`; a switch is `on` or `off`, in sequences
-        with the decision.
+        """Return one action as text, such as `heading_deg 30, speed 5`.
+
+        A switch is `on` or `off`, in sequences with the decision.
         """
         numbers = zip(self.columns, self.values[index].tolist(), strict=True)
         return ", ".join(switch_words(name, value) or f"{name} {round(value, 6):g}" for name, value in numbers)
@@ -195,9 +195,7 @@ class HasScans(Protocol):
     """A platform whose actions may keep its sensor from scanning; sensors of other platforms always scan."""
 
     def scans(self, pose: Floats, actions: Floats, times: Floats) -> Bools:
-        """Return (num_actions, num_times) whether the sensor scans `times` seconds after it began each
-        action at `pose`.
-        """
+        """Return (num_actions, num_times) whether the sensor scans at `times`, s after each action began at `pose`."""
         ...
 
 

@@ -75,8 +75,9 @@ class ByCompass:
         return (found.carrier, found.pointing) if isinstance(found, MountedPlatform) else (found,)
 
     def _given(self, rows: Floats, pose: Floats, *, fixed: bool) -> Floats:
-        """Return (num_rows, num_columns) converted rows of the platform's own columns; fixed directions may be compass
-        ones.
+        """Return converted rows (num_rows, num_columns) of the platform's own columns.
+
+        fixed: whether directions that do not depend on the pose are already relative to true north.
         """
         found, place = [], 0
         for part in self._parts:

@@ -160,9 +160,7 @@ class AdditiveRewards:
         return sums[..., 0] if self.reward is None else combined(self.reward, sums)
 
     def price(self, actions: Ints) -> Floats:
-        """Return prices (num_joint,) of joint actions (num_joint, num_sensors); -1: the sensor does not
-        scan, no price.
-        """
+        """Return prices (num_joint,) of joint actions (num_joint, num_sensors); -1: not scanning, at no price."""
         prices = self.prices[np.maximum(actions, 0) + self.table.first_courses[:-1]]
         return np.asarray(np.where(actions >= 0, prices, 0.0).sum(axis=1))
 

@@ -90,8 +90,7 @@ class Mask:
         return self._conflicts[sensor]
 
     def conflicts(self, at: Sequence[int], sensor: int) -> Ints:
-        """Return (num_courses,) the number of violations that each course of one sensor causes with the others'
-        courses.
+        """Return (num_courses,) the violations that each course of one sensor causes with the others' courses.
 
         at: courses; negative ones belong to undecided sensors, which cause no conflict.
         """

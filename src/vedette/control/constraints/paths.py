@@ -89,9 +89,7 @@ class VisibilityGraph:
         return np.asarray(touched.reshape(courses.shape[:2]).any(axis=1))
 
     def free_fraction(self, starts: Floats, ends: Floats) -> Floats:
-        """Return the fraction (num,) of the line from each start to its end (num, 2) before it touches a
-        zone; 1: all.
-        """
+        """Return the fraction (num,) of each line from start to end (num, 2) before it touches a zone; 1: all."""
         shares = first_touches(starts, ends, self.edges, _inside(self.edges, starts))
         length = np.maximum(np.hypot(*(ends - starts).T), MARGIN)
         return np.where(np.isinf(shares), 1.0, np.maximum(shares - MARGIN / length, 0.0))

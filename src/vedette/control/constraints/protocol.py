@@ -33,8 +33,9 @@ class ConstraintContext(NamedTuple):
     scans: tuple[Bools, ...] = ()
 
     def ways(self, sensor: int) -> Floats:
-        """Return (num_courses, num_points, 2) the corners of one sensor's ways: its present position, if
-        known, and later.
+        """Return (num_courses, num_points, 2) the corners of one sensor's ways.
+
+        They begin at its present position, if it is known.
         """
         if self.poses is None:
             return self.courses[sensor][:, :, :2]

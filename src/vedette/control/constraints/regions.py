@@ -46,8 +46,9 @@ class StayInside(PerSensorConstraint):
         return inner + _BEYOND * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]), inner
 
     def violations(self, situation: ConstraintContext) -> tuple[Floats, ...]:
-        """Return the distance, m, from the rectangle, averaged over the times; ways between two points
-        inside are inside.
+        """Return the distance, m, from the rectangle, averaged over the times.
+
+        The straight way between two points inside is inside, too.
         """
         places = np.concatenate([own[:, :, :2] for own in situation.courses])
         low, high = self.region.corners.min(axis=0), self.region.corners.max(axis=0)

@@ -16,8 +16,7 @@ from vedette.models.arguments import dimension
 
 @dataclass(frozen=True, slots=True)
 class BeamSearch:
-    """A search of one sensor at a time: a beam of its best beginnings grows decision by decision, the others held
-    fixed.
+    """A search of one sensor at a time, with a beam of its best beginnings that grows decision by decision.
 
     The value of a beginning is that of the sequence that repeats its last action until the end. So the far future
     counts from the first decision on, and every evaluation is of a whole sequence; ties are broken at random. Starting

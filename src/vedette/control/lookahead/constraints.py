@@ -84,8 +84,9 @@ class MultiStepConstraints:
         )
 
     def mask(self, places: Mapping[int, Place]) -> Mask:
-        """Return the mask of the first decision, relaxed if necessary. Raises `InputError` as
-        `feasible_action_mask`.
+        """Return the mask of the first decision, relaxed if necessary.
+
+        Raises `InputError` as `feasible_action_mask`.
         """
         return feasible_action_mask(self.constraints, self._situation(1, places))
 
@@ -99,8 +100,9 @@ class MultiStepConstraints:
         return allowed[sensor], sensor not in blocked
 
     def pairs(self, stage: int, places: Mapping[int, Place]) -> dict[tuple[int, int], Bools]:
-        """Return tables of pairs of sensors i < j with forbidden courses; raises `InputError` as
-        `feasible_action_mask`.
+        """Return tables of the pairs of sensors i < j with forbidden courses.
+
+        Raises `InputError` as `feasible_action_mask`.
         """
         return pairs_allowed(self.constraints, self._situation(stage, places))
 

@@ -101,8 +101,9 @@ class HasMissedCost(Protocol):
 
 @runtime_checkable
 class LinearReward(Protocol):
-    """A reward whose `combine` is linear, so that searches have bounds and compiled ascents, and explanations have
-    targets.
+    """A reward whose `combine` is linear.
+
+    Searches then have bounds and compiled ascents, and explanations have gains of targets.
     """
 
     @property

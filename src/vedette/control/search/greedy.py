@@ -86,9 +86,7 @@ class _Steps:
 
 
 def _best_first(steps: _Steps) -> None:
-    """Decide by lazy greedy: the sensor with the largest expected gain is evaluated again, until that gain
-    is current.
-    """
+    """Decide by lazy greedy: evaluate the sensor with the largest expected gain until that gain is current."""
     steps.reward = float(steps.partial(np.array([steps.at], np.int64))[0])
     num_sensors = len(steps.at)
     # Expected gain, negated; the sensor; the round of its last evaluation; its best action then.

@@ -36,8 +36,7 @@ def tie_tolerance(reward: float) -> float:
 
 
 class JointProblem(NamedTuple):
-    """The problem given to a search. An action is the index of a course among a sensor's distinct courses, in printed
-    order.
+    """The problem given to a search. An action is the index of one of a sensor's distinct courses, in printed order.
 
     shape: number of distinct courses of each sensor.
     evaluate: returns mean joint rewards (num,) of joint actions (num, num_sensors), each row one action per sensor; the
@@ -112,9 +111,7 @@ class RewardCache:
         return np.array([self.values[joint] for joint in joint_actions])
 
     def line(self, through: Joint, sensor: int) -> list[Joint]:
-        """Return the allowed joint actions that differ at most in this sensor's action; their rewards are
-        then known.
-        """
+        """Return the allowed joint actions that differ at most in this sensor's action, and evaluate them."""
         ahead, behind = through[:sensor], through[sensor + 1 :]
         joint_actions = [(*ahead, action, *behind) for action in self.actions(through, sensor)]
         if self.problem.line is None:

@@ -109,9 +109,7 @@ def _line(
     work: ValueWork,
     gains: Floats,
 ) -> None:
-    """Write the gain of each course of a sensor over its not scanning, given the joint rows `at` of the
-    other sensors.
-    """
+    """Write the gain of each course of a sensor over not scanning, with the joint rows `at` of the others."""
     first, last = table.first_courses[sensor], table.first_courses[sensor + 1]
     for entry in range(table.offsets[first], table.offsets[last]):
         before[table.labels[entry]] = math.inf

@@ -166,9 +166,7 @@ def _trace_at_least(join: _Join) -> float:
 
 @kernel
 def loss_reward_bounds(table: Table, valuation: Valuation, choices: Choices, out: Floats) -> None:
-    """Write out[label] = an upper bound on the label's contribution to the expected loss reward; inf if
-    arithmetic fails.
-    """
+    """Write out[label] = an upper bound on the label's term of the expected loss; inf if the arithmetic fails."""
     n, num_labels, last = valuation.references.shape[1], len(table.start), valuation.prior.shape[1]
     square = np.empty((8, n, n))
     join = _Join(square[0], square[1], square[2], square[3], square[4], square[5], square[6], square[7])

@@ -90,8 +90,7 @@ def add_noise(sensor: Sensor, state: Floats, pose: Floats, normals: Floats, scra
 
 @inlined
 def ideal_measurement(decision: Decision, action: int, target: int, step: int, scratch: Scratch, out: Floats) -> bool:
-    """Write the ideal measurement of a sampled target at a step of an action into `out`; returns False if there is
-    none.
+    """Write the ideal measurement of a sampled target at a step of an action; returns False if there is none.
 
     IDEAL: without noise, of a target whose detection probability is at least the threshold. EXPECTED: without noise, of
     a target detected at random with its detection probability. SAMPLED: detected likewise, with measurement noise.

@@ -39,8 +39,9 @@ def spread_row(row: Floats, out: Floats) -> None:
 
 @borrowing
 def add_course(table: Table, sensor: int, course: int, sign: float, totals: Floats) -> None:
-    """Add the changes of a course, or subtract them with sign -1, in totals (num_labels, bernoulli_size,
-    num_samples).
+    """Add the changes of a course, or subtract them with sign -1.
+
+    totals: (num_labels, bernoulli_size, num_samples), changed in place.
     """
     power = sign * table.powers[sensor]
     for entry in range(table.offsets[course], table.offsets[course + 1]):
@@ -59,9 +60,7 @@ def value_rows(valuation: Valuation, label: int, rows: Floats, work: ValueWork, 
 
 @kernel
 def label_values(rows: Floats, valuation: Valuation) -> Floats:
-    """Return values (num_labels, num, num_samples) of rows (num_labels, bernoulli_size, num_samples), label
-    by label.
-    """
+    """Return values (num_labels, num, num_samples) of rows (num_labels, bernoulli_size, num_samples)."""
     num_labels, _, num_samples = rows.shape
     work, out = make_value_work(valuation, num_samples), np.empty((num_labels, valuation.num, num_samples))
     for label in range(num_labels):
@@ -160,9 +159,7 @@ def joint_values(table: Table, valuation: Valuation, actions: Ints, first: int, 
 def value_changed(
     table: Table, valuation: Valuation, sensor: int, entry: int, rows: Floats, work: ValueWork, out: Floats
 ) -> None:
-    """Write values (num, num_samples) of the label of an entry, with its change added to the joint rows of
-    the others.
-    """
+    """Write values (num, num_samples) of an entry's label, with its change added to the others' joint rows."""
     add_rows(rows, table.powers[sensor], table.changes[entry], work.total)
     value_label(valuation, table.labels[entry], work, out)
 

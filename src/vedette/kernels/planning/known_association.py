@@ -281,9 +281,7 @@ def _follow(
 
 @kernel
 def rows_without_scans(means: Floats, covs: Floats, logits: Floats, references: Floats) -> Floats:
-    """Return (num, bernoulli_size) Bernoulli rows of labels with one Gaussian each; logits of certain ones
-    are limited.
-    """
+    """Return Bernoulli rows (num, bernoulli_size) of labels with one Gaussian each; their logits are limited."""
     num, dim = means.shape
     rows, factor, inverse = np.empty((num, bernoulli_size(dim))), np.empty((dim, dim)), np.empty((dim, dim))
     for i in range(num):
