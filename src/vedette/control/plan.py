@@ -179,8 +179,8 @@ class Plan(TabularRepr):
     def _detail(self) -> str:
         texts = [own.text(index) for own, index in zip(self.actions, self.chosen, strict=True)][:_MOST_TOLD]
         more = self.num_sensors - len(texts)
-        told = [f"sensor {number}: {text}" for number, text in enumerate(texts, start=1)]
-        return "; ".join(told + ([f"{more} more"] if more else []))
+        lines = [f"sensor {number}: {text}" for number, text in enumerate(texts, start=1)]
+        return "; ".join(lines + ([f"{more} more"] if more else []))
 
     @property
     def chosen_actions(self) -> tuple[Floats, ...]:

@@ -110,12 +110,12 @@ class Preparation:
             evaluator = Evaluator.of_sums(
                 sensors, own, rule, settings, reward, state, horizons=None, graph=self.graph, rng=rng
             )
-        told = (
+        all_notes = (
             *state_notes(sensors, settings, state, sums=rule is not None),
             *(self.mask.notes if self.mask is not None else ()),
             *notes,
         )
-        evaluator.notes.update(dict.fromkeys(told))
+        evaluator.notes.update(dict.fromkeys(all_notes))
         return evaluator
 
 
