@@ -65,7 +65,7 @@ class KeepOut(PerSensorConstraint):
 
     Attributes:
         area: a `Region`, or the corners (num_corners, 2) of a polygon in order, m, 3 or more; the interior of a polygon
-            that crosses itself is by the even-odd rule. Its edge is forbidden, too.
+            that crosses itself is determined by the even-odd rule. Its edge is forbidden, too.
         holes: polygons inside the area that are allowed, except for their edges: a lake on an island.
 
     Raises:

@@ -36,8 +36,9 @@ class Reward(Protocol):
 class PowerReward(Protocol):
     """A reward made of power integrals Z(a, b) of prediction and update; no fused density needs to be formed.
 
-    Z(a, b) is the log of the set integral of K^((a + b - 1) |X|) predicted(X)^a updated(X)^b over the label sets of
-    both (see `vedette.divergence.power_integral`). The update need not be normalised: exp(Z(0, 1)) is its integral. The
+    Z(a, b) is the log of the set integral of K^((a + b - 1) |X|) predicted(X)^a updated(X)^b over the label sets that
+    both have (see `vedette.divergence.power_integral`). The update need not be normalised: exp(Z(0, 1)) is its
+    integral. The
     reward may have the members of `HasUnitVolume` and `LinearReward`, too; without the former K is 1.
     """
 

@@ -20,7 +20,7 @@ from vedette.models.fields import Checked, Positive, part
 class CauchySchwarzReward:
     """Cauchy-Schwarz divergence between the prediction and the update (paper eqs. 5, 8 and 13 to 17).
 
-    It is taken on the label sets of both.
+    It is computed on the label sets that both densities have.
 
     Attributes:
         unit_volume: unit K of hyper-volume (eq. 5): a number, or "reference" for (4 pi)^(d/2) sqrt(det P) of the
@@ -54,7 +54,7 @@ class CauchySchwarzReward:
 @part("renyi", "reward")
 @dataclass(frozen=True, slots=True)
 class RenyiReward:
-    """Renyi divergence of the prediction from the update, on the label sets of both, with both normalised.
+    """Renyi divergence of the prediction from the update, normalised on the label sets that both have.
 
     log(integral of predicted^order updated^(1 - order)) / (order - 1); see `vedette.divergence.renyi`. It needs no K.
 
