@@ -122,7 +122,7 @@ def test_a_scenario_says_whether_decisions_are_explained() -> None:
     record = run_scenario(few, "jdm", seed=1)
     for decision in record.decisions:
         plan, why = decision.plan, decision.plan.explain()
-        assert plan.questions is None
+        assert plan.analysis is None
         assert why.of_sensors is not None
         assert why.baseline is not None
         assert why.reward == plan.expected_rewards[0][0]

@@ -37,7 +37,7 @@ _BLOCK = 250
 
 
 # What a sensor that decides alone assumes about the others: that they stay as they are, or that there are none.
-Presumption: TypeAlias = Literal["stay", "absent"]
+OthersAssumption: TypeAlias = Literal["stay", "absent"]
 
 
 @dataclass(slots=True)
@@ -180,14 +180,19 @@ def decide_jointly(
 
 
 def decide_independently(
-    name: str, preparation: Preparation, presume: Presumption, notes: Sequence[str], *, rng: np.random.Generator
+    name: str,
+    preparation: Preparation,
+    others_assumption: OthersAssumption,
+    notes: Sequence[str],
+    *,
+    rng: np.random.Generator,
 ) -> Plan:
     """Return the plan with the best feasible course of each sensor; the confidence is that all of them are best.
 
-    presume: what each sensor assumes about the others.
+    others_assumption: what each sensor assumes about the others.
     """
     settings, options, races = preparation.settings, preparation.options, preparation.races
-    others = stationary_courses(options, preparation.mask) if presume == "stay" else None
+    others = stationary_courses(options, preparation.mask) if others_assumption == "stay" else None
     rounds = Rounds.begin(preparation, FIRST_ROUND if races else settings.num_samples, others, rng=rng)
     each_sure = 1.0 - (1.0 - float(settings.confidence or 0.0)) / len(options)
     parts, entered = [], []
@@ -227,7 +232,7 @@ def _raced_plan(
 
     Candidates that left the race early have other samples than the choice.
     """
-    return replace(combine_parts(name, parts, notes, (str(certainty),), certainty=certainty, **fields), questions=None)
+    return replace(combine_parts(name, parts, notes, (str(certainty),), certainty=certainty, **fields), analysis=None)
 
 
 def combine_parts(
@@ -252,7 +257,7 @@ def combine_parts(
         tuple(tables),
         dict(evaluator.counts),
         (*notes, *evaluator.notes, *more_notes, *beyond_cutoff(evaluator, courses)),
-        questions=DecisionAnalysis(name, tuple(parts), fields.get("bound")),
+        analysis=DecisionAnalysis(name, tuple(parts), fields.get("bound")),
         **fields,
     )
 

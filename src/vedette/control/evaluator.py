@@ -126,10 +126,10 @@ class Evaluator:
         """
         if others is None:
             return self._counted(self.source.alone(sensor))
-        joint, presumed = self.joint(), np.array(others, np.int64)
+        joint, assumed = self.joint(), np.array(others, np.int64)
 
         def evaluate(actions: Ints) -> Floats:
-            rows = np.tile(presumed, (len(actions), 1))
+            rows = np.tile(assumed, (len(actions), 1))
             rows[:, sensor] = actions[:, 0]
             return joint(rows)
 

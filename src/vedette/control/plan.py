@@ -107,7 +107,7 @@ class Plan(TabularRepr):
             chosen actions, the first of which is to be taken; else empty.
         certainty: why sampling stopped, if a confidence was required; else None.
         explanation: the explanation, if it was computed for storage; see `explain`.
-        questions: answers `explain` from the evidence; None without it (`without_evidence`, a pickle, a record).
+        analysis: computes `explain` from the evidence; None without it (`without_evidence`, a pickle, a record).
     """
 
     planner: str
@@ -120,7 +120,7 @@ class Plan(TabularRepr):
     bound: Bound | None = None
     certainty: SamplingOutcome | None = None
     explanation: Explanation | None = None
-    questions: Callable[[], Explanation] | None = field(default=None, repr=False, compare=False)
+    analysis: Callable[[], Explanation] | None = field(default=None, repr=False, compare=False)
     sequence: tuple[Floats, ...] = ()
 
     def explain(self) -> Explanation:
@@ -132,8 +132,8 @@ class Plan(TabularRepr):
         Raises:
             InputError: a plan that was stored or sent without its explanation, or made by a planner that gives none.
         """
-        if self.questions is not None:
-            return self.questions()
+        if self.analysis is not None:
+            return self.analysis()
         if self.explanation is not None:
             return self.explanation
         chosen = tuple(own.text(index) for own, index in zip(self.actions, self.chosen, strict=True))
@@ -149,9 +149,9 @@ class Plan(TabularRepr):
     def without_evidence(self, *, explained: bool) -> Plan:
         """Return the plan for storage, without its evidence, which takes memory; `explained`: with its explanation."""
         kept = self.explanation
-        if explained and self.questions is not None:
-            kept = self.questions().without_evidence()
-        return replace(self, explanation=kept, questions=None)
+        if explained and self.analysis is not None:
+            kept = self.analysis().without_evidence()
+        return replace(self, explanation=kept, analysis=None)
 
     @property
     def num_sensors(self) -> int:

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from vedette.control.constraints import Constraint
-from vedette.control.decisions import Presumption, decide_independently, decide_jointly
+from vedette.control.decisions import OthersAssumption, decide_independently, decide_jointly
 from vedette.control.inputs import check_control_inputs, check_reward_inputs
 from vedette.control.plan import Plan
 from vedette.control.preparation import AnyReward, Preparation
@@ -97,7 +97,7 @@ class IndependentPlanner:
     reward: AnyReward = field(default_factory=ExpectedLossReward)
     constraints: tuple[Constraint, ...] = ()
     notes: tuple[str, ...] = ()
-    others: Presumption = "stay"
+    others: OthersAssumption = "stay"
     name: ClassVar[str] = "idm"
 
     def __post_init__(self) -> None:

@@ -234,7 +234,7 @@ class HorizonPlanner:
             bound=upper_bound(evidence, courses) if problem is None else problem.bound(),
             sequence=tuple(tree.rows(own) for tree, own in zip(given.trees, sequence, strict=True)),
         )
-        return plan if problem is None else replace(plan, questions=None)
+        return plan if problem is None else replace(plan, analysis=None)
 
     def _notes(self, choice: tuple[int, ...], courses: tuple[int, ...], depth: int) -> Iterator[str]:
         """Yield notes on the depth and on the samples."""

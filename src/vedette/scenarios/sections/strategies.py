@@ -15,7 +15,7 @@ from vedette.scenarios.sections.tracking import LABELLING, UNLABELLED
 
 if TYPE_CHECKING:  # with the planners comes the compiler, which a check does without
     from vedette.control import Constraint, JointSearch, MobileSensor, Planner, PlanningSettings
-    from vedette.control.decisions import Presumption
+    from vedette.control.decisions import OthersAssumption
     from vedette.control.preparation import AnyReward as PlannedReward
     from vedette.densities import Estimator
     from vedette.fusion import Fusion
@@ -40,7 +40,7 @@ class Parts(NamedTuple):
     settings: PlanningSettings
     reward: PlannedReward
     search: JointSearch
-    others: Presumption
+    others: OthersAssumption
     first_actions: tuple[Actions, ...]
     constraints: tuple[Constraint, ...]
     notes: tuple[str, ...]
