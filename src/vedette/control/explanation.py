@@ -208,7 +208,7 @@ def _wrapped(line: str) -> list[str]:
 
 
 def with_error(value: float, error: float | None, sign: str = "+-") -> str:
-    """`1.234 +- 0.05`."""
+    """Return a value with its error as text, such as `1.234 +- 0.05`."""
     return f"{value:.4g}" + ("" if error is None else f" {sign} {error:.2g}")
 
 
@@ -230,7 +230,7 @@ def _of_choice(found: Explanation) -> list[str]:
 
 
 def margin_text(runner_up: RunnerUp, reward: float) -> str:
-    """`less by 0.12 +- 0.03 (4 standard errors)`."""
+    """Return the margin as text, such as `less by 0.12 +- 0.03 (4 standard errors)`."""
     if abs(runner_up.margin) <= _SAME * max(1.0, abs(reward)):
         return "as good"
     ratio = runner_up.in_standard_errors

@@ -71,7 +71,7 @@ class Race:
 
     @property
     def candidates(self) -> Ints:
-        """(num_left, num_sensors) the joint actions that are not excluded, in the order of `rewards`."""
+        """The joint actions (num_left, num_sensors) that are not excluded, in the order of `rewards`."""
         return np.asarray(self.actions[self.left])
 
     @property

@@ -46,7 +46,7 @@ class PlaneCompass:
 
 
 def wrapped(angles: ArrayLike) -> Floats:
-    """Return angles in [-pi, pi], rad."""
+    """Return angles in rad, wrapped to [-pi, pi]."""
     given = np.asarray(angles, np.float64)
     return np.asarray(given - 2.0 * math.pi * np.rint(given / (2.0 * math.pi)))
 

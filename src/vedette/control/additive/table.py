@@ -30,7 +30,7 @@ from vedette.models.arguments import provides
 from vedette.platforms import Options
 from vedette.tracking import State
 
-# A label is out of reach if its probability of detection is no higher, for every sample and for the prediction.
+# A label is out of reach if its detection probability is below this for every sample and for the prediction.
 LEAST_DETECTION = 1e-6
 
 # Lower limit: a search never empties a cell completely.

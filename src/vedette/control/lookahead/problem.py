@@ -48,7 +48,7 @@ class _Lists:
 
     @property
     def values(self) -> tuple[np.ndarray[Any, Any], ...]:
-        """Offsets and columns."""
+        """The offsets and the columns."""
         return tuple(room[:num] for room, num in zip(self._rooms, self._nums, strict=True))
 
 

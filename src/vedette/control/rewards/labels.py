@@ -58,7 +58,7 @@ class KullbackLeiblerReward(_OneSum):
 
     @property
     def function(self) -> ModelFunction:
-        """See `vedette.control.rewards.labels`."""
+        """Model function of the reward; see `vedette.control.rewards.labels`."""
         return kullback_leibler_of_label
 
 
@@ -71,7 +71,7 @@ class CardinalityVarianceReward(_OneSum):
 
     @property
     def function(self) -> ModelFunction:
-        """See `vedette.control.rewards.labels`."""
+        """Model function of the reward; see `vedette.control.rewards.labels`."""
         return cardinality_variance_of_label
 
 
@@ -100,7 +100,7 @@ class ExpectedGospaReward(_OneSum, Checked):
 
     @property
     def function(self) -> ModelFunction:
-        """See `vedette.control.rewards.labels`."""
+        """Model function of the reward; see `vedette.control.rewards.labels`."""
         return gospa_of_label
 
     @property
@@ -133,7 +133,7 @@ class PeecsReward(Checked):
 
     @property
     def function(self) -> ModelFunction:
-        """See `vedette.control.rewards.labels`."""
+        """Model function of the reward; see `vedette.control.rewards.labels`."""
         return peecs_of_label
 
     @property

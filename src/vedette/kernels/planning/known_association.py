@@ -194,7 +194,10 @@ def _whiten(decision: Decision, num: int, work: Work) -> None:
 
 @inlined
 def _update_odds(num: int, work: Work, out: Followed) -> None:
-    """Multiply the odds: log (1 - P_D + P_D N / kappa) = log (1 - P_D) + log (1 + P_D exp(levels - log (1 - P_D)))."""
+    """Multiply the odds by the likelihood of the scan.
+
+    log (1 - P_D + P_D N / kappa) = log (1 - P_D) + log (1 + P_D exp(levels - log (1 - P_D))).
+    """
     detection, levels, missed, rest = work.batch.prob_detection, work.levels, work.missed, work.detection
     for s in range(num):
         relative = levels[s] - missed[s]
