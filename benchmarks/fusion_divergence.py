@@ -21,7 +21,7 @@ from vedette.control import CauchySchwarzReward, RenyiReward
 from vedette.control.pseudo_posterior_rewards import PlainRewards, lay_out_rewards
 from vedette.control.search import all_joint_actions
 from vedette.densities import GLMB, LMB, TrackTable, as_lmb
-from vedette.densities.cases import LabelledCases
+from vedette.densities.batches import LabelledCases
 from vedette.divergence import cauchy_schwarz
 from vedette.fusion import Clmb, CmDeltaGlmb
 

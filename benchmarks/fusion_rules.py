@@ -16,7 +16,7 @@ import numpy as np
 from timing import Measure, Once, milliseconds_of, repeated
 
 from vedette.densities import LMB
-from vedette.fusion import ArithmeticAverage, Clmb, ParallelUpdate, Views, match_labels
+from vedette.fusion import ArithmeticAverage, Clmb, FieldsOfView, ParallelUpdate, match_labels
 from vedette.models import SensorModel, constant_noise, gaussian_detection, measurement_space_clutter, position
 
 NUM_LABELS, NUM_SENSORS = 20, 8
@@ -43,7 +43,7 @@ def rules() -> dict[str, Callable[[], object]]:
     clutter = measurement_space_clutter(5.0, [0.0, 0.0], [1000.0, 1000.0])
     model = SensorModel(position(), constant_noise([2.0, 2.0]), gaussian_detection(1000.0), clutter)
     poses = np.concatenate([rng.uniform(0.0, 1000.0, (NUM_SENSORS, 2)), np.zeros((NUM_SENSORS, 1))], axis=1)
-    views = Views((model,) * NUM_SENSORS, poses, (True,) * NUM_SENSORS, prediction)
+    views = FieldsOfView((model,) * NUM_SENSORS, poses, (True,) * NUM_SENSORS, prediction)
     equal = np.full(NUM_SENSORS, 1.0 / NUM_SENSORS)
     return {
         "parallel update": lambda: ParallelUpdate().fuse(posteriors, views),

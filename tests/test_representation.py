@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 import vedette
 from vedette.campaigns import open_results, parse_spec, resolve, run_campaign
 from vedette.densities import LMB, MultiTargetSamples, UndetectedIntensity, sample_lmb
-from vedette.densities.telling import Targets
+from vedette.densities.inspection import Targets
 from vedette.errors import InputError
 from vedette.evaluation import compare, measure_run, run_scenario
 from vedette.internal.representation import SummaryRepr

@@ -258,8 +258,8 @@ def additive_of(situation: Situation, reward: Any = None, seed: int = 5, horizon
 
     horizons: settings of those after the first; None: those of a `JointPlanner`.
     """
-    rule, state = situation.fusion.linear_rule(len(situation.sensors)), situation.state
-    if getattr(situation.fusion, "shares_prediction", False):
+    rule, state = situation.fusion.log_linear_pool(len(situation.sensors)), situation.state
+    if getattr(situation.fusion, "requires_common_prior", False):
         state = replace(state, local=(situation.fused,) * len(situation.sensors))
     return Evaluator.of_sums(
         situation.sensors,

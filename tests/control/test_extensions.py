@@ -107,8 +107,8 @@ class LaidOutBefore:
         self.fused += 1
         return self.rule.fuse(beliefs, views)
 
-    def lay_out(self, cases: Any, prediction: Any) -> Any:
-        return self.rule.lay_out(cases, prediction)
+    def precompute(self, cases: Any, prediction: Any) -> Any:
+        return self.rule.precompute(cases, prediction)
 
 
 def test_a_fusion_of_the_users_own_that_lays_out() -> None:

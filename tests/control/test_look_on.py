@@ -225,7 +225,7 @@ def prepared(of: Situation, horizon: Any = None, later: Any = (), hidden: Any = 
     return Evaluator.of_sums(
         of.sensors,
         options,
-        ParallelUpdate().linear_rule(len(of.sensors)),
+        ParallelUpdate().log_linear_pool(len(of.sensors)),
         settings,
         REWARD,
         replace(of.state, undetected=hidden),

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vedette.densities import LMB
-from vedette.fusion import Views
+from vedette.fusion import FieldsOfView
 from vedette.models import (
     SensorModel,
     constant_detection,
@@ -40,11 +40,11 @@ def views(
     at: Sequence[float] | None = None,
     scanned: Sequence[bool] | None = None,
     prediction: Any = None,
-) -> Views:
+) -> FieldsOfView:
     """Sensors on the x axis; a number is a detection probability within 150 m."""
     models = tuple(sensor(limited_range(d, 150.0) if isinstance(d, float) else d) for d in detections)
     poses = np.array([[x, 0.0, 0.0] for x in (at or [0.0] * len(models))])
-    return Views(models, poses, tuple(scanned or [True] * len(models)), prediction)
+    return FieldsOfView(models, poses, tuple(scanned or [True] * len(models)), prediction)
 
 
 def belief(existence: Sequence[float], rng: np.random.Generator, labels: Sequence[int] = (0, 1, 2)) -> LMB:

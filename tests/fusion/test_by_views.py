@@ -11,7 +11,7 @@ from scipy.special import logit
 from fusion.sights import BLIND, LABELS, PLACES, assert_same_bits, belief, informed, moments, sensor, views
 from vedette.densities import LMB, TrackTable
 from vedette.errors import InputError
-from vedette.fusion import ArithmeticAverage, Clmb, Views
+from vedette.fusion import ArithmeticAverage, Clmb, FieldsOfView
 from vedette.models import constant_detection
 
 QUARTERS = (0.25, 0.25, 0.5)
@@ -168,12 +168,12 @@ def test_views_that_are_missing_or_do_not_fit() -> None:
         Clmb((0.5, 0.5), by_views=True).fuse(beliefs, views([0.9] * 3))
     model = sensor(BLIND)
     with pytest.raises(InputError, match=r"views.sensors: expected at least one SensorModel"):
-        Views((), np.zeros((0, 3)), ())
+        FieldsOfView((), np.zeros((0, 3)), ())
     with pytest.raises(InputError, match=r"views.poses: expected an array of shape \(1, any\)"):
-        Views((model,), np.zeros((2, 3)), (True,))
+        FieldsOfView((model,), np.zeros((2, 3)), (True,))
     with pytest.raises(InputError, match=r"views.scanned: expected 1, one a sensor; got 2"):
-        Views((model,), np.zeros((1, 3)), (True, False))
+        FieldsOfView((model,), np.zeros((1, 3)), (True, False))
     with pytest.raises(
         InputError, match=r"views.prediction: expected a GLMB, an LMB or a FactoredGLMB, or None; got int"
     ):
-        Views((model,), np.zeros((1, 3)), (True,), 3)  # type: ignore[arg-type]
+        FieldsOfView((model,), np.zeros((1, 3)), (True,), 3)  # type: ignore[arg-type]

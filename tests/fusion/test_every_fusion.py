@@ -25,7 +25,15 @@ from reference import glmb as oracle
 from vedette.densities import GLMB, LMB, FactoredGLMB, Poisson, TrackTable, as_glmb, marginalise
 from vedette.densities.containers import unchecked
 from vedette.errors import InputError
-from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb, FusionLimits, Matched, ParallelUpdate, match_labels
+from vedette.fusion import (
+    ArithmeticAverage,
+    Clmb,
+    CmDeltaGlmb,
+    FusionLimits,
+    LabelMatchedFusion,
+    ParallelUpdate,
+    match_labels,
+)
 
 EQUAL = (0.5, 0.5)
 RULES: dict[str, Any] = {"clmb": Clmb, "cm": CmDeltaGlmb, "average": ArithmeticAverage, "parallel": ParallelUpdate}
@@ -228,16 +236,16 @@ def test_words_and_flags() -> None:
     with pytest.raises(InputError, match="quadrature"):
         CmDeltaGlmb(EQUAL, "quadrature").fuse([GLMB.empty(9)] * 2)
     with pytest.raises(InputError, match="rule: expected a Fusion; got None"):
-        Matched(None)  # type: ignore[arg-type]
+        LabelMatchedFusion(None)  # type: ignore[arg-type]
     for gate in (None, "a", 0.0, math.nan):
         with pytest.raises(InputError, match="gate_probability: expected"):
-            Matched(Clmb(EQUAL), gate)  # type: ignore[arg-type]
+            LabelMatchedFusion(Clmb(EQUAL), gate)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("beliefs", [None, 3, "ab", {0: 1}, [None, None], [LMB.empty(4)], [LMB.empty(4), LMB.empty(5)]])
 @pytest.mark.parametrize("name", [*WEIGHTED, "matched"])
 def test_beliefs(name: str, beliefs: Any) -> None:
-    rule = Matched(Clmb(EQUAL)) if name == "matched" else WEIGHTED[name](EQUAL)
+    rule = LabelMatchedFusion(Clmb(EQUAL)) if name == "matched" else WEIGHTED[name](EQUAL)
     with pytest.raises(InputError, match=r"beliefs(\[0\])?: expected"):
         rule.fuse(beliefs)
     if beliefs is None or isinstance(beliefs, int | str | dict):
@@ -272,7 +280,7 @@ def test_labels_out_of_order() -> None:
 
 
 def test_views_that_are_none() -> None:
-    nobody, seen = [LMB.empty(4)] * 2, "views: expected a Views; got bool"
+    nobody, seen = [LMB.empty(4)] * 2, "views: expected a FieldsOfView; got bool"
     for by_views in (Clmb(EQUAL, by_views=True), ArithmeticAverage(EQUAL, by_views=True)):
         with pytest.raises(InputError, match=seen):
             by_views.fuse(nobody, True)  # type: ignore[arg-type]

@@ -15,7 +15,7 @@ from densities.examples import random_covs, random_factor, random_factored
 from fusion.examples import assert_same_glmb, by_label_set
 from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable, as_glmb, as_lmb, settled_lmb
 from vedette.errors import InputError, NumericalError
-from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb, FusionLimits, Matched, match_labels
+from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb, FusionLimits, LabelMatchedFusion, match_labels
 
 ALL = 10**6
 THIRDS = (0.5, 0.3, 0.2)
@@ -235,6 +235,6 @@ def test_labels_are_matched_across_sensors():
     matched.validate()
     assert isinstance(matched, FactoredGLMB)
     assert_same_glmb(all_of(matched), all_of(first), 1e-12)
-    fused, _ = Matched(CmDeltaGlmb((0.5, 0.5))).fuse([first, second])
+    fused, _ = LabelMatchedFusion(CmDeltaGlmb((0.5, 0.5))).fuse([first, second])
     settled = FactoredGLMB.from_lmb(settled_lmb(first, max_components=10))  # names that are open are not matched
     assert_same_glmb(all_of(fused), all_of(CmDeltaGlmb((0.5, 0.5)).fuse([settled, settled])[0]), 1e-9)

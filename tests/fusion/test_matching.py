@@ -14,7 +14,7 @@ from densities.examples import random_glmb, random_lmb
 from fusion.sights import assert_same_bits
 from vedette.densities import GLMB, LMB, Poisson, as_lmb
 from vedette.errors import InputError
-from vedette.fusion import Clmb, CmDeltaGlmb, Matched, match_labels
+from vedette.fusion import Clmb, CmDeltaGlmb, LabelMatchedFusion, match_labels
 from vedette.kernels.gaussian.distances import near_pairs
 
 Label = tuple[int, int]
@@ -126,15 +126,15 @@ def test_a_matched_fusion_is_the_rule_on_matched_beliefs() -> None:
     halves = (0.5, 0.5)
     beliefs = [at({(1, 0): 0.0}, 0.95), at({(2, 0): 0.2}, 0.95)]
     assert Clmb(halves).fuse(beliefs)[0].existence.max() < 0.1
-    fused, info = Matched(Clmb(halves)).fuse(beliefs)
+    fused, info = LabelMatchedFusion(Clmb(halves)).fuse(beliefs)
     assert_same_bits(fused, Clmb(halves).fuse(match_labels(beliefs))[0])
     assert (fused.tracks.labels.tolist(), info.num_missing_labels) == ([[1, 0]], 0)
     assert fused.existence[0] > 0.9
-    matched: Any = Matched(Clmb(halves))
-    assert matched.lay_out([], fused) is None
+    matched: Any = LabelMatchedFusion(Clmb(halves))
+    assert matched.precompute([], fused) is None
     rng = np.random.default_rng(3)
     glmbs = [random_glmb(rng, 4, 8, 2) for _ in range(2)]
-    Matched(CmDeltaGlmb(halves)).fuse(glmbs)[0].validate()
+    LabelMatchedFusion(CmDeltaGlmb(halves)).fuse(glmbs)[0].validate()
 
 
 def test_nothing_to_match_and_what_is_refused() -> None:
@@ -150,7 +150,7 @@ def test_nothing_to_match_and_what_is_refused() -> None:
         with pytest.raises(InputError, match="gate_probability"):
             match_labels([nothing], gate_probability=gate)
         with pytest.raises(InputError, match="gate_probability"):
-            Matched(Clmb((1.0,)), gate)
+            LabelMatchedFusion(Clmb((1.0,)), gate)
 
 
 def test_near_pairs_are_those_within_the_gate() -> None:

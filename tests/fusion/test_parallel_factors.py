@@ -11,7 +11,7 @@ import pytest
 from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable, as_lmb, existence_probabilities, track_moments
 from vedette.errors import InputError
 from vedette.filters import FactoredGlmbFilter, Limits, LmbFilter
-from vedette.fusion import ParallelUpdate, Views
+from vedette.fusion import FieldsOfView, ParallelUpdate
 from vedette.models import (
     BirthModel,
     SensorModel,
@@ -39,8 +39,8 @@ def filter_of(own: SensorModel, split: float = 0.0) -> FactoredGlmbFilter:
     return FactoredGlmbFilter(TARGETS, own, Limits.none(), max_split_error=split, max_factor_labels=20)
 
 
-def views(sensors: Any, prediction: Any) -> Views:
-    return Views(tuple(sensors), np.zeros((len(sensors), 3)), (True,) * len(sensors), prediction)
+def views(sensors: Any, prediction: Any) -> FieldsOfView:
+    return FieldsOfView(tuple(sensors), np.zeros((len(sensors), 3)), (True,) * len(sensors), prediction)
 
 
 def one_of_two(weights: Any, apart: float = 15.0) -> FactoredGLMB:

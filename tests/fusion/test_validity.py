@@ -11,7 +11,7 @@ from densities.examples import random_glmb, random_lmb
 from vedette.densities import LMB, TrackTable
 from vedette.densities.containers import unchecked
 from vedette.errors import InputError
-from vedette.fusion import Clmb, CmDeltaGlmb, ValidBeliefs
+from vedette.fusion import Clmb, CmDeltaGlmb, PrevalidatedBeliefs
 from vedette.fusion.base import all_valid
 
 
@@ -80,7 +80,7 @@ def test_beliefs_that_need_no_check_are_fused_to_the_same_bytes() -> None:
         cases: list[tuple[Any, list[Any]]] = [(CmDeltaGlmb((0.4, 0.6)), glmbs), (Clmb((0.4, 0.6)), lmbs)]
         for rule, beliefs in (*cases, (Clmb((0.4, 0.6)), glmbs)):
             checked, report = rule.fuse(beliefs)
-            taken, same = rule.fuse(ValidBeliefs(beliefs))
+            taken, same = rule.fuse(PrevalidatedBeliefs(beliefs))
             assert report == same
             for mine, other in zip(checked.to_kernel(), taken.to_kernel(), strict=True):
                 np.testing.assert_equal(mine, other)
@@ -88,6 +88,8 @@ def test_beliefs_that_need_no_check_are_fused_to_the_same_bytes() -> None:
 
 def test_their_kinds_are_checked_all_the_same() -> None:
     with pytest.raises(InputError, match=r"beliefs\[1\]: expected GLMB or FactoredGLMB; got LMB"):
-        CmDeltaGlmb((0.5, 0.5)).fuse(ValidBeliefs([random_glmb(np.random.default_rng(0), 2, 3, 2), LMB.empty(2)]))
+        CmDeltaGlmb((0.5, 0.5)).fuse(
+            PrevalidatedBeliefs([random_glmb(np.random.default_rng(0), 2, 3, 2), LMB.empty(2)])
+        )
     with pytest.raises(InputError, match="one state dimension"):
-        Clmb((0.5, 0.5)).fuse(ValidBeliefs([LMB.empty(4), LMB.empty(2)]))
+        Clmb((0.5, 0.5)).fuse(PrevalidatedBeliefs([LMB.empty(4), LMB.empty(2)]))

@@ -9,7 +9,7 @@ import numpy as np
 
 from vedette import control, divergence, filters, fusion, models, platforms, simulation, tracking
 from vedette.densities import LMB, as_glmb
-from vedette.fusion import FusionLimits, Views
+from vedette.fusion import FieldsOfView, FusionLimits
 
 Data = dict[str, Any]
 STATE = np.array([10.0, 20.0, 1.0, -1.0])
@@ -116,8 +116,8 @@ def vars_of(thing: Any) -> Data:
     return {name: getattr(thing, name) for name in type(thing).__dataclass_fields__}
 
 
-def _views() -> Views:
-    return Views((sensor(), sensor()), POSES, (True, True), lmb())
+def _views() -> FieldsOfView:
+    return FieldsOfView((sensor(), sensor()), POSES, (True, True), lmb())
 
 
 def _fusions() -> Iterator[tuple[str, Made]]:
@@ -154,11 +154,17 @@ def _fusions() -> Iterator[tuple[str, Made]]:
         "ParallelUpdate",
         Made(fusion.ParallelUpdate, {"weights": weights, "missing_existence": 1e-4, "limits": FusionLimits()}, (fuse,)),
     )
-    yield "Matched", Made(fusion.Matched, {"rule": fusion.Clmb(weights), "gate_probability": 0.99}, (fuse,))
+    yield (
+        "LabelMatchedFusion",
+        Made(fusion.LabelMatchedFusion, {"rule": fusion.Clmb(weights), "gate_probability": 0.99}, (fuse,)),
+    )
     yield "FusionLimits", Made(limited_fusion, FusionLimits()._asdict(), (fuse,))
     yield (
-        "Views",
-        Made(Views, {"sensors": (sensor(), sensor()), "poses": POSES, "scanned": (True, True), "prediction": lmb()}),
+        "FieldsOfView",
+        Made(
+            FieldsOfView,
+            {"sensors": (sensor(), sensor()), "poses": POSES, "scanned": (True, True), "prediction": lmb()},
+        ),
     )
     yield "match_labels", Made(fusion.match_labels, {"beliefs": [lmb(), lmb()], "gate_probability": 0.99})
     for name in ("cauchy_schwarz", "log_inner_product"):

@@ -33,7 +33,7 @@ from vedette.filters import (
     PhdFilter,
     Ranked,
 )
-from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb, Matched, ParallelUpdate
+from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb, LabelMatchedFusion, ParallelUpdate
 from vedette.scenarios import Scenario, build, list_builtin, load_scenario, parse_scenario, with_fields
 from vedette.scenarios.cautions import cautions
 from vedette.scenarios.sections.fusion import Fusion
@@ -269,11 +269,11 @@ def of_decisions(loaded: Scenario) -> Any:
         ("clmb, by_views: true", "lmb", Clmb((0.5, 0.5), by_views=True), ParallelUpdate()),
         ("arithmetic_average, by_views: true", "lmb", ArithmeticAverage((0.5, 0.5), True), ParallelUpdate()),
         ("arithmetic_average", "m_delta_glmb", ArithmeticAverage((0.5, 0.5)), ParallelUpdate()),
-        ("clmb, matching: assignment", "lmb", Matched(Clmb((0.5, 0.5))), Clmb((0.5, 0.5))),
+        ("clmb, matching: assignment", "lmb", LabelMatchedFusion(Clmb((0.5, 0.5))), Clmb((0.5, 0.5))),
         (
             "cm_delta_glmb, matching: assignment",
             "delta_glmb",
-            Matched(CmDeltaGlmb((0.5, 0.5))),
+            LabelMatchedFusion(CmDeltaGlmb((0.5, 0.5))),
             CmDeltaGlmb((0.5, 0.5)),
         ),
         ("parallel", "lmb", ParallelUpdate(), ParallelUpdate()),
@@ -288,7 +288,7 @@ def test_decisions_take_scans_in_full_or_go_by_plain_covariance_intersection(
     )
     tracker: Any = build.build_experiment(loaded).tracker
     for made, expected in ((tracker.fusion, rule), (of_decisions(loaded), of_decision)):
-        if isinstance(expected, Matched):
+        if isinstance(expected, LabelMatchedFusion):
             made, expected = made.rule, expected.rule
         assert type(made) is type(expected)
         if not isinstance(expected, ParallelUpdate):
@@ -296,7 +296,7 @@ def test_decisions_take_scans_in_full_or_go_by_plain_covariance_intersection(
             assert made.limits.merge_distance == 1.0
         assert getattr(made, "by_views", False) == getattr(expected, "by_views", False)
     assert tracker.feedback == (kind == "parallel")
-    assert isinstance(tracker.fusion, Matched) == ("matching" in kind)
+    assert isinstance(tracker.fusion, LabelMatchedFusion) == ("matching" in kind)
     assert kind.split(",")[0] in dict(facts(loaded.model))["fusion"]
     assert ("by views" in dict(facts(loaded.model))["fusion"]) == ("by_views" in kind)
 

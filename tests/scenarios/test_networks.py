@@ -12,7 +12,7 @@ import pytest
 from scenarios.minimal import changed
 from vedette.errors import ScenarioError
 from vedette.filters import LmbFilter, MultiSensorGlmbFilter, MultiSensorLmbFilter, SequentialLmbFilter
-from vedette.fusion import Clmb, CmDeltaGlmb, Matched, ParallelUpdate
+from vedette.fusion import Clmb, CmDeltaGlmb, LabelMatchedFusion, ParallelUpdate
 from vedette.scenarios import Scenario, load_scenario, parse_scenario
 from vedette.scenarios.build import build_experiment
 from vedette.scenarios.cautions import cautions
@@ -50,7 +50,7 @@ def test_scans_go_to_one_filter_or_over_the_radio(kind: str, fusion: str, centra
     assert isinstance(radio.filter, central)
     network = radio.network
     assert (network.radio_range, network.hops, network.loss, network.delay) == (50.0, 2, 0.1, 1)
-    assert isinstance(radio.merging, Matched if kind == "lmb" else CmDeltaGlmb)
+    assert isinstance(radio.merging, LabelMatchedFusion if kind == "lmb" else CmDeltaGlmb)
 
 
 def test_beliefs_go_to_a_fusion_or_over_the_radio() -> None:
@@ -62,7 +62,7 @@ def test_beliefs_go_to_a_fusion_or_over_the_radio() -> None:
     assert isinstance(radio, BeliefNetwork)
     assert radio.network.consensus_rounds == 7
     assert math.isinf(radio.network.radio_range)
-    assert isinstance(radio.merging, Matched)
+    assert isinstance(radio.merging, LabelMatchedFusion)
     views = tracker_of("lmb", "{kind: clmb, by_views: true, feedback: true}\nnetwork: {}")
     assert isinstance(views.fusion, Clmb)
     assert views.fusion.by_views

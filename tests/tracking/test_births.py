@@ -13,7 +13,7 @@ from tracking.scenes import filters, lmb, rngs, scans_of, sensor, targets
 from vedette import models
 from vedette.errors import InputError, ModelError
 from vedette.filters import LmbFilter, MultiSensorGlmbFilter, MultiSensorLmbFilter, PhdFilter, SequentialLmbFilter
-from vedette.fusion import Clmb, Matched
+from vedette.fusion import Clmb, LabelMatchedFusion
 from vedette.fusion.matching import OWN_LABELS
 from vedette.models import BirthModel, MeasurementBirth
 from vedette.tracking import Central, Distributed, State
@@ -152,7 +152,7 @@ def test_targets_are_found_without_any_site(kind: Any) -> None:
     if kind == "feedback":
         tracker: Any = Distributed(filters(WORLD, SENSORS), Clmb((0.5, 0.5)), feedback=True)
     elif kind == "matched":
-        tracker = Distributed(filters(WORLD, SENSORS), Matched(Clmb((0.5, 0.5))))
+        tracker = Distributed(filters(WORLD, SENSORS), LabelMatchedFusion(Clmb((0.5, 0.5))))
     else:
         tracker = Central(kind(WORLD, SENSORS))
     state, rng = tracker.initial(), np.random.default_rng(0)
@@ -175,7 +175,7 @@ def test_a_birth_needs_labels_and_a_fusion_that_matches_them() -> None:
     placeless = replace(SENSORS[0], measurement=replace(SENSORS[0].measurement, places=None))
     wanted = r"sensors\[1\]\.measurement: expected a measurement with `places`, as targets are born of measurements"
     for made in (
-        lambda: Distributed(filters(WORLD, (SENSORS[0], placeless)), Matched(Clmb((0.5, 0.5)))),
+        lambda: Distributed(filters(WORLD, (SENSORS[0], placeless)), LabelMatchedFusion(Clmb((0.5, 0.5)))),
         lambda: Central(MultiSensorLmbFilter(WORLD, (SENSORS[0], placeless))),
     ):
         with pytest.raises(InputError, match=wanted):

@@ -13,7 +13,7 @@ from vedette import models
 from vedette.densities import LMB, existence_probabilities
 from vedette.errors import InputError
 from vedette.filters import FactoredGlmbFilter, LmbFilter
-from vedette.fusion import Clmb, Matched, Views
+from vedette.fusion import Clmb, FieldsOfView, LabelMatchedFusion
 from vedette.tracking import Distributed, State
 from vedette.tracking.losing import without_forgotten
 
@@ -54,7 +54,7 @@ def mean_labels(states: list[State]) -> float:
 
 @pytest.mark.parametrize("kind", [LmbFilter, FactoredGlmbFilter])
 def test_own_tracks_do_not_pile_up(kind: Any) -> None:
-    fusion = Matched(Clmb((0.5, 0.5), by_views=True))
+    fusion = LabelMatchedFusion(Clmb((0.5, 0.5), by_views=True))
     filters = tuple(kind(WORLD, SENSOR) for _ in range(2))
     states, infos = follow(Distributed(filters, fusion), 150, passing)
     piled, others = follow(Distributed(filters, fusion, min_detection=0.0), 150, passing)
@@ -68,7 +68,7 @@ def test_own_tracks_do_not_pile_up(kind: Any) -> None:
 
 @pytest.mark.parametrize("away", [5, 15])
 def test_a_target_that_is_out_of_view_for_a_while_keeps_its_label(away: int) -> None:
-    fusion = Matched(Clmb((0.5, 0.5), by_views=True))
+    fusion = LabelMatchedFusion(Clmb((0.5, 0.5), by_views=True))
     tracker = Distributed((LmbFilter(WORLD, SENSOR), LmbFilter(WORLD, SENSOR)), fusion)
 
     rng, state, sure = np.random.default_rng(2), tracker.initial(), []
@@ -88,7 +88,7 @@ def test_what_is_forgotten_is_unseen_and_vaguer_than_a_birth() -> None:
     means = np.hstack([places, np.zeros((5, 2))])
     covs = np.array([np.diag([std**2, std**2, 1.0, 1.0]) for std in stds])
     belief = LMB.from_bernoullis([(1, i) for i in range(5)], existence, means, covs)
-    views = Views((SENSOR, SENSOR), POSES, (False, False))
+    views = FieldsOfView((SENSOR, SENSOR), POSES, (False, False))
     peaks, of_birth = existence / stds**2, 0.03 / 20.0**2
     gone = [2]
     assert [i for i in range(5) if peaks[i] < of_birth and abs(places[i, 0]) > 400.0] == gone

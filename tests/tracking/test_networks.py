@@ -12,8 +12,8 @@ from tracking.scenes import assert_same_lmb, filters, lmb, rngs, scans_of, senso
 from vedette.densities import LMB, FactoredGLMB, as_glmb
 from vedette.errors import InputError
 from vedette.filters import MultiSensorGlmbFilter, SequentialLmbFilter
-from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb, FusionLimits, Matched, ParallelUpdate
-from vedette.fusion.rebasing import rebased, with_labels_of
+from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb, FusionLimits, LabelMatchedFusion, ParallelUpdate
+from vedette.fusion.rebasing import rebase, with_labels_of
 from vedette.models import MeasurementBirth
 from vedette.tracking import BeliefNetwork, Central, Distributed, Network, ScanNetwork, State, Tracker
 from vedette.tracking.base import bytes_of_belief
@@ -211,13 +211,13 @@ def test_what_a_scan_said_can_be_added_to_another_prediction() -> None:
     own = lmb([[1, 0], [1, 1]], [0.4, 0.2], [first, first], [one, one])
     posterior = lmb([[1, 0]], [0.4 * math.exp(log) / (0.4 * math.exp(log) + 0.6)], [mean], [cov])
     base = lmb([[1, 0], [1, 5]], [0.7, 0.1], [second, second], [other, other])
-    moved = rebased(posterior, own, base)
+    moved = rebase(posterior, own, base)
     np.testing.assert_allclose(moved.tracks.means[0], expected_mean, rtol=1e-11)
     np.testing.assert_allclose(moved.tracks.covs[0], expected_cov, rtol=1e-10, atol=1e-11)
     np.testing.assert_allclose(moved.existence_logit[0], math.log(0.7 / 0.3) + expected_log, rtol=1e-11)
     np.testing.assert_array_equal(moved.tracks.means[1], second)
     assert moved.existence[1] == pytest.approx(0.1, rel=1e-15)
-    assert rebased(posterior, own, own) is posterior
+    assert rebase(posterior, own, own) is posterior
     both = with_labels_of(base, own)
     np.testing.assert_array_equal(both.tracks.labels, [[1, 0], [1, 1], [1, 5]])
     np.testing.assert_allclose(both.existence, [0.7, 0.2, 0.1])
@@ -264,7 +264,7 @@ def test_labels_that_sensors_make_themselves_are_matched_in_a_network(rule: Any,
     sharp = tuple(sensor(3.0, 0.98, 0.1) for _ in range(3))
     with pytest.raises(InputError, match=r"fusion: expected one that matches labels"):
         BeliefNetwork(filters(world, sharp), rule, network, MERGING)
-    tracker = BeliefNetwork(filters(world, sharp), Matched(rule), network, MERGING)
+    tracker = BeliefNetwork(filters(world, sharp), LabelMatchedFusion(rule), network, MERGING)
     rng, state = np.random.default_rng(2), tracker.initial()
     poses = np.array([[-300.0, 0.0, 0.0], [0.0, 0.0, 0.0], [300.0, 0.0, 0.0]])
     for step in range(1, 9):

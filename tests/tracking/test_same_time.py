@@ -22,7 +22,7 @@ from vedette.filters import (
     MultiSensorLmbFilter,
     SequentialLmbFilter,
 )
-from vedette.fusion import Clmb, Matched, ParallelUpdate
+from vedette.fusion import Clmb, LabelMatchedFusion, ParallelUpdate
 from vedette.tracking import BeliefNetwork, Central, Distributed, Network, ScanNetwork, State, Tracker
 
 TRUTH = np.array([[2.0, 1.0, 1.0, 0.0], [98.0, 3.0, 0.0, 1.0]])
@@ -157,7 +157,7 @@ def test_who_was_measured_by_scans_that_came_apart_is_born_once_in_a_network(del
     world, near = targets((), BORN), [np.array([[10.0, 0.0]]), np.array([[12.0, 1.0], [300.0, 0.0]])]
     trackers = (
         ScanNetwork(SequentialLmbFilter(world, SENSORS), Network(delay=delay), Clmb((0.5, 0.5))),
-        BeliefNetwork(filters(world, SENSORS), Matched(Clmb((0.5, 0.5))), Network(), Clmb((0.5, 0.5))),
+        BeliefNetwork(filters(world, SENSORS), LabelMatchedFusion(Clmb((0.5, 0.5))), Network(), Clmb((0.5, 0.5))),
     )
     for tracker in trackers:
         state, _ = tracker.step(tracker.initial(), [near[0], None], POSES, 1.0, rngs=rngs(2))

@@ -13,7 +13,7 @@ from vedette import models
 from vedette.densities import LMB, UndetectedIntensity
 from vedette.errors import InputError, ModelError
 from vedette.filters import Limits, SequentialLmbFilter
-from vedette.fusion import Clmb, Matched
+from vedette.fusion import Clmb, LabelMatchedFusion
 from vedette.models.functions import model_function
 from vedette.tracking import (
     BeliefNetwork,
@@ -35,8 +35,8 @@ CLMB = Clmb((0.5, 0.5))
 TRACKERS: dict[str, Tracker] = {
     "distributed": Distributed(filters(WORLD, SENSORS), CLMB, feedback=True),
     "central": Central(SequentialLmbFilter(WORLD, SENSORS)),
-    "scans": ScanNetwork(SequentialLmbFilter(WORLD, SENSORS), Network(delay=1), Matched(CLMB)),
-    "beliefs": BeliefNetwork(filters(WORLD, SENSORS), CLMB, Network(), Matched(CLMB)),
+    "scans": ScanNetwork(SequentialLmbFilter(WORLD, SENSORS), Network(delay=1), LabelMatchedFusion(CLMB)),
+    "beliefs": BeliefNetwork(filters(WORLD, SENSORS), CLMB, Network(), LabelMatchedFusion(CLMB)),
 }
 
 

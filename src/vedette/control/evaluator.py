@@ -18,7 +18,7 @@ from vedette.control.rewards.base import LabelReward, PowerReward, Reward
 from vedette.control.rewards.power import ExpectedLossReward
 from vedette.control.settings import Belief, MobileSensor, PlanningSettings
 from vedette.densities.checks import offsets_of
-from vedette.fusion import Fusion, LinearRule
+from vedette.fusion import Fusion, LogLinearPool
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.planning.ascent import Cells
 from vedette.platforms import Options
@@ -74,7 +74,7 @@ class Evaluator:
         cls,
         sensors: Sequence[MobileSensor],
         options: Sequence[Options],
-        rule: LinearRule,
+        rule: LogLinearPool,
         settings: PlanningSettings,
         reward: Any,
         state: State,

@@ -24,7 +24,15 @@ from vedette.densities import (
     existence_probabilities,
     settled_lmb,
 )
-from vedette.fusion import Clmb, CmDeltaGlmb, Fusion, Linear, LinearRule, ParallelUpdate, shares_prediction
+from vedette.fusion import (
+    Clmb,
+    CmDeltaGlmb,
+    Fusion,
+    LogLinearFusion,
+    LogLinearPool,
+    ParallelUpdate,
+    requires_common_prior,
+)
 from vedette.models.arguments import provides, reject
 from vedette.platforms import Options
 from vedette.tracking import State
@@ -41,7 +49,7 @@ class PlanningBeliefs(NamedTuple):
 
     state: State
     fusion: Fusion
-    rule: LinearRule | None  # how densities are summed; None if the decision is not a sum
+    rule: LogLinearPool | None  # how densities are summed; None if the decision is not a sum
     notes: tuple[str, ...]  # notes on their form
 
 
@@ -139,7 +147,7 @@ def state_notes(
 
 def check_sums(
     purpose: str, num_sensors: int, fusion: Fusion, settings: PlanningSettings, reward: AnyReward
-) -> LinearRule:
+) -> LogLinearPool:
     """Return how densities are summed if beliefs are LMBs, or are planned on as LMBs.
 
     Raises `InputError`, with the `purpose`, for settings, a reward or a fusion with which a decision is not a sum over
@@ -171,7 +179,7 @@ def planning_beliefs(
         return _planned_on_loss(fusion, state, why or "the expected loss asks for no more")
     num_sensors, beliefs, notes = len(sensors), (*state.local, state.fused), tuple[str, ...]()
     # A fusion that divides by the common prediction needs beliefs that have one.
-    from_one = shares_prediction(fusion)
+    from_one = requires_common_prior(fusion)
     if _has_glmb(beliefs) and (why := why or _why_lmbs(num_sensors, fusion, settings, beliefs)):
         # Ambiguous labels are resolved only in a single belief; several beliefs would resolve them differently.
         as_planned = settled_lmb if from_one or len(set(map(id, beliefs))) == 1 else as_lmb
@@ -201,7 +209,7 @@ def _planned_on_loss(fusion: Fusion, state: State, why: str) -> PlanningBeliefs:
         fused, fusion, notes = settled_lmb(fused), _of_lmbs(fusion), (_PLANNED_ON_LMBS.format(why),)
     fused = at_peaks(fused)
     state = replace(state, local=(fused,) * num_sensors, fused=fused)
-    return PlanningBeliefs(state, fusion, _PARALLEL.linear_rule(num_sensors), notes)
+    return PlanningBeliefs(state, fusion, _PARALLEL.log_linear_pool(num_sensors), notes)
 
 
 def _of_lmbs(fusion: Fusion) -> Fusion:
@@ -220,7 +228,7 @@ def _has_glmb(beliefs: Sequence[Labelled]) -> bool:
 
 def _why_lmbs(num_sensors: int, fusion: Fusion, settings: PlanningSettings, beliefs: Sequence[Labelled]) -> str:
     """Return why GLMBs are planned on as their LMBs; empty if they are not. beliefs: the fused one last."""
-    if shares_prediction(fusion):
+    if requires_common_prior(fusion):
         return f"{type(fusion).__name__} fuses LMBs"
     if any(belief.is_product for belief in beliefs):
         return "products of GLMBs always are"
@@ -232,17 +240,19 @@ def _why_lmbs(num_sensors: int, fusion: Fusion, settings: PlanningSettings, beli
     return ""
 
 
-def _rule_of_lmbs(num_sensors: int, fusion: Fusion, settings: PlanningSettings, reward: AnyReward) -> LinearRule | None:
+def _rule_of_lmbs(
+    num_sensors: int, fusion: Fusion, settings: PlanningSettings, reward: AnyReward
+) -> LogLinearPool | None:
     """Return how densities are summed if they are LMBs; None if the decision is not a sum."""
     if isinstance(reward, ExpectedLossReward):
-        return _PARALLEL.linear_rule(num_sensors)
+        return _PARALLEL.log_linear_pool(num_sensors)
     if settings.association != "known":
         return None
     if not (provides(reward, PowerReward) or provides(reward, LabelReward)):
         return None
     if not may_replace(reward, "combine", "__call__"):
         return None
-    if not provides(fusion, Linear) or not may_replace(fusion, "linear_rule", "fuse"):
+    if not provides(fusion, LogLinearFusion) or not may_replace(fusion, "log_linear_pool", "fuse"):
         return None
-    rule: LinearRule = fusion.linear_rule(num_sensors)
+    rule: LogLinearPool = fusion.log_linear_pool(num_sensors)
     return rule

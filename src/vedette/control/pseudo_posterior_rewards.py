@@ -25,9 +25,9 @@ from vedette.control.rewards.base import (
     unit_volume_of,
 )
 from vedette.control.settings import Belief, MobileSensor, PlanningSettings, scans_within
-from vedette.densities.cases import LabelledCases
+from vedette.densities.batches import LabelledCases
 from vedette.errors import NumericalError, SlowRewardWarning
-from vedette.fusion import Fusion, LaidOut, LaysOut, Views, lay_out_alone
+from vedette.fusion import FieldsOfView, Fusion, PrecomputedFusion, SupportsPrecomputation, precompute_single_sensor
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models.arguments import provides
 from vedette.platforms import Options
@@ -126,12 +126,12 @@ class PseudoPosteriorRewards:
         warn_slow(laid)
         return PlainRewards(posteriors, self.prediction, fusion, self.reward, self.settings.num_samples, self.views)
 
-    def views(self, chosen: Sequence[int]) -> Views:
+    def views(self, chosen: Sequence[int]) -> FieldsOfView:
         """Return the fields of view at the ends of the chosen courses, with the prediction before the updates."""
         models = tuple(sensor.filter.sensor for sensor in self.sensors)
         poses = np.stack([own.courses[course, -1] for own, course in zip(self.options, chosen, strict=True)])
         scanned = tuple(bool(own[course]) for own, course in zip(self.scanned, chosen, strict=True))
-        return Views(models, poses, scanned, self.prediction)
+        return FieldsOfView(models, poses, scanned, self.prediction)
 
     def _check_finite(self, which: Sequence[int], actions: Ints, rewards: Floats) -> None:
         bad = np.argwhere(~np.isfinite(rewards))
@@ -160,11 +160,11 @@ def lay_out_rewards(
     """
     if not provides(reward, PowerReward) or not may_replace(reward, "combine", "__call__"):
         return f"{_name(reward)} is a function of two densities"
-    laid: LaidOut | None = None
+    laid: PrecomputedFusion | None = None
     if fusion is None:
-        laid = lay_out_alone(cases[0], prediction)
-    elif provides(fusion, LaysOut) and may_replace(fusion, "lay_out", "fuse"):
-        laid = fusion.lay_out(cases, prediction)
+        laid = precompute_single_sensor(cases[0], prediction)
+    elif provides(fusion, SupportsPrecomputation) and may_replace(fusion, "precompute", "fuse"):
+        laid = fusion.precompute(cases, prediction)
     if laid is None:
         return f"{'a sensor alone' if fusion is None else _name(fusion)} cannot lay out these beliefs"
     z, volume = laid.z, unit_volume_of(reward, prediction)
@@ -203,7 +203,7 @@ class PlainRewards:
     fusion: Fusion | None
     reward: Reward | PowerReward | LabelReward
     num_samples: int
-    views: Callable[[Sequence[int]], Views]
+    views: Callable[[Sequence[int]], FieldsOfView]
     _densities: dict[tuple[int, int], Belief] = field(default_factory=dict)
 
     def __call__(self, actions: Ints) -> Floats:

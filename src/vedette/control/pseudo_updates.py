@@ -19,7 +19,7 @@ from vedette.densities import (
     GLMB,
     LMB,
 )
-from vedette.densities.cases import LabelledCases
+from vedette.densities.batches import LabelledCases
 from vedette.densities.checks import offsets_of
 from vedette.densities.containers import for_kernel
 from vedette.densities.label_sets import label_sets, relinked, take_hypotheses

@@ -22,6 +22,7 @@ from vedette.densities.estimates import (
 from vedette.densities.factored import FactoredGLMB
 from vedette.densities.files import load_density, save_density
 from vedette.densities.glmb import GLMB
+from vedette.densities.inspection import Hypothesis, Target
 from vedette.densities.labelled import LMB, Labelled
 from vedette.densities.multi_bernoulli import MultiBernoulli
 from vedette.densities.samples import (
@@ -33,7 +34,6 @@ from vedette.densities.samples import (
     sample_poisson,
 )
 from vedette.densities.statistics import cardinality_distribution, existence_probabilities
-from vedette.densities.telling import Hypothesis, Target
 from vedette.densities.tracks import TrackTable, mixture_moments, track_moments
 from vedette.densities.undetected import LearntRate, UndetectedIntensity, UndetectedTargets
 from vedette.densities.unlabelled import IidCluster, Poisson

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from vedette.densities.telling import Targets
+from vedette.densities.inspection import Targets
 from vedette.internal.representation import SummaryRepr, TabularRepr
 from vedette.kernels.base.types import Floats
 

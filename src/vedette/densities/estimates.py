@@ -13,10 +13,10 @@ from vedette.densities import checks
 from vedette.densities.conversions import settled_lmb
 from vedette.densities.factored import FactoredGLMB
 from vedette.densities.glmb import GLMB
+from vedette.densities.inspection import Target, Targets
 from vedette.densities.labelled import LMB, Labelled
 from vedette.densities.multi_bernoulli import MultiBernoulli
 from vedette.densities.statistics import cardinality_distribution, labelled
-from vedette.densities.telling import Target, Targets
 from vedette.densities.tracks import TrackTable, gaussian_tracks, heaviest_components
 from vedette.densities.unlabelled import IidCluster, Poisson
 from vedette.errors import InputError, NumericalError, VedetteError

@@ -11,7 +11,7 @@ import numpy as np
 
 from vedette.densities import checks
 from vedette.densities.containers import MultiTarget, for_kernel, unchecked
-from vedette.densities.telling import Hypothesis, Target, Targets, indices_or_none
+from vedette.densities.inspection import Hypothesis, Target, Targets, indices_or_none
 from vedette.densities.tracks import TrackTable, run_moments, take_tracks, track_moments
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.internal.probabilities import expit

@@ -10,8 +10,8 @@ import numpy as np
 
 from vedette.densities import checks
 from vedette.densities.containers import kernel_arrays, unchecked
+from vedette.densities.inspection import Target, Targets
 from vedette.densities.labelled import poisson_binomial
-from vedette.densities.telling import Target, Targets
 from vedette.densities.tracks import run_moments
 from vedette.densities.unlabelled import Unlabelled
 from vedette.errors import NumericalError, VedetteError

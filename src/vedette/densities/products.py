@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.densities.cases import LabelledCases
+from vedette.densities.batches import LabelledCases
 from vedette.densities.checks import offsets_of
 from vedette.densities.label_sets import Label
 from vedette.errors import InputError

@@ -11,7 +11,7 @@ import numpy as np
 
 from vedette.densities import checks
 from vedette.densities.containers import MultiTarget, kernel_arrays, unchecked
-from vedette.densities.telling import Targets
+from vedette.densities.inspection import Targets
 from vedette.densities.tracks import log_weights as logs_of
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.internal.text import pluralise

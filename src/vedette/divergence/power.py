@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from vedette.densities import GLMB, LMB, Labelled, Poisson, as_lmb, track_moments
-from vedette.densities.cases import LabelledCases
+from vedette.densities.batches import LabelledCases
 from vedette.densities.conversions import collapsed, lmb_on_label_sets
 from vedette.densities.label_sets import label_sets
 from vedette.densities.labelled import LABELLED

@@ -11,7 +11,7 @@ import numpy as np
 
 from vedette.control import JointPlanner
 from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled
-from vedette.fusion import shares_prediction
+from vedette.fusion import requires_common_prior
 from vedette.internal.processes import as_children, end_with_parent
 from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_experiment, build_planner
@@ -78,7 +78,7 @@ def _compile_planning(scenario: Scenario, name: str) -> None:
     assert planner is not None
     num_sites, num_others = experiment.tracker.targets.birth.num_sites, experiment.num_sensors - 1
     beliefs = (_belief(experiment, num_sites), *(_belief(experiment, max(num_sites - 1, 1)),) * num_others)
-    fused = beliefs[0] if shares_prediction(planner.fusion) else planner.fusion.fuse(beliefs)[0]
+    fused = beliefs[0] if requires_common_prior(planner.fusion) else planner.fusion.fuse(beliefs)[0]
     experiment.estimate(fused, 1)
     quick = replace(planner, settings=replace(planner.settings, **_QUICK))
     state = State(beliefs, fused, undetected=experiment.tracker.initial().undetected)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from vedette.densities.telling import state_columns
+from vedette.densities.inspection import state_columns
 from vedette.errors import InputError
 from vedette.evaluation.joining import Join, track_names
 from vedette.evaluation.metrics.matching import match_run

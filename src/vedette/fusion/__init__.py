@@ -3,41 +3,41 @@
 from vedette.fusion.base import (
     Fusion,
     FusionInfo,
-    Linear,
-    LinearRule,
-    MatchesLabels,
-    SharesPrediction,
-    ValidBeliefs,
-    shares_prediction,
+    LogLinearFusion,
+    LogLinearPool,
+    PrevalidatedBeliefs,
+    RequiresCommonPrior,
+    SupportsLabelMatching,
+    requires_common_prior,
 )
 from vedette.fusion.cm_delta_glmb import CmDeltaGlmb
-from vedette.fusion.laid_out import LaidOut, LaysOut, lay_out_alone
 from vedette.fusion.lmbs import ArithmeticAverage, Clmb
-from vedette.fusion.matching import Matched, match_labels
+from vedette.fusion.matching import LabelMatchedFusion, match_labels
 from vedette.fusion.parallel import ParallelUpdate
 from vedette.fusion.powers import MIXTURE_POWERS, FusionLimits, MixturePower
-from vedette.fusion.views import Views
+from vedette.fusion.precomputed import PrecomputedFusion, SupportsPrecomputation, precompute_single_sensor
+from vedette.fusion.views import FieldsOfView
 
 __all__ = [
     "MIXTURE_POWERS",
     "ArithmeticAverage",
     "Clmb",
     "CmDeltaGlmb",
+    "FieldsOfView",
     "Fusion",
     "FusionInfo",
     "FusionLimits",
-    "LaidOut",
-    "LaysOut",
-    "Linear",
-    "LinearRule",
-    "Matched",
-    "MatchesLabels",
+    "LabelMatchedFusion",
+    "LogLinearFusion",
+    "LogLinearPool",
     "MixturePower",
     "ParallelUpdate",
-    "SharesPrediction",
-    "ValidBeliefs",
-    "Views",
-    "lay_out_alone",
+    "PrecomputedFusion",
+    "PrevalidatedBeliefs",
+    "RequiresCommonPrior",
+    "SupportsLabelMatching",
+    "SupportsPrecomputation",
     "match_labels",
-    "shares_prediction",
+    "precompute_single_sensor",
+    "requires_common_prior",
 ]

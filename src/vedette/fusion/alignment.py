@@ -49,7 +49,7 @@ def _one_a_group(belief: FactoredGLMB, groups: Ints, num_groups: int, max_produc
     return take_factors(FactoredGLMB.product(parts, belief.state_dim), place), log_kept
 
 
-def tidied(marginalised: FactoredGLMB) -> FactoredGLMB:
+def sort_factors(marginalised: FactoredGLMB) -> FactoredGLMB:
     """The factors in the order of their first labels; those of one label as `FactoredGLMB.from_lmb` lays them out.
 
     marginalised: of which every hypothesis has tracks of its own. Factors without tracks go.

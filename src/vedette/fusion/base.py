@@ -11,7 +11,7 @@ import numpy as np
 
 from vedette.densities import Labelled
 from vedette.errors import InputError
-from vedette.fusion.views import Views
+from vedette.fusion.views import FieldsOfView
 from vedette.internal.text import join_alternatives
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.labelled.set_fusion import LOST, SURE
@@ -66,7 +66,7 @@ class FusionInfo:
 class Fusion(Protocol):
     """One belief of all the sensors'. The order of `beliefs` is that of the fusion weights."""
 
-    def fuse(self, beliefs: Sequence[Any], views: Views | None = None) -> tuple[Any, FusionInfo]:
+    def fuse(self, beliefs: Sequence[Any], views: FieldsOfView | None = None) -> tuple[Any, FusionInfo]:
         """The fused belief, and what had to be repaired or thrown away.
 
         views: what each sensor could see, and what they were updated from; None where that is not known, as in the
@@ -76,17 +76,17 @@ class Fusion(Protocol):
 
 
 @runtime_checkable
-class SharesPrediction(Protocol):
+class RequiresCommonPrior(Protocol):
     """A fusion that says whether its beliefs must all be updated from one prediction; one that does not: no."""
 
     @property
-    def shares_prediction(self) -> bool:
+    def requires_common_prior(self) -> bool:
         """Whether they must."""
         ...
 
 
 @runtime_checkable
-class MatchesLabels(Protocol):
+class SupportsLabelMatching(Protocol):
     """A fusion that says whether labels need not agree across sensors; of one that does not they must."""
 
     @property
@@ -95,12 +95,12 @@ class MatchesLabels(Protocol):
         ...
 
 
-def shares_prediction(fusion: Any) -> bool:
+def requires_common_prior(fusion: Any) -> bool:
     """Whether the fusion is of beliefs that were all updated from one prediction, as `ParallelUpdate` is."""
-    return isinstance(fusion, SharesPrediction) and bool(fusion.shares_prediction)
+    return isinstance(fusion, RequiresCommonPrior) and bool(fusion.requires_common_prior)
 
 
-class LinearRule(NamedTuple):
+class LogLinearPool(NamedTuple):
     """A fusion of LMBs whose log is linear in the sensors' logs, label by label.
 
     In proportion to pi+^prior_power prod_s pi_s^(powers_s).
@@ -115,15 +115,15 @@ class LinearRule(NamedTuple):
 
 
 @runtime_checkable
-class Linear(Protocol):
+class LogLinearFusion(Protocol):
     """A fusion whose decisions a planner can take by adding up what each sensor says of each label."""
 
-    def linear_rule(self, num_sensors: int) -> LinearRule | None:
+    def log_linear_pool(self, num_sensors: int) -> LogLinearPool | None:
         """The rule for so many sensors, of single Gaussians; None where the fusion is none such."""
         ...
 
 
-class ValidBeliefs(tuple[Any, ...]):
+class PrevalidatedBeliefs(tuple[Any, ...]):
     """Beliefs that need no check of their values, as filters of this library have made them at this step.
 
     A fusion takes them like any other sequence. It still checks their kinds and state dimensions.
@@ -173,15 +173,15 @@ def check_kinds(given: Sequence[type], kinds: tuple[type, ...], num_sensors: int
 def check_beliefs(beliefs: Sequence[Any], kinds: tuple[type, ...], num_sensors: int) -> None:
     """Raise `InputError` unless there is one belief a sensor, all valid, of the given kinds and of one state dimension.
 
-    `ValidBeliefs` are taken to be what they say.
+    `PrevalidatedBeliefs` are taken to be what they say.
     """
-    if not isinstance(beliefs, ValidBeliefs):
+    if not isinstance(beliefs, PrevalidatedBeliefs):
         beliefs = sequence("beliefs", beliefs, "densities, one a sensor")
     check_kinds([type(belief) for belief in beliefs], kinds, num_sensors)
     dims = [belief.state_dim for belief in beliefs]
     if len(set(dims)) > 1:
         raise InputError(f"beliefs: expected one state dimension at all sensors; got {dims}")
-    if isinstance(beliefs, ValidBeliefs) or all_valid(beliefs):
+    if isinstance(beliefs, PrevalidatedBeliefs) or all_valid(beliefs):
         return
     for i, belief in enumerate(beliefs):
         try:
@@ -195,14 +195,14 @@ def count_lost(existence: Floats, fused: Floats) -> int:
     return int(np.count_nonzero((existence.max(axis=1, initial=0.0) >= SURE) & (fused < LOST)))
 
 
-def by_sensor(counts: Ints, active: Sequence[int], num_sensors: int) -> tuple[int, ...]:
+def per_sensor_counts(counts: Ints, active: Sequence[int], num_sensors: int) -> tuple[int, ...]:
     """A number for each sensor from those of the sensors that take part; 0 for the others."""
     numbers = np.zeros(num_sensors, np.int64)
     numbers[list(active)] = counts
     return tuple(numbers.tolist())
 
 
-def info_of_labels(
+def label_fusion_info(
     lacking: Bools, active: Sequence[int], num_sensors: int, existence: Floats, fused: Floats, log_normaliser: float
 ) -> FusionInfo:
     """The report of a fusion label by label.
@@ -210,7 +210,7 @@ def info_of_labels(
     lacking: (num_labels, len(active)) whether a sensor that takes part at a label lacks it. existence: the same shape.
     fused: (num_labels,) existence.
     """
-    missing = by_sensor(np.count_nonzero(lacking, axis=0), active, num_sensors)
+    missing = per_sensor_counts(np.count_nonzero(lacking, axis=0), active, num_sensors)
     return FusionInfo(
         missing_sets=missing,
         missing_labels=missing,
@@ -222,7 +222,7 @@ def info_of_labels(
     )
 
 
-def taking_part(weights: Sequence[float] | Floats) -> tuple[list[int], Floats]:
+def active_sensors(weights: Sequence[float] | Floats) -> tuple[list[int], Floats]:
     """The sensors of positive weight, and their weights."""
     active = [i for i, weight in enumerate(weights) if weight > 0.0]
     return active, np.array([weights[i] for i in active])

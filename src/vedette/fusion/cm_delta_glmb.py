@@ -10,14 +10,14 @@ from typing import Any, TypeVar
 import numpy as np
 
 from vedette.densities import GLMB, FactoredGLMB, Labelled
-from vedette.densities.cases import LabelledCases
+from vedette.densities.batches import LabelledCases
 from vedette.densities.conversions import marginalised_factors
 from vedette.densities.products import PowerProducts, Share
-from vedette.fusion.alignment import side_by_side, tidied
-from vedette.fusion.base import FusionInfo, by_sensor, check_beliefs, check_kinds, check_weights, taking_part
-from vedette.fusion.laid_out import lay_out_glmbs
-from vedette.fusion.powers import FusionLimits, MixturePower, check_power, power_rule, told_of_tracks
-from vedette.fusion.views import Views
+from vedette.fusion.alignment import side_by_side, sort_factors
+from vedette.fusion.base import FusionInfo, active_sensors, check_beliefs, check_kinds, check_weights, per_sensor_counts
+from vedette.fusion.powers import FusionLimits, MixturePower, check_power, numerical_errors_of_tracks, power_rule
+from vedette.fusion.precomputed import precompute_glmbs
+from vedette.fusion.views import FieldsOfView
 from vedette.kernels.base.types import Floats, Glmb, Ints
 from vedette.kernels.labelled.set_alignment import Sets
 from vedette.kernels.labelled.set_fusion import SetReport, SetRule, fuse_glmbs, fuse_sets
@@ -68,7 +68,7 @@ class CmDeltaGlmb:
         if real("missing_log_weight", self.missing_log_weight) >= 0.0:
             raise reject("missing_log_weight", "the log of a probability above 0 and below 1", self.missing_log_weight)
 
-    def fuse(self, beliefs: Sequence[_Glmb], views: Views | None = None) -> tuple[_Glmb, FusionInfo]:
+    def fuse(self, beliefs: Sequence[_Glmb], views: FieldsOfView | None = None) -> tuple[_Glmb, FusionInfo]:
         """Fused marginalised GLMB of the sensors' GLMBs (delta or marginalised), heaviest set first, and what was done.
 
         Label sets of equal weight come in the order of their first occurrence. Of products of GLMBs, where a GLMB is
@@ -79,14 +79,14 @@ class CmDeltaGlmb:
         a density that is not valid, and `NumericalError` where a product of track densities cannot be integrated.
         """
         check_beliefs(beliefs, (GLMB, FactoredGLMB), len(self.weights))
-        active, weights = taking_part(self.weights)
+        active, weights = active_sensors(self.weights)
         power = power_rule(self.mixture_power, self.limits, beliefs[0].state_dim, len(self.weights))
         rule = SetRule(weights, self.missing_log_weight, power, self.limits.max_hypotheses)
         own, log_kept = [beliefs[i] for i in active], 0.0
         fused: Any
         if not any(belief.is_product for belief in beliefs):
             hyps, sensor_of = _stacked(own)
-            with told_of_tracks():
+            with numerical_errors_of_tracks():
                 glmb, report = fuse_glmbs(hyps, sensor_of, rule)
             fused = GLMB.from_kernel(glmb)
         else:
@@ -94,17 +94,17 @@ class CmDeltaGlmb:
             sensors, log_shares = side_by_side(factored, self.limits.max_hypotheses)
             hyps, sensor_of = _stacked(sensors)
             sets = Sets(hyps, sensor_of, np.concatenate([sensor.factor_of for sensor in sensors]))
-            with told_of_tracks():
+            with numerical_errors_of_tracks():
                 product, report = fuse_sets(sets, len(log_shares), rule)
-            fused, log_kept = tidied(FactoredGLMB.from_kernel(product)), float(log_shares.sum())
+            fused, log_kept = sort_factors(FactoredGLMB.from_kernel(product)), float(log_shares.sum())
         return fused, self._info(report, active, log_kept)
 
     def _info(self, report: SetReport, active: Sequence[int], log_kept: float) -> FusionInfo:
         """log_kept: of the weight that was left of the sensors' factors."""
         num = len(self.weights)
         return FusionInfo(
-            missing_sets=by_sensor(report.missing_sets, active, num),
-            missing_labels=by_sensor(report.missing_labels, active, num),
+            missing_sets=per_sensor_counts(report.missing_sets, active, num),
+            missing_labels=per_sensor_counts(report.missing_labels, active, num),
             num_sets=report.num_sets,
             num_lost_labels=report.num_lost_labels,
             empty_intersection=bool(report.empty_intersection),
@@ -112,7 +112,7 @@ class CmDeltaGlmb:
             discarded_weight=-math.expm1(report.log_kept + log_kept) + 0.0,  # no -0
         )
 
-    def lay_out(self, cases: Sequence[LabelledCases], prediction: Labelled) -> PowerProducts | None:
+    def precompute(self, cases: Sequence[LabelledCases], prediction: Labelled) -> PowerProducts | None:
         """The fusions of any of the sensors' cases; None for an LMB prediction, or where the powers are not exact.
 
         cases: one a sensor. prediction: marginalised, of one Gaussian a track. Floors and stand-ins are as in
@@ -121,7 +121,7 @@ class CmDeltaGlmb:
         prediction.
         """
         check_kinds([own.kind for own in cases], (GLMB,), len(self.weights))
-        active, _ = taking_part(self.weights)
+        active, _ = active_sensors(self.weights)
         if prediction.is_lmb:
             return None
         shares = [self._share(cases[i], self.weights[i]) for i in active]
@@ -131,7 +131,7 @@ class CmDeltaGlmb:
         exact = self.mixture_power in ("auto", "moment_matched") or (whole and self.mixture_power != "quadrature")
         if not exact or len(sets) > self.limits.max_hypotheses:
             return None
-        return lay_out_glmbs(shares, LabelledCases.of(prediction), active)
+        return precompute_glmbs(shares, LabelledCases.of(prediction), active)
 
     def _share(self, own: LabelledCases, weight: float) -> Share:
         held = own.possible

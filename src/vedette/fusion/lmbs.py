@@ -9,28 +9,28 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled, TrackTable
-from vedette.densities.cases import LabelledCases, lmb_cases
+from vedette.densities.batches import LabelledCases, lmb_cases
 from vedette.densities.checks import offsets_of
 from vedette.densities.containers import unchecked
 from vedette.densities.conversions import reduced_lmb
 from vedette.densities.products import PowerProducts, Share, lay_out_products
 from vedette.fusion.base import (
     FusionInfo,
-    LinearRule,
+    LogLinearPool,
+    active_sensors,
     check_beliefs,
     check_kinds,
     check_weights,
-    info_of_labels,
-    taking_part,
+    label_fusion_info,
 )
 from vedette.fusion.powers import (
     FusionLimits,
     MixturePower,
     check_power,
+    numerical_errors_of_tracks,
     power_rule,
-    told_of_tracks,
 )
-from vedette.fusion.views import AlignedLmbs, Views, align_lmbs, require_views, sum_over_sensors, weights_by_view
+from vedette.fusion.views import AlignedLmbs, FieldsOfView, align_lmbs, require_views, sum_over_sensors, view_weights
 from vedette.internal.probabilities import expit, log_expit, logit
 from vedette.kernels.base.types import Bools, Floats, Ints, Lmb
 from vedette.kernels.gaussian.pooling import pooled_tracks, reduced_tracks
@@ -83,7 +83,7 @@ class Clmb:
         chance("missing_existence", self.missing_existence)
         flag("by_views", self.by_views)
 
-    def fuse(self, beliefs: Sequence[Labelled], views: Views | None = None) -> tuple[LMB, FusionInfo]:
+    def fuse(self, beliefs: Sequence[Labelled], views: FieldsOfView | None = None) -> tuple[LMB, FusionInfo]:
         """Fused LMB of the sensors' LMBs (others are first converted), in increasing label order, and what was done.
 
         views: what the sensors could see; not used with plain weights. Raises `InputError` for another number or kind
@@ -93,25 +93,25 @@ class Clmb:
         check_beliefs(beliefs, (LMB, GLMB, FactoredGLMB), len(self.weights))
         seen = require_views(self.by_views, views, len(self.weights))
         rule = power_rule(self.mixture_power, self.limits, beliefs[0].state_dim, len(self.weights))
-        active, weights = taking_part(self.weights)
+        active, weights = active_sensors(self.weights)
         aligned = align_lmbs([_reduced(beliefs[i], rule.caps) for i in active], self.missing_existence)
         powers = _Powers.plain(aligned, weights) if seen is None else _Powers.by_view(aligned, weights, seen, active)
         of_tracks = np.array(np.broadcast_to(powers.of_tracks, powers.chosen.shape))
-        with told_of_tracks():
+        with numerical_errors_of_tracks():
             tracks, log_overlaps = fused_tracks(aligned.labels, powers.chosen, of_tracks, aligned.tracks, rule)
         log_present = powers.mean(log_expit(aligned.logits)) + log_overlaps
         log_absent = powers.mean(log_expit(-aligned.logits))
-        logits, lacking = powers.mean(aligned.logits) + log_overlaps, powers.taking_part & ~aligned.held
+        logits, lacking = powers.mean(aligned.logits) + log_overlaps, powers.participating & ~aligned.held
         log_normaliser = float(np.logaddexp(log_present, log_absent).sum())
         existence = expit(aligned.logits), expit(logits)
-        info = info_of_labels(lacking, active, len(beliefs), *existence, log_normaliser)
+        info = label_fusion_info(lacking, active, len(beliefs), *existence, log_normaliser)
         return unchecked(LMB, TrackTable.from_kernel(tracks), logits), info
 
-    def linear_rule(self, num_sensors: int) -> LinearRule | None:
+    def log_linear_pool(self, num_sensors: int) -> LogLinearPool | None:
         """The weights; None by views."""
-        return None if self.by_views else LinearRule(0.0, tuple(self.weights), self.missing_existence)
+        return None if self.by_views else LogLinearPool(0.0, tuple(self.weights), self.missing_existence)
 
-    def lay_out(self, cases: Sequence[LabelledCases], prediction: Labelled) -> PowerProducts | None:
+    def precompute(self, cases: Sequence[LabelledCases], prediction: Labelled) -> PowerProducts | None:
         """The fusions of any of the sensors' cases; None by views, for a GLMB prediction, or inexact powers.
 
         cases: one a sensor; a GLMB is first converted, as by `fuse`. prediction: of one Gaussian a track. Raises
@@ -122,7 +122,7 @@ class Clmb:
         exact = self.mixture_power in ("auto", "moment_matched") or all(own.is_lmb for own in cases)
         if self.by_views or not exact or not prediction.is_lmb:
             return None
-        active, _ = taking_part(self.weights)
+        active, _ = active_sensors(self.weights)
         shares = [self._share(cases[i], self.weights[i]) for i in active]
         return lay_out_products(shares, LabelledCases.of(prediction), active)
 
@@ -139,7 +139,7 @@ class _Powers(NamedTuple):
     of_labels: Floats  # (num_labels, num_sensors) rows that sum to one, or (num_sensors,) of all labels alike
     of_tracks: Floats  # the same, for the tracks that are `chosen`
     chosen: Ints  # (num_labels, num_sensors) tracks, -1 of those that are left out
-    taking_part: Bools  # (num_labels, num_sensors)
+    participating: Bools  # (num_labels, num_sensors)
 
     @classmethod
     def plain(cls, aligned: AlignedLmbs, weights: Floats) -> _Powers:
@@ -147,9 +147,9 @@ class _Powers(NamedTuple):
         return cls(weights, weights, aligned.chosen, np.ones(aligned.chosen.shape, np.bool_))
 
     @classmethod
-    def by_view(cls, aligned: AlignedLmbs, weights: Floats, views: Views, active: Sequence[int]) -> _Powers:
+    def by_view(cls, aligned: AlignedLmbs, weights: Floats, views: FieldsOfView, active: Sequence[int]) -> _Powers:
         """By how well each sensor sees each label."""
-        shares = weights_by_view(aligned, weights, views, active)
+        shares = view_weights(aligned, weights, views, active)
         chosen = np.where(shares > 0.0, aligned.chosen, -1)
         # Where all that see the place lack the label, its density is that of those that have it.
         bare = (chosen < 0).all(axis=1, keepdims=True)
@@ -160,7 +160,7 @@ class _Powers(NamedTuple):
         """(num_labels,) weighted mean of (num_labels, num_sensors) values, which may be infinite where none counts."""
         if self.of_labels.ndim == 1:
             return np.asarray(values @ self.of_labels)
-        return sum_over_sensors(self.of_labels * np.where(self.taking_part, values, 0.0))
+        return sum_over_sensors(self.of_labels * np.where(self.participating, values, 0.0))
 
 
 def _reduced(belief: Labelled, caps: MixtureCaps) -> Lmb:
@@ -198,7 +198,7 @@ class ArithmeticAverage:
         check_power("moment_matched", self.limits, len(self.weights))
         flag("by_views", self.by_views)
 
-    def fuse(self, beliefs: Sequence[Labelled], views: Views | None = None) -> tuple[LMB, FusionInfo]:
+    def fuse(self, beliefs: Sequence[Labelled], views: FieldsOfView | None = None) -> tuple[LMB, FusionInfo]:
         """Fused LMB of the sensors' LMBs (others are first converted), in increasing label order, and what was done.
 
         views: what the sensors could see; not used with plain weights. Labels that no sensor with a say has are left
@@ -208,11 +208,11 @@ class ArithmeticAverage:
         check_beliefs(beliefs, (LMB, GLMB, FactoredGLMB), len(self.weights))
         seen = require_views(self.by_views, views, len(self.weights))
         caps = power_rule("component_wise", self.limits, beliefs[0].state_dim).caps
-        active, weights = taking_part(self.weights)
+        active, weights = active_sensors(self.weights)
         aligned = align_lmbs([reduced_lmb(beliefs[i], caps) for i in active], 0.0)
         shares = np.tile(weights, (len(aligned.labels), 1))
         if seen is not None:
-            shares = weights_by_view(aligned, weights, seen, active)
+            shares = view_weights(aligned, weights, seen, active)
         existence = expit(aligned.logits)
         present = shares * existence
         exists, absent = sum_over_sensors(present), sum_over_sensors(shares * expit(-aligned.logits))
@@ -220,7 +220,7 @@ class ArithmeticAverage:
         with np.errstate(divide="ignore"):
             logits = np.log(exists) - np.log(absent)
         fused = unchecked(LMB, _pooled(aligned, kept, present, caps), logits[kept])
-        return fused, info_of_labels((shares > 0.0) & ~aligned.held, active, len(beliefs), existence, exists, 0.0)
+        return fused, label_fusion_info((shares > 0.0) & ~aligned.held, active, len(beliefs), existence, exists, 0.0)
 
 
 def _pooled(aligned: AlignedLmbs, kept: Bools, present: Floats, caps: MixtureCaps) -> TrackTable:

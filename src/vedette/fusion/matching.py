@@ -9,11 +9,11 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled, as_lmb, track_moments
-from vedette.densities.cases import LabelledCases
+from vedette.densities.batches import LabelledCases
 from vedette.densities.conversions import names_settled
 from vedette.densities.label_sets import Label
-from vedette.fusion.base import Fusion, FusionInfo, ValidBeliefs, check_beliefs
-from vedette.fusion.views import Views
+from vedette.fusion.base import Fusion, FusionInfo, PrevalidatedBeliefs, check_beliefs
+from vedette.fusion.views import FieldsOfView
 from vedette.internal.probabilities import chi_squared_quantile
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.distances import near_pairs
@@ -68,7 +68,7 @@ def common_names(
     beliefs: Sequence[Labelled], *, gate_probability: float = GATE_PROBABILITY
 ) -> list[dict[Label, Label]]:
     """For each sensor, the label that `match_labels` gives to each of its labels. Raises as that."""
-    if not isinstance(beliefs, ValidBeliefs):
+    if not isinstance(beliefs, PrevalidatedBeliefs):
         beliefs = sequence("beliefs", beliefs, "densities, one a sensor")
     check_beliefs(beliefs, (GLMB, LMB, FactoredGLMB), len(beliefs))
     chance("gate_probability", gate_probability)
@@ -166,7 +166,7 @@ def relabelled(belief: Labelled, names: dict[Label, Label]) -> Labelled:
 
 
 @dataclass(frozen=True, slots=True)
-class Matched:
+class LabelMatchedFusion:
     """A fusion by labels of beliefs whose labels need not agree: they are matched first (`match_labels`).
 
     For sensors that take targets up at different steps, or make labels of their own, and do not go on from the fused
@@ -197,10 +197,10 @@ class Matched:
         settled = [names_settled(belief, _COMPONENTS) for belief in given]
         return match_labels(settled, gate_probability=self.gate_probability)
 
-    def fuse(self, beliefs: Sequence[Labelled], views: Views | None = None) -> tuple[Any, FusionInfo]:
+    def fuse(self, beliefs: Sequence[Labelled], views: FieldsOfView | None = None) -> tuple[Any, FusionInfo]:
         """The fusion of the beliefs under common labels; see the rule's. Raises as `match_labels` and the rule."""
-        return self.rule.fuse(ValidBeliefs(self.match(beliefs)), views)
+        return self.rule.fuse(PrevalidatedBeliefs(self.match(beliefs)), views)
 
-    def lay_out(self, cases: Sequence[LabelledCases], prediction: GLMB | LMB) -> None:
+    def precompute(self, cases: Sequence[LabelledCases], prediction: GLMB | LMB) -> None:
         """None: which labels match differs from case to case. Of matched beliefs, ask the rule."""
         return None

@@ -16,7 +16,7 @@ from vedette.densities.conversions import marginalised_factors
 from vedette.densities.label_sets import WHOLE, in_label_order, join_factors
 from vedette.densities.tracks import places_of
 from vedette.errors import InputError, NumericalError
-from vedette.fusion.base import FusionInfo, LinearRule, ValidBeliefs, check_beliefs, info_of_labels
+from vedette.fusion.base import FusionInfo, LogLinearPool, PrevalidatedBeliefs, check_beliefs, label_fusion_info
 from vedette.fusion.parallel_sets import (
     check_evidence,
     check_single,
@@ -28,7 +28,7 @@ from vedette.fusion.parallel_sets import (
     updated_logs,
 )
 from vedette.fusion.powers import ONE, FusionLimits, check_limits
-from vedette.fusion.views import Views
+from vedette.fusion.views import FieldsOfView
 from vedette.internal.probabilities import expit, log_expit
 from vedette.kernels.base.types import Floats, Ints, Tracks
 from vedette.kernels.gaussian.components import components_of
@@ -82,7 +82,7 @@ class ParallelUpdate:
     weights: Sequence[float] | Floats | None = None
     missing_existence: float = 1e-4
     limits: FusionLimits = field(default_factory=FusionLimits)
-    shares_prediction: ClassVar[bool] = True  # a tracker must update all beliefs from one
+    requires_common_prior: ClassVar[bool] = True  # a tracker must update all beliefs from one
 
     def __post_init__(self) -> None:
         if self.weights is not None:
@@ -94,12 +94,12 @@ class ParallelUpdate:
         chance("missing_existence", self.missing_existence)
         check_limits(self.limits)
 
-    def linear_rule(self, num_sensors: int) -> LinearRule:
+    def log_linear_pool(self, num_sensors: int) -> LogLinearPool:
         """pi+^(1 - sum of v) prod_s pi_s^(v_s)."""
         powers = (1.0,) * num_sensors if self.weights is None else tuple(self.weights)
-        return LinearRule(1.0 - math.fsum(powers), powers, self.missing_existence)
+        return LogLinearPool(1.0 - math.fsum(powers), powers, self.missing_existence)
 
-    def fuse(self, beliefs: Sequence[_Density], views: Views | None = None) -> tuple[_Density, FusionInfo]:
+    def fuse(self, beliefs: Sequence[_Density], views: FieldsOfView | None = None) -> tuple[_Density, FusionInfo]:
         """The fused density of the labels of the prediction, in increasing order, and what was done.
 
         Of LMBs an LMB; where a belief or the prediction is a `FactoredGLMB`, one with a Gaussian a label, its factors
@@ -113,10 +113,10 @@ class ParallelUpdate:
         `NumericalError` where a label is certain at one sensor and impossible at another, or a product cannot be
         integrated.
         """
-        prediction = _prediction_of(views, check=not isinstance(beliefs, ValidBeliefs))
-        given: Sequence[Labelled] = (
-            beliefs if isinstance(beliefs, ValidBeliefs) else sequence("beliefs", beliefs, "one density a sensor")
-        )
+        prediction = _prediction_of(views, check=not isinstance(beliefs, PrevalidatedBeliefs))
+        given: Sequence[Labelled] = beliefs
+        if not isinstance(beliefs, PrevalidatedBeliefs):
+            given = sequence("beliefs", beliefs, "one density a sensor")
         num_sensors = len(given) if self.weights is None else len(self.weights)
         check_beliefs(given, (LMB, FactoredGLMB), num_sensors)
         if any(belief.state_dim != prediction.state_dim for belief in given):
@@ -147,7 +147,7 @@ class ParallelUpdate:
         active = np.flatnonzero(weights > 0.0).tolist()
         lacking, existence = (given.chosen < 0)[:, active], expit(given.logits[:, active])
         log_normaliser = float(np.logaddexp(present + log_overlaps, absent).sum())
-        info = info_of_labels(lacking, active, len(weights), existence, expit(logits), log_normaliser)
+        info = label_fusion_info(lacking, active, len(weights), existence, expit(logits), log_normaliser)
         return unchecked(LMB, tracks, logits), info
 
     def _fused_factors(
@@ -204,8 +204,8 @@ def _moment_matched(belief: LMB) -> LMB:
     return belief.with_fields(tracks=TrackTable.from_kernel(reduced_tracks(belief.tracks.to_kernel(), ONE)))
 
 
-def _prediction_of(views: Views | None, *, check: bool) -> Labelled:
-    prediction = views.prediction if isinstance(views, Views) else None
+def _prediction_of(views: FieldsOfView | None, *, check: bool) -> Labelled:
+    prediction = views.prediction if isinstance(views, FieldsOfView) else None
     if prediction is None or not (prediction.is_lmb or prediction.is_product):
         raise InputError(
             "views.prediction: expected the LMB or FactoredGLMB that all beliefs were updated from, each by its "

@@ -89,7 +89,7 @@ def power_rule(mixture_power: str, limits: FusionLimits, state_dim: int, num_sen
 
 
 @contextmanager
-def told_of_tracks() -> Iterator[None]:
+def numerical_errors_of_tracks() -> Iterator[None]:
     """Raise a `NumericalError` from what a kernel raises of a product of powers that is no density."""
     try:
         yield

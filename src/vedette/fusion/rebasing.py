@@ -23,7 +23,7 @@ def with_labels_of(prediction: LMB, others: LMB) -> LMB:
     return both.take(np.lexsort(table.labels.T[::-1]))
 
 
-def rebased(posterior: LMB, own: LMB, prediction: LMB) -> LMB:
+def rebase(posterior: LMB, own: LMB, prediction: LMB) -> LMB:
     """A sensor's posterior as if its scan had updated `prediction` instead of `own`, label by label.
 
     What the scan said is the ratio of the sensor's posterior to its own prediction, a Gaussian of information

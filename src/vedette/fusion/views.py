@@ -24,7 +24,7 @@ SURE_EXISTENCE = 0.999
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Views:
+class FieldsOfView:
     """The sensors at one time, from where they scanned.
 
     Attributes:
@@ -53,7 +53,7 @@ class Views:
         if not isinstance(self.prediction, Labelled | None):
             raise reject("views.prediction", f"{LABELLED}, or None", type(self.prediction).__name__)
 
-    def if_all_scanned(self) -> Views:
+    def if_all_scanned(self) -> FieldsOfView:
         """What the sensors would see if each had scanned."""
         return replace(self, scanned=(True,) * len(self.sensors))
 
@@ -103,7 +103,7 @@ def align_lmbs(sensors: Sequence[Lmb], missing_existence: float) -> AlignedLmbs:
     return AlignedLmbs(labels, chosen, table, np.where(chosen >= 0, own_logits[chosen], floors))
 
 
-def weights_by_view(aligned: AlignedLmbs, weights: Floats, views: Views, active: Sequence[int]) -> Floats:
+def view_weights(aligned: AlignedLmbs, weights: Floats, views: FieldsOfView, active: Sequence[int]) -> Floats:
     """(num_labels, len(active)) weights that each sensor has at each label, made to sum to one.
 
     In proportion to w_s P / (1 - .999 P), P = E[P_D^s(l)]. P / (1 - r P) is, up to a factor, the information (Fisher's)
@@ -124,7 +124,7 @@ def weights_by_view(aligned: AlignedLmbs, weights: Floats, views: Views, active:
     return np.asarray(shares / sum_over_sensors(shares)[:, None])
 
 
-def _detection(aligned: AlignedLmbs, views: Views, active: Sequence[int]) -> Floats:
+def _detection(aligned: AlignedLmbs, views: FieldsOfView, active: Sequence[int]) -> Floats:
     """(num_labels, len(active)) E[P_D^s(l)] over the density of the surest that sees the label."""
     table, held = TrackTable.from_kernel(aligned.tracks), aligned.held
     existence = np.where(held, aligned.logits, -math.inf)
@@ -149,7 +149,7 @@ def sum_over_sensors(values: Floats) -> Floats:
     return total
 
 
-def require_views(by_views: bool, views: Views | None, num_sensors: int) -> Views | None:
+def require_views(by_views: bool, views: FieldsOfView | None, num_sensors: int) -> FieldsOfView | None:
     """The views that a fusion goes by, None where it goes by none. Raises `InputError` where they are missing."""
     if not by_views:
         return None
@@ -158,7 +158,7 @@ def require_views(by_views: bool, views: Views | None, num_sensors: int) -> View
             "views: expected the views of the sensors, as the fusion weights labels by_views; got None (a tracker "
             "knows them; decisions do not, and go by a fusion of plain weights)"
         )
-    instance("views", views, Views)
+    instance("views", views, FieldsOfView)
     if len(views.sensors) != num_sensors:
         raise InputError(f"views.sensors: expected {num_sensors}, one for each fusion weight; got {len(views.sensors)}")
     return views

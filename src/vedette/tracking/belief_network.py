@@ -11,9 +11,9 @@ import numpy as np
 from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.filters import FilterInfo
-from vedette.fusion import Fusion, FusionInfo, Matched, Views, shares_prediction
+from vedette.fusion import FieldsOfView, Fusion, FusionInfo, LabelMatchedFusion, requires_common_prior
 from vedette.fusion.matching import common_names, relabelled
-from vedette.fusion.rebasing import rebased, with_labels_of
+from vedette.fusion.rebasing import rebase, with_labels_of
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import reject
 from vedette.tracking.base import Stages, State, TrackerInfo, check_step
@@ -79,7 +79,7 @@ class BeliefNetwork(LocalFilters):
         for rule in (self.fusion, self.merging):
             with_weights(rule, [1.0])
         check_labels_of_births(self.fusion, self.targets)
-        if shares_prediction(self.fusion) and self.network.delay > 0:
+        if requires_common_prior(self.fusion) and self.network.delay > 0:
             raise InputError("network.delay: expected 0, as the fusion divides by the prediction of the same time")
 
     def initial(self) -> State:
@@ -111,7 +111,7 @@ class BeliefNetwork(LocalFilters):
         longest = self.network.longest_delay(num)
         memory = _Memory(births, tuple(own for own in waiting if own.step + longest > step))
         messages: list[tuple[Any, ...]] = [(belief,) for belief in local]
-        if shares_prediction(self.fusion) and len({id(own) for own in predictions}) > 1:
+        if requires_common_prior(self.fusion) and len({id(own) for own in predictions}) > 1:
             messages = list(zip(local, predictions, strict=True))
         heard = bytes_of_messages(self.network, hops, messages)
         told = TrackerInfo(infos, report or reports[0], stages.seconds, heard)
@@ -127,7 +127,7 @@ class BeliefNetwork(LocalFilters):
         results = []
         for s, (belief, own) in enumerate(zip(state.local, state.memory.births, strict=True)):
             due = births_due(birth, step, dt, own)
-            if not shares_prediction(self.fusion):
+            if not requires_common_prior(self.fusion):
                 predictions.append(None)
                 results.append(self._stepped(s, belief, scans[s], poses[s], dt, step, due, rngs[s]))
                 continue
@@ -162,12 +162,12 @@ class BeliefNetwork(LocalFilters):
 
     def _heard_weights(self, shares: Floats) -> Floats:
         """Of a mean, scaled to those that are heard; of a sum, as they are: who is not heard adds nothing."""
-        return shares if shares_prediction(self.fusion) else shares / shares.sum()
+        return shares if requires_common_prior(self.fusion) else shares / shares.sum()
 
     def _fuse(self, messages: Sequence[_Sent], heard: Sequence[int], weights: Floats) -> tuple[Any, FusionInfo | None]:
         """What these sensors' messages are together; `weights` are of a mean, or of a sum where predictions divide."""
         seen = views_of([self._views(sent) for sent in messages], heard)
-        if not shares_prediction(self.fusion):
+        if not requires_common_prior(self.fusion):
             now = max(messages, key=lambda sent: sent.step)
             current = [self._current(sent, now, j) for sent, j in zip(messages, heard, strict=True)]
             if len(current) == 1:
@@ -178,7 +178,7 @@ class BeliefNetwork(LocalFilters):
         posteriors = [sent.beliefs[j] for sent, j in zip(messages, heard, strict=True)]
         base = predictions[0]
         if any(prediction is not base for prediction in predictions):
-            if isinstance(self.merging, Matched):
+            if isinstance(self.merging, LabelMatchedFusion):
                 names = common_names(predictions, gate_probability=self.merging.gate_probability)
                 predictions = list(map(relabelled, predictions, names))
                 posteriors = list(map(relabelled, posteriors, names))
@@ -186,12 +186,12 @@ class BeliefNetwork(LocalFilters):
             base, _ = merging.fuse(self._for_fusion(predictions), seen.if_all_scanned())
             for prediction in predictions:
                 base = with_labels_of(base, prediction)
-        posteriors = [rebased(*own, base) for own in zip(posteriors, predictions, strict=True)]
+        posteriors = [rebase(*own, base) for own in zip(posteriors, predictions, strict=True)]
         fused, report = with_weights(self.fusion, weights.tolist()).fuse(posteriors, replace(seen, prediction=base))
         return self._kept(fused), report
 
-    def _views(self, sent: _Sent) -> Views:
-        return Views(self.sensors, sent.poses, sent.scanned)
+    def _views(self, sent: _Sent) -> FieldsOfView:
+        return FieldsOfView(self.sensors, sent.poses, sent.scanned)
 
     def _current(self, sent: _Sent, now: _Sent, sensor: int) -> Any:
         """A sensor's belief at the time of the step `now`; nobody is born on the way."""
@@ -207,7 +207,7 @@ class BeliefNetwork(LocalFilters):
         sizes = groups.sum(axis=1, keepdims=True)
         rounds = self.network.consensus_rounds
         shares = groups / sizes if rounds is None else np.linalg.matrix_power(metropolis_weights(hops == 1), rounds)
-        return np.asarray(shares * sizes if shares_prediction(self.fusion) else shares)
+        return np.asarray(shares * sizes if requires_common_prior(self.fusion) else shares)
 
     def _births(
         self, before: Sequence[LMB | None], fused: Sequence[Any], scans: Sequence[Any], poses: Floats, sent: _Sent

@@ -11,7 +11,7 @@ import numpy as np
 from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.filters import FilterInfo
-from vedette.fusion import Fusion, Matched, MatchesLabels, Views, shares_prediction
+from vedette.fusion import FieldsOfView, Fusion, LabelMatchedFusion, SupportsLabelMatching, requires_common_prior
 from vedette.kernels.base.types import Floats
 from vedette.models import MeasurementBirth, TargetModel
 from vedette.models.arguments import flag, instance, probability
@@ -44,7 +44,7 @@ class Distributed(LocalFilters):
     fusion: Fusion | None = None
     feedback: bool = False
     min_detection: float = 0.1
-    _shares_prediction: bool = field(init=False, repr=False)
+    _requires_common_prior: bool = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         LocalFilters.__post_init__(self)  # slots replace the class that super() looks for
@@ -52,12 +52,12 @@ class Distributed(LocalFilters):
             raise InputError(f"fusion: expected one for {len(self.filters)} sensors; got none")
         if self.fusion is not None:
             instance("fusion", self.fusion, Fusion)
-        object.__setattr__(self, "_shares_prediction", shares_prediction(self.fusion))
+        object.__setattr__(self, "_requires_common_prior", requires_common_prior(self.fusion))
         flag("feedback", self.feedback)
         probability("Distributed.min_detection", self.min_detection)
         if self.feedback or self.fusion is None:
             return
-        if self._shares_prediction:
+        if self._requires_common_prior:
             raise InputError("feedback: expected true, as the fusion is of beliefs that share their prediction")
         if len(self.filters) > 1:  # one sensor has nothing to match its labels with
             check_labels_of_births(self.fusion, self.targets)
@@ -77,7 +77,7 @@ class Distributed(LocalFilters):
         if birth.from_measurements is not None:
             births = [births_due(birth, step, dt, own) for own in state.memory or births]
         prediction, local, infos, scanned, sent = None, [], [], [], []
-        if self._shares_prediction:
+        if self._requires_common_prior:
             with stages.timing("filter"):
                 prediction, _ = self._predicted(0, state.fused, dt, step, births[0])
         for s in range(num):
@@ -93,12 +93,12 @@ class Distributed(LocalFilters):
             scanned.append(scans[s] is not None or not self.feedback)
         fused, report, measured, rule = local[0], None, None, self.fusion
         if rule is not None:
-            views = Views(self.sensors, at, tuple(scanned), prediction)
+            views = FieldsOfView(self.sensors, at, tuple(scanned), prediction)
             with stages.timing("fusion"):
                 if birth.from_measurements is not None and not self.feedback and self.min_detection > 0.0:
                     local, infos = self._without_forgotten(birth.from_measurements, local, infos, views)
                 made = self._for_fusion(local)
-                if isinstance(rule, Matched):
+                if isinstance(rule, LabelMatchedFusion):
                     # Labels then outlast the sensor that led them, and are those that decisions need.
                     local, rule = rule.match(made), rule.rule
                     made = self._for_fusion(local)
@@ -117,7 +117,7 @@ class Distributed(LocalFilters):
         return State(tuple(local), fused, step, float(time), measured, undetected), told
 
     def _without_forgotten(
-        self, birth: MeasurementBirth, local: list[Any], infos: list[FilterInfo], views: Views
+        self, birth: MeasurementBirth, local: list[Any], infos: list[FilterInfo], views: FieldsOfView
     ) -> tuple[list[Any], list[FilterInfo]]:
         """The sensors' own beliefs without what they have lost sight of, and their reports with what that was."""
         kept, dropped = zip(
@@ -146,9 +146,9 @@ def check_labels_of_births(fusion: Fusion, targets: TargetModel) -> None:
 
     One that divides by a common prediction does not: a tracker gives it the labels of that prediction.
     """
-    if targets.birth.from_measurements is None or shares_prediction(fusion):
+    if targets.birth.from_measurements is None or requires_common_prior(fusion):
         return
-    if not (isinstance(fusion, MatchesLabels) and fusion.matches_labels):
+    if not (isinstance(fusion, SupportsLabelMatching) and fusion.matches_labels):
         raise InputError(
             "fusion: expected one that matches labels, as sensors that do not share all they know make their own from "
             f"their measurements; got {type(fusion).__name__}, which fuses by label"

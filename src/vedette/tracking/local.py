@@ -20,7 +20,7 @@ from vedette.filters import (
     with_labelled_births,
 )
 from vedette.filters.base import NO_POSE, NO_SCAN, SingleSensorFilter, blind_sensor
-from vedette.fusion import ValidBeliefs
+from vedette.fusion import PrevalidatedBeliefs
 from vedette.models import BirthModel, SensorModel, TargetModel
 from vedette.models.arguments import provides, reject, sequence
 from vedette.tracking.births import births_of_tracker, check_measured_births
@@ -125,7 +125,7 @@ class LocalFilters:
 
     def _for_fusion(self, beliefs: Sequence[Any]) -> Sequence[Any]:
         """What was made of the filters' beliefs at this step, to be fused: checked where a filter is the user's own."""
-        return ValidBeliefs(beliefs) if self._are_own else beliefs
+        return PrevalidatedBeliefs(beliefs) if self._are_own else beliefs
 
     def _two_step(self, s: int, why: str) -> TwoStepFilter:
         own = self.filters[s]

@@ -11,7 +11,7 @@ from vedette.densities import LMB, Labelled, UndetectedIntensity, as_lmb, existe
 from vedette.densities.containers import for_kernel
 from vedette.densities.label_sets import without_labels
 from vedette.filters.inputs import model_errors
-from vedette.fusion import Views
+from vedette.fusion import FieldsOfView
 from vedette.kernels.base.types import Floats
 from vedette.kernels.gaussian.position_integrals import spread_nodes
 from vedette.kernels.planning.reach import predict_paths
@@ -88,7 +88,7 @@ def expected_in_cells(states: Floats, shares: Floats, grid: CellGrid) -> Floats:
 
 
 def without_forgotten(
-    belief: _Labelled, birth: MeasurementBirth, views: Views, sensor: int, min_detection: float
+    belief: _Labelled, birth: MeasurementBirth, views: FieldsOfView, sensor: int, min_detection: float
 ) -> tuple[_Labelled, float]:
     """A sensor's own belief without the labels that it cannot see and knows too little of, and their summed existence.
 

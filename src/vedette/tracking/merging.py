@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.fusion import Fusion, FusionInfo, Matched, Views
+from vedette.fusion import FieldsOfView, Fusion, FusionInfo, LabelMatchedFusion
 
 
 def merged(
-    merging: Fusion, beliefs: Sequence[Any], sensors: Sequence[int], views: Views
+    merging: Fusion, beliefs: Sequence[Any], sensors: Sequence[int], views: FieldsOfView
 ) -> tuple[Any, FusionInfo | None]:
     """The one belief of these sensors under equal weights, and what was done; the first where all are the same object.
 
@@ -25,10 +25,10 @@ def merged(
     return equal.fuse(beliefs, views_of([views] * len(beliefs), sensors))
 
 
-def views_of(views: Sequence[Views], sensors: Sequence[int]) -> Views:
+def views_of(views: Sequence[FieldsOfView], sensors: Sequence[int]) -> FieldsOfView:
     """The views of some of the sensors, in that order, each as of its own time."""
     places = list(zip(views, sensors, strict=True))
-    return Views(
+    return FieldsOfView(
         tuple(own.sensors[s] for own, s in places),
         np.array([own.poses[s] for own, s in places]),
         tuple(own.scanned[s] for own, s in places),
@@ -44,7 +44,7 @@ def with_weights(fusion: Fusion, weights: Sequence[float]) -> Fusion:
     names: list[str] = [field.name for field in fields(fusion)] if is_dataclass(fusion) else []
     if "weights" in names:
         return replace(fusion, weights=tuple(weights))  # type: ignore[type-var]
-    if isinstance(fusion, Matched):
+    if isinstance(fusion, LabelMatchedFusion):
         return replace(fusion, rule=with_weights(fusion.rule, weights))
     raise InputError(
         f"fusion: expected a dataclass with a field weights, as each sensor of a network fuses other beliefs; got "

@@ -10,7 +10,7 @@ import numpy as np
 
 from vedette.densities import LMB
 from vedette.filters import FilterInfo, with_labelled_births
-from vedette.fusion import Fusion, Views
+from vedette.fusion import FieldsOfView, Fusion
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import reject
 from vedette.tracking.base import Stages, State, TrackerInfo, bytes_of_scan, check_step
@@ -91,7 +91,7 @@ class ScanNetwork(OfAllScans):
         instant = state.memory.instant + (dt > 0.0)
         hops = hop_counts(self.network.links(at, rngs[0]))
         frame = _Frame(step, instant, dt, tuple(scans), at, self.network.arrivals(hops, instant))
-        views = Views(self.sensors, at, tuple(scan is not None for scan in scans))
+        views = FieldsOfView(self.sensors, at, tuple(scan is not None for scan in scans))
         sent = np.array(self.network.bytes_sent(hops, [bytes_of_scan(*own) for own in zip(scans, at, strict=True)]))
         known = state.memory.known
         if self.network.delay == 0 and len({id(own.belief) for own in known}) > 1:
@@ -112,7 +112,7 @@ class ScanNetwork(OfAllScans):
         last = (frame,) if dt > 0.0 else (*state.memory.last, frame)
         return State(local, fused, step, float(time), _Memory(known, frames, last, instant)), info
 
-    def _merge(self, memory: _Memory, frame: _Frame, views: Views) -> tuple[_Known, ...]:
+    def _merge(self, memory: _Memory, frame: _Frame, views: FieldsOfView) -> tuple[_Known, ...]:
         """Each sensor's belief and those of all that it hears as one; the same for those who hear the same.
 
         Who scans at this step is not asked, as the beliefs are those of before.

@@ -17,7 +17,7 @@ from vedette.densities import LMB, UndetectedIntensity
 from vedette.densities.checks import offsets_of
 from vedette.errors import InputError
 from vedette.filters.inputs import model_errors
-from vedette.fusion import LinearRule
+from vedette.fusion import LogLinearPool
 from vedette.internal.threads import run_chunks
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.planning.ascent import Cells
@@ -46,7 +46,7 @@ _MOST_BYTES = 8e9
 def lay_out(
     sensors: Sequence[MobileSensor],
     options: Sequence[Options],
-    rule: LinearRule,
+    rule: LogLinearPool,
     settings: PlanningSettings,
     reward: Any,
     state: State,
@@ -74,7 +74,7 @@ def lay_out(
     return AdditiveRewards(table, valuation, start.bases, own, cells, prices, num_threads), prediction
 
 
-def lay_out_changes(start: SensorGroups, rule: LinearRule, num_threads: int, *, sampled: bool) -> Table:
+def lay_out_changes(start: SensorGroups, rule: LogLinearPool, num_threads: int, *, sampled: bool) -> Table:
     """Return the changes of all sensors' courses, by samples or, without samples, their expectation.
 
     Raises:

@@ -7,7 +7,7 @@ from typing import Any
 
 from vedette.densities import Labelled
 from vedette.filters import Filter, shared_targets
-from vedette.fusion import Clmb, CmDeltaGlmb, Fusion, Matched
+from vedette.fusion import Clmb, CmDeltaGlmb, Fusion, LabelMatchedFusion
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections.courses import in_courses
 from vedette.scenarios.sections.fusion import OF_SCANS
@@ -64,8 +64,8 @@ def _merging(num_sensors: int, *, of_lmbs: bool, own_labels: bool) -> Fusion:
     """
     equal = (1.0 / num_sensors,) * num_sensors
     if of_lmbs:
-        return Matched(Clmb(equal, by_views=True))
-    return Matched(CmDeltaGlmb(equal)) if own_labels else CmDeltaGlmb(equal)
+        return LabelMatchedFusion(Clmb(equal, by_views=True))
+    return LabelMatchedFusion(CmDeltaGlmb(equal)) if own_labels else CmDeltaGlmb(equal)
 
 
 def _central_filter(scenario: Scenario, filters: tuple[Filter, ...]) -> CentralFilter | None:

@@ -156,14 +156,14 @@ class Fusion(Section):
 
     def build(self, num_sensors: int, folder: Path) -> FusionRule | None:
         """The fusion of the sensors' densities after each scan; None where one belief takes all scans."""
-        from vedette.fusion import Matched, ParallelUpdate
+        from vedette.fusion import LabelMatchedFusion, ParallelUpdate
 
         if self.kind in ONE_BELIEF:
             return None
         if self.kind == "parallel":
             return ParallelUpdate(missing_existence=self.missing_existence, limits=self.limits.build())
         rule = self._by_label(num_sensors)
-        return Matched(rule) if self.matching == "assignment" else rule
+        return LabelMatchedFusion(rule) if self.matching == "assignment" else rule
 
     def build_of_decisions(self, num_sensors: int, *, of_lmbs: bool) -> FusionRule:
         """The fusion that joint decisions go by: a parallel update, of any density, or plain covariance intersection.

@@ -8,7 +8,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from vedette.densities import GLMB, LMB
-from vedette.densities.cases import LabelledCases
+from vedette.densities.batches import LabelledCases
 from vedette.densities.conversions import lmb_on_label_sets
 from vedette.densities.products import PowerProducts, Share, lay_out_products
 from vedette.errors import InputError
@@ -17,7 +17,7 @@ from vedette.kernels.base.types import Floats, Ints
 _ALL_BUT_CERTAIN = 700.0  # logit; its exponential is still a number
 
 
-class LaidOut(Protocol):
+class PrecomputedFusion(Protocol):
     """A prediction p and, for any choice of one case a sensor, the fused density q, ready for their power integrals."""
 
     def z(self, actions: Ints, exponents: Sequence[tuple[float, float]], unit_volume: float = 1.0) -> Floats:
@@ -31,10 +31,10 @@ class LaidOut(Protocol):
 
 
 @runtime_checkable
-class LaysOut(Protocol):
+class SupportsPrecomputation(Protocol):
     """A fusion that a planner need not call for every joint action and sample."""
 
-    def lay_out(self, cases: Sequence[LabelledCases], prediction: GLMB | LMB) -> LaidOut | None:
+    def precompute(self, cases: Sequence[LabelledCases], prediction: GLMB | LMB) -> PrecomputedFusion | None:
         """The fusions of any of the sensors' cases, or None where they cannot be had this way.
 
         cases: one a sensor. prediction: what they are compared with, of one Gaussian a track; a GLMB marginalised. What
@@ -43,7 +43,7 @@ class LaysOut(Protocol):
         ...
 
 
-def lay_out_alone(own: LabelledCases, prediction: GLMB | LMB) -> PowerProducts | None:
+def precompute_single_sensor(own: LabelledCases, prediction: GLMB | LMB) -> PowerProducts | None:
     """A sensor's cases as they are; None for LMBs and a GLMB prediction.
 
     An LMB prediction is taken on a GLMB's label sets. Raises `InputError` for GLMBs without a label set in common.
@@ -52,10 +52,10 @@ def lay_out_alone(own: LabelledCases, prediction: GLMB | LMB) -> PowerProducts |
     if own.is_lmb:
         return lay_out_products([share], LabelledCases.of(prediction)) if prediction.is_lmb else None
     compared = _on_label_sets(prediction, own) if prediction.is_lmb else prediction
-    return lay_out_glmbs([share], LabelledCases.of(compared))
+    return precompute_glmbs([share], LabelledCases.of(compared))
 
 
-def lay_out_glmbs(
+def precompute_glmbs(
     shares: Sequence[Share], prediction: LabelledCases, sensors: Sequence[int] | None = None
 ) -> PowerProducts | None:
     """GLMBs laid out; None where a choice may have no label set in common with the prediction.
