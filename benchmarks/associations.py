@@ -14,7 +14,7 @@ import numpy as np
 
 from vedette import models
 from vedette.densities import LMB
-from vedette.filters import BeliefPropagation, Limits, LmbFilter, Ranked
+from vedette.filters import BeliefPropagation, Limits, LmbFilter, RankedAssignment
 
 CROWDS = ((20, 100.0), (50, 200.0), (200, 400.0), (1000, 900.0))  # tracks, m
 PRIOR, MEASURED, SEEN = 8.0, 10.0, 0.95
@@ -47,7 +47,7 @@ def main() -> None:
     print("tracks  side m  association            ms  existence  log likelihood  left out, at most")
     for num, side in CROWDS:
         belief, scan = crowd(num, side, np.random.default_rng(0))
-        for assignment in (Ranked(), BeliefPropagation()):
+        for assignment in (RankedAssignment(), BeliefPropagation()):
             tracker = LmbFilter(targets, sensor(), Limits(max_labels=5000), assignment)
             seconds = []
             for _ in range(REPEATS):

@@ -15,7 +15,7 @@ from places import expected_in_cells, true_in_cells
 from prior_targets import Names, PriorTargets
 from scenes import Scene
 
-from vedette.densities import Labelled, cardinality_distribution
+from vedette.densities import LabelledDensity, cardinality_distribution
 from vedette.errors import ScenarioError
 from vedette.evaluation import ospa_of_run
 from vedette.internal.unit_warnings import suppress_unit_warnings
@@ -241,7 +241,7 @@ class _Scores:
                 ids, states = truth.at(moment.step - 1)
                 belief = moment.state.fused
                 names.take(moment.step, moment.scans)
-                if isinstance(belief, Labelled):
+                if isinstance(belief, LabelledDensity):
                     labels += binned(EXISTENCES, *names.label_scores(belief, ids))
                 expected, true = expected_in_cells(belief, self.grid), true_in_cells(states, self.grid)
                 places += binned(NUMBERS, expected, true)

@@ -28,7 +28,7 @@ from timing import Measure, Once
 
 from vedette.densities import Estimate
 from vedette.evaluation import ospa
-from vedette.filters import TwoStepFilter
+from vedette.filters import PredictUpdateFilter
 from vedette.internal.processes import end_with_parent
 from vedette.models import SensorModel, TargetModel
 from vedette.scenarios import GeneratedCrowd, Scenario, crowd_text, parse_scenario, with_fields
@@ -75,7 +75,7 @@ def prepared(crowd: GeneratedCrowd, kind: str) -> tuple[Experiment, Truth, list[
 class TimedFilter:
     """A filter that notes the CPU seconds of its steps."""
 
-    inner: TwoStepFilter
+    inner: PredictUpdateFilter
     seconds: list[float]
 
     @property

@@ -53,7 +53,7 @@ def variants(tracker: DeltaGlmbFilter) -> dict[str, Filter]:
     ranked: Any = "ranked"
     gibbs: Any = "gibbs"
     if hasattr(filters, "BeliefPropagation"):
-        ranked, gibbs = filters.Ranked(), filters.Gibbs()
+        ranked, gibbs = filters.RankedAssignment(), filters.Gibbs()
         newer["LMB, belief propagation"] = LmbFilter(*parts, filters.BeliefPropagation())
     return {
         **newer,

@@ -21,7 +21,7 @@ from vedette.control import CauchySchwarzReward, RenyiReward
 from vedette.control.pseudo_posterior_rewards import PlainRewards, lay_out_rewards
 from vedette.control.search import all_joint_actions
 from vedette.densities import GLMB, LMB, TrackTable, as_lmb
-from vedette.densities.batches import LabelledCases
+from vedette.densities.batches import DensityBatch
 from vedette.divergence import cauchy_schwarz
 from vedette.fusion import Clmb, CmDeltaGlmb
 
@@ -59,7 +59,7 @@ def belief(rng: np.random.Generator) -> GLMB:
     return GLMB.from_hypotheses(tracks, hyps, rng.dirichlet(np.ones(20)))
 
 
-def cases(rng: np.random.Generator, kind: str) -> tuple[list[LabelledCases], GLMB | LMB]:
+def cases(rng: np.random.Generator, kind: str) -> tuple[list[DensityBatch], GLMB | LMB]:
     """Two sensors' cases on one label set of four labels (GLMB), or on four labels (LMB), and the prediction."""
     num_cases, labels = NUM_ACTIONS * NUM_SAMPLES, [(1, site) for site in range(NUM_LABELS)]
     covs = np.array([covariance(rng) for _ in range(20)])
@@ -68,9 +68,9 @@ def cases(rng: np.random.Generator, kind: str) -> tuple[list[LabelledCases], GLM
         shape = num_cases, NUM_LABELS
         tracks = rng.normal(size=(*shape, DIM)), covs[rng.integers(20, size=shape)]
         if kind == "GLMB":
-            own = LabelledCases.of_glmbs([tuple(labels)], np.zeros((num_cases, 1)), *tracks, num_samples=NUM_SAMPLES)
+            own = DensityBatch.of_glmbs([tuple(labels)], np.zeros((num_cases, 1)), *tracks, num_samples=NUM_SAMPLES)
         else:
-            own = LabelledCases.of_lmbs(labels, np.full(shape, 4.6), *tracks, num_samples=NUM_SAMPLES)
+            own = DensityBatch.of_lmbs(labels, np.full(shape, 4.6), *tracks, num_samples=NUM_SAMPLES)
         sensors.append(own)
     means = rng.normal(size=(NUM_LABELS, DIM))
     lmb = LMB.from_bernoullis(labels, np.full(NUM_LABELS, 0.99), means, 4.0 * covs[:NUM_LABELS])

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from vedette.densities import IidCluster, MultiBernoulli, Poisson, UndetectedTargets
-from vedette.densities.labelled import Labelled
+from vedette.densities.labelled import LabelledDensity
 from vedette.models import CellGrid
 
 Floats = NDArray[np.float64]
@@ -38,7 +38,7 @@ def true_in_cells(states: Floats, grid: CellGrid) -> Floats:
 
 def weighted_gaussians(density: Any) -> tuple[Floats, Floats, Floats]:
     """Return the expected number, mean and covariance of each Gaussian component of the intensity of a density."""
-    if isinstance(density, Labelled):
+    if isinstance(density, LabelledDensity):
         tracks = density.tracks
         existence = np.repeat(density.track_existence, np.diff(tracks.offsets))
         return existence * np.exp(tracks.log_weights), tracks.means, tracks.covs

@@ -180,10 +180,10 @@ def _random(number: int, folder: Path) -> str:
 
 def _belief(belief: Any) -> Arrays:
     """A labelled belief by its labels in order, an unlabelled one by its numbers of targets."""
-    from vedette.densities import Labelled, as_lmb, cardinality_distribution, track_moments
+    from vedette.densities import LabelledDensity, as_lmb, cardinality_distribution, track_moments
 
     found = {"cardinality": cardinality_distribution(belief)}
-    if not isinstance(belief, Labelled):
+    if not isinstance(belief, LabelledDensity):
         return found
     lmb = as_lmb(belief)
     order = np.lexsort(lmb.tracks.labels.T[::-1])

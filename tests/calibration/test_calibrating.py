@@ -14,7 +14,7 @@ import pytest
 from recordings import SENSORS, write_recording
 from vedette.calibration import Calibration, Problem, calibrate
 from vedette.calibration.maximum import _scores, covariance, maximise
-from vedette.filters import Limits, SequentialLmbFilter, shared_targets
+from vedette.filters import Limits, SequentialLmbFilter, common_target_model
 from vedette.kernels.base.types import Floats
 from vedette.scenarios.build import build_sensors
 from vedette.scenarios.calibrated import calibrated_text, problem_of
@@ -53,7 +53,7 @@ def test_the_likelihood_is_the_sum_of_what_the_filter_reports(tmp_path: Path) ->
     scenario, scans, _ = recorded(tmp_path, text=(SENSORS + MOTION).replace("sensors:\n", clutter + "\n", 1))
     filters = [sensor.filter for sensor in build_sensors(scenario)]
     sensors = tuple(each.sensor for each in filters)
-    tracker = Central(SequentialLmbFilter(shared_targets(filters), sensors, Limits(min_existence=1e-3)))
+    tracker = Central(SequentialLmbFilter(common_target_model(filters), sensors, Limits(min_existence=1e-3)))
     state, total, rngs = tracker.initial(), [], (np.random.default_rng(0),) * 2
     for time, measured, poses in zip(scans.times.tolist(), scans.scans, scans.poses, strict=True):
         state, info = tracker.step(state, list(measured), poses, time, rngs=rngs)

@@ -11,7 +11,7 @@ import pytest
 from control.examples import KNOWN, Situation, decided, situation
 from vedette.control import ExpectedLossReward, HorizonPlanner, IndependentPlanner, JointPlanner, KullbackLeiblerReward
 from vedette.control.prediction import predicted
-from vedette.densities import LMB, at_peaks
+from vedette.densities import LMB, at_dominant_components
 from vedette.internal.probabilities import expit
 
 PLANNERS = (JointPlanner, IndependentPlanner, HorizonPlanner)
@@ -32,7 +32,7 @@ def errors(of: Situation, chosen: tuple[int, ...]) -> Any:
     """(num_labels,) existence and error at the end if detected, out of rewards under a cutoff that cuts nothing off."""
     existence = expit(of.fused.existence_logit)
     covs = predicted(
-        at_peaks(of.fused), of.sensors[0].filter.targets.motion, KNOWN.horizon_steps, KNOWN.horizon_period
+        at_dominant_components(of.fused), of.sensors[0].filter.targets.motion, KNOWN.horizon_steps, KNOWN.horizon_period
     ).tracks.covs
     found = []
     for label, own in enumerate(existence):

@@ -16,11 +16,11 @@ from vedette.densities import (
     TrackTable,
     as_glmb,
     as_lmb,
-    at_peaks,
+    at_dominant_components,
     cardinality_distribution,
     map_estimate,
     marginal_estimate,
-    settled_lmb,
+    resolve_labels,
     track_histories,
 )
 from vedette.errors import InputError, NumericalError
@@ -59,7 +59,7 @@ def test_map_estimate_of_an_lmb_is_that_of_its_glmb(lmb):
 @given(glmbs())
 def test_each_label_at_its_heaviest_component(glmb):
     lmb = as_lmb(glmb)
-    peaks = at_peaks(lmb)
+    peaks = at_dominant_components(lmb)
     peaks.validate()
     plain = plain_lmb(lmb)
     assert peaks.tracks.labels.tolist() == lmb.tracks.labels.tolist()
@@ -74,14 +74,14 @@ def test_each_label_at_its_heaviest_component(glmb):
 def test_of_components_of_equal_weight_the_first_is_the_heaviest():
     mixture = np.full(2, 0.5), np.array([[3.0, 1.0], [-3.0, 1.0]]), np.tile(np.eye(2), (2, 1, 1))
     rivals = LMB(TrackTable.from_mixtures([(0, 1)], [mixture]), np.zeros(1))
-    np.testing.assert_array_equal(at_peaks(rivals).tracks.means, [[3.0, 1.0]])
-    assert at_peaks(at_peaks(rivals)).tracks.means.tolist() == [[3.0, 1.0]]
-    assert at_peaks(LMB.empty(2)).tracks.num_tracks == 0
+    np.testing.assert_array_equal(at_dominant_components(rivals).tracks.means, [[3.0, 1.0]])
+    assert at_dominant_components(at_dominant_components(rivals)).tracks.means.tolist() == [[3.0, 1.0]]
+    assert at_dominant_components(LMB.empty(2)).tracks.num_tracks == 0
 
 
 @given(glmbs(), lmbs(), st.sampled_from([0.0, 0.3, 0.5, 0.9]))
 def test_marginal_estimate(glmb, lmb, threshold):
-    for density, settled in ((glmb, settled_lmb(glmb, max_components=10)), (lmb, lmb)):
+    for density, settled in ((glmb, resolve_labels(glmb, max_components=10)), (lmb, lmb)):
         estimate = marginal_estimate(density, threshold)
         estimate.validate()
         expected = {label: entry for label, entry in plain_lmb(settled).items() if entry[0] > threshold}

@@ -36,7 +36,7 @@ from vedette.densities import (
     marginalise,
     save_density,
 )
-from vedette.densities.label_sets import laid_out, take_factors, without_labels
+from vedette.densities.label_sets import as_single_factor, take_factors, without_labels
 from vedette.errors import InputError
 
 ALL = 10**6
@@ -261,12 +261,12 @@ def test_factors_are_taken_in_any_order(density, seed):
 def test_a_factor_of_one_label_is_laid_out_as_of_an_lmb():
     tracks = random_factor(np.random.default_rng(0), [[1, 0], [1, 1]], 3).tracks
     glmb = GLMB.from_hypotheses(tracks, [[0], [1], []], [0.5, 0.3, 0.2])
-    own = laid_out(glmb)
+    own = as_single_factor(glmb)
     own.validate()
     assert own.is_bernoulli.tolist() == [True]
     _close(np.exp(own.hyp_log_weights), [0.2, 0.8])
     assert own.tracks.offsets[1] == tracks.offsets[2]
-    assert laid_out(GLMB.empty(2)).num_factors == 0
+    assert as_single_factor(GLMB.empty(2)).num_factors == 0
 
 
 @given(factoreds(3))

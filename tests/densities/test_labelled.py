@@ -15,13 +15,13 @@ from vedette.densities import (
     GLMB,
     LMB,
     FactoredGLMB,
-    Labelled,
+    LabelledDensity,
     cardinality_distribution,
     existence_probabilities,
     marginalise,
     track_moments,
 )
-from vedette.densities.conversions import collapsed
+from vedette.densities.conversions import with_single_gaussians
 from vedette.densities.label_sets import possible
 from vedette.densities.tracks import place_labels
 
@@ -45,7 +45,7 @@ def _close(got: dict[Any, float], expected: dict[Any, float]) -> None:
 
 
 @given(ANY)
-def test_numbers_and_existences_are_those_of_all_label_sets(density: Labelled) -> None:
+def test_numbers_and_existences_are_those_of_all_label_sets(density: LabelledDensity) -> None:
     sets = _sets(density)
     distribution = cardinality_distribution(density)
     numbers = np.bincount([len(labels) for labels in sets], list(sets.values()), len(distribution))
@@ -60,13 +60,13 @@ def test_numbers_and_existences_are_those_of_all_label_sets(density: Labelled) -
 
 
 @given(ANY)
-def test_a_density_is_the_product_of_its_factors(density: Labelled) -> None:
+def test_a_density_is_the_product_of_its_factors(density: LabelledDensity) -> None:
     _close(_sets(FactoredGLMB.of(density)), _sets(density))
     assert (density.is_lmb, density.is_product) == (type(density) is LMB, type(density) is FactoredGLMB)
 
 
 @given(ANY)
-def test_other_labels_change_nothing_else(density: Labelled) -> None:
+def test_other_labels_change_nothing_else(density: LabelledDensity) -> None:
     def renamed(label: Any) -> tuple[int, int]:
         return label[0], 100 - label[1]  # in the other order within a step
 
@@ -79,7 +79,7 @@ def test_other_labels_change_nothing_else(density: Labelled) -> None:
 
 @given(ANY)
 def test_single_gaussians_have_the_same_sets_and_every_one_once(density: Any) -> None:
-    single = collapsed(density)
+    single = with_single_gaussians(density)
     assert single.is_marginalised
     assert single.tracks.num_tracks == len(single.tracks.log_weights)
     _close(_sets(single), _sets(density))

@@ -19,7 +19,7 @@ from vedette.densities import (
     as_lmb,
     cardinality_distribution,
     marginal_estimate,
-    settled_lmb,
+    resolve_labels,
 )
 
 _ALL: dict[str, Any] = {"max_components": 10**6, "log_min_weight": -np.inf, "merge_distance": 0.0}
@@ -55,7 +55,7 @@ def _same(got, expected):
 
 @given(glmbs())
 def test_names_of_a_glmb_are_those_of_the_cheapest_assignments(glmb):
-    _same(plain_lmb(settled_lmb(glmb, **_ALL)), _renamed(glmb))
+    _same(plain_lmb(resolve_labels(glmb, **_ALL)), _renamed(glmb))
 
 
 @given(factoreds(max_components=2))
@@ -63,19 +63,19 @@ def test_factors_are_settled_each_by_itself(density):
     expected: dict[Any, Any] = {}
     for factor in density.factors:
         expected |= _renamed(factor)
-    _same(plain_lmb(settled_lmb(density, **_ALL)), expected)
+    _same(plain_lmb(resolve_labels(density, **_ALL)), expected)
 
 
 @given(lmbs())
 def test_an_lmb_has_no_open_names(lmb):
-    assert settled_lmb(lmb) is lmb
-    _same(plain_lmb(settled_lmb(FactoredGLMB.from_lmb(lmb), **_ALL)), plain_lmb(lmb))
+    assert resolve_labels(lmb) is lmb
+    _same(plain_lmb(resolve_labels(FactoredGLMB.from_lmb(lmb), **_ALL)), plain_lmb(lmb))
 
 
 @given(factoreds())
 def test_the_mean_number_of_targets_stays(density):
     expected = np.dot(cardinality_distribution(density), np.arange(len(cardinality_distribution(density))))
-    assert settled_lmb(density).existence.sum() == pytest.approx(expected, abs=1e-9)
+    assert resolve_labels(density).existence.sum() == pytest.approx(expected, abs=1e-9)
 
 
 def _tracks(labels, places):
@@ -84,7 +84,7 @@ def _tracks(labels, places):
 
 def test_one_target_with_two_names_is_one_target():
     glmb = GLMB.from_hypotheses(_tracks([[1, 0], [2, 0]], [0, 0.1]), [[0], [1], []], [0.19, 0.78, 0.03])
-    settled_names = settled_lmb(glmb)
+    settled_names = resolve_labels(glmb)
     assert settled_names.tracks.labels.tolist() == [[2, 0]]
     assert settled_names.existence == pytest.approx([0.97])
     assert as_lmb(glmb).existence == pytest.approx([0.19, 0.78])
@@ -94,7 +94,7 @@ def test_one_target_with_two_names_is_one_target():
 def test_two_targets_that_may_be_swapped_stand_in_two_places():
     tracks = _tracks([[0, 0], [1, 0], [0, 0], [1, 0]], [0, 100, 100, 0])
     density = FactoredGLMB.from_glmb(GLMB.from_hypotheses(tracks, [[0, 1], [2, 3]], [0.4, 0.6]))
-    lmb = settled_lmb(density)
+    lmb = resolve_labels(density)
     assert lmb.existence == pytest.approx([1.0, 1.0])
     assert lmb.tracks.means.ravel() == pytest.approx([100.0, 0.0])
 
@@ -102,6 +102,6 @@ def test_two_targets_that_may_be_swapped_stand_in_two_places():
 def test_a_target_far_from_all_takes_a_name_that_is_free():
     """One of two labels here, or one of them there: two places, though both hypotheses name the first."""
     tracks = _tracks([[0, 0], [0, 0], [1, 0]], [0, 100, 1])
-    lmb = settled_lmb(GLMB.from_hypotheses(tracks, [[0], [1], [2]], [0.5, 0.3, 0.2]))
+    lmb = resolve_labels(GLMB.from_hypotheses(tracks, [[0], [1], [2]], [0.5, 0.3, 0.2]))
     assert lmb.existence == pytest.approx([0.7, 0.3])
     assert lmb.tracks.means[1] == pytest.approx([100.0])

@@ -28,12 +28,12 @@ from vedette.errors import InputError, ModelError, VedetteError
 from vedette.evaluation import run_scenario
 from vedette.filters import (
     BeliefPropagation,
+    CustomMarginals,
     FilterInfo,
     Gibbs,
     Limits,
     LmbFilter,
-    Marginals,
-    Ranked,
+    RankedAssignment,
     SequentialLmbFilter,
 )
 from vedette.kernels.association.assignment import ABSENT, MISSED
@@ -170,7 +170,7 @@ def rewards_of(assignment: Any) -> Floats:
 
 
 def test_pseudo_updates_associate_as_the_filter_does() -> None:
-    ranked, propagated = rewards_of(Ranked()), rewards_of(BeliefPropagation())
+    ranked, propagated = rewards_of(RankedAssignment()), rewards_of(BeliefPropagation())
     np.testing.assert_allclose(rewards_of(exact), ranked, rtol=1e-9, atol=1e-12)
     assert np.isfinite(propagated).all()
     assert not np.allclose(propagated, ranked, rtol=0.01)
@@ -252,10 +252,11 @@ def test_options_that_are_refused() -> None:
     scene = linear_scene()
     wrong: Any
     for wrong, name in ((Gibbs(), "Gibbs"), (None, "NoneType"), ("ranked", "str")):
-        wanted = rf"assignment: expected Ranked, BeliefPropagation, Marginals or another with to_kernel\(\); got {name}"
+        kinds = "RankedAssignment, BeliefPropagation, CustomMarginals"
+        wanted = rf"assignment: expected {kinds} or another with to_kernel\(\); got {name}"
         with pytest.raises(InputError, match=wanted):
             replace(scene.lmb_filter(), assignment=wrong)
-    with pytest.raises(InputError, match="assignment: expected Ranked or Gibbs; got BeliefPropagation"):
+    with pytest.raises(InputError, match="assignment: expected RankedAssignment or Gibbs; got BeliefPropagation"):
         scene.glmb_filter(assignment=BeliefPropagation())
     with pytest.raises(InputError, match=r"max_sweeps: expected .*at least 1"):
         BeliefPropagation(0)
@@ -287,13 +288,13 @@ def _first_of_small_scans(offsets: Ints, columns: Ints, log_weights: Floats, par
 
 def test_functions_that_are_refused() -> None:
     with pytest.raises(InputError, match=r"function: expected a function decorated with @model_function"):
-        Marginals(lambda: 0.0)
+        CustomMarginals(lambda: 0.0)
     with pytest.raises(ModelError, match=r"(?s)'_not_normalised' at .*expected log probabilities that sum to 1"):
-        Marginals(_not_normalised)
+        CustomMarginals(_not_normalised)
     with pytest.raises(ModelError, match=r"(?s)'_too_far' at .*reads or writes outside an array"):
-        Marginals(_too_far)
+        CustomMarginals(_too_far)
     scene = linear_scene()
-    tracker = replace(scene.lmb_filter(), assignment=Marginals(_first_of_small_scans, np.array([0.1])))
+    tracker = replace(scene.lmb_filter(), assignment=CustomMarginals(_first_of_small_scans, np.array([0.1])))
     belief, _ = tracker.step(tracker.initial(), scene.scans[0], scene.pose, 1.0, 1, rng=np.random.default_rng(0))
     with pytest.raises(ModelError, match="the probabilities of a row's options do not sum to 1"):
         tracker.step(belief, scene.scans[1], scene.pose, 1.0, 2, rng=np.random.default_rng(0))

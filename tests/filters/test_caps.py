@@ -13,7 +13,7 @@ import pytest
 from filters.members import arrays
 from vedette import models
 from vedette.densities import GLMB, LMB, map_estimate
-from vedette.filters import DeltaGlmbFilter, FilterInfo, Gibbs, Limits, LmbFilter, Ranked
+from vedette.filters import DeltaGlmbFilter, FilterInfo, Gibbs, Limits, LmbFilter, RankedAssignment
 from vedette.kernels.base.compile import JIT_ENABLED
 
 POSE = np.array([900.0, 900.0, 0.0])
@@ -35,7 +35,7 @@ def make(kind: str, limits: Limits = LIMITS) -> Any:
     targets = models.TargetModel(MOTION, models.constant_survival(0.99), birth)
     if kind == "lmb":
         return LmbFilter(targets, SENSOR, limits)
-    assignment = Gibbs(300) if kind == "gibbs" else Ranked()
+    assignment = Gibbs(300) if kind == "gibbs" else RankedAssignment()
     return DeltaGlmbFilter(targets, SENSOR, limits, assignment, kind == "marginalised")
 
 

@@ -42,7 +42,7 @@ from vedette.filters import (
     Gibbs,
     Limits,
     LmbFilter,
-    TwoStepFilter,
+    PredictUpdateFilter,
 )
 from vedette.filters.inputs import model_errors
 from vedette.kernels.base.arrays import counted_ints
@@ -232,7 +232,7 @@ def test_births_must_be_new(kind: Any) -> None:
 @pytest.mark.parametrize(
     ("kind", "field", "value", "message"),
     [
-        (DeltaGlmbFilter, "assignment", "murty", "assignment: expected Ranked or Gibbs; got str"),
+        (DeltaGlmbFilter, "assignment", "murty", "assignment: expected RankedAssignment or Gibbs; got str"),
         (FactoredGlmbFilter, "max_split_error", 3.0, "max_split_error: expected at most 2"),
         (FactoredGlmbFilter, "max_factor_labels", 0, "max_factor_labels"),
     ],
@@ -500,7 +500,7 @@ def test_nothing_is_written_into_the_arguments_and_a_filter_can_be_sent(kind: An
 @pytest.mark.parametrize("kind", LABELLED)
 def test_a_prediction_and_an_update_are_a_step(kind: Any) -> None:
     local = make(kind, Limits.none())
-    assert isinstance(local, TwoStepFilter)
+    assert isinstance(local, PredictUpdateFilter)
     belief = two = local.initial()
     for number, scan in enumerate(([[12.0, 9.0]], [[13.0, 7.0], [47.0, 53.0]]), start=1):
         belief, info = step(local, scan, belief, number=number)

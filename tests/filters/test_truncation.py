@@ -14,7 +14,7 @@ from filters.examples import DT, SCENES, assert_same_glmb, linear_scene, plain_g
 from reference import glmb as oracle
 from vedette.densities import GLMB, FactoredGLMB, TrackTable
 from vedette.evaluation.runs import run_scenario
-from vedette.filters import DeltaGlmbFilter, FactoredGlmbFilter, Gibbs, Limits, Ranked
+from vedette.filters import DeltaGlmbFilter, FactoredGlmbFilter, Gibbs, Limits, RankedAssignment
 from vedette.scenarios import load_scenario
 from vedette.scenarios.build import build_experiment, build_sensors
 from vedette.scenarios.overrides import with_fields
@@ -28,7 +28,7 @@ def step(tracker, belief, scene, at, seed=0):
 
 
 @pytest.mark.parametrize("name", SCENES)
-@pytest.mark.parametrize("assignment", [Ranked(), Gibbs(30)], ids=["ranked", "gibbs"])
+@pytest.mark.parametrize("assignment", [RankedAssignment(), Gibbs(30)], ids=["ranked", "gibbs"])
 def test_what_was_discarded_is_stated_though_measurements_are_contested(name, assignment):
     scene = SCENES[name]()
     exact, belief = scene.glmb_filter(), scene.glmb_filter().initial()
@@ -124,7 +124,7 @@ def test_capped_is_the_head_of_the_whole(most):
     assert_same_glmb(plain_glmb(head), [(weight / total, tracks) for weight, tracks in expected])
 
 
-@pytest.mark.parametrize("assignment", [Ranked(), Gibbs(30)], ids=["ranked", "gibbs"])
+@pytest.mark.parametrize("assignment", [RankedAssignment(), Gibbs(30)], ids=["ranked", "gibbs"])
 def test_light_hypotheses_are_dropped(assignment):
     scene = linear_scene()
     limits = replace(Limits.none(), min_relative_weight=0.05, min_track_weight=1.0)
@@ -136,7 +136,7 @@ def test_light_hypotheses_are_dropped(assignment):
     assert info.discarded_weight_bound > 0.0
 
 
-@pytest.mark.parametrize("assignment", [Ranked(), Gibbs(30)], ids=["ranked", "gibbs"])
+@pytest.mark.parametrize("assignment", [RankedAssignment(), Gibbs(30)], ids=["ranked", "gibbs"])
 def test_every_way_a_target_may_be_seen_is_kept(assignment):
     scene = linear_scene(existence=0.02, prob_detection=0.6)
     few = replace(Limits.none(), max_hypotheses=12, min_track_weight=1.0)

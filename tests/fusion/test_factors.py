@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from densities.examples import random_covs, random_factor, random_factored
 from fusion.examples import assert_same_glmb, by_label_set
-from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable, as_glmb, as_lmb, settled_lmb
+from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable, as_glmb, as_lmb, resolve_labels
 from vedette.errors import InputError, NumericalError
 from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb, FusionLimits, LabelMatchedFusion, match_labels
 
@@ -236,5 +236,5 @@ def test_labels_are_matched_across_sensors():
     assert isinstance(matched, FactoredGLMB)
     assert_same_glmb(all_of(matched), all_of(first), 1e-12)
     fused, _ = LabelMatchedFusion(CmDeltaGlmb((0.5, 0.5))).fuse([first, second])
-    settled = FactoredGLMB.from_lmb(settled_lmb(first, max_components=10))  # names that are open are not matched
+    settled = FactoredGLMB.from_lmb(resolve_labels(first, max_components=10))  # names that are open are not matched
     assert_same_glmb(all_of(fused), all_of(CmDeltaGlmb((0.5, 0.5)).fuse([settled, settled])[0]), 1e-9)

@@ -17,7 +17,7 @@ from vedette.filters import (
     Limits,
     LmbFilter,
     PhdFilter,
-    Ranked,
+    RankedAssignment,
 )
 
 Rng = np.random.Generator
@@ -141,10 +141,10 @@ def make_filter(rng: Rng, kind: str, targets: models.TargetModel) -> Any:
     if kind in ("ranked", "gibbs", "marginalised"):
         drawn = Gibbs(int(rng.integers(1, 40)))
         return DeltaGlmbFilter(
-            *args, drawn if kind == "gibbs" else one_of(rng, Ranked(), drawn), kind == "marginalised"
+            *args, drawn if kind == "gibbs" else one_of(rng, RankedAssignment(), drawn), kind == "marginalised"
         )
     if kind == "lmb":
-        return LmbFilter(*args, one_of(rng, Ranked(), Ranked(), BeliefPropagation()))
+        return LmbFilter(*args, one_of(rng, RankedAssignment(), RankedAssignment(), BeliefPropagation()))
     return {"phd": PhdFilter, "cphd": CphdFilter, "cbmember": CbMemberFilter}[kind](*args)
 
 

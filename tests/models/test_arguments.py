@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from vedette.errors import InputError
-from vedette.filters import TwoStepFilter
+from vedette.filters import PredictUpdateFilter
 from vedette.models.arguments import instance, provides
 from vedette.platforms import HeadingPlatform, Operated, Stationary
 from vedette.platforms.base import HasPrices, HasScans, Platform, SupportsManyActions
 
-PROTOCOLS = (Platform, SupportsManyActions, HasPrices, HasScans, TwoStepFilter)
+PROTOCOLS = (Platform, SupportsManyActions, HasPrices, HasScans, PredictUpdateFilter)
 
 
 class Loose:

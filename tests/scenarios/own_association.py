@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from vedette.filters import Marginals
+from vedette.filters import CustomMarginals
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models import model_function
 
@@ -39,5 +39,5 @@ def enumerated(offsets: Ints, columns: Ints, log_weights: Floats, params: Floats
     return math.log(total)
 
 
-exact = Marginals(enumerated)
+exact = CustomMarginals(enumerated)
 no_marginals = np.zeros(3)

@@ -31,7 +31,7 @@ from vedette.filters import (
     MultiSensorGlmbFilter,
     MultiSensorLmbFilter,
     PhdFilter,
-    Ranked,
+    RankedAssignment,
 )
 from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb, LabelMatchedFusion, ParallelUpdate
 from vedette.scenarios import Scenario, build, list_builtin, load_scenario, parse_scenario, with_fields
@@ -196,7 +196,7 @@ def test_a_state_dimension_that_is_not_the_models() -> None:
 def test_filters_of_each_kind() -> None:
     ranked, _ = filters_of(scenario())
     assert isinstance(ranked, DeltaGlmbFilter)
-    assert (ranked.marginalised, ranked.assignment) == (True, Ranked())
+    assert (ranked.marginalised, ranked.assignment) == (True, RankedAssignment())
     text = "kind: delta_glmb, gaussian_method: ckf, assignment: {kind: gibbs, num_samples: 77}, limits: {max_hypotheses: 9}"
     gibbs, _ = filters_of(scenario(("kind: m_delta_glmb", text)))
     assert isinstance(gibbs, DeltaGlmbFilter)

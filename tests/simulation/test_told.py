@@ -10,7 +10,7 @@ import pytest
 
 from control.examples import mobile_sensor
 from vedette.control import FixedPlanner, Plan
-from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled, Poisson, UndetectedIntensity, as_glmb
+from vedette.densities import GLMB, LMB, FactoredGLMB, LabelledDensity, Poisson, UndetectedIntensity, as_glmb
 from vedette.errors import InputError
 from vedette.evaluation import run_scenario
 from vedette.models import BirthModel, CellGrid, MeasurementBirth, Region
@@ -80,7 +80,7 @@ def told_of(kind: str, births: bool) -> State:
     return found
 
 
-def table(belief: Labelled) -> Any:
+def table(belief: LabelledDensity) -> Any:
     """Labels, existences, means and covariances of a belief, one Gaussian each."""
     rows = list(belief.targets())
     return [own.label for own in rows], *(
@@ -111,7 +111,7 @@ def test_it_needs_its_truth_and_labels() -> None:
     state, rng = State((fused, local), fused, step=1, time=1.0), np.random.default_rng(0)
     with pytest.raises(InputError, match="truth: expected the targets of the run"):
         planner.plan(state, POSES, rng=rng)
-    with pytest.raises(InputError, match=r"state\.fused: expected a Labelled"):
+    with pytest.raises(InputError, match=r"state\.fused: expected a LabelledDensity"):
         planner.with_truth(truth()).plan(replace(state, fused=Poisson.empty(4)), POSES, rng=rng)
     with pytest.raises(InputError, match="truth: expected states of at most 4 components"):
         planner.with_truth(replace(truth(), states=np.ones((6, 5))))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tracking.scenes import lmb, sensor
-from vedette.densities import GLMB, FactoredGLMB, Labelled, TrackTable, as_lmb
+from vedette.densities import GLMB, FactoredGLMB, LabelledDensity, TrackTable, as_lmb
 from vedette.models import BirthModel, MeasurementBirth
 from vedette.tracking.base import bytes_of_belief
 from vedette.tracking.births import births_from_scans
@@ -42,7 +42,7 @@ def test_births_are_those_beside_the_lmb() -> None:
     alone = FactoredGLMB.from_lmb(targets([[1, 0], [1, 1]], [0.6, 0.9]))
     product = FactoredGLMB.product([alone, FactoredGLMB.from_glmb(pair())], 4)
     scan = np.array([[2.0, -1.0], [101.0, 0.0], [302.0, 1.0], [-300.0, 50.0]])
-    own: list[Labelled] = [product, as_lmb(product)]
+    own: list[LabelledDensity] = [product, as_lmb(product)]
     born, wanted = (
         births_from_scans(BIRTH, belief, [sensor(3.0, 0.9, 4.0)], [scan], np.zeros((1, 3)), 7) for belief in own
     )

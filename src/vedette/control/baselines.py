@@ -11,7 +11,7 @@ from vedette.control.constraints import Constraint, ConstraintContext, nearest_f
 from vedette.control.inputs import check_control_inputs, check_poses, mask_of_decision, options_of, predicted_beliefs
 from vedette.control.plan import Plan
 from vedette.control.settings import MobileSensor, PlanningSettings
-from vedette.filters import labels_targets
+from vedette.filters import has_labels
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import generator, instance, reject, sequence
 from vedette.platforms import Actions
@@ -63,7 +63,7 @@ class RandomPlanner:
     def __post_init__(self) -> None:
         check_control_inputs(self)
         asking = [own.name for own in self.constraints if own.needs_beliefs]
-        if asking and not all(labels_targets(sensor.filter) for sensor in self.sensors):
+        if asking and not all(has_labels(sensor.filter) for sensor in self.sensors):
             raise reject("constraints", "none that asks where targets will be, as filters have no labels", asking[0])
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:

@@ -12,9 +12,9 @@ from vedette.control.prediction import predicted
 from vedette.control.rewards.base import LabelReward, PowerReward
 from vedette.control.rewards.power import ExpectedLossReward
 from vedette.control.settings import MobileSensor, PlanningSettings
-from vedette.densities import Labelled
+from vedette.densities import LabelledDensity
 from vedette.errors import InputError
-from vedette.filters import shared_targets
+from vedette.filters import common_target_model
 from vedette.fusion import Fusion
 from vedette.kernels.base.types import Floats
 from vedette.kernels.labelled.validity import is_valid_glmb, is_valid_lmb
@@ -31,7 +31,7 @@ def check_sensors(sensors: Sequence[MobileSensor]) -> TargetModel:
     """Return the target model of the sensors; `InputError` unless there is a sensor and all have the same model."""
     if len(sensors) == 0 or not all(isinstance(sensor, MobileSensor) for sensor in sensors):
         raise reject("sensors", "at least one MobileSensor", sensors)
-    return shared_targets([sensor.filter for sensor in sensors])
+    return common_target_model([sensor.filter for sensor in sensors])
 
 
 def check_control_inputs(planner: Any) -> None:
@@ -83,13 +83,13 @@ def check_state(sensors: Sequence[MobileSensor], state: State) -> None:
         if sensor.belief is None:
             raise reject(f"sensors[{i}].filter", "one that labels its targets", type(sensor.filter).__name__)
         _check_density(f"state.local[{i}]", belief, sensor.belief, state_dim, checked)
-    _check_density("state.fused", state.fused, Labelled, state_dim, checked)
+    _check_density("state.fused", state.fused, LabelledDensity, state_dim, checked)
 
 
 def _check_density(name: str, density: Any, kind: type[Any], state_dim: int, checked: set[int]) -> None:
     """Validate a density. checked: identities of valid densities, as sensors of one tracker may share one."""
     if not isinstance(density, kind):
-        expected = "GLMB, LMB or FactoredGLMB" if kind is Labelled else kind.__name__
+        expected = "GLMB, LMB or FactoredGLMB" if kind is LabelledDensity else kind.__name__
         raise InputError(f"{name}: expected {expected}; got {type(density).__name__}")
     if density.state_dim != state_dim:
         raise InputError(f"{name}: expected states of dimension {state_dim}, as its filter; got {density.state_dim}")
@@ -146,7 +146,7 @@ def predicted_beliefs(
     settings: PlanningSettings,
     first: int,
     last: int,
-) -> tuple[Labelled, ...]:
+) -> tuple[LabelledDensity, ...]:
     """Return the fused belief predicted by `first` to `last` steps of the horizon; empty if no constraint needs it.
 
     Raises `InputError` for a belief without labels.
@@ -154,10 +154,10 @@ def predicted_beliefs(
     asking = [constraint.name for constraint in constraints if constraint.needs_beliefs]
     if fused is None or not asking:
         return ()
-    if not isinstance(fused, Labelled):
+    if not isinstance(fused, LabelledDensity):
         expected = f"a density with labels, as the constraint {asking[0]} asks where targets will be"
         raise reject("state.fused", expected, type(fused).__name__)
-    motion = shared_targets([sensor.filter for sensor in sensors]).motion
+    motion = common_target_model([sensor.filter for sensor in sensors]).motion
     return tuple(predicted(fused, motion, step, settings.horizon_period) for step in range(first, last + 1))
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from vedette.control.prediction import ALWAYS_SURVIVES
 from vedette.control.settings import IDEAL_MODES, MobileSensor, PlanningSettings
-from vedette.filters.inputs import nobody
+from vedette.filters.inputs import no_births_for_kernel
 from vedette.kernels.base.types import Bools, Floats, Motion, Sensor
 from vedette.kernels.gaussian.sigma_points import LINEARISED
 from vedette.kernels.planning.batched_models import (
@@ -74,7 +74,7 @@ def decision_of(
     targets, own = sensor.filter.targets, sensor.filter.sensor
     motion, sees = kernel_motion(targets.motion, ALWAYS_SURVIVES), own.to_kernel(detection_at)
     return Decision(
-        nobody(targets.state_dim),
+        no_births_for_kernel(targets.state_dim),
         motion,
         sees,
         forms_of(motion, sees, horizon.dt, targets.state_dim, is_turn(courses[:, 0])),

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple, TypeVar
 
-from vedette.densities import LMB, Labelled, track_moments
+from vedette.densities import LMB, LabelledDensity, track_moments
 from vedette.densities.containers import for_kernel, unchecked
-from vedette.densities.conversions import collapsed
+from vedette.densities.conversions import with_single_gaussians
 from vedette.densities.label_sets import possible
 from vedette.densities.tracks import gaussian_tracks, single_gaussians
 from vedette.filters.inputs import model_errors
@@ -14,7 +14,7 @@ from vedette.kernels.base.types import Lmb
 from vedette.kernels.planning.reach import Paths, predict_paths
 from vedette.models import MotionModel, constant_survival, kernel_motion
 
-_Labelled = TypeVar("_Labelled", bound=Labelled)
+_Labelled = TypeVar("_Labelled", bound=LabelledDensity)
 
 # No deaths over the horizon. All decisions share this model, so that the cached kernel input of a motion is reused.
 ALWAYS_SURVIVES = constant_survival(1.0)
@@ -44,7 +44,7 @@ def predicted(fused: _Labelled, motion: MotionModel, num_steps: int, period: flo
     Tracks are first collapsed to one Gaussian each (GLMBs are marginalised), as in the pseudo-updates. Label sets of
     weight zero are left out of a GLMB.
     """
-    single = possible(collapsed(fused))
+    single = possible(with_single_gaussians(fused))
     means, covs = track_moments(single.tracks)
     with model_errors():
         paths = predict_paths(kernel_motion(motion, ALWAYS_SURVIVES), float(period), int(num_steps), means, covs)

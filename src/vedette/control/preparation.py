@@ -18,11 +18,11 @@ from vedette.control.rewards.power import ExpectedLossReward
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import (
     LMB,
-    Labelled,
+    LabelledDensity,
     as_lmb,
-    at_peaks,
+    at_dominant_components,
     existence_probabilities,
-    settled_lmb,
+    resolve_labels,
 )
 from vedette.fusion import (
     Clmb,
@@ -182,7 +182,7 @@ def planning_beliefs(
     from_one = requires_common_prior(fusion)
     if _has_glmb(beliefs) and (why := why or _why_lmbs(num_sensors, fusion, settings, beliefs)):
         # Ambiguous labels are resolved only in a single belief; several beliefs would resolve them differently.
-        as_planned = settled_lmb if from_one or len(set(map(id, beliefs))) == 1 else as_lmb
+        as_planned = resolve_labels if from_one or len(set(map(id, beliefs))) == 1 else as_lmb
         converted: dict[int, LMB] = {}
         for belief in (state.fused,) if from_one else beliefs:
             if id(belief) not in converted:
@@ -206,8 +206,8 @@ def _planned_on_loss(fusion: Fusion, state: State, why: str) -> PlanningBeliefs:
     """
     fused, num_sensors, notes = state.fused, len(state.local), tuple[str, ...]()
     if _has_glmb((*state.local, fused)):
-        fused, fusion, notes = settled_lmb(fused), _of_lmbs(fusion), (_PLANNED_ON_LMBS.format(why),)
-    fused = at_peaks(fused)
+        fused, fusion, notes = resolve_labels(fused), _of_lmbs(fusion), (_PLANNED_ON_LMBS.format(why),)
+    fused = at_dominant_components(fused)
     state = replace(state, local=(fused,) * num_sensors, fused=fused)
     return PlanningBeliefs(state, fusion, _PARALLEL.log_linear_pool(num_sensors), notes)
 
@@ -222,11 +222,11 @@ def _clmb(weights: tuple[float, ...]) -> Clmb:
     return Clmb(weights)
 
 
-def _has_glmb(beliefs: Sequence[Labelled]) -> bool:
+def _has_glmb(beliefs: Sequence[LabelledDensity]) -> bool:
     return not all([belief.is_lmb for belief in beliefs])
 
 
-def _why_lmbs(num_sensors: int, fusion: Fusion, settings: PlanningSettings, beliefs: Sequence[Labelled]) -> str:
+def _why_lmbs(num_sensors: int, fusion: Fusion, settings: PlanningSettings, beliefs: Sequence[LabelledDensity]) -> str:
     """Return why GLMBs are planned on as their LMBs; empty if they are not. beliefs: the fused one last."""
     if requires_common_prior(fusion):
         return f"{type(fusion).__name__} fuses LMBs"

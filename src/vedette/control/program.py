@@ -13,7 +13,7 @@ from vedette.control.constraints import Constraint, Mask
 from vedette.control.inputs import check_control_inputs, check_poses, mask_of_decision, options_of, single_mask
 from vedette.control.plan import Plan
 from vedette.control.settings import MobileSensor, PlanningSettings
-from vedette.densities import Estimate, Estimator, Labelled, best_estimate
+from vedette.densities import Estimate, Estimator, LabelledDensity, best_estimate
 from vedette.internal.programs import Program, start_program
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import generator, instance
@@ -105,7 +105,7 @@ def _choices(options: Sequence[Options], mask: Mask | None) -> list[dict[str, An
 
 def _target_list(belief: Any) -> list[dict[str, Any]]:
     """Return the targets of an estimate, or of a labelled density."""
-    if not isinstance(belief, Estimate | Labelled):
+    if not isinstance(belief, Estimate | LabelledDensity):
         return []
     return [
         {

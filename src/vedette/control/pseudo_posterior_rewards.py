@@ -25,7 +25,7 @@ from vedette.control.rewards.base import (
     unit_volume_of,
 )
 from vedette.control.settings import Belief, MobileSensor, PlanningSettings, scans_within
-from vedette.densities.batches import LabelledCases
+from vedette.densities.batches import DensityBatch
 from vedette.errors import NumericalError, SlowRewardWarning
 from vedette.fusion import FieldsOfView, Fusion, PrecomputedFusion, SupportsPrecomputation, precompute_single_sensor
 from vedette.kernels.base.types import Bools, Floats, Ints
@@ -59,7 +59,7 @@ class PseudoPosteriorRewards:
     reward: Reward | PowerReward | LabelReward
     options: tuple[Options, ...]
     prediction: Belief
-    posteriors: tuple[LabelledCases, ...]
+    posteriors: tuple[DensityBatch, ...]
     scanned: tuple[Bools, ...]
     counts: dict[str, int]
     notes: dict[str, None]
@@ -118,7 +118,7 @@ class PseudoPosteriorRewards:
 
         return evaluate
 
-    def _compute(self, posteriors: Sequence[LabelledCases], fusion: Fusion | None) -> SampleRewards:
+    def _compute(self, posteriors: Sequence[DensityBatch], fusion: Fusion | None) -> SampleRewards:
         laid = lay_out_rewards(posteriors, self.prediction, fusion, self.reward)
         if not isinstance(laid, str):
             return laid
@@ -149,7 +149,7 @@ class PseudoPosteriorRewards:
 
 
 def lay_out_rewards(
-    cases: Sequence[LabelledCases],
+    cases: Sequence[DensityBatch],
     prediction: Belief,
     fusion: Fusion | None,
     reward: Reward | PowerReward | LabelReward,
@@ -198,7 +198,7 @@ class PlainRewards:
         views: returns the fields of view at the end of a joint action, which a fusion may need.
     """
 
-    posteriors: Sequence[LabelledCases]
+    posteriors: Sequence[DensityBatch]
     prediction: Belief
     fusion: Fusion | None
     reward: Reward | PowerReward | LabelReward

@@ -19,7 +19,7 @@ from vedette.densities import (
     GLMB,
     LMB,
 )
-from vedette.densities.batches import LabelledCases
+from vedette.densities.batches import DensityBatch
 from vedette.densities.checks import offsets_of
 from vedette.densities.containers import for_kernel
 from vedette.densities.label_sets import label_sets, relinked, take_hypotheses
@@ -64,7 +64,7 @@ def pseudo_posteriors(
     futures: SampledTrajectories,
     settings: PlanningSettings,
     scans: Bools,
-) -> LabelledCases:
+) -> DensityBatch:
     """Run the sensor's filter over the horizon for every course and sample, without births or deaths.
 
     courses: (num_courses, horizon_steps, pose_dim) poses at the pseudo-updates. labels: of the targets of `futures`.
@@ -79,7 +79,7 @@ def pseudo_posteriors(
     return _run_lmb(belief, decision, association_of(sensor.filter), settings, num_cases, targets)
 
 
-def _run_glmb(belief: GLMB, decision: Decision, settings: PlanningSettings, num_cases: int) -> LabelledCases:
+def _run_glmb(belief: GLMB, decision: Decision, settings: PlanningSettings, num_cases: int) -> DensityBatch:
     heaviest = heaviest_hypotheses(belief, settings.max_prior_hypotheses)
     single = heaviest.with_fields(tracks=single_gaussians(heaviest.tracks))
     prior = merge_similar_tracks(single, settings.max_version_divergence)
@@ -98,7 +98,7 @@ def _run_glmb(belief: GLMB, decision: Decision, settings: PlanningSettings, num_
 
     with model_errors():
         run_chunks(work, num_cases, settings.threads())
-    return LabelledCases.of_glmbs(found.sets, results.log_weights, results.means, results.covs, **_counts(settings))
+    return DensityBatch.of_glmbs(found.sets, results.log_weights, results.means, results.covs, **_counts(settings))
 
 
 def _run_lmb(
@@ -108,7 +108,7 @@ def _run_lmb(
     settings: PlanningSettings,
     num_cases: int,
     targets: Ints,
-) -> LabelledCases:
+) -> DensityBatch:
     num, dim = belief.tracks.num_tracks, belief.tracks.state_dim
     results = LmbResults(
         np.empty((num_cases, num)), np.empty((num_cases, num, dim)), np.empty((num_cases, num, dim, dim))
@@ -133,7 +133,7 @@ def _run_lmb(
                 settings.threads(),
             )
     labels = [tuple(label) for label in belief.tracks.labels.tolist()]
-    return LabelledCases.of_lmbs(labels, results.logits, results.means, results.covs, **_counts(settings))
+    return DensityBatch.of_lmbs(labels, results.logits, results.means, results.covs, **_counts(settings))
 
 
 def _counts(settings: PlanningSettings) -> dict[str, int]:

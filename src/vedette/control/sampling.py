@@ -10,7 +10,7 @@ from vedette.control.settings import Belief, MobileSensor, PlanningSettings
 from vedette.densities import MultiTargetSamples
 from vedette.densities.samples import sample_labelled
 from vedette.densities.tracks import places_of
-from vedette.filters import shared_targets
+from vedette.filters import common_target_model
 from vedette.filters.inputs import model_errors
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.planning.ideal import propagate_samples
@@ -21,7 +21,7 @@ def draw_paths(
     fused: Belief, sensors: Sequence[MobileSensor], settings: PlanningSettings, *, rng: np.random.Generator
 ) -> tuple[MultiTargetSamples, Floats]:
     """Return samples of the fused density, and their noise-free states (horizon_steps, num_targets, state_dim)."""
-    targets = shared_targets([sensor.filter for sensor in sensors])
+    targets = common_target_model([sensor.filter for sensor in sensors])
     samples = sample_labelled(fused, settings.num_samples, rng=rng)
     with model_errors():
         motion = kernel_motion(targets.motion, targets.survival)

@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, Labelled
+from vedette.densities import GLMB, LMB, LabelledDensity
 from vedette.errors import InputError
 from vedette.filters import Filter, Limits
 from vedette.internal.threads import processors
@@ -145,7 +145,7 @@ class MobileSensor:
     filter: Filter
     platform: Platform
     scan_times: Floats | None = None
-    belief: type[Labelled] | None = field(init=False)
+    belief: type[LabelledDensity] | None = field(init=False)
     abilities: Abilities = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -154,7 +154,7 @@ class MobileSensor:
         check_platform("platform", self.platform)
         object.__setattr__(self, "abilities", Abilities.of(self.platform))
         initial = self.filter.initial()
-        object.__setattr__(self, "belief", type(initial) if isinstance(initial, Labelled) else None)
+        object.__setattr__(self, "belief", type(initial) if isinstance(initial, LabelledDensity) else None)
         if self.scan_times is not None:
             times = float_array("scan_times", self.scan_times, (None,))
             if (np.diff(times) <= 0.0).any():

@@ -4,13 +4,13 @@ from vedette.densities.conversions import (
     as_glmb,
     as_lmb,
     marginalise,
-    settled_lmb,
+    resolve_labels,
 )
 from vedette.densities.estimates import (
     Estimate,
     Estimator,
     TrackHistory,
-    at_peaks,
+    at_dominant_components,
     best_estimate,
     least_ospa_estimate,
     map_estimate,
@@ -23,7 +23,7 @@ from vedette.densities.factored import FactoredGLMB
 from vedette.densities.files import load_density, save_density
 from vedette.densities.glmb import GLMB
 from vedette.densities.inspection import Hypothesis, Target
-from vedette.densities.labelled import LMB, Labelled
+from vedette.densities.labelled import LMB, LabelledDensity
 from vedette.densities.multi_bernoulli import MultiBernoulli
 from vedette.densities.samples import (
     MultiTargetSamples,
@@ -46,7 +46,7 @@ __all__ = [
     "FactoredGLMB",
     "Hypothesis",
     "IidCluster",
-    "Labelled",
+    "LabelledDensity",
     "LearntRate",
     "MultiBernoulli",
     "MultiTargetSamples",
@@ -58,7 +58,7 @@ __all__ = [
     "UndetectedTargets",
     "as_glmb",
     "as_lmb",
-    "at_peaks",
+    "at_dominant_components",
     "best_estimate",
     "cardinality_distribution",
     "existence_probabilities",
@@ -69,13 +69,13 @@ __all__ = [
     "marginal_estimate",
     "marginalise",
     "mixture_moments",
+    "resolve_labels",
     "sample_glmb",
     "sample_iid_cluster",
     "sample_lmb",
     "sample_multi_bernoulli",
     "sample_poisson",
     "save_density",
-    "settled_lmb",
     "track_histories",
     "track_moments",
     "unlabelled_estimate",

@@ -12,7 +12,7 @@ from vedette.densities.checks import offsets_of
 from vedette.densities.containers import for_kernel, unchecked
 from vedette.densities.glmb import GLMB
 from vedette.densities.label_sets import Label, LabelSet, label_sets, possible
-from vedette.densities.labelled import LMB, Labelled
+from vedette.densities.labelled import LMB, LabelledDensity
 from vedette.densities.tracks import gaussian_tracks, single_gaussians
 from vedette.internal.probabilities import log_expit
 from vedette.internal.threads import run_chunks
@@ -25,7 +25,7 @@ Place: TypeAlias = tuple[LabelSet, LabelSet]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LabelledCases:
+class DensityBatch:
     """Labelled densities of one kind on the same label sets, of one Gaussian a track.
 
     Each is a product of factors, and a factor a weighted list of label sets with a Gaussian for each (set, label): a
@@ -56,14 +56,14 @@ class LabelledCases:
     @classmethod
     def of_glmbs(
         cls, sets: Sequence[LabelSet], log_weights: Floats, means: Floats, covs: Floats, **counts: int
-    ) -> LabelledCases:
+    ) -> DensityBatch:
         """Marginalised GLMBs on distinct label sets, log_weights (num_cases, num_sets)."""
         return cls(GLMB, ((),), np.array([0, len(sets)]), tuple(sets), log_weights, means, covs, **counts)
 
     @classmethod
     def of_lmbs(
         cls, labels: Sequence[Label], existence_logits: Floats, means: Floats, covs: Floats, **counts: int
-    ) -> LabelledCases:
+    ) -> DensityBatch:
         """LMBs of these labels, existence_logits (num_cases, num_labels)."""
         log_weights = np.empty((len(existence_logits), 2 * len(labels)))
         log_weights[:, 0::2], log_weights[:, 1::2] = log_expit(-existence_logits), log_expit(existence_logits)
@@ -73,7 +73,7 @@ class LabelledCases:
         return cls(LMB, factors, offsets, sets, log_weights, means, covs, **counts)
 
     @classmethod
-    def of(cls, density: Labelled) -> LabelledCases:
+    def of(cls, density: LabelledDensity) -> DensityBatch:
         """One LMB or marginalised GLMB as the only case; a mixture is replaced by one Gaussian of its moments."""
         tracks = single_gaussians(density.tracks).to_kernel()
         gaussians = tracks.components
@@ -135,7 +135,7 @@ class LabelledCases:
         return possible(unchecked(GLMB, tracks, self.set_offsets, members, self.log_weights[case].copy()))
 
 
-def lmb_cases(own: LabelledCases) -> LabelledCases:
+def lmb_batch(own: DensityBatch) -> DensityBatch:
     """GLMBs as LMBs of the same existence probabilities and of one Gaussian a label, in increasing label order."""
     members = np.array([label for labels in own.sets for label in labels], np.int64).reshape(-1, 2)
     labels = np.unique(members, axis=0)
@@ -148,4 +148,4 @@ def lmb_cases(own: LabelledCases) -> LabelledCases:
 
     run_chunks(work, own.num_cases, own.num_threads)
     known = [tuple(label) for label in labels.tolist()]
-    return LabelledCases.of_lmbs(known, logits, means, covs, num_samples=own.num_samples, num_threads=own.num_threads)
+    return DensityBatch.of_lmbs(known, logits, means, covs, num_samples=own.num_samples, num_threads=own.num_threads)

@@ -13,7 +13,7 @@ from vedette.densities.containers import unchecked
 from vedette.densities.factored import FactoredGLMB, sets_of_factors
 from vedette.densities.glmb import GLMB
 from vedette.densities.label_sets import take_factors
-from vedette.densities.labelled import LMB, Labelled
+from vedette.densities.labelled import LMB, LabelledDensity
 from vedette.densities.tracks import TrackTable, single_gaussians, take_tracks
 from vedette.errors import InputError
 from vedette.internal.probabilities import log_expit
@@ -24,7 +24,7 @@ from vedette.kernels.gaussian.reduction import MixtureCaps
 from vedette.kernels.labelled import conversions as kernels
 
 _Glmb = TypeVar("_Glmb", GLMB, FactoredGLMB)
-_Labelled = TypeVar("_Labelled", bound=Labelled)
+_Labelled = TypeVar("_Labelled", bound=LabelledDensity)
 
 DEFAULT_LOG_MIN_WEIGHT = math.log(1e-5)
 DEFAULT_MERGE_DISTANCE = 2.0
@@ -104,7 +104,7 @@ def _marginalised_glmbs(density: FactoredGLMB, caps: MixtureCaps) -> FactoredGLM
 
 
 def as_lmb(
-    density: Labelled,
+    density: LabelledDensity,
     *,
     max_components: int = 1,
     log_min_weight: float = DEFAULT_LOG_MIN_WEIGHT,
@@ -121,14 +121,14 @@ def as_lmb(
     return LMB.from_kernel(reduced_lmb(density, caps))
 
 
-def reduced_lmb(density: Labelled, caps: MixtureCaps, *, settled: bool = False) -> Lmb:
-    """The LMB of a density, its mixtures reduced where it is not one; settled: under the names of `settled_lmb`."""
+def reduced_lmb(density: LabelledDensity, caps: MixtureCaps, *, resolved: bool = False) -> Lmb:
+    """The LMB of a density, its mixtures reduced where it is not one; resolved: under the names of `resolve_labels`."""
     if isinstance(density, LMB):
         return density.to_kernel()
     factors, hypotheses = density.to_factors(), density.as_hypotheses()
     all_labels, place = distinct_labels(density.tracks.labels)
     place_of_entry = place[factors.hyp_tracks]
-    if settled:
+    if resolved:
         place_of_entry = settled_names(hypotheses, factors.factor_offsets, factors.track_offsets, place, _APART)
     used = np.bincount(place_of_entry, minlength=len(all_labels)) > 0  # a table may have more
     factor = np.empty(len(all_labels), np.int64)
@@ -138,8 +138,8 @@ def reduced_lmb(density: Labelled, caps: MixtureCaps, *, settled: bool = False) 
     return kernels.factors_to_lmb(hypotheses, all_labels[used], label_of, firsts, ends, caps)
 
 
-def settled_lmb(
-    density: Labelled,
+def resolve_labels(
+    density: LabelledDensity,
     *,
     max_components: int = 1,
     log_min_weight: float = DEFAULT_LOG_MIN_WEIGHT,
@@ -157,10 +157,10 @@ def settled_lmb(
     if isinstance(density, LMB):
         return density
     caps = _checked_caps(max_components, log_min_weight, merge_distance)
-    return LMB.from_kernel(reduced_lmb(density, caps, settled=True))
+    return LMB.from_kernel(reduced_lmb(density, caps, resolved=True))
 
 
-def collapsed(density: _Labelled) -> _Labelled:
+def with_single_gaussians(density: _Labelled) -> _Labelled:
     """The density with one Gaussian for each mixture: that of its moments; GLMBs are marginalised."""
     if density.is_lmb:
         return density.with_fields(tracks=single_gaussians(density.tracks))
@@ -168,14 +168,14 @@ def collapsed(density: _Labelled) -> _Labelled:
     return cast(_Labelled, marginalise(given, max_components=1))
 
 
-def names_settled(density: Labelled, max_components: int) -> Labelled:
-    """The density; where it is a product of GLMBs that leave names open, that of its `settled_lmb`."""
+def with_resolved_labels(density: LabelledDensity, max_components: int) -> LabelledDensity:
+    """The density; where it is a product of GLMBs that leave names open, that of its `resolve_labels`."""
     if not isinstance(density, FactoredGLMB) or density.is_bernoulli.all():
         return density
-    return FactoredGLMB.of(settled_lmb(density, max_components=max_components))
+    return FactoredGLMB.of(resolve_labels(density, max_components=max_components))
 
 
-def as_glmb(density: Labelled, *, max_hypotheses: int) -> tuple[GLMB, float]:
+def as_glmb(density: LabelledDensity, *, max_hypotheses: int) -> tuple[GLMB, float]:
     """GLMB of the `max_hypotheses` heaviest products of one hypothesis of each factor, and the weight of the others.
 
     Of an LMB these are its most probable label subsets; a GLMB is one factor. The GLMB shares the track table, and its

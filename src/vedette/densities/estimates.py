@@ -10,13 +10,13 @@ from typing import Any, Protocol
 import numpy as np
 
 from vedette.densities import checks
-from vedette.densities.conversions import settled_lmb
+from vedette.densities.conversions import resolve_labels
 from vedette.densities.factored import FactoredGLMB
 from vedette.densities.glmb import GLMB
 from vedette.densities.inspection import Target, Targets
-from vedette.densities.labelled import LMB, Labelled
+from vedette.densities.labelled import LMB, LabelledDensity
 from vedette.densities.multi_bernoulli import MultiBernoulli
-from vedette.densities.statistics import cardinality_distribution, labelled
+from vedette.densities.statistics import cardinality_distribution, check_labelled
 from vedette.densities.tracks import TrackTable, gaussian_tracks, heaviest_components
 from vedette.densities.unlabelled import IidCluster, Poisson
 from vedette.errors import InputError, NumericalError, VedetteError
@@ -109,7 +109,7 @@ class Estimator(Protocol):
         ...
 
 
-def map_estimate(density: Labelled) -> Estimate:
+def map_estimate(density: LabelledDensity) -> Estimate:
     """The most probable number of targets with labels, then the most probable ones of that number (paper, Algorithm 1).
 
     GLMB: the heaviest hypothesis of that cardinality. LMB: that many labels of highest existence. Product of GLMBs: the
@@ -117,7 +117,7 @@ def map_estimate(density: Labelled) -> Estimate:
     earlier hypothesis; the smaller label. A track that is a mixture is estimated by its heaviest component,
     as the mean of two rival components may lie where the target cannot be.
     """
-    given: Any = labelled(density)
+    given: Any = check_labelled(density)
     if not isinstance(given, GLMB | LMB):
         return _peaks(given.tracks, *map_tracks(given.to_factors()))
     number = int(np.argmax(given.cardinality_of_labels()))
@@ -127,7 +127,7 @@ def map_estimate(density: Labelled) -> Estimate:
     return _peaks(given.tracks, chosen, given.existence[chosen])
 
 
-def least_ospa_estimate(density: Labelled) -> Estimate:
+def least_ospa_estimate(density: LabelledDensity) -> Estimate:
     """The targets whose expected OSPA is least where a target is either in place or not.
 
     With n estimated targets of which M are in place, and N targets that exist, OSPA of order p and cutoff c is then
@@ -139,7 +139,7 @@ def least_ospa_estimate(density: Labelled) -> Estimate:
     0.11 it shows one, which is wrong in eight cases of nine. Targets without a label are not counted.
     Ties: the smaller number; then as `map_estimate`. A mixture is estimated by its heaviest component.
     """
-    given = labelled(density)
+    given = check_labelled(density)
     return _peaks(given.tracks, *least_ospa_tracks(given.to_factors()))
 
 
@@ -152,21 +152,21 @@ def best_estimate(density: Any, step: int) -> Estimate:
 
 def map_or_unlabelled(density: Any, step: int) -> Estimate:
     """An `Estimator` of every density: `map_estimate` if it has labels, else `unlabelled_estimate`."""
-    return map_estimate(density) if isinstance(density, Labelled) else unlabelled_estimate(density, step)
+    return map_estimate(density) if isinstance(density, LabelledDensity) else unlabelled_estimate(density, step)
 
 
-def marginal_estimate(density: Labelled, threshold: float = 0.5) -> Estimate:
+def marginal_estimate(density: LabelledDensity, threshold: float = 0.5) -> Estimate:
     """Every target whose probability of existence exceeds `threshold`, each estimated by the heaviest component of its
     marginal density.
 
-    Of GLMBs these are the targets of `settled_lmb`: one that may go by several names is one target, as probable as all
-    of them, and two whose names may be swapped stand in two places. Near components (Mahalanobis distance 2) are merged
-    before they are weighed.
+    Of GLMBs these are the targets of `resolve_labels`: one that may go by several names is one target, as probable as
+    all of them, and two whose names may be swapped stand in two places. Near components (Mahalanobis distance 2) are
+    merged before they are weighed.
     Raises `InputError` for a threshold outside [0, 1).
     """
     if not 0.0 <= threshold < 1.0:
         raise InputError(f"threshold: expected a probability below 1; got {threshold}")
-    lmb = settled_lmb(labelled(density), max_components=_MARGINAL_COMPONENTS)
+    lmb = resolve_labels(check_labelled(density), max_components=_MARGINAL_COMPONENTS)
     chosen = np.flatnonzero(lmb.existence > threshold)
     return _peaks(lmb.tracks, chosen, lmb.existence[chosen])
 
@@ -177,7 +177,7 @@ def _peaks(tracks: TrackTable, chosen: Ints, existence: Floats) -> Estimate:
     return Estimate(tracks.labels[chosen], tracks.means[heaviest], tracks.covs[heaviest], existence)
 
 
-def at_peaks(density: LMB) -> LMB:
+def at_dominant_components(density: LMB) -> LMB:
     """Each label at the heaviest component of its mixture, the first of several.
 
     The mean of two rival components may lie where the target cannot be, and their spread is no error that scans make

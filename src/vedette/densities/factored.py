@@ -11,7 +11,7 @@ import numpy as np
 from vedette.densities import checks
 from vedette.densities.containers import kernel_arrays, unchecked
 from vedette.densities.glmb import GLMB, Hypotheses
-from vedette.densities.labelled import LMB, Labelled
+from vedette.densities.labelled import LMB, LabelledDensity
 from vedette.densities.tracks import TrackTable
 from vedette.densities.undetected import UndetectedTargets
 from vedette.errors import InputError, VedetteError
@@ -156,7 +156,7 @@ class FactoredGLMB(Hypotheses):
         return cls.product([cls.of(factor) for factor in factors], state_dim)
 
     @classmethod
-    def of(cls, density: Labelled) -> FactoredGLMB:
+    def of(cls, density: LabelledDensity) -> FactoredGLMB:
         """The same density: a GLMB as one factor, an LMB as one a label (that it is absent, then that it is there)."""
         return density if isinstance(density, cls) else unchecked(cls, density.tracks, *density.to_factors()[1:], None)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from vedette.densities.factored import FactoredGLMB
 from vedette.densities.glmb import GLMB
-from vedette.densities.labelled import LMB, Labelled
+from vedette.densities.labelled import LMB, LabelledDensity
 from vedette.densities.multi_bernoulli import MultiBernoulli
 from vedette.densities.tracks import TrackTable
 from vedette.densities.undetected import LearntRate, UndetectedIntensity, UndetectedTargets
@@ -27,7 +27,7 @@ from vedette.models import CellGrid, Region
 FORMAT_NAME = "vedette-density"
 FORMAT_VERSION = 1
 
-Density: TypeAlias = Labelled | Poisson | IidCluster | MultiBernoulli
+Density: TypeAlias = LabelledDensity | Poisson | IidCluster | MultiBernoulli
 _KINDS: dict[str, type[Density]] = {
     "glmb": GLMB,
     "lmb": LMB,
@@ -92,14 +92,16 @@ def _kind_of(source: Path, arrays: Mapping[str, Any]) -> str:
 
 def _names(container: type[Any]) -> list[str]:
     """Of a container's arrays in a file, in the order of its fields, those of its track table first."""
-    of_tracks = [f"tracks.{field.name}" for field in fields(TrackTable)] if issubclass(container, Labelled) else []
+    of_tracks = (
+        [f"tracks.{field.name}" for field in fields(TrackTable)] if issubclass(container, LabelledDensity) else []
+    )
     return of_tracks + [field.name for field in fields(container) if field.name not in ("tracks", "undetected")]
 
 
 def _build(kind: str, arrays: Mapping[str, Any]) -> Density:
     container: Any = _KINDS[kind]
     own: list[Any] = [arrays.get(name) if name in _OPTIONAL else arrays[name] for name in _names(container)]
-    if not issubclass(container, Labelled):
+    if not issubclass(container, LabelledDensity):
         return cast(Density, container(*own))
     num = len(fields(TrackTable))
     undetected = {} if f"{_UNDETECTED}.next_label" not in arrays else {"undetected": _undetected_of(arrays)}

@@ -10,7 +10,7 @@ import numpy as np
 
 from vedette.densities import checks
 from vedette.densities.containers import kernel_arrays, unchecked
-from vedette.densities.labelled import Labelled
+from vedette.densities.labelled import LabelledDensity
 from vedette.densities.tracks import TrackTable, log_weights
 from vedette.errors import InputError, VedetteError
 from vedette.internal.text import pluralise
@@ -21,7 +21,7 @@ from vedette.kernels.labelled.labels import group_by_label_set
 _HYPOTHESES = kernel_arrays("hyp_offsets", "hyp_tracks", "hyp_log_weights")
 
 
-class Hypotheses(Labelled):
+class Hypotheses(LabelledDensity):
     """Factors of listed hypotheses, each a set of tracks with its weight in its factor."""
 
     __slots__ = ()

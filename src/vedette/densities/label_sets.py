@@ -13,7 +13,7 @@ from vedette.densities.checks import distinct_labels, offsets_of, take_runs
 from vedette.densities.containers import unchecked
 from vedette.densities.factored import FactoredGLMB
 from vedette.densities.glmb import GLMB
-from vedette.densities.labelled import LMB, Labelled
+from vedette.densities.labelled import LMB, LabelledDensity
 from vedette.densities.tracks import take_tracks
 from vedette.kernels.base.types import Bools, Ints
 from vedette.kernels.gaussian.reduction import MixtureCaps
@@ -22,7 +22,7 @@ from vedette.kernels.labelled.labels import group_by_label_set
 
 Label: TypeAlias = tuple[int, ...]
 LabelSet: TypeAlias = tuple[Label, ...]
-_Labelled = TypeVar("_Labelled", bound=Labelled)
+_Labelled = TypeVar("_Labelled", bound=LabelledDensity)
 WHOLE = MixtureCaps(-math.inf, 0.0, 2**62)  # which leave mixtures as they are
 
 
@@ -33,7 +33,7 @@ class LabelSets(NamedTuple):
     groups: Ints
 
 
-def label_sets(belief: Labelled) -> LabelSets:
+def label_sets(belief: LabelledDensity) -> LabelSets:
     """The label sets of a GLMB and which of them each hypothesis has."""
     hyps, labels = belief.as_hypotheses(), belief.tracks.labels.tolist()
     groups, firsts = group_by_label_set(hyps)
@@ -89,7 +89,7 @@ def lmb_of_factors(density: FactoredGLMB, factors: Ints) -> LMB:
     return unchecked(LMB, take_tracks(density.tracks, density.track_offsets[factors]), logits)
 
 
-def laid_out(glmb: GLMB) -> FactoredGLMB:
+def as_single_factor(glmb: GLMB) -> FactoredGLMB:
     """A GLMB as one factor; of one label, as `FactoredGLMB.from_lmb` lays it out, of none, no factor at all.
 
     Nothing is lost: the tracks of one label become one mixture of all their components.
@@ -145,7 +145,7 @@ def _factors_without(belief: FactoredGLMB, kept: Bools) -> FactoredGLMB:
     whole, parted = counts == np.diff(belief.track_offsets), []
     for index in np.flatnonzero(~whole & (counts > 0)).tolist():
         tracks = kept[belief.track_offsets[index] : belief.track_offsets[index + 1]]
-        parted.append(laid_out(_glmb_without(belief.factor(index), tracks)))
+        parted.append(as_single_factor(_glmb_without(belief.factor(index), tracks)))
     return FactoredGLMB.product([take_factors(belief, np.flatnonzero(whole & (counts > 0))), *parted], belief.state_dim)
 
 

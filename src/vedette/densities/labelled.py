@@ -24,7 +24,7 @@ from vedette.kernels.labelled.conversions import factored_to_glmb
 LABELLED = "a GLMB, an LMB or a FactoredGLMB"  # how messages call one
 
 
-class Labelled(MultiTarget):
+class LabelledDensity(MultiTarget):
     """A density that names its targets: a product of factors, each a weighted list of label sets, over one track table.
 
     An LMB is one factor a label, with the sets {} and {l}; a GLMB is one factor; a FactoredGLMB any number of them.
@@ -170,7 +170,7 @@ class Labelled(MultiTarget):
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class LMB(Labelled):
+class LMB(LabelledDensity):
     """Labelled multi-Bernoulli density: independent tracks, each with a probability of existence.
 
     Attributes:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.densities.batches import LabelledCases
+from vedette.densities.batches import DensityBatch
 from vedette.densities.checks import offsets_of
 from vedette.densities.label_sets import Label
 from vedette.errors import InputError
@@ -21,16 +21,16 @@ from vedette.kernels.gaussian.linalg import LOG_2PI
 from vedette.kernels.labelled.power_integrals import Laid, Places, SensorCases, Terms, power_table, write_rows
 
 
-class Share(NamedTuple):
+class SensorPower(NamedTuple):
     """What one sensor gives to a product."""
 
-    cases: LabelledCases
+    cases: DensityBatch
     power: float  # above 0
     held: Bools  # (num_cases, num_sets) false where the case counts as lacking the set
     floors: Floats  # (num_cases, n) log weights of stand-ins for the 1st, ..., n-th, 1st, ... set that a case lacks
 
     @classmethod
-    def whole(cls, cases: LabelledCases, held: Bools) -> Share:
+    def whole(cls, cases: DensityBatch, held: Bools) -> SensorPower:
         """A sensor alone, of which nothing is lacking."""
         return cls(cases, 1.0, held, np.zeros((cases.num_cases, 1)))
 
@@ -115,8 +115,8 @@ def check_exponents(exponents: Sequence[tuple[float, float]]) -> Floats:
     return pairs
 
 
-def lay_out_products(
-    shares: Sequence[Share], prediction: LabelledCases, sensors: Sequence[int] | None = None
+def precompute_products(
+    shares: Sequence[SensorPower], prediction: DensityBatch, sensors: Sequence[int] | None = None
 ) -> PowerProducts:
     """Lay out products of one case of each sensor, to be compared with the prediction on the sets that any sensor has.
 
@@ -132,7 +132,7 @@ def lay_out_products(
     target = _restricted(prediction, chosen)
     references = target.means[0].copy()
     parts = [_lay_out(share, target, references) for share in shares]
-    own = _lay_out(Share.whole(target, np.ones((1, len(target.sets)), np.bool_)), target, references)
+    own = _lay_out(SensorPower.whole(target, np.ones((1, len(target.sets)), np.bool_)), target, references)
     log_weights, held, rows = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     all_held = bool(np.any([part[1].all(axis=0) for part in parts], axis=0).all())
     laid = Laid(target.factor_offsets, target.set_offsets, log_weights, held, all_held, rows)
@@ -146,12 +146,12 @@ def lay_out_products(
     )  # fmt: skip
 
 
-def _restricted(cases: LabelledCases, chosen: Ints) -> LabelledCases:
+def _restricted(cases: DensityBatch, chosen: Ints) -> DensityBatch:
     """The cases on some of their sets, not renormalised; factors without a set go."""
     counts = np.histogram(chosen, cases.factor_offsets)[0] if len(cases.factors) else np.empty(0, np.int64)
     starts = cases.set_offsets
     members = np.array([m for i in chosen.tolist() for m in range(starts[i], starts[i + 1])], np.int64)
-    return LabelledCases(
+    return DensityBatch(
         cases.kind,
         tuple(name for name, count in zip(cases.factors, counts.tolist(), strict=True) if count),
         offsets_of(counts[counts > 0]),
@@ -162,7 +162,7 @@ def _restricted(cases: LabelledCases, chosen: Ints) -> LabelledCases:
     )
 
 
-def _lay_out(share: Share, target: LabelledCases, references: Floats) -> tuple[Floats, Bools, Floats]:
+def _lay_out(share: SensorPower, target: DensityBatch, references: Floats) -> tuple[Floats, Bools, Floats]:
     """Log weights, what is held, and rows of a sensor's cases on the sets of `target`."""
     cases = share.cases
     own = {place: i for i, place in enumerate(cases.places)}
@@ -183,7 +183,7 @@ def _lay_out(share: Share, target: LabelledCases, references: Floats) -> tuple[F
     return np.ascontiguousarray(log_weights), held, rows
 
 
-def _find_members(cases: LabelledCases, target: LabelledCases, places: Ints, references: Floats) -> Places:
+def _find_members(cases: DensityBatch, target: DensityBatch, places: Ints, references: Floats) -> Places:
     starts, own_sets = cases.set_offsets, np.repeat(np.arange(len(cases.sets)), np.diff(cases.set_offsets))
     versions: dict[Label, list[int]] = {}
     for m, label in enumerate(label for labels in cases.sets for label in labels):

@@ -10,7 +10,7 @@ import numpy as np
 
 from vedette.densities import checks
 from vedette.densities.glmb import GLMB
-from vedette.densities.labelled import LMB, Labelled
+from vedette.densities.labelled import LMB, LabelledDensity
 from vedette.densities.multi_bernoulli import MultiBernoulli
 from vedette.densities.unlabelled import IidCluster, Poisson
 from vedette.errors import InputError, NumericalError, VedetteError
@@ -73,7 +73,7 @@ def sample_lmb(density: LMB, num_samples: int, *, rng: np.random.Generator) -> M
     return _independent(density.to_kernel(), density.existence, num_samples, rng)
 
 
-def sample_labelled(density: Labelled, num_samples: int, *, rng: np.random.Generator) -> MultiTargetSamples:
+def sample_labelled(density: LabelledDensity, num_samples: int, *, rng: np.random.Generator) -> MultiTargetSamples:
     """Independent samples of an LMB or of a GLMB."""
     if isinstance(density, LMB):
         return sample_lmb(density, num_samples, rng=rng)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from vedette.densities.containers import MultiTarget
-from vedette.densities.labelled import LABELLED, Labelled
+from vedette.densities.labelled import LABELLED, LabelledDensity
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
 
@@ -22,13 +22,13 @@ def cardinality_distribution(density: MultiTarget) -> Floats:
     return density.cardinality()
 
 
-def existence_probabilities(density: Labelled) -> tuple[Ints, Floats]:
+def existence_probabilities(density: LabelledDensity) -> tuple[Ints, Floats]:
     """(num_labels, 2) labels in increasing order and (num_labels,) the probability that each one's target exists."""
-    return labelled(density).label_existence()
+    return check_labelled(density).label_existence()
 
 
-def labelled(density: Any) -> Labelled:
+def check_labelled(density: Any) -> LabelledDensity:
     """The density. Raises `InputError` where it does not name its targets."""
-    if not isinstance(density, Labelled):
+    if not isinstance(density, LabelledDensity):
         raise InputError(f"density: expected {LABELLED}, which have labels; got {type(density).__name__}")
     return density

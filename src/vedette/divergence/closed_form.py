@@ -7,7 +7,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from vedette.densities import LMB, FactoredGLMB, Labelled, Poisson, as_lmb
+from vedette.densities import LMB, FactoredGLMB, LabelledDensity, Poisson, as_lmb
 from vedette.densities.conversions import as_glmb, lmb_on_label_sets
 from vedette.densities.label_sets import in_label_order, join_factors, label_sets, lmb_of_factors
 from vedette.densities.labelled import LABELLED
@@ -18,7 +18,7 @@ from vedette.kernels.labelled.inner_products import log_glmbs, log_lmbs, log_tra
 from vedette.kernels.labelled.stacking import stack_glmbs, stack_tracks
 from vedette.models.arguments import positive
 
-Density: TypeAlias = Labelled | Poisson
+Density: TypeAlias = LabelledDensity | Poisson
 Support = Literal["full", "common"]
 
 MAX_PRODUCTS = 100_000
@@ -109,7 +109,7 @@ def check_support(support: str) -> None:
 
 
 def log_inner_products(
-    a: Labelled, b: Labelled, log_unit_volume: float, common: bool, *, self_terms: bool
+    a: LabelledDensity, b: LabelledDensity, log_unit_volume: float, common: bool, *, self_terms: bool
 ) -> tuple[float, float, float]:
     """Return log zeta(a, b), zeta(a, a), zeta(b, b) of labelled densities.
 
@@ -120,7 +120,7 @@ def log_inner_products(
     return cross, own_a, own_b
 
 
-def paired_parts(p: Labelled, q: Labelled) -> list[tuple[Labelled, Labelled]]:
+def paired_parts(p: LabelledDensity, q: LabelledDensity) -> list[tuple[LabelledDensity, LabelledDensity]]:
     """Return parts whose products are p and q, as pairs with the same labels; no two pairs share a label.
 
     If neither is a product, the only pair is the densities themselves. Labels that form factors of their own in both
@@ -132,7 +132,7 @@ def paired_parts(p: Labelled, q: Labelled) -> list[tuple[Labelled, Labelled]]:
     if not (p.is_product or q.is_product):
         return [(p, q)]
     joined = join_factors([FactoredGLMB.of(p), FactoredGLMB.of(q)])
-    pairs: list[tuple[Labelled, Labelled]] = []
+    pairs: list[tuple[LabelledDensity, LabelledDensity]] = []
     if joined.alone.any():
         first, second = joined.lmbs_alone()
         pairs.append((first, second))
@@ -142,7 +142,7 @@ def paired_parts(p: Labelled, q: Labelled) -> list[tuple[Labelled, Labelled]]:
     return pairs
 
 
-def _part(product: FactoredGLMB) -> Labelled:
+def _part(product: FactoredGLMB) -> LabelledDensity:
     if product.is_bernoulli.all():
         return lmb_of_factors(in_label_order(product), np.arange(product.num_factors))
     if product.num_factors == 1:
@@ -157,7 +157,7 @@ def _part(product: FactoredGLMB) -> Labelled:
 
 
 def _of_parts(
-    a: Labelled, b: Labelled, log_unit_volume: float, common: bool, self_terms: bool
+    a: LabelledDensity, b: LabelledDensity, log_unit_volume: float, common: bool, self_terms: bool
 ) -> tuple[float, float, float]:
     if a.is_lmb and b.is_lmb:
         return _lmbs(as_lmb(a), as_lmb(b), log_unit_volume, common)

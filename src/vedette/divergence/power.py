@@ -7,12 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, Labelled, Poisson, as_lmb, track_moments
-from vedette.densities.batches import LabelledCases
-from vedette.densities.conversions import collapsed, lmb_on_label_sets
+from vedette.densities import GLMB, LMB, LabelledDensity, Poisson, as_lmb, track_moments
+from vedette.densities.batches import DensityBatch
+from vedette.densities.conversions import lmb_on_label_sets, with_single_gaussians
 from vedette.densities.label_sets import label_sets
 from vedette.densities.labelled import LABELLED
-from vedette.densities.products import Share, check_exponents, lay_out_products
+from vedette.densities.products import SensorPower, check_exponents, precompute_products
 from vedette.divergence.closed_form import (
     Support,
     at_least_zero,
@@ -31,7 +31,7 @@ _MASSES = ((1.0, 0.0), (0.0, 1.0))
 
 
 def power_integral(
-    p: Labelled, q: Labelled, a: float, b: float, *, unit_volume: float = 1.0, support: Support = "full"
+    p: LabelledDensity, q: LabelledDensity, a: float, b: float, *, unit_volume: float = 1.0, support: Support = "full"
 ) -> float:
     """Return Z(a, b): the log of the set integral of K^((a + b - 1) |X|) p(X)^a q(X)^b; dimensionless.
 
@@ -57,8 +57,8 @@ def power_integral(
 
 
 def power_integrals(
-    p: Labelled,
-    q: Labelled,
+    p: LabelledDensity,
+    q: LabelledDensity,
     exponents: Sequence[tuple[float, float]],
     *,
     unit_volume: float = 1.0,
@@ -67,7 +67,7 @@ def power_integrals(
     """Return (num_exponents,) the `power_integral` of each pair (a, b)."""
     check_densities({"p": p, "q": q}, unit_volume)
     check_support(support)
-    if not isinstance(p, Labelled):
+    if not isinstance(p, LabelledDensity):
         raise InputError("p, q: expected labelled densities; got two Poisson densities")
     pairs = [(float(a), float(b)) for a, b in check_exponents(exponents).tolist()]
     found = np.zeros(len(pairs))
@@ -77,7 +77,7 @@ def power_integrals(
 
 
 def _of_parts(
-    p: Labelled, q: Labelled, pairs: Sequence[tuple[float, float]], unit_volume: float, support: Support
+    p: LabelledDensity, q: LabelledDensity, pairs: Sequence[tuple[float, float]], unit_volume: float, support: Support
 ) -> Floats:
     mixed = not (_is_single(p) and _is_single(q))
     if not mixed:
@@ -89,11 +89,15 @@ def _of_parts(
                 "mixtures"
             )
     products = log_inner_products(p, q, math.log(unit_volume), support == "common", self_terms=True)
-    masses = dict(zip(_MASSES, _of_singles(collapsed(p), collapsed(q), _MASSES, 1.0, support), strict=True))
+    masses = dict(
+        zip(
+            _MASSES, _of_singles(with_single_gaussians(p), with_single_gaussians(q), _MASSES, 1.0, support), strict=True
+        )
+    )
     return np.array([products[_INNER_PRODUCTS[pair]] if pair in _INNER_PRODUCTS else masses[pair] for pair in pairs])
 
 
-def renyi(p: Labelled, q: Labelled, order: float, *, support: Support = "full") -> float:
+def renyi(p: LabelledDensity, q: LabelledDensity, order: float, *, support: Support = "full") -> float:
     """Return the Renyi divergence of p from q: log(integral of p^order q^(1 - order)) / (order - 1), both normalised.
 
     At least 0, and 0 for equal densities. Order 1/2 is symmetric and twice the Bhattacharyya distance; in general it is
@@ -118,15 +122,15 @@ def renyi(p: Labelled, q: Labelled, order: float, *, support: Support = "full") 
     return at_least_zero(divergence, max(abs(z), abs(log_p), abs(log_q)), "Renyi")
 
 
-def _is_single(density: Labelled) -> bool:
+def _is_single(density: LabelledDensity) -> bool:
     return len(density.tracks.log_weights) == density.tracks.num_tracks and density.is_marginalised
 
 
 def _of_singles(
-    p: Labelled, q: Labelled, pairs: Sequence[tuple[float, float]], unit_volume: float, support: Support
+    p: LabelledDensity, q: LabelledDensity, pairs: Sequence[tuple[float, float]], unit_volume: float, support: Support
 ) -> Floats:
     if p.is_lmb == q.is_lmb:
-        return _of_one_kind(LabelledCases.of(p), LabelledCases.of(q), pairs, unit_volume, support)
+        return _of_one_kind(DensityBatch.of(p), DensityBatch.of(q), pairs, unit_volume, support)
     if q.is_lmb:
         swapped = [(b, a) for a, b in pairs]
         return _of_singles(q, p, swapped, unit_volume, support)
@@ -140,7 +144,7 @@ def _of_singles(
         elif support == "full" and b < 0.0 and _has_more_sets(lmb, on_sets):
             found[i] = math.inf
         else:
-            views = LabelledCases.of(on_sets), LabelledCases.of(q)
+            views = DensityBatch.of(on_sets), DensityBatch.of(q)
             found[i] = _of_one_kind(*views, ((a, b),), unit_volume, support)[0]
     return found
 
@@ -152,18 +156,18 @@ def _has_more_sets(lmb: LMB, on_sets: GLMB) -> bool:
 
 
 def _of_one_kind(
-    p: LabelledCases, q: LabelledCases, pairs: Sequence[tuple[float, float]], unit_volume: float, support: Support
+    p: DensityBatch, q: DensityBatch, pairs: Sequence[tuple[float, float]], unit_volume: float, support: Support
 ) -> Floats:
     if support == "full":
         p, q = _extended(p, q), _extended(q, p)
     elif not p.is_lmb and not set(p.sets) & set(q.sets):
         raise InputError("support: 'common' is for densities that share a label set; got two that share none")
-    whole = Share.whole(q, np.ones_like(q.possible))
-    laid = lay_out_products([whole], p)
+    whole = SensorPower.whole(q, np.ones_like(q.possible))
+    laid = precompute_products([whole], p)
     return np.asarray(laid.z(np.zeros((1, 1), np.int64), pairs, unit_volume)[0, 0])
 
 
-def _extended(own: LabelledCases, other: LabelledCases) -> LabelledCases:
+def _extended(own: DensityBatch, other: DensityBatch) -> DensityBatch:
     """Return `own` with the label sets (labels) that only `other` has, at weight zero."""
     known, starts = set(own.places), other.set_offsets
     lacking = [i for i, place in enumerate(other.places) if place not in known]
@@ -174,13 +178,13 @@ def _extended(own: LabelledCases, other: LabelledCases) -> LabelledCases:
         labels = [labels[0] for labels in (*own.sets, *(other.sets[i] for i in lacking)) if labels]
         logits = np.full((1, len(labels)), -math.inf)
         logits[:, : len(own.factors)] = own.existence_logits
-        return LabelledCases.of_lmbs(labels, logits, means, covs)
+        return DensityBatch.of_lmbs(labels, logits, means, covs)
     log_weights = np.full((1, len(own.sets) + len(lacking)), -math.inf)
     log_weights[:, : len(own.sets)] = own.log_weights
-    return LabelledCases.of_glmbs((*own.sets, *(other.sets[i] for i in lacking)), log_weights, means, covs)
+    return DensityBatch.of_glmbs((*own.sets, *(other.sets[i] for i in lacking)), log_weights, means, covs)
 
 
-def reference_unit_volume(density: Labelled | Poisson) -> float:
+def reference_unit_volume(density: LabelledDensity | Poisson) -> float:
     """Return (4 pi)^(d / 2) sqrt(det P_ref): the K for which K <p, p> is 1 for a Gaussian p of covariance P_ref.
 
     P_ref is the arithmetic mean of the track covariances (of a mixture's moments), each weighted by the probability of
@@ -190,7 +194,7 @@ def reference_unit_volume(density: Labelled | Poisson) -> float:
 
     Raises `InputError` for a density that is not valid or expects no target.
     """
-    if not isinstance(density, Labelled | Poisson):
+    if not isinstance(density, LabelledDensity | Poisson):
         raise InputError(f"density: expected {LABELLED} or a Poisson; got {type(density).__name__}")
     density.validate(error=InputError)
     if isinstance(density, Poisson):

@@ -12,7 +12,7 @@ from vedette.densities import Estimate, track_histories
 from vedette.evaluation.gaps import gap_log_ratios
 from vedette.evaluation.scans import scans_of_record
 from vedette.evaluation.watch import Watch
-from vedette.filters import labels_targets, shared_targets
+from vedette.filters import common_target_model, has_labels
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import probability
 from vedette.scenarios import Scenario
@@ -43,11 +43,11 @@ def joins_of_run(
     probabilities, and `VedetteError` for models or a recording that cannot be built.
     """
     filters = tuple(sensor.filter for sensor in build_sensors(scenario))
-    if not all(map(labels_targets, filters)):
+    if not all(map(has_labels, filters)):
         return ()
     scanned = np.array([[scan is not None for scan in scans] for scans in scans_of_record(record, scenario)])
     sensors = tuple(local.sensor for local in filters)
-    watch = Watch(shared_targets(filters), sensors, record.times, record.poses, scanned, prob_hidden)
+    watch = Watch(common_target_model(filters), sensors, record.times, record.poses, scanned, prob_hidden)
     return joins_of(record.estimates, watch, threshold=threshold)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from vedette.control import JointPlanner
-from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled
+from vedette.densities import GLMB, LMB, FactoredGLMB, LabelledDensity
 from vedette.fusion import requires_common_prior
 from vedette.internal.processes import as_children, end_with_parent
 from vedette.scenarios import Scenario
@@ -36,7 +36,7 @@ def precompile(scenario: Scenario, planners: Sequence[str] = ("jdm",)) -> None:
         planners: names of strategies; those that are no joint decisions are left out.
     """
     experiment = build_experiment(scenario)
-    labelled = isinstance(experiment.tracker.initial().fused, Labelled)
+    labelled = isinstance(experiment.tracker.initial().fused, LabelledDensity)
     if not (labelled and experiment.tracker.targets.birth.num_sites):
         _compile_tracker(experiment)  # no fusion nor planning without labels; no example without birth sites
         return
@@ -85,7 +85,7 @@ def _compile_planning(scenario: Scenario, name: str) -> None:
     quick.plan(state, experiment.poses, rng=run_stream(0, 0))
 
 
-def _belief(experiment: Experiment, num_targets: int) -> Labelled:
+def _belief(experiment: Experiment, num_targets: int) -> LabelledDensity:
     """One target at each of the first birth sites, in the kind of density that the filter keeps."""
     birth, labels = experiment.tracker.targets.birth, [(1, site) for site in range(num_targets)]
     sites = slice(num_targets)

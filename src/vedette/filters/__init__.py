@@ -2,17 +2,17 @@
 
 from typing import TypeAlias
 
-from vedette.densities import IidCluster, Labelled, MultiBernoulli, Poisson
-from vedette.filters.assignment import Assignment, BeliefPropagation, Gibbs, Marginals, Ranked
+from vedette.densities import IidCluster, LabelledDensity, MultiBernoulli, Poisson
+from vedette.filters.assignment import Assignment, BeliefPropagation, CustomMarginals, Gibbs, RankedAssignment
 from vedette.filters.factored import FactoredGlmbFilter, SequentialFactoredFilter, with_labelled_births
 from vedette.filters.glmb import DeltaGlmbFilter, MultiSensorGlmbFilter
 from vedette.filters.limits import Limits
 from vedette.filters.lmb import LmbFilter, SequentialLmbFilter
 from vedette.filters.multi_sensor_lmb import MultiSensorLmbFilter
-from vedette.filters.protocols import Filter, FilterInfo, TwoStepFilter, labels_targets, shared_targets
+from vedette.filters.protocols import Filter, FilterInfo, PredictUpdateFilter, common_target_model, has_labels
 from vedette.filters.unlabelled import CbMemberFilter, CphdFilter, PhdFilter
 
-Belief: TypeAlias = Labelled | Poisson | IidCluster | MultiBernoulli
+Belief: TypeAlias = LabelledDensity | Poisson | IidCluster | MultiBernoulli
 
 __all__ = [
     "Assignment",
@@ -20,6 +20,7 @@ __all__ = [
     "BeliefPropagation",
     "CbMemberFilter",
     "CphdFilter",
+    "CustomMarginals",
     "DeltaGlmbFilter",
     "FactoredGlmbFilter",
     "Filter",
@@ -27,15 +28,14 @@ __all__ = [
     "Gibbs",
     "Limits",
     "LmbFilter",
-    "Marginals",
     "MultiSensorGlmbFilter",
     "MultiSensorLmbFilter",
     "PhdFilter",
-    "Ranked",
+    "PredictUpdateFilter",
+    "RankedAssignment",
     "SequentialFactoredFilter",
     "SequentialLmbFilter",
-    "TwoStepFilter",
-    "labels_targets",
-    "shared_targets",
+    "common_target_model",
+    "has_labels",
     "with_labelled_births",
 ]

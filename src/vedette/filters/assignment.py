@@ -18,7 +18,7 @@ from vedette.models.probe import probe_marginals
 
 
 @runtime_checkable
-class OfMarginals(Protocol):
+class MarginalAssociation(Protocol):
     """How an LMB filter has the probabilities of associations."""
 
     def to_kernel(self) -> Association | None:
@@ -28,7 +28,7 @@ class OfMarginals(Protocol):
 
 @part("ranked", "assignment")
 @dataclass(frozen=True, slots=True)
-class Ranked:
+class RankedAssignment:
     """Joint choices in exact order, as many as `Limits` lets; for an LMB the exact sum over all of them, but in
     clusters too large for that.
     """
@@ -56,7 +56,7 @@ class Gibbs(Checked):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Marginals:
+class CustomMarginals:
     """Association marginals by a function of your own, for filters that ask no more of a scan: LMB filters.
 
     The function, of kind `association_marginals` (`vedette.models.model_function`), is told what may happen to each row
@@ -123,12 +123,12 @@ class BeliefPropagation(Checked):
         return Association(belief_propagation, np.array([float(self.max_sweeps), float(self.tolerance)]))
 
 
-OfChoices: TypeAlias = Ranked | Gibbs
-Assignment: TypeAlias = OfChoices | OfMarginals
+JointAssociation: TypeAlias = RankedAssignment | Gibbs
+Assignment: TypeAlias = JointAssociation | MarginalAssociation
 
 
 def check_marginals(value: Any) -> None:
     """`InputError` unless an LMB filter can associate so."""
-    if not isinstance(value, OfMarginals):
-        expected = "Ranked, BeliefPropagation, Marginals or another with to_kernel()"
+    if not isinstance(value, MarginalAssociation):
+        expected = "RankedAssignment, BeliefPropagation, CustomMarginals or another with to_kernel()"
         raise InputError(f"assignment: expected {expected}; got {type(value).__name__}")

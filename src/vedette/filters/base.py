@@ -10,9 +10,16 @@ from typing import Any, ClassVar, Generic, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
-from vedette.densities import LMB, Labelled
+from vedette.densities import LMB, LabelledDensity
 from vedette.errors import InputError
-from vedette.filters.inputs import births_for, blame_model, check_belief, check_scan, no_time, nobody
+from vedette.filters.inputs import (
+    births_for,
+    check_belief,
+    check_scan,
+    is_zero_duration,
+    no_births_for_kernel,
+    raise_model_error,
+)
 from vedette.filters.limits import Limits
 from vedette.filters.protocols import FilterInfo
 from vedette.internal.representation import SummaryRepr
@@ -29,7 +36,7 @@ from vedette.models import (
 )
 from vedette.models.arguments import generator, pose_vector, positive, step_number
 
-BeliefT = TypeVar("BeliefT", bound=Labelled)
+BeliefT = TypeVar("BeliefT", bound=LabelledDensity)
 
 
 StepInputs: TypeAlias = tuple[ScanInput, Motion | None, Sensor, Truncation]
@@ -71,7 +78,7 @@ class WithBirths(SummaryRepr):
     __slots__ = ()
     targets: TargetModel
 
-    def _births(self, dt: float, step: Any, prior: Labelled | None, births: LMB | None) -> Lmb:
+    def _births(self, dt: float, step: Any, prior: LabelledDensity | None, births: LMB | None) -> Lmb:
         """The labels that begin within the `dt` seconds before a step, whatever is detected; see `births_for`."""
         return births_for(self.targets.birth, dt, step, prior, births)
 
@@ -100,14 +107,20 @@ class SingleSensorFilter(WithBirths):
                 raise InputError(f"{name}: expected a {kind.__name__}; got {type(value).__name__}")
 
     def _inputs_after(
-        self, dt: Any, scan: Floats, pose: Any, step: Any, prior: Labelled | None = None, births: LMB | None = None
+        self,
+        dt: Any,
+        scan: Floats,
+        pose: Any,
+        step: Any,
+        prior: LabelledDensity | None = None,
+        births: LMB | None = None,
     ) -> StepInputs:
         """Scan, models and truncation as the kernels take them, in their order; of no time those of an update.
 
         prior: whose labels those of the births must not repeat; None where there are none. births: instead of those of
         the targets' model.
         """
-        if no_time(dt):
+        if is_zero_duration(dt):
             step_number(step)
             return self._update_inputs(scan, pose)
         (motion, sensor, truncation), period = _models(self.targets, self.sensor, self.limits), positive("dt", dt)
@@ -117,7 +130,7 @@ class SingleSensorFilter(WithBirths):
     def _update_inputs(self, scan: Floats, pose: Any) -> StepInputs:
         """As `_inputs_after`, of a scan of the prior's own time."""
         _, sensor, truncation = _models(self.targets, self.sensor, self.limits)
-        given = ScanInput(nobody(self.targets.state_dim), scan, pose_vector("pose", pose), 0.0)
+        given = ScanInput(no_births_for_kernel(self.targets.state_dim), scan, pose_vector("pose", pose), 0.0)
         return given, None, sensor, truncation
 
 
@@ -128,7 +141,7 @@ def _models(targets: TargetModel, sensor: SensorModel, limits: Limits) -> tuple[
     return motion, sensor.to_kernel(), limits.truncation(sensor.meas_dim)
 
 
-class OfKind(WithBirths, ABC, Generic[BeliefT]):
+class LabelledFilterBase(WithBirths, ABC, Generic[BeliefT]):
     """What filters of one kind of labelled belief have in common, whatever the number of their sensors."""
 
     __slots__ = ()
@@ -155,7 +168,7 @@ class OfKind(WithBirths, ABC, Generic[BeliefT]):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class LabelledFilter(SingleSensorFilter, OfKind[BeliefT]):
+class LabelledFilter(SingleSensorFilter, LabelledFilterBase[BeliefT]):
     """A filter of one sensor that labels its targets: what its step, its prediction and its update have in common.
 
     Attributes and errors: as `SingleSensorFilter`.
@@ -163,7 +176,7 @@ class LabelledFilter(SingleSensorFilter, OfKind[BeliefT]):
 
     def step(
         self,
-        belief: Labelled,
+        belief: LabelledDensity,
         scan: Any,
         pose: Any,
         dt: float,
@@ -201,7 +214,7 @@ class LabelledFilter(SingleSensorFilter, OfKind[BeliefT]):
         return self._taken(before, inputs, rng, [repeats], f"step {step}: ")
 
     def predict(
-        self, belief: Labelled, dt: float, step: int, *, births: LMB | None = None
+        self, belief: LabelledDensity, dt: float, step: int, *, births: LMB | None = None
     ) -> tuple[BeliefT, FilterInfo]:
         """The belief `dt` seconds later, births included: a step without sight. Arguments and errors as of `step`.
 
@@ -211,7 +224,9 @@ class LabelledFilter(SingleSensorFilter, OfKind[BeliefT]):
         inputs = blind._inputs_after(dt, NO_SCAN, NO_POSE, step, prior, births)
         return blind._taken(blind._before_scan(prior, inputs[0].dt, step, births), inputs, None, [], f"step {step}: ")
 
-    def update(self, belief: Labelled, scan: Any, pose: Any, *, rng: np.random.Generator) -> tuple[BeliefT, FilterInfo]:
+    def update(
+        self, belief: LabelledDensity, scan: Any, pose: Any, *, rng: np.random.Generator
+    ) -> tuple[BeliefT, FilterInfo]:
         """The belief after a scan of its own time; nobody moves, dies or is born. Arguments and errors as of `step`."""
         generator(rng)
         measurements, repeats = check_scan(scan, self.sensor)
@@ -230,7 +245,7 @@ class LabelledFilter(SingleSensorFilter, OfKind[BeliefT]):
         try:
             posterior, report = self._stepped(prior, SensorStep(inputs, self.limits, self.sensor, rng=rng))
         except Exception as error:
-            blame_model(error)
+            raise_model_error(error)
             raise
         log_likelihood = self._check(posterior, report, place) + report.log_clutter - self.sensor.clutter.rate
         return self._concluded(posterior, [report], log_likelihood=log_likelihood, repeats=repeats)

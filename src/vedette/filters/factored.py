@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from vedette.densities import LMB, FactoredGLMB, Labelled, UndetectedTargets
+from vedette.densities import LMB, FactoredGLMB, LabelledDensity, UndetectedTargets
 from vedette.densities.checks import offsets_of
 from vedette.densities.label_sets import take_factors
 from vedette.errors import InputError, NumericalError
@@ -21,10 +21,10 @@ from vedette.filters.appearing import (
     with_faint_candidates,
     with_learnt_rate,
 )
-from vedette.filters.base import LabelledFilter, OfKind, SensorStep, blind_sensor
-from vedette.filters.inputs import born_at, check_new, nobody
+from vedette.filters.base import LabelledFilter, LabelledFilterBase, SensorStep, blind_sensor
+from vedette.filters.inputs import born_at, check_new, no_births_for_kernel
 from vedette.filters.limits import Limits
-from vedette.filters.multi_sensor import InTurn, MultiSensorFilter
+from vedette.filters.multi_sensor import MultiSensorFilter, SequentialUpdate
 from vedette.filters.protocols import FilterInfo
 from vedette.filters.undetected import (
     SplitBirths,
@@ -66,7 +66,7 @@ class _Before(NamedTuple):
     error: float = 0.0  # L1, of taking births at sites as Poisson
 
 
-class _OfFactors(OfKind[FactoredGLMB]):
+class _FactoredFilterBase(LabelledFilterBase[FactoredGLMB]):
     """What both have in common."""
 
     __slots__ = ()
@@ -89,14 +89,14 @@ class _OfFactors(OfKind[FactoredGLMB]):
     def _none(self) -> UndetectedTargets:
         return UndetectedTargets.none(self.targets.state_dim)
 
-    def _births(self, dt: float, step: Any, prior: Labelled | None, births: LMB | None) -> Lmb:
+    def _births(self, dt: float, step: Any, prior: LabelledDensity | None, births: LMB | None) -> Lmb:
         if self.births == "labelled" or births is not None:
-            return OfKind._births(self, dt, step, prior, births)
+            return LabelledFilterBase._births(self, dt, step, prior, births)
         number, birth = step_number(step), self.targets.birth
         if prior is not None and birth.is_active(number):
             check_new(prior, number, step)
         born = self._born(dt, number).labels
-        return born_at(born, number).to_kernel() if born.tracks.num_tracks else nobody(birth.state_dim)
+        return born_at(born, number).to_kernel() if born.tracks.num_tracks else no_births_for_kernel(birth.state_dim)
 
     def _born(self, dt: float, step: int) -> SplitBirths:
         """At the sites within the `dt` seconds before a step."""
@@ -173,7 +173,7 @@ class _OfFactors(OfKind[FactoredGLMB]):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class FactoredGlmbFilter(_OfFactors, LabelledFilter[FactoredGLMB]):
+class FactoredGlmbFilter(_FactoredFilterBase, LabelledFilter[FactoredGLMB]):
     """delta-GLMB filter of one sensor whose density is a product of independent factors.
 
     At a scan, factors that lay claim to the same measurements are multiplied out and updated together, exactly as a
@@ -222,11 +222,11 @@ class FactoredGlmbFilter(_OfFactors, LabelledFilter[FactoredGLMB]):
         return replace(self, sensor=blind_sensor(), limits=self.limits.keeping_labels())
 
     def _stepped(self, prior: _Before, step: SensorStep) -> tuple[_Before, FactoredReport]:
-        return _OfFactors._stepped(self, prior, step._replace(num_scans=self.scans_together))
+        return _FactoredFilterBase._stepped(self, prior, step._replace(num_scans=self.scans_together))
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class SequentialFactoredFilter(_OfFactors, InTurn[FactoredGLMB]):
+class SequentialFactoredFilter(_FactoredFilterBase, SequentialUpdate[FactoredGLMB]):
     """Factored GLMB filter of several sensors that takes their scans in turn.
 
     As `SequentialLmbFilter`, with the density of `FactoredGlmbFilter`: which of contending labels is which stays open
@@ -281,4 +281,4 @@ def with_labelled_births(local: Any) -> Any:
 
     Two sensors' first detections of one target would be two labels.
     """
-    return replace(local, births="labelled") if isinstance(local, _OfFactors) else local  # type: ignore[type-var]
+    return replace(local, births="labelled") if isinstance(local, _FactoredFilterBase) else local  # type: ignore[type-var]

@@ -12,10 +12,10 @@ import numpy as np
 from vedette.densities import GLMB
 from vedette.densities.tracks import UNSCANNED
 from vedette.errors import InputError, NumericalError
-from vedette.filters.assignment import Gibbs, OfChoices, Ranked
-from vedette.filters.base import LabelledFilter, OfKind, SensorStep, blind_sensor
+from vedette.filters.assignment import Gibbs, JointAssociation, RankedAssignment
+from vedette.filters.base import LabelledFilter, LabelledFilterBase, SensorStep, blind_sensor
 from vedette.filters.limits import Limits
-from vedette.filters.multi_sensor import InTurn
+from vedette.filters.multi_sensor import SequentialUpdate
 from vedette.filters.protocols import FilterInfo
 from vedette.kernels.base.types import Glmb, Ints
 from vedette.kernels.labelled.conversions import marginalise
@@ -23,7 +23,7 @@ from vedette.kernels.steps.glmb import StepReport, step_gibbs, step_ranked
 from vedette.models.arguments import flag
 
 
-class _OfGlmb(OfKind[GLMB]):
+class _GlmbFilterBase(LabelledFilterBase[GLMB]):
     """What both have in common."""
 
     __slots__ = ()
@@ -76,7 +76,7 @@ def _sources(reports: Sequence[StepReport], repeats: Sequence[Ints]) -> Ints | N
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class DeltaGlmbFilter(_OfGlmb, LabelledFilter[GLMB]):
+class DeltaGlmbFilter(_GlmbFilterBase, LabelledFilter[GLMB]):
     """delta-GLMB filter of one sensor (Vo, Vo, Hoang 2017; paper, Algorithm 1, local prediction and update).
 
     Predictions and updates apart are ranked, whatever `assignment`; a prediction is cut by `limits` as after a scan.
@@ -85,7 +85,7 @@ class DeltaGlmbFilter(_OfGlmb, LabelledFilter[GLMB]):
         targets: how targets move, live on and appear.
         sensor: what the sensor sees of them.
         limits: caps and thresholds.
-        assignment: how joint choices are found: `Ranked`, the heaviest in exact order, or drawn, `Gibbs`.
+        assignment: how joint choices are found: `RankedAssignment`, the heaviest in exact order, or drawn, `Gibbs`.
         marginalised: collapse the posterior to one hypothesis a label set after each step (M-delta-GLMB filter,
             Fantacci and Vo 2015); track mixtures are then reduced to `limits.max_components`.
 
@@ -93,17 +93,17 @@ class DeltaGlmbFilter(_OfGlmb, LabelledFilter[GLMB]):
         InputError: a part of another kind, or a field out of range.
     """
 
-    assignment: OfChoices = field(default_factory=Ranked)
+    assignment: JointAssociation = field(default_factory=RankedAssignment)
     marginalised: bool = False
 
     def __post_init__(self) -> None:
         LabelledFilter.__post_init__(self)  # slots replace the class that super() looks for
-        if not isinstance(self.assignment, OfChoices):
-            raise InputError(f"assignment: expected Ranked or Gibbs; got {type(self.assignment).__name__}")
+        if not isinstance(self.assignment, JointAssociation):
+            raise InputError(f"assignment: expected RankedAssignment or Gibbs; got {type(self.assignment).__name__}")
         flag("marginalised", self.marginalised)
 
     def _blind(self) -> DeltaGlmbFilter:
-        return replace(self, sensor=blind_sensor(), assignment=Ranked())
+        return replace(self, sensor=blind_sensor(), assignment=RankedAssignment())
 
     def _stepped(self, prior: Glmb, step: SensorStep) -> tuple[Glmb, StepReport]:
         scan, motion, sensor, truncation = step.inputs
@@ -113,7 +113,7 @@ class DeltaGlmbFilter(_OfGlmb, LabelledFilter[GLMB]):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class MultiSensorGlmbFilter(_OfGlmb, InTurn[GLMB]):
+class MultiSensorGlmbFilter(_GlmbFilterBase, SequentialUpdate[GLMB]):
     """delta-GLMB filter of several sensors: one prediction, then an update by each sensor's scan in turn.
 
     Without caps the posterior is the multi-sensor delta-GLMB (Vo, Vo and Beard 2019), whatever the order of the

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, FactoredGLMB, IidCluster, Labelled, MultiBernoulli, Poisson, TrackTable
+from vedette.densities import GLMB, LMB, FactoredGLMB, IidCluster, LabelledDensity, MultiBernoulli, Poisson, TrackTable
 from vedette.densities.containers import unchecked
 from vedette.densities.tracks import gaussian_tracks, relabelled_tracks
 from vedette.errors import InputError, ModelError, VedetteError
@@ -57,7 +57,7 @@ def check_scan(scan: Any, sensor: SensorModel) -> tuple[Floats, Ints]:
     if bad >= 0:
         raise InputError(f"scan: expected finite numbers; got {array[bad].tolist()} in row {bad}")
     if is_below:
-        _tell_negative(array, measurement, sensor.noise.least_stds)
+        _warn_negative(array, measurement, sensor.noise.least_stds)
     if largest > 3.14:  # few scans
         array, may_repeat = _in_one_turn(array, measurement.angular), True
     if not may_repeat:  # most scans
@@ -67,7 +67,7 @@ def check_scan(scan: Any, sensor: SensorModel) -> tuple[Floats, Ints]:
     return np.delete(array, repeats, axis=0), repeats
 
 
-def _tell_negative(scan: Floats, measurement: MeasurementModel, stds: Floats | None) -> None:
+def _warn_negative(scan: Floats, measurement: MeasurementModel, stds: Floats | None) -> None:
     below = measurement.least - scan > _MOST_STDS * (np.inf if stds is None else stds)
     for row, component in np.argwhere(below)[:1].tolist():
         got = f"{scan[row, component]:g} in row {row}, component {component}"
@@ -96,7 +96,7 @@ def check_belief(belief: object, kind: type[_Density], state_dim: int, name: str
 
 
 def births_for(
-    birth: BirthModel, dt: float, step: Any, belief: Labelled | None = None, births: LMB | None = None
+    birth: BirthModel, dt: float, step: Any, belief: LabelledDensity | None = None, births: LMB | None = None
 ) -> Lmb:
     """Who may be born within the `dt` seconds of a step, as kernels take it: `births`; at the model's sites where None.
 
@@ -110,13 +110,13 @@ def births_for(
     elif birth.is_active(number):
         born = births_within(births_at(birth, number), birth.period, dt)
     else:
-        return nobody(birth.state_dim)
+        return no_births_for_kernel(birth.state_dim)
     if belief is not None and len(born.tracks.labels):
         check_new(belief, born.tracks.labels[:, 0].min(), step)
     return born.to_kernel()
 
 
-def check_new(belief: Labelled, first: int, step: Any) -> None:
+def check_new(belief: LabelledDensity, first: int, step: Any) -> None:
     """`InputError` where labels born at steps from `first` on could repeat those of a belief. step: that was given."""
     steps = belief.tracks.labels[:, 0]
     newest = steps.max() if len(steps) else first - 1
@@ -124,7 +124,7 @@ def check_new(belief: Labelled, first: int, step: Any) -> None:
         raise reject("step", f"a step after those of the labels in the belief, of which the last is {newest}", step)
 
 
-def no_time(dt: Any) -> bool:
+def is_zero_duration(dt: Any) -> bool:
     """Whether it is the number 0; what is no number is told of where it is taken."""
     return not isinstance(dt, bool) and isinstance(dt, Real) and dt == 0.0
 
@@ -136,7 +136,7 @@ def no_births(state_dim: int) -> LMB:
 
 
 @cache
-def nobody(state_dim: int) -> Lmb:
+def no_births_for_kernel(state_dim: int) -> Lmb:
     """No births, as kernels take them; made once for each dimension."""
     return no_births(state_dim).to_kernel()
 
@@ -162,7 +162,7 @@ def births_within(born: LMB, period: float | None, dt: float, others: LMB | None
     """
     if period is None and others is None:
         return born
-    more = nobody(born.state_dim) if others is None else others.to_kernel()
+    more = no_births_for_kernel(born.state_dim) if others is None else others.to_kernel()
     within = kernels.births_within(born.to_kernel(), more, 1.0 if period is None else dt / period)
     return unchecked(LMB, TrackTable.from_kernel(within.tracks), within.existence_logit)
 
@@ -177,15 +177,15 @@ def births_of(birth: BirthModel) -> LMB:
 
 @contextmanager
 def model_errors() -> Iterator[None]:
-    """As `blame_model`, of what is raised inside."""
+    """As `raise_model_error`, of what is raised inside."""
     try:
         yield
     except Exception as error:
-        blame_model(error)
+        raise_model_error(error)
         raise
 
 
-def blame_model(error: Exception) -> None:
+def raise_model_error(error: Exception) -> None:
     """Raise a `ModelError` from what a model function raised inside a kernel.
 
     Numba leaves the place in the traceback. What a kernel raises itself (`MemoryError`), or Numba, is let be.

@@ -9,7 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled, as_lmb, existence_probabilities, track_moments
+from vedette.densities import GLMB, LMB, FactoredGLMB, LabelledDensity, as_lmb, existence_probabilities, track_moments
 from vedette.densities.label_sets import without_labels
 from vedette.internal.probabilities import chi_squared_quantile, logit
 from vedette.kernels.association.search import SearchCaps
@@ -175,7 +175,7 @@ def _keeping_labels(limits: Limits) -> Limits:
     return replace(limits, min_existence=0.0, max_labels=2**62, max_position_std=math.inf)
 
 
-def _spread_labels(belief: Labelled, max_position_std: float) -> Ints:
+def _spread_labels(belief: LabelledDensity, max_position_std: float) -> Ints:
     """(num, 2) labels whose position has more than this standard deviation along both axes."""
     lmb = as_lmb(belief)
     variances = np.diagonal(track_moments(lmb.tracks)[1], axis1=1, axis2=2)[:, :2]

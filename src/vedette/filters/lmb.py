@@ -11,10 +11,10 @@ import numpy as np
 
 from vedette.densities import LMB
 from vedette.errors import NumericalError
-from vedette.filters.assignment import OfMarginals, Ranked, check_marginals
-from vedette.filters.base import LabelledFilter, OfKind, SensorStep, blind_sensor
+from vedette.filters.assignment import MarginalAssociation, RankedAssignment, check_marginals
+from vedette.filters.base import LabelledFilter, LabelledFilterBase, SensorStep, blind_sensor
 from vedette.filters.limits import Limits
-from vedette.filters.multi_sensor import InTurn, MultiSensorFilter
+from vedette.filters.multi_sensor import MultiSensorFilter, SequentialUpdate
 from vedette.filters.protocols import Filter, FilterInfo
 from vedette.kernels.association.marginals import Association
 from vedette.kernels.base.types import Bools, Ints, Lmb
@@ -24,7 +24,7 @@ from vedette.kernels.steps.multi_sensor_combinations import predict_combinations
 from vedette.kernels.steps.multi_sensor_lmb import update_lmb
 
 
-class OfLmb(OfKind[LMB]):
+class LmbFilterBase(LabelledFilterBase[LMB]):
     """What filters of an LMB have in common."""
 
     __slots__ = ()
@@ -57,7 +57,7 @@ class OfLmb(OfKind[LMB]):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class LmbFilter(OfLmb, LabelledFilter[LMB]):
+class LmbFilter(LmbFilterBase, LabelledFilter[LMB]):
     """LMB filter of one sensor (Reuter, Vo, Vo, Dietmayer 2014), cheaper than the delta-GLMB filter.
 
     It draws nothing, and its predictions drop nothing.
@@ -72,7 +72,7 @@ class LmbFilter(OfLmb, LabelledFilter[LMB]):
         InputError: a part of another kind.
     """
 
-    assignment: OfMarginals = field(default_factory=Ranked)
+    assignment: MarginalAssociation = field(default_factory=RankedAssignment)
 
     def __post_init__(self) -> None:
         LabelledFilter.__post_init__(self)  # slots replace the class that super() looks for
@@ -89,7 +89,7 @@ class LmbFilter(OfLmb, LabelledFilter[LMB]):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class SequentialLmbFilter(OfLmb, InTurn[LMB]):
+class SequentialLmbFilter(LmbFilterBase, SequentialUpdate[LMB]):
     """LMB filter of several sensors that takes their scans in turn ("iterated corrector").
 
     After each scan the posterior is projected to an LMB again, so that the order of the sensors matters a little. In
@@ -102,7 +102,7 @@ class SequentialLmbFilter(OfLmb, InTurn[LMB]):
     Attributes and errors: as `MultiSensorGlmbFilter`, and `assignment` as of `LmbFilter`.
     """
 
-    assignment: OfMarginals = field(default_factory=Ranked)
+    assignment: MarginalAssociation = field(default_factory=RankedAssignment)
 
     def __post_init__(self) -> None:
         MultiSensorFilter.__post_init__(self)  # slots replace the class that super() looks for

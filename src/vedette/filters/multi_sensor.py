@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vedette.densities import LMB, Labelled
+from vedette.densities import LMB, LabelledDensity
 from vedette.errors import InputError
-from vedette.filters.base import NO_POSE, NO_SCAN, BeliefT, OfKind, SensorStep, blind_sensor
-from vedette.filters.inputs import check_belief, check_scan, model_errors, no_time, nobody
+from vedette.filters.base import NO_POSE, NO_SCAN, BeliefT, LabelledFilterBase, SensorStep, blind_sensor
+from vedette.filters.inputs import check_belief, check_scan, is_zero_duration, model_errors, no_births_for_kernel
 from vedette.filters.limits import Limits
 from vedette.filters.protocols import FilterInfo
 from vedette.kernels.base.types import Bools, Floats, Ints, Lmb, Motion, ScanInput
@@ -35,7 +35,7 @@ class SensorScans(NamedTuple):
 
     def inputs_in_turn(self, born: Lmb, dt: float) -> list[ScanInput]:
         """As `inputs`, with births and a period for the first alone."""
-        none = nobody(born.tracks.components.means.shape[1])
+        none = no_births_for_kernel(born.tracks.components.means.shape[1])
         first, *others = self.inputs(born, dt)
         return [first, *(own._replace(birth=none, dt=0.0) for own in others)]
 
@@ -47,7 +47,7 @@ class SensorScans(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class MultiSensorFilter(OfKind[BeliefT]):
+class MultiSensorFilter(LabelledFilterBase[BeliefT]):
     """The parts of a filter of several sensors.
 
     Attributes:
@@ -77,7 +77,7 @@ class MultiSensorFilter(OfKind[BeliefT]):
 
     def step(
         self,
-        belief: Labelled,
+        belief: LabelledDensity,
         scans: Any,
         poses: Any,
         dt: float,
@@ -109,10 +109,10 @@ class MultiSensorFilter(OfKind[BeliefT]):
         """
         taken = self._checked_scans(scans, poses, rng)
         prior = check_belief(belief, self.kind, self.targets.state_dim)
-        if no_time(dt):
+        if is_zero_duration(dt):
             step_number(step)
             before = self._before_scan(prior, 0.0, step, births)
-            return self._updated(before, nobody(self.targets.state_dim), taken, 0.0, f"step {step}")
+            return self._updated(before, no_births_for_kernel(self.targets.state_dim), taken, 0.0, f"step {step}")
         period = positive("dt", dt)
         born = self._births(period, step, prior, births)
         return self._updated(self._before_scan(prior, period, step, births), born, taken, period, f"step {step}")
@@ -149,7 +149,7 @@ class MultiSensorFilter(OfKind[BeliefT]):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class InTurn(MultiSensorFilter[BeliefT]):
+class SequentialUpdate(MultiSensorFilter[BeliefT]):
     """One prediction, then an update by each sensor's scan in turn.
 
     Attributes and errors: as `MultiSensorFilter`.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from vedette.densities import LMB
 from vedette.filters.inputs import model_errors
-from vedette.filters.lmb import OfLmb
+from vedette.filters.lmb import LmbFilterBase
 from vedette.filters.multi_sensor import MultiSensorFilter, SensorScans
 from vedette.filters.protocols import FilterInfo
 from vedette.kernels.base.types import Lmb
@@ -19,7 +19,7 @@ from vedette.kernels.steps.multi_sensor_lmb import lmb_of_combinations
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class MultiSensorLmbFilter(OfLmb, MultiSensorFilter[LMB]):
+class MultiSensorLmbFilter(LmbFilterBase, MultiSensorFilter[LMB]):
     """LMB filter of several sensors: the existences and densities of the exact posterior given all scans of a time.
 
     Every track is weighed under each combination of a miss or a gated measurement at every sensor, and the combinations

@@ -8,7 +8,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from vedette.densities import LMB, Labelled
+from vedette.densities import LMB, LabelledDensity
 from vedette.errors import InputError
 from vedette.models import SensorModel, TargetModel
 
@@ -98,7 +98,7 @@ class Filter(Protocol):
 
 
 @runtime_checkable
-class TwoStepFilter(Filter, Protocol):
+class PredictUpdateFilter(Filter, Protocol):
     """A filter whose prediction and update can also be had apart: for several scans at one time, or none.
 
     Needed of a filter of your own where a sensor may miss a scan, where sensors share their prediction, and where
@@ -128,12 +128,12 @@ class TwoStepFilter(Filter, Protocol):
         ...
 
 
-def labels_targets(tracker: Filter) -> bool:
+def has_labels(tracker: Filter) -> bool:
     """Whether the filter's belief is a `GLMB`, an `LMB` or a `FactoredGLMB`."""
-    return isinstance(tracker.initial(), Labelled)
+    return isinstance(tracker.initial(), LabelledDensity)
 
 
-def shared_targets(filters: Sequence[Filter]) -> TargetModel:
+def common_target_model(filters: Sequence[Filter]) -> TargetModel:
     """The one model of the targets that all these filters hold; `InputError` if they do not."""
     targets = filters[0].targets
     for i, other in enumerate(filters):

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from vedette.densities import Labelled
+from vedette.densities import LabelledDensity
 from vedette.errors import InputError
 from vedette.fusion.views import FieldsOfView
 from vedette.internal.text import join_alternatives
@@ -134,7 +134,7 @@ class PrevalidatedBeliefs(tuple[Any, ...]):
 
 def all_valid(beliefs: Sequence[Any]) -> bool:
     """Whether all beliefs are valid LMBs of one state dimension: a fast check that does not report what is wrong."""
-    if not beliefs or not all(isinstance(belief, Labelled) and belief.is_lmb for belief in beliefs):
+    if not beliefs or not all(isinstance(belief, LabelledDensity) and belief.is_lmb for belief in beliefs):
         return False
     if not all(map(_formed, beliefs)) or len({belief.state_dim for belief in beliefs}) > 1:
         return False

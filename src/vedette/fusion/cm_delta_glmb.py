@@ -9,10 +9,10 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from vedette.densities import GLMB, FactoredGLMB, Labelled
-from vedette.densities.batches import LabelledCases
+from vedette.densities import GLMB, FactoredGLMB, LabelledDensity
+from vedette.densities.batches import DensityBatch
 from vedette.densities.conversions import marginalised_factors
-from vedette.densities.products import PowerProducts, Share
+from vedette.densities.products import PowerProducts, SensorPower
 from vedette.fusion.alignment import side_by_side, sort_factors
 from vedette.fusion.base import FusionInfo, active_sensors, check_beliefs, check_kinds, check_weights, per_sensor_counts
 from vedette.fusion.powers import FusionLimits, MixturePower, check_power, numerical_errors_of_tracks, power_rule
@@ -112,7 +112,7 @@ class CmDeltaGlmb:
             discarded_weight=-math.expm1(report.log_kept + log_kept) + 0.0,  # no -0
         )
 
-    def precompute(self, cases: Sequence[LabelledCases], prediction: Labelled) -> PowerProducts | None:
+    def precompute(self, cases: Sequence[DensityBatch], prediction: LabelledDensity) -> PowerProducts | None:
         """The fusions of any of the sensors' cases; None for an LMB prediction, or where the powers are not exact.
 
         cases: one a sensor. prediction: marginalised, of one Gaussian a track. Floors and stand-ins are as in
@@ -131,15 +131,15 @@ class CmDeltaGlmb:
         exact = self.mixture_power in ("auto", "moment_matched") or (whole and self.mixture_power != "quadrature")
         if not exact or len(sets) > self.limits.max_hypotheses:
             return None
-        return precompute_glmbs(shares, LabelledCases.of(prediction), active)
+        return precompute_glmbs(shares, DensityBatch.of(prediction), active)
 
-    def _share(self, own: LabelledCases, weight: float) -> Share:
+    def _share(self, own: DensityBatch, weight: float) -> SensorPower:
         held = own.possible
         least = own.log_weights.min(axis=1, where=held, initial=self.missing_log_weight)
-        return Share(own, weight, held, least[:, None])
+        return SensorPower(own, weight, held, least[:, None])
 
 
-def _stacked(beliefs: Sequence[Labelled]) -> tuple[Glmb, Ints]:
+def _stacked(beliefs: Sequence[LabelledDensity]) -> tuple[Glmb, Ints]:
     """The hypotheses of all beliefs, and (num_hyps,) whose each is."""
     hyps = [belief.as_hypotheses() for belief in beliefs]
     sensor_of = np.repeat(np.arange(len(hyps)), [len(own.hyp_log_weights) for own in hyps])

@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled, TrackTable
-from vedette.densities.batches import LabelledCases, lmb_cases
+from vedette.densities import GLMB, LMB, FactoredGLMB, LabelledDensity, TrackTable
+from vedette.densities.batches import DensityBatch, lmb_batch
 from vedette.densities.checks import offsets_of
 from vedette.densities.containers import unchecked
 from vedette.densities.conversions import reduced_lmb
-from vedette.densities.products import PowerProducts, Share, lay_out_products
+from vedette.densities.products import PowerProducts, SensorPower, precompute_products
 from vedette.fusion.base import (
     FusionInfo,
     LogLinearPool,
@@ -83,7 +83,7 @@ class Clmb:
         chance("missing_existence", self.missing_existence)
         flag("by_views", self.by_views)
 
-    def fuse(self, beliefs: Sequence[Labelled], views: FieldsOfView | None = None) -> tuple[LMB, FusionInfo]:
+    def fuse(self, beliefs: Sequence[LabelledDensity], views: FieldsOfView | None = None) -> tuple[LMB, FusionInfo]:
         """Fused LMB of the sensors' LMBs (others are first converted), in increasing label order, and what was done.
 
         views: what the sensors could see; not used with plain weights. Raises `InputError` for another number or kind
@@ -111,7 +111,7 @@ class Clmb:
         """The weights; None by views."""
         return None if self.by_views else LogLinearPool(0.0, tuple(self.weights), self.missing_existence)
 
-    def precompute(self, cases: Sequence[LabelledCases], prediction: Labelled) -> PowerProducts | None:
+    def precompute(self, cases: Sequence[DensityBatch], prediction: LabelledDensity) -> PowerProducts | None:
         """The fusions of any of the sensors' cases; None by views, for a GLMB prediction, or inexact powers.
 
         cases: one a sensor; a GLMB is first converted, as by `fuse`. prediction: of one Gaussian a track. Raises
@@ -124,13 +124,13 @@ class Clmb:
             return None
         active, _ = active_sensors(self.weights)
         shares = [self._share(cases[i], self.weights[i]) for i in active]
-        return lay_out_products(shares, LabelledCases.of(prediction), active)
+        return precompute_products(shares, DensityBatch.of(prediction), active)
 
-    def _share(self, own: LabelledCases, weight: float) -> Share:
-        lmbs = own if own.is_lmb else lmb_cases(own)
+    def _share(self, own: DensityBatch, weight: float) -> SensorPower:
+        lmbs = own if own.is_lmb else lmb_batch(own)
         held, logits = lmbs.possible, lmbs.existence_logits
         least = logits.min(axis=1, where=held[:, 1::2], initial=logit(self.missing_existence))
-        return Share(lmbs, weight, held, np.stack([log_expit(-least), log_expit(least)], axis=1))
+        return SensorPower(lmbs, weight, held, np.stack([log_expit(-least), log_expit(least)], axis=1))
 
 
 class _Powers(NamedTuple):
@@ -163,7 +163,7 @@ class _Powers(NamedTuple):
         return sum_over_sensors(self.of_labels * np.where(self.participating, values, 0.0))
 
 
-def _reduced(belief: Labelled, caps: MixtureCaps) -> Lmb:
+def _reduced(belief: LabelledDensity, caps: MixtureCaps) -> Lmb:
     """An LMB with reduced mixtures."""
     lmb = reduced_lmb(belief, caps)
     return Lmb(reduced_tracks(lmb.tracks, caps), lmb.existence_logit) if belief.is_lmb else lmb
@@ -198,7 +198,7 @@ class ArithmeticAverage:
         check_power("moment_matched", self.limits, len(self.weights))
         flag("by_views", self.by_views)
 
-    def fuse(self, beliefs: Sequence[Labelled], views: FieldsOfView | None = None) -> tuple[LMB, FusionInfo]:
+    def fuse(self, beliefs: Sequence[LabelledDensity], views: FieldsOfView | None = None) -> tuple[LMB, FusionInfo]:
         """Fused LMB of the sensors' LMBs (others are first converted), in increasing label order, and what was done.
 
         views: what the sensors could see; not used with plain weights. Labels that no sensor with a say has are left

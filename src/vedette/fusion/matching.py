@@ -8,9 +8,9 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from vedette.densities import GLMB, LMB, FactoredGLMB, Labelled, as_lmb, track_moments
-from vedette.densities.batches import LabelledCases
-from vedette.densities.conversions import names_settled
+from vedette.densities import GLMB, LMB, FactoredGLMB, LabelledDensity, as_lmb, track_moments
+from vedette.densities.batches import DensityBatch
+from vedette.densities.conversions import with_resolved_labels
 from vedette.densities.label_sets import Label
 from vedette.fusion.base import Fusion, FusionInfo, PrevalidatedBeliefs, check_beliefs
 from vedette.fusion.views import FieldsOfView
@@ -36,13 +36,15 @@ class _Targets(NamedTuple):
     covs: Floats  # (num_labels, dim, dim)
 
     @classmethod
-    def of(cls, belief: Labelled) -> _Targets:
+    def of(cls, belief: LabelledDensity) -> _Targets:
         lmb = as_lmb(belief)
         labels = [tuple(label) for label in lmb.tracks.labels.tolist()]
         return cls(labels, lmb.existence, *track_moments(lmb.tracks))
 
 
-def match_labels(beliefs: Sequence[Labelled], *, gate_probability: float = GATE_PROBABILITY) -> list[Labelled]:
+def match_labels(
+    beliefs: Sequence[LabelledDensity], *, gate_probability: float = GATE_PROBABILITY
+) -> list[LabelledDensity]:
     """The sensors' beliefs with one label for what is one target by its place.
 
     The first sensor's labels stay as they are. Each further sensor's labels are assigned to those found so far, at the
@@ -65,7 +67,7 @@ def match_labels(beliefs: Sequence[Labelled], *, gate_probability: float = GATE_
 
 
 def common_names(
-    beliefs: Sequence[Labelled], *, gate_probability: float = GATE_PROBABILITY
+    beliefs: Sequence[LabelledDensity], *, gate_probability: float = GATE_PROBABILITY
 ) -> list[dict[Label, Label]]:
     """For each sensor, the label that `match_labels` gives to each of its labels. Raises as that."""
     if not isinstance(beliefs, PrevalidatedBeliefs):
@@ -156,7 +158,7 @@ def _joined(found: _Targets, own: _Targets) -> _Targets:
     return _Targets([*found.labels, *(own.labels[i] for i in new)], existence, means, covs)
 
 
-def relabelled(belief: Labelled, names: dict[Label, Label]) -> Labelled:
+def relabelled(belief: LabelledDensity, names: dict[Label, Label]) -> LabelledDensity:
     """The belief under other labels, of which no two are the same; labels without a new name keep theirs."""
     if all(old == new for old, new in names.items()):
         return belief
@@ -188,19 +190,19 @@ class LabelMatchedFusion:
         instance("rule", self.rule, Fusion)
         chance("gate_probability", self.gate_probability)
 
-    def match(self, beliefs: Sequence[Labelled]) -> list[Labelled]:
+    def match(self, beliefs: Sequence[LabelledDensity]) -> list[LabelledDensity]:
         """The beliefs under common labels; products of GLMBs with the names settled that they leave open.
 
         Of several labels that may be one target's, each by itself would be matched as an improbable target.
         """
         given = sequence("beliefs", beliefs, "densities, one a sensor")
-        settled = [names_settled(belief, _COMPONENTS) for belief in given]
+        settled = [with_resolved_labels(belief, _COMPONENTS) for belief in given]
         return match_labels(settled, gate_probability=self.gate_probability)
 
-    def fuse(self, beliefs: Sequence[Labelled], views: FieldsOfView | None = None) -> tuple[Any, FusionInfo]:
+    def fuse(self, beliefs: Sequence[LabelledDensity], views: FieldsOfView | None = None) -> tuple[Any, FusionInfo]:
         """The fusion of the beliefs under common labels; see the rule's. Raises as `match_labels` and the rule."""
         return self.rule.fuse(PrevalidatedBeliefs(self.match(beliefs)), views)
 
-    def precompute(self, cases: Sequence[LabelledCases], prediction: GLMB | LMB) -> None:
+    def precompute(self, cases: Sequence[DensityBatch], prediction: GLMB | LMB) -> None:
         """None: which labels match differs from case to case. Of matched beliefs, ask the rule."""
         return None

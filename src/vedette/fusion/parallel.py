@@ -9,7 +9,7 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from vedette.densities import LMB, FactoredGLMB, Labelled, TrackTable, as_lmb
+from vedette.densities import LMB, FactoredGLMB, LabelledDensity, TrackTable, as_lmb
 from vedette.densities.checks import offsets_of
 from vedette.densities.containers import unchecked
 from vedette.densities.conversions import marginalised_factors
@@ -114,7 +114,7 @@ class ParallelUpdate:
         integrated.
         """
         prediction = _prediction_of(views, check=not isinstance(beliefs, PrevalidatedBeliefs))
-        given: Sequence[Labelled] = beliefs
+        given: Sequence[LabelledDensity] = beliefs
         if not isinstance(beliefs, PrevalidatedBeliefs):
             given = sequence("beliefs", beliefs, "one density a sensor")
         num_sensors = len(given) if self.weights is None else len(self.weights)
@@ -204,7 +204,7 @@ def _moment_matched(belief: LMB) -> LMB:
     return belief.with_fields(tracks=TrackTable.from_kernel(reduced_tracks(belief.tracks.to_kernel(), ONE)))
 
 
-def _prediction_of(views: FieldsOfView | None, *, check: bool) -> Labelled:
+def _prediction_of(views: FieldsOfView | None, *, check: bool) -> LabelledDensity:
     prediction = views.prediction if isinstance(views, FieldsOfView) else None
     if prediction is None or not (prediction.is_lmb or prediction.is_product):
         raise InputError(

@@ -12,7 +12,7 @@ from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable
 from vedette.densities.checks import offsets_of
 from vedette.densities.containers import for_kernel, unchecked
 from vedette.densities.conversions import as_glmb
-from vedette.densities.label_sets import JoinedFactors, laid_out
+from vedette.densities.label_sets import JoinedFactors, as_single_factor
 from vedette.densities.tracks import place_labels, places_of
 from vedette.errors import InputError, NumericalError
 from vedette.fusion.base import count_lost
@@ -221,7 +221,7 @@ def _group(labels: Ints, places: Ints, log_weights: Floats, means: Floats, covs:
     offsets = offsets_of(np.bincount(label_of, minlength=num))
     tracks = pooled_tracks(table, labels[held], offsets, pool, shares, ONE)
     hyp_offsets = offsets_of(columns.sum(axis=1))
-    return laid_out(unchecked(GLMB, TrackTable.from_kernel(tracks), hyp_offsets, label_of, log_weights))
+    return as_single_factor(unchecked(GLMB, TrackTable.from_kernel(tracks), hyp_offsets, label_of, log_weights))
 
 
 def lost_labels(posteriors: Sequence[FactoredGLMB], weights: Floats, fused: FactoredGLMB) -> int:

@@ -8,9 +8,9 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from vedette.densities import GLMB, LMB
-from vedette.densities.batches import LabelledCases
+from vedette.densities.batches import DensityBatch
 from vedette.densities.conversions import lmb_on_label_sets
-from vedette.densities.products import PowerProducts, Share, lay_out_products
+from vedette.densities.products import PowerProducts, SensorPower, precompute_products
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
 
@@ -34,7 +34,7 @@ class PrecomputedFusion(Protocol):
 class SupportsPrecomputation(Protocol):
     """A fusion that a planner need not call for every joint action and sample."""
 
-    def precompute(self, cases: Sequence[LabelledCases], prediction: GLMB | LMB) -> PrecomputedFusion | None:
+    def precompute(self, cases: Sequence[DensityBatch], prediction: GLMB | LMB) -> PrecomputedFusion | None:
         """The fusions of any of the sensors' cases, or None where they cannot be had this way.
 
         cases: one a sensor. prediction: what they are compared with, of one Gaussian a track; a GLMB marginalised. What
@@ -43,20 +43,20 @@ class SupportsPrecomputation(Protocol):
         ...
 
 
-def precompute_single_sensor(own: LabelledCases, prediction: GLMB | LMB) -> PowerProducts | None:
+def precompute_single_sensor(own: DensityBatch, prediction: GLMB | LMB) -> PowerProducts | None:
     """A sensor's cases as they are; None for LMBs and a GLMB prediction.
 
     An LMB prediction is taken on a GLMB's label sets. Raises `InputError` for GLMBs without a label set in common.
     """
-    share = Share.whole(own, np.ones_like(own.possible) if own.is_lmb else own.possible)
+    share = SensorPower.whole(own, np.ones_like(own.possible) if own.is_lmb else own.possible)
     if own.is_lmb:
-        return lay_out_products([share], LabelledCases.of(prediction)) if prediction.is_lmb else None
+        return precompute_products([share], DensityBatch.of(prediction)) if prediction.is_lmb else None
     compared = _on_label_sets(prediction, own) if prediction.is_lmb else prediction
-    return precompute_glmbs([share], LabelledCases.of(compared))
+    return precompute_glmbs([share], DensityBatch.of(compared))
 
 
 def precompute_glmbs(
-    shares: Sequence[Share], prediction: LabelledCases, sensors: Sequence[int] | None = None
+    shares: Sequence[SensorPower], prediction: DensityBatch, sensors: Sequence[int] | None = None
 ) -> PowerProducts | None:
     """GLMBs laid out; None where a choice may have no label set in common with the prediction.
 
@@ -68,10 +68,10 @@ def precompute_glmbs(
     places = [[i for i, labels in enumerate(share.cases.sets) if labels in common] for share in shares]
     if not any(share.held[:, own].any(axis=1).all() for share, own in zip(shares, places, strict=True)):
         return None
-    return lay_out_products(shares, prediction, sensors)
+    return precompute_products(shares, prediction, sensors)
 
 
-def _on_label_sets(lmb: LMB, own: LabelledCases) -> GLMB:
+def _on_label_sets(lmb: LMB, own: DensityBatch) -> GLMB:
     """The LMB's hypotheses on those of the label sets that it has; their weights do not sum to one.
 
     A certain or impossible label is taken as all but that: a divergence on common label sets does not depend on the

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.densities import Labelled, TrackTable
+from vedette.densities import LabelledDensity, TrackTable
 from vedette.densities.checks import distinct_labels
 from vedette.densities.labelled import LABELLED
 from vedette.densities.tracks import take_tracks
@@ -41,7 +41,7 @@ class FieldsOfView:
     sensors: tuple[SensorModel, ...]
     poses: Floats
     scanned: tuple[bool, ...]
-    prediction: Labelled | None = None
+    prediction: LabelledDensity | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "sensors", sequence("views.sensors", self.sensors, "at least one SensorModel"))
@@ -50,7 +50,7 @@ class FieldsOfView:
             raise reject("views.sensors", "at least one SensorModel", self.sensors)
         object.__setattr__(self, "poses", float_array("views.poses", self.poses, (num, None)))
         one_a_sensor(num, **{"views.scanned": self.scanned})
-        if not isinstance(self.prediction, Labelled | None):
+        if not isinstance(self.prediction, LabelledDensity | None):
             raise reject("views.prediction", f"{LABELLED}, or None", type(self.prediction).__name__)
 
     def if_all_scanned(self) -> FieldsOfView:

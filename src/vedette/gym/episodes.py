@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vedette.control import Plan
-from vedette.densities import Labelled
+from vedette.densities import LabelledDensity
 from vedette.errors import InputError
 from vedette.evaluation.runs import score_of
 from vedette.gym.observing import Observer, Outlook, deciding_of
@@ -222,7 +222,7 @@ def expected_loss(belief: Any, cutoff: float) -> float:
     r is the existence of a label, P the covariance of its position, c the cutoff. It knows nothing of targets that the
     belief does not hold. Raises `InputError` for a belief without labels.
     """
-    if not isinstance(belief, Labelled):
+    if not isinstance(belief, LabelledDensity):
         raise reject("reward", "ospa or a function, as the belief has no labels", "expected_loss")
     return sum(
         target.existence * min(float(np.sqrt(np.trace(target.cov[:2, :2]))), cutoff) for target in belief.targets()

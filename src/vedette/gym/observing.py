@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from vedette.control import Constraint, MobileSensor, PlanningSettings
 from vedette.control.constraints import Mask, nearest_feasible
 from vedette.control.inputs import mask_of_decision, options_of, single_mask
-from vedette.densities import Labelled, best_estimate
+from vedette.densities import LabelledDensity, best_estimate
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import as_array, dimension, reject
@@ -136,7 +136,7 @@ def belief_arrays(belief: Any, step: int, num_labels: int) -> Observation:
     Mean and covariance are those of a label's marginal density; where a belief has no labels, targets are those that
     are estimated.
     """
-    rows = list((belief if isinstance(belief, Labelled) else best_estimate(belief, step)).targets())
+    rows = list((belief if isinstance(belief, LabelledDensity) else best_estimate(belief, step)).targets())
     rows = [rows[i] for i in np.argsort([-row.existence for row in rows], kind="stable")[:num_labels]]
     dim = belief.state_dim
     existence, mask = np.zeros(num_labels, np.float32), np.zeros(num_labels, np.int8)

@@ -1,7 +1,7 @@
 """Model functions: the decorator that compiles a plain Python function, and how it is called from Python.
 
 A model function sees one state at a time and writes its result into the last argument, `out`, or returns a number;
-one of `association_marginals` (`vedette.filters.Marginals`) sees all that a scan may mean, and does both.
+one of `association_marginals` (`vedette.filters.CustomMarginals`) sees all that a scan may mean, and does both.
 `out` comes with arbitrary contents: **every** entry must be written, zeros too.
 
 | kind | arguments | result |
@@ -16,7 +16,7 @@ one of `association_marginals` (`vedette.filters.Marginals`) sees all that a sca
 | `prob_detection` | state, pose, params | probability in [0, 1] |
 | `mean_prob_detection` | mean, cov, pose, params | mean of `prob_detection` over states N(mean, cov) |
 | `label_reward` | existence, mean, cov, the same of the update, params, out | out: what a target adds to a reward |
-| `association_marginals` | offsets, columns, log_weights, params, out | out: log probabilities; see `Marginals` |
+| `association_marginals` | offsets, columns, log_weights, params, out | out: log probabilities; see `CustomMarginals` |
 | `log_clutter_intensity` | measurement, pose, params | log of the expected clutter per unit of measurement space |
 
 `state[0:2]` is always the position in metres; `pose` is [px, py, heading_rad], and further components that

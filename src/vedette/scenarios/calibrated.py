@@ -10,7 +10,7 @@ import numpy as np
 
 from vedette.calibration import Calibration, Parameter, Problem
 from vedette.calibration.parameters import with_biases
-from vedette.filters import Limits, SequentialLmbFilter, shared_targets
+from vedette.filters import Limits, SequentialLmbFilter, common_target_model
 from vedette.internal.quantities import COMPONENTS, QUANTITIES, SOLID, in_file
 from vedette.internal.reading import read_text
 from vedette.internal.unit_warnings import suppress_unit_warnings
@@ -65,7 +65,7 @@ def problem_of(scenario: Scenario, *, position: bool = False, bearings: Bearings
             clockwise = recording.bearings[s] == "north"
             parameters += _biases(s, sensor, sites[s].bias, clockwise, position, only_positions)
             parameters += _of_models(s, sensor)
-    targets = _born_at_once(shared_targets([sensor.filter for sensor in build_sensors(scenario)]), recording.times)
+    targets = _born_at_once(common_target_model([sensor.filter for sensor in build_sensors(scenario)]), recording.times)
     region, method = model.region.build(), model.filter.gaussian_method
 
     wide = _widened(region)

@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any
 
 from vedette.errors import VedetteError
-from vedette.filters import labels_targets
+from vedette.filters import has_labels
 from vedette.scenarios.build import build_experiment, build_planner, build_sensors, build_tracking
 from vedette.scenarios.faults import Told
 from vedette.scenarios.loading import Scenario, document_of, place_fault
@@ -55,7 +55,7 @@ def _faults(scenario: Scenario) -> Iterator[Told]:
 def _plan(scenario: Scenario) -> None:
     """Make the planners that the section about control is for."""
     build_planner(scenario, "random")
-    if labels_targets(build_sensors(scenario)[0].filter):
+    if has_labels(build_sensors(scenario)[0].filter):
         build_planner(scenario, "jdm")
         if scenario.model.control.lookahead is not None:
             build_planner(scenario, "lookahead")

@@ -20,7 +20,7 @@ from vedette.control.constraints import Mask, nearest_feasible
 from vedette.control.inputs import check_control_inputs, check_poses, mask_of_decision, options_of
 from vedette.densities import Estimator, best_estimate
 from vedette.errors import InputError
-from vedette.filters import shared_targets
+from vedette.filters import common_target_model
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models import MotionModel
 from vedette.models.arguments import dimension, generator, instance, positive
@@ -107,7 +107,7 @@ class OraclePlanner:
     @property
     def _motion(self) -> MotionModel:
         """How the filters take the targets to move."""
-        return shared_targets([sensor.filter for sensor in self.sensors]).motion
+        return common_target_model([sensor.filter for sensor in self.sensors]).motion
 
     def with_truth(self, truth: Truth) -> OraclePlanner:
         """The same for the targets of a run."""

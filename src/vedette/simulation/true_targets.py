@@ -9,7 +9,7 @@ import numpy as np
 
 from vedette.control import MobileSensor, Plan, Planner
 from vedette.control.inputs import check_sensors
-from vedette.densities import LMB, Estimator, FactoredGLMB, Labelled, as_glmb, best_estimate
+from vedette.densities import LMB, Estimator, FactoredGLMB, LabelledDensity, as_glmb, best_estimate
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models import BirthModel
@@ -79,7 +79,7 @@ class ToldPlanner:
 
     def _on_truth(self, state: State, truth: Truth) -> State:
         """The state with beliefs about targets that have a label or may start a track, and about false estimates."""
-        instance("state.fused", state.fused, Labelled)
+        instance("state.fused", state.fused, LabelledDensity)
         birth, step = check_sensors(self.sensors).birth, state.step
         ids, states = truth.at(max(step, 1) - 1)
         held = held_covs(self.estimate, state.fused, step, states, self.cutoff)
@@ -108,7 +108,7 @@ def held_covs(estimate: Estimator, belief: Any, step: int, states: Floats, cutof
     covs, found = np.tile(np.diag(stds**2), (len(states), 1, 1)), np.zeros(len(states), bool)
     false = np.ones(len(estimated.means), bool)
     false[_assign(estimated.means, estimated.covs, states, cutoff, covs, found)] = False
-    if isinstance(belief, Labelled) and not found.all():
+    if isinstance(belief, LabelledDensity) and not found.all():
         named = {(step, index) for step, index in estimated.labels.tolist()}
         others = [own for own in belief.targets() if own.label not in named]
         if others:
@@ -144,7 +144,7 @@ def _may_be_born(birth: BirthModel, step: int) -> bool:
     return birth.from_measurements is not None or (birth.num_sites > 0 and max(birth.steps or {step + 1}) > step)
 
 
-def _certain(of_kind: Labelled, labels: list[tuple[int, int]], means: Floats, covs: Floats) -> Labelled:
+def _certain(of_kind: LabelledDensity, labels: list[tuple[int, int]], means: Floats, covs: Floats) -> LabelledDensity:
     """The belief, of the kind of another, that is certain of these targets."""
     lmb = LMB.from_bernoullis(labels, np.ones(len(labels)), means, covs) if labels else LMB.empty(means.shape[1])
     if of_kind.is_product:

@@ -11,7 +11,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from vedette.densities import Labelled, UndetectedIntensity
+from vedette.densities import LabelledDensity, UndetectedIntensity
 from vedette.densities.factored import bernoulli_factors
 from vedette.errors import InputError
 from vedette.filters import FilterInfo
@@ -200,7 +200,7 @@ def bytes_of_scan(scan: Any, pose: Any) -> int:
 
 def bytes_of_belief(belief: Any) -> int:
     """Labels, existences or hypotheses, and the components of all tracks; 0 of a density without labels."""
-    if not isinstance(belief, Labelled):
+    if not isinstance(belief, LabelledDensity):
         return 0
     tracks = belief.tracks
     num, dim = len(tracks.labels), int(tracks.means.shape[1])

@@ -11,13 +11,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vedette.densities import LMB, Labelled, as_lmb
+from vedette.densities import LMB, LabelledDensity, as_lmb
 from vedette.densities.containers import unchecked
 from vedette.densities.labelled import LABELLED
 from vedette.densities.tracks import take_tracks
 from vedette.errors import InputError
 from vedette.filters import Limits
-from vedette.filters.inputs import births_at, births_within, model_errors, nobody
+from vedette.filters.inputs import births_at, births_within, model_errors, no_births_for_kernel
 from vedette.fusion.matching import OWN_LABELS
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.types import Floats, Ints, Lmb, ScanInput
@@ -84,7 +84,7 @@ def births_due(birth: BirthModel, step: int, dt: float, measured: LMB | None) ->
 
 def births_from_scans(
     birth: BirthModel,
-    belief: Labelled,
+    belief: LabelledDensity,
     sensors: Sequence[SensorModel],
     scans: Sequence[Any],
     poses: Any,
@@ -134,7 +134,7 @@ def births_waiting(birth: BirthModel, before: LMB | None, found: LMB | None) -> 
 
 
 def unexplained(
-    model: MeasurementBirth, belief: Labelled, sensors: Sequence[SensorModel], scans: Sequence[Any], poses: Any
+    model: MeasurementBirth, belief: LabelledDensity, sensors: Sequence[SensorModel], scans: Sequence[Any], poses: Any
 ) -> Unexplained:
     """What no track explains surely, once for what several sensors measured of one target; see `births_from_scans`."""
     lmb = _as_kernel(belief)
@@ -148,7 +148,7 @@ def unexplained(
 
 def births_heard(
     birth: BirthModel,
-    belief: Labelled,
+    belief: LabelledDensity,
     sensors: Sequence[SensorModel],
     scans: Sequence[Any],
     poses: Any,
@@ -161,8 +161,8 @@ def births_heard(
     return births_from_scans(birth, belief, sensors, known, poses, step, owner=owner)
 
 
-def _as_kernel(belief: Labelled) -> Lmb:
-    if not isinstance(belief, Labelled):
+def _as_kernel(belief: LabelledDensity) -> Lmb:
+    if not isinstance(belief, LabelledDensity):
         raise InputError(f"belief: expected {LABELLED} for births from measurements; got {type(belief).__name__}")
     return as_lmb(belief).to_kernel()
 
@@ -170,7 +170,9 @@ def _as_kernel(belief: Labelled) -> Lmb:
 def _look(belief: Lmb, sensor: SensorModel, scan: Any, pose: Any) -> ScanInput:
     """A scan that the filters have checked."""
     measurements = np.ascontiguousarray(scan, np.float64).reshape(-1, sensor.meas_dim)
-    return ScanInput(nobody(belief.tracks.components.means.shape[1]), measurements, pose_vector("pose", pose), 0.0)
+    return ScanInput(
+        no_births_for_kernel(belief.tracks.components.means.shape[1]), measurements, pose_vector("pose", pose), 0.0
+    )
 
 
 def _unexplained(belief: Lmb, sensor: SensorModel, scan: Any, pose: Any, number: int) -> Unexplained:
@@ -182,7 +184,9 @@ def _unexplained(belief: Lmb, sensor: SensorModel, scan: Any, pose: Any, number:
     return Unexplained(positions, 1.0 - explained[free], np.full(len(free), number))
 
 
-def _born_of_one(belief: Labelled, sensor: SensorModel, scan: Any, pose: Any, begin: BirthsOfMeasurements) -> LMB:
+def _born_of_one(
+    belief: LabelledDensity, sensor: SensorModel, scan: Any, pose: Any, begin: BirthsOfMeasurements
+) -> LMB:
     """Return the birth candidates from the scan of a single sensor."""
     lmb = _as_kernel(belief)
     given = _look(lmb, sensor, scan, pose)

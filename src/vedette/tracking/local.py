@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from vedette.densities import LMB, FactoredGLMB, Labelled
+from vedette.densities import LMB, FactoredGLMB, LabelledDensity
 from vedette.errors import InputError
 from vedette.filters import (
     FactoredGlmbFilter,
     Filter,
     FilterInfo,
     LmbFilter,
-    TwoStepFilter,
-    shared_targets,
+    PredictUpdateFilter,
+    common_target_model,
     with_labelled_births,
 )
 from vedette.filters.base import NO_POSE, NO_SCAN, SingleSensorFilter, blind_sensor
@@ -57,7 +57,7 @@ class LocalFilters:
                 raise reject(f"filters[{s}]", "a Filter, with targets, sensor, initial() and step()", local)
         if len(self.filters) > 1:
             object.__setattr__(self, "filters", tuple(map(with_labelled_births, self.filters)))
-        object.__setattr__(self, "targets", shared_targets(self.filters))
+        object.__setattr__(self, "targets", common_target_model(self.filters))
         object.__setattr__(self, "sensors", tuple(local.sensor for local in self.filters))
         object.__setattr__(self, "_are_own", all(isinstance(local, SingleSensorFilter) for local in self.filters))
         birth = self.targets.birth
@@ -120,17 +120,17 @@ class LocalFilters:
 
     def _as_kept(self, belief: Any) -> Any:
         """The same density as the filters keep it: an LMB as a product of GLMBs where they keep these."""
-        factored = isinstance(self.filters[0], FactoredGlmbFilter) and isinstance(belief, Labelled)
+        factored = isinstance(self.filters[0], FactoredGlmbFilter) and isinstance(belief, LabelledDensity)
         return FactoredGLMB.of(belief) if factored else belief
 
     def _for_fusion(self, beliefs: Sequence[Any]) -> Sequence[Any]:
         """What was made of the filters' beliefs at this step, to be fused: checked where a filter is the user's own."""
         return PrevalidatedBeliefs(beliefs) if self._are_own else beliefs
 
-    def _two_step(self, s: int, why: str) -> TwoStepFilter:
+    def _two_step(self, s: int, why: str) -> PredictUpdateFilter:
         own = self.filters[s]
-        if provides(own, TwoStepFilter):
-            found: TwoStepFilter = own
+        if provides(own, PredictUpdateFilter):
+            found: PredictUpdateFilter = own
             return found
         expected = f"a TwoStepFilter, with predict() and update(), as {why}"
         raise reject(f"filters[{s}]", expected, type(own).__name__)

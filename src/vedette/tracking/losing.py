@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from vedette.densities import LMB, Labelled, UndetectedIntensity, as_lmb, existence_probabilities, track_moments
+from vedette.densities import LMB, LabelledDensity, UndetectedIntensity, as_lmb, existence_probabilities, track_moments
 from vedette.densities.containers import for_kernel
 from vedette.densities.label_sets import without_labels
 from vedette.filters.inputs import model_errors
@@ -17,14 +17,14 @@ from vedette.kernels.gaussian.position_integrals import spread_nodes
 from vedette.kernels.planning.reach import predict_paths
 from vedette.models import BirthModel, CellGrid, MeasurementBirth, SensorModel, TargetModel, kernel_motion
 
-_Labelled = TypeVar("_Labelled", bound=Labelled)
+_Labelled = TypeVar("_Labelled", bound=LabelledDensity)
 _NODES = spread_nodes()
 _LEAST = 1e-300  # of a probability that is divided by
 
 
 def lost_labels(before: Any, after: Sequence[Any]) -> LMB | None:
     """The labels of a belief that none of the beliefs after the next scan holds; None where beliefs have no labels."""
-    if not all(isinstance(belief, Labelled) for belief in (before, *after)):
+    if not all(isinstance(belief, LabelledDensity) for belief in (before, *after)):
         return None
     held = [existence_probabilities(belief)[0] for belief in {id(belief): belief for belief in after}.values()]
     return as_lmb(without_labels(before, np.concatenate(held))[0])

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from vedette.densities import FactoredGLMB, Labelled, as_lmb
+from vedette.densities import FactoredGLMB, LabelledDensity, as_lmb
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models.arguments import reject
 from vedette.models.fields import Count, Limit, Natural, Share, check_fields
@@ -127,7 +127,7 @@ def parts_of_belief(belief: Any) -> dict[bytes, int]:
 
     A label of an LMB, a factor of a factored density, a GLMB as a whole; nothing of a density without labels.
     """
-    if not isinstance(belief, Labelled):
+    if not isinstance(belief, LabelledDensity):
         return {}
     tracks, dim = belief.tracks, belief.state_dim
     of_component = 1 + dim + dim * (dim + 1) // 2

@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
-from vedette.densities import Labelled
+from vedette.densities import LabelledDensity
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models.arguments import provides
 
@@ -28,7 +28,7 @@ class ConstraintContext(NamedTuple):
 
     courses: tuple[Floats, ...]
     times: Floats
-    beliefs: tuple[Labelled, ...] = ()
+    beliefs: tuple[LabelledDensity, ...] = ()
     poses: Floats | None = None
     scans: tuple[Bools, ...] = ()
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from vedette.control.constraints.discs import disc_probabilities, near_pairs
 from vedette.control.constraints.protocol import ConstraintContext, PerSensorConstraint
-from vedette.densities import Labelled, TrackTable
+from vedette.densities import LabelledDensity, TrackTable
 from vedette.densities.labelled import LABELLED
 from vedette.kernels.base.types import FactoredGlmb, Floats, Ints
 from vedette.models.arguments import float_array, positive, reject
@@ -49,7 +49,7 @@ class VoidProbability(PerSensorConstraint, Checked):
         return situation.split(lacking)
 
 
-def void_probability(belief: Labelled, centres: Floats, radius: float) -> Floats:
+def void_probability(belief: LabelledDensity, centres: Floats, radius: float) -> Floats:
     """Return the probability (num,) that no target is within `radius`, m, of `centres` (num, 2).
 
     With P_l the probability of the disc under a track: the product over l of 1 - r_l P_l for an LMB; for a GLMB the sum
@@ -58,7 +58,7 @@ def void_probability(belief: Labelled, centres: Floats, radius: float) -> Floats
     `InputError` for invalid centres, or a radius that is not above 0.
     """
     positive("radius", radius)
-    if not isinstance(belief, Labelled):
+    if not isinstance(belief, LabelledDensity):
         raise reject("belief", LABELLED, type(belief).__name__)
     places = float_array("centres", centres, (None, 2))
     disc, track, inside = _inside(belief.tracks, places, radius)

@@ -22,7 +22,7 @@ from vedette.control.constraints import (
 )
 from vedette.control.inputs import predicted_beliefs
 from vedette.control.settings import MobileSensor, PlanningSettings
-from vedette.densities import Labelled
+from vedette.densities import LabelledDensity
 from vedette.kernels.base.types import Bools, Floats
 
 
@@ -70,12 +70,12 @@ class MultiStepConstraints:
     constraints: tuple[Constraint, ...]
     sensors: tuple[MobileSensor, ...]
     settings: PlanningSettings
-    fused: Labelled
+    fused: LabelledDensity
     poses: Floats
     stages: Stages
     on_pairs: bool = field(init=False)
     _time_invariant: bool = field(init=False)
-    _beliefs: dict[int, tuple[Labelled, ...]] = field(default_factory=dict)
+    _beliefs: dict[int, tuple[LabelledDensity, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.on_pairs = max(map(interaction_range_of, self.constraints)) > 0.0

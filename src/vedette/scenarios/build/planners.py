@@ -7,7 +7,7 @@ from functools import partial
 
 from vedette.control import MobileSensor, Planner
 from vedette.errors import InputError
-from vedette.filters import Filter, labels_targets
+from vedette.filters import Filter, has_labels
 from vedette.fusion import Fusion, ParallelUpdate
 from vedette.scenarios.build.sensors import build_scan_times, build_sensors, first_actions
 from vedette.scenarios.build.trackers import keeps_lmbs, told_of
@@ -41,7 +41,7 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
         raise InputError(f"planner: expected one of {', '.join((*STRATEGIES, *model.planners))}; got {name!r}")
     sensors = build_sensors(scenario)
     strategy = strategy_of(model, name)
-    if wanted := strategy.misfit(model, labels=labels_targets(sensors[0].filter)):
+    if wanted := strategy.misfit(model, labels=has_labels(sensors[0].filter)):
         raise InputError(f"planner {name}: expected {wanted}; got {name}")
     parts = build_parts(scenario, sensors, strategy, num_threads)
     if name in model.planners:

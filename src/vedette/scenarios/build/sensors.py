@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from vedette.control import MobileSensor
-from vedette.filters import Filter, TwoStepFilter
+from vedette.filters import Filter, PredictUpdateFilter
 from vedette.kernels.base.types import OWN_VELOCITY, Bools, Floats
 from vedette.models import SensorModel, TargetModel
 from vedette.platforms import Actions, ByCompass, Operated, Patrolling, Platform
@@ -98,7 +98,7 @@ def _check_own(scenario: Scenario, section: Sensor, sensor: SensorModel, local: 
         raise NotGiven(measured, "function", wanted, "one without")
     waits = section.scans.drop_out or section.scans.late or not section.scans.build(model.time).all()
     waits = waits or section.switchable or (model.network is not None and model.network.delay)
-    if isinstance(model.filter, CustomFilter) and (born or waits) and not isinstance(local, TwoStepFilter):
+    if isinstance(model.filter, CustomFilter) and (born or waits) and not isinstance(local, PredictUpdateFilter):
         why = "targets are born of measurements" if born else "it must predict without a scan"
         wanted = f"{model.filter.function} to give a TwoStepFilter, with predict() and update(), as {why}"
         raise NotGiven(model.filter, "function", wanted, f"a {type(local).__name__}")

@@ -5,8 +5,8 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-from vedette.densities import Labelled
-from vedette.filters import Filter, shared_targets
+from vedette.densities import LabelledDensity
+from vedette.filters import Filter, common_target_model
 from vedette.fusion import Clmb, CmDeltaGlmb, Fusion, LabelMatchedFusion
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections.courses import in_courses
@@ -53,7 +53,7 @@ def _tracker_of_found(scenario: Scenario, filters: tuple[Filter, ...]) -> Tracke
 def keeps_lmbs(local: Filter) -> bool:
     """Whether the beliefs of a filter are labelled multi-Bernoulli densities."""
     initial = local.initial()
-    return isinstance(initial, Labelled) and initial.is_lmb
+    return isinstance(initial, LabelledDensity) and initial.is_lmb
 
 
 def _merging(num_sensors: int, *, of_lmbs: bool, own_labels: bool) -> Fusion:
@@ -73,7 +73,7 @@ def _central_filter(scenario: Scenario, filters: tuple[Filter, ...]) -> CentralF
     model = scenario.model
     if model.fusion.kind not in OF_SCANS or not isinstance(model.filter, FilterSection):
         return None
-    targets, sensors, own = shared_targets(filters), tuple(local.sensor for local in filters), model.fusion.filter
+    targets, sensors, own = common_target_model(filters), tuple(local.sensor for local in filters), model.fusion.filter
     if own is not None:
         made: CentralFilter = own.made(
             scenario.folder, targets=targets, sensors=sensors, scene=partial(told_of, scenario)

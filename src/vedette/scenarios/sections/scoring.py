@@ -51,10 +51,10 @@ class MarginalEstimator(Section):
 
     def build(self, folder: Path) -> Estimator:
         """How estimates are read off a density after a scan, given its number."""
-        from vedette.densities import Labelled, marginal_estimate, unlabelled_estimate
+        from vedette.densities import LabelledDensity, marginal_estimate, unlabelled_estimate
 
         def estimate(density: Belief, step: int) -> Estimate:
-            if not isinstance(density, Labelled):
+            if not isinstance(density, LabelledDensity):
                 return unlabelled_estimate(density, step)
             return marginal_estimate(density, self.threshold)
 
