@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from vedette.evaluation import run_scenario
-from vedette.gym import Observation, ScenarioEnv, planner_of
+from vedette.gym import Observation, ScenarioEnv, policy_planner
 from vedette.scenarios import Scenario, load_scenario, with_fields
 
 KEPT = Path(__file__).with_name("gym_policy.npz")
@@ -58,7 +58,7 @@ class Network:
 
 def steer(**parts: Any) -> Any:
     """The kept policy as a planner of a scenario: `kind: custom`, `function: "gym_policy.py:steer"`."""
-    return planner_of(Network(np.load(KEPT)["weights"]), num_labels=LABELS)(**parts)
+    return policy_planner(Network(np.load(KEPT)["weights"]), num_labels=LABELS)(**parts)
 
 
 def scene(name: str = "eight-mobile", scans: int = 100) -> Scenario:

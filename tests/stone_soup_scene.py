@@ -11,7 +11,7 @@ from stonesoup.models.transition.linear import CombinedLinearGaussianTransitionM
 from stonesoup.simulator.simple import MultiTargetGroundTruthSimulator, SimpleDetectionSimulator
 from stonesoup.types.state import GaussianState
 
-from vedette.stonesoup import Converted, convert
+from vedette.stonesoup import ConvertedModels, convert
 
 START = datetime.datetime(2026, 1, 1)
 SECOND = datetime.timedelta(seconds=1)
@@ -20,7 +20,7 @@ MEASUREMENT = LinearGaussian(4, (0, 2), np.diag([25.0, 25.0]))
 PRIOR = GaussianState([0.0] * 4, np.diag([100.0, 20.0, 100.0, 20.0]))
 
 
-def simulated(num_steps: int = 30, seed: int = 2) -> tuple[Any, Any, Converted]:
+def simulated(num_steps: int = 30, seed: int = 2) -> tuple[Any, Any, ConvertedModels]:
     """Truth, detector and models of some targets in clutter; the same for a seed."""
     motion = CombinedLinearGaussianTransitionModel([ConstantVelocity(0.05)] * 2, seed=seed)
     measurement = LinearGaussian(4, (0, 2), np.diag([25.0, 25.0]), seed=seed)

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from filters.tables import children_of, choices_of, make_options, make_parents, tables
 from vedette.kernels.association.assignment import ABSENT, MISSED, make_dual_work, solve_assignment
 from vedette.kernels.association.children import grown_children, make_children
-from vedette.kernels.association.coverage import add_uncovered, associations_of_options
+from vedette.kernels.association.detection_coverage import add_uncovered, associations_of_options
 from vedette.kernels.association.gibbs import sample_children
-from vedette.kernels.association.openings import start_search
 from vedette.kernels.association.ranked import add_missing_groups, rank_children, run_search
 from vedette.kernels.association.search import WIDEST, SearchCaps, grown_search, make_search
+from vedette.kernels.association.search_start import start_search
 
 pytestmark = pytest.mark.lanes
 

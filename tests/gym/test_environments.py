@@ -17,7 +17,7 @@ from pettingzoo.test import parallel_api_test, parallel_seed_test
 from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.evaluation import ospa, run_scenario
-from vedette.gym import Observation, ScenarioEnv, ScenarioParallelEnv, expected_loss, planner_of
+from vedette.gym import Observation, ScenarioEnv, ScenarioParallelEnv, expected_loss, policy_planner
 from vedette.gym.observing import belief_arrays
 from vedette.scenarios import Scenario, load_scenario, with_fields
 from vedette.simulation import Moment, RunRecord, Truth
@@ -50,7 +50,7 @@ def go_on(observation: Observation) -> np.ndarray:
     return mask.shape[1] - 1 - mask[:, ::-1].argmax(axis=1)
 
 
-steer = planner_of(go_on)  # as a scenario names it
+steer = policy_planner(go_on)  # as a scenario names it
 
 
 def episode(env: ScenarioEnv, policy: Any = go_on, **reset: Any) -> list[tuple[Observation, float]]:
@@ -196,7 +196,7 @@ def test_actions_that_constraints_forbid_are_masked_and_moved() -> None:
     env.step(mask.argmin(axis=1))
     assert env.episodes.num_moved == 2
     while not env.episodes.is_over:
-        env.step(env.episodes.outlook.observation["action_mask"].argmin(axis=1))
+        env.step(env.episodes.context.observation["action_mask"].argmin(axis=1))
     places = env.record().poses[..., :2]
     assert np.abs(places).max() <= 1000.0
     assert np.hypot(*(places[:, 0] - places[:, 1]).T).min() >= 300.0
@@ -218,7 +218,7 @@ def test_agents_are_the_sensors_with_their_own_first() -> None:
     assert list(seen) == env.agents == ["sensor_1", "sensor_2"]
     np.testing.assert_array_equal(seen["sensor_2"]["poses"], whole["poses"][::-1])
     np.testing.assert_array_equal(seen["sensor_2"]["ends"], whole["ends"][1])
-    state = env.episodes.outlook.state
+    state = env.episodes.context.state
     np.testing.assert_array_equal(seen["sensor_2"]["means"], belief_arrays(state.local[1], 10, 10)["means"])
     _, rewards, ended, truncated, _ = env.step({"sensor_1": 3, "sensor_2": 9})
     _, reward, *_ = single.step([3, 9])

@@ -34,8 +34,8 @@ from vedette.errors import InputError
 from vedette.filters import LmbFilter
 from vedette.fusion import ParallelUpdate
 from vedette.models import Region, region_clutter
-from vedette.stonesoup import PlanningSensorManager, convert, pose_of
-from vedette.stonesoup.manager import Choices
+from vedette.stonesoup import PlanningSensorManager, convert, convert_pose
+from vedette.stonesoup.manager import StoneSoupActions
 from vedette.tracking import State as Believed
 
 CLUTTER = region_clutter(1.0, Region(-1e3, 1e3, -1e3, 1e3), "bearing_range")
@@ -125,16 +125,18 @@ def test_the_plan_is_that_of_the_planner_itself() -> None:
 
 def test_poses_are_those_that_actions_lead_to() -> None:
     radar = rotating(30.0, -20.0, 1.0)
-    choices = Choices(radar, None, START, UNTIL)
+    choices = StoneSoupActions(radar, None, START, UNTIL)
     times = np.array([0.3, 0.7, 1.0])
     courses = choices.courses(choices.pose, choices.actions(choices.pose), times)
-    np.testing.assert_array_equal(choices.pose, pose_of(radar.measurement_model))
+    np.testing.assert_array_equal(choices.pose, convert_pose(radar.measurement_model))
     for course, chosen in zip(courses, choices.chosen, strict=True):
         for seconds, pose in zip(times.tolist(), course, strict=True):
             twin = copy.deepcopy(radar)
             twin.add_actions(chosen[radar])
             twin.act(START + datetime.timedelta(seconds=seconds))
-            np.testing.assert_allclose(pose, pose_of(twin.measurement_model), atol=1e-6)  # times are in microseconds
+            np.testing.assert_allclose(
+                pose, convert_pose(twin.measurement_model), atol=1e-6
+            )  # times are in microseconds
     assert float(radar.dwell_centre[0, 0]) == 0.7  # nothing was done with it
 
 
@@ -208,7 +210,7 @@ def test_what_no_planner_here_knows_is_named() -> None:
         ours.choose_actions(set(TRACKS), START)
     loud = rotating(0.0, 0.0, 0.0, Loud)
     with pytest.raises(InputError, match="Loud: actionable property: expected one of dwell_centre, position"):
-        Choices(loud, None, START, UNTIL)
+        StoneSoupActions(loud, None, START, UNTIL)
 
 
 def test_a_platform_carries_one_sensor_and_may_go_its_own_way() -> None:
@@ -226,5 +228,5 @@ def test_a_platform_carries_one_sensor_and_may_go_its_own_way() -> None:
         transition_model=MOTION,
     )
     platform, radar = on_board(sailing)
-    choices = Choices(radar, platform, START, UNTIL)
+    choices = StoneSoupActions(radar, platform, START, UNTIL)
     np.testing.assert_allclose(choices.courses(choices.pose, np.zeros((1, 1)), np.array([1.0]))[0], [[10.0, 0.0, 0.0]])

@@ -42,19 +42,19 @@ from vedette.models.functions import write_rows
 from vedette.models.measurement import wrap_angular
 from vedette.recorded.detections import elements_of
 from vedette.stonesoup import (
-    Layout,
-    clutter_of,
+    StateLayout,
     convert,
-    detection_of,
-    measurement_of,
-    motion_of,
-    noise_of,
-    pose_of,
+    convert_clutter,
+    convert_detection,
+    convert_measurement,
+    convert_motion,
+    convert_noise,
+    convert_pose,
 )
-from vedette.stonesoup.sensors import quantities_of
+from vedette.stonesoup.sensors import measured_quantities
 
 START = datetime.datetime(2026, 1, 1)
-PLANE = Layout((0, 2, 1, 3))
+PLANE = StateLayout((0, 2, 1, 3))
 MOTIONS = {
     "walk": CombinedLinearGaussianTransitionModel([RandomWalk(0.3), RandomWalk(0.7)]),
     "velocity": CombinedLinearGaussianTransitionModel([ConstantVelocity(0.3)] * 2),
@@ -72,7 +72,7 @@ MOTIONS = {
 @pytest.mark.parametrize("seconds", [0.5, 1.0, 3.7])
 def test_motions_are_stone_soups_own(name: str, seconds: float) -> None:
     model = MOTIONS[name]
-    motion, layout = motion_of(model)
+    motion, layout = convert_motion(model)
     rng, interval = np.random.default_rng(3), datetime.timedelta(seconds=seconds)
     vectors = rng.normal(size=(6, motion.state_dim)) * 20.0
     if name == "turn":
@@ -98,12 +98,12 @@ def test_motions_are_stone_soups_own(name: str, seconds: float) -> None:
 
 @pytest.mark.parametrize("name", MOTIONS)
 def test_motions_that_are_compiled_hold_to_their_own_checks(name: str) -> None:
-    motion, _ = motion_of(MOTIONS[name])
+    motion, _ = convert_motion(MOTIONS[name])
     motion.check(np.random.default_rng(1).normal(size=(3, motion.state_dim)) + 0.1, 2.0)
 
 
 def test_where_a_state_has_what() -> None:
-    _, layout = motion_of(MOTIONS["acceleration"])
+    _, layout = convert_motion(MOTIONS["acceleration"])
     assert (layout.order, layout.position) == ((0, 3, 1, 4, 2, 5), (0, 3))
     there = layout.states([[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]])
     assert there.tolist() == [[1.0, 4.0, 2.0, 5.0, 3.0, 6.0]]
@@ -137,18 +137,18 @@ STATES = [
 @pytest.mark.parametrize("vector", STATES)
 def test_measurements_are_stone_soups_own(name: str, vector: list[float]) -> None:
     model, state = MEASURED[name], State(StateVector(vector))
-    measurement, pose, ours = measurement_of(model, PLANE), pose_of(model), PLANE.states([vector])
+    measurement, pose, ours = convert_measurement(model, PLANE), convert_pose(model), PLANE.states([vector])
     their = Detection(model.function(state, noise=False), measurement_model=model)
-    taken = np.array([elements_of(their, quantities_of(model), model, "here")])
+    taken = np.array([elements_of(their, measured_quantities(model), model, "here")])
     off = wrap_angular(taken - measurement.measure(ours, pose), measurement.angular)
     np.testing.assert_allclose(off, 0.0, atol=1e-10)
 
     # As likely as they say, of a measurement that is some way off.
     aside = np.resize([0.03, 12.0], model.ndim_meas)
     noisy = Detection(model.function(state, noise=False) + aside[:, np.newaxis], measurement_model=model)
-    taken = np.array([elements_of(noisy, quantities_of(model), model, "here")])
+    taken = np.array([elements_of(noisy, measured_quantities(model), model, "here")])
     off = wrap_angular(taken - measurement.measure(ours, pose), measurement.angular)[0]
-    cov = noise_of(model).covs(ours, pose, model.ndim_meas)[0]
+    cov = convert_noise(model).covs(ours, pose, model.ndim_meas)[0]
     np.testing.assert_allclose(cov, np.asarray(model.covar(), float), rtol=1e-12)
     log_density = multivariate_normal.logpdf(off, cov=cov)
     np.testing.assert_allclose(log_density, float(model.logpdf(noisy, state)), rtol=1e-10)
@@ -174,7 +174,7 @@ def test_measurements_are_stone_soups_own(name: str, vector: list[float]) -> Non
 
 def test_noise_that_is_compiled_holds_to_its_own_checks() -> None:
     model = MEASURED["turned"]
-    noise_of(model).check(PLANE.states(STATES), pose_of(model), 2)
+    convert_noise(model).check(PLANE.states(STATES), convert_pose(model), 2)
 
 
 def radar(kind: Any = RadarBearingRange, **fields: Any) -> Any:
@@ -193,13 +193,13 @@ def test_fields_of_view_are_those_of_the_radars() -> None:
         orientation=StateVector([[0.0], [0.0], [0.6]]),
     )
     for sensor in (radar(), radar(max_range=250.0), rotating):
-        model, seen = sensor.measurement_model, detection_of(sensor, 0.8)
+        model, seen = sensor.measurement_model, convert_detection(sensor, 0.8)
         rng = np.random.default_rng(8)
         vectors = np.column_stack(
             [rng.uniform(-500, 700, 400), np.zeros(400), rng.uniform(-600, 500, 400), np.zeros(400)]
         )
         theirs = [bool(np.all(sensor.is_detectable(State(StateVector(vector))))) for vector in vectors]
-        ours = seen.prob(PLANE.states(vectors), pose_of(model))
+        ours = seen.prob(PLANE.states(vectors), convert_pose(model))
         assert ours.tolist() == [0.8 if one else 0.0 for one in theirs]
     assert 0 < sum(theirs) < 400
 
@@ -207,22 +207,24 @@ def test_fields_of_view_are_those_of_the_radars() -> None:
 def test_clutter_is_as_dense_as_they_say() -> None:
     turned = MEASURED["turned"]
     simulator = SimpleDetectionSimulator([], turned, np.array([[-math.pi, math.pi], [0.0, 900.0]]), clutter_rate=7.0)
-    clutter = clutter_of(simulator, turned)
-    density = math.exp(clutter.log_intensity_at([[1.0, 50.0]], pose_of(turned))[0])
+    clutter = convert_clutter(simulator, turned)
+    density = math.exp(clutter.log_intensity_at([[1.0, 50.0]], convert_pose(turned))[0])
     assert density == pytest.approx(float(simulator.clutter_spatial_density), rel=1e-12)
-    assert clutter.log_intensity_at([[1.0, 901.0]], pose_of(turned))[0] == -math.inf
+    assert clutter.log_intensity_at([[1.0, 901.0]], convert_pose(turned))[0] == -math.inf
 
     sector = SimpleDetectionSimulator([], turned, np.array([[0.0, 0.5], [0.0, 900.0]]), clutter_rate=7.0)
-    logs = clutter_of(sector, turned).log_intensity_at([[2.3 - 0.01, 50.0], [2.3 + 0.01, 50.0]], pose_of(turned))
+    logs = convert_clutter(sector, turned).log_intensity_at(
+        [[2.3 - 0.01, 50.0], [2.3 + 0.01, 50.0]], convert_pose(turned)
+    )
     assert np.isinf(logs).tolist() == [True, False]  # as it was turned
 
     uniform = ClutterModel(clutter_rate=4.0, dist_params=((-200.0, 300.0), (-100.0, 100.0)))
     position = MEASURED["position"]
-    there = clutter_of(uniform, position).log_intensity_at([[290.0, 0.0], [0.0, 290.0]], np.zeros(3))
+    there = convert_clutter(uniform, position).log_intensity_at([[290.0, 0.0], [0.0, 290.0]], np.zeros(3))
     assert math.exp(there[0]) == pytest.approx(4.0 / (500.0 * 200.0))
     assert there[1] == -math.inf
     # Of a radar, with the Jacobian: what falls into a small cell around (bearing, range).
-    polar = clutter_of(uniform, turned).log_intensity_at([[math.pi / 2.0, 50.0]], pose_of(turned))
+    polar = convert_clutter(uniform, turned).log_intensity_at([[math.pi / 2.0, 50.0]], convert_pose(turned))
     assert math.exp(polar[0]) == pytest.approx(4.0 / (500.0 * 200.0) * 50.0)
 
 
@@ -313,7 +315,7 @@ def test_what_has_no_equal_is_named(given: dict[str, Any], message: str) -> None
 def test_a_sensor_that_leans_is_refused() -> None:
     leaning = CartesianToBearingRange(4, (0, 2), np.eye(2), rotation_offset=StateVector([[0.0], [0.3], [1.0]]))
     with pytest.raises(InputError, match="rotation_offset: expected turns about the z axis alone"):
-        pose_of(leaning)
+        convert_pose(leaning)
 
 
 def test_sensors_may_bring_their_own_clutter_and_detection() -> None:

@@ -36,7 +36,7 @@ from vedette.filters import LmbFilter
 from vedette.fusion import ParallelUpdate
 from vedette.models import BirthModel, measurement_space_clutter
 from vedette.recorded import Conventions, Site, parse_scans, table_of_detections
-from vedette.stonesoup import LabelledTracker, ScansOf, convert, truth_of
+from vedette.stonesoup import LabelledTracker, ScanConverter, convert, convert_truth
 from vedette.tracking import Distributed
 
 BOX = measurement_space_clutter(1e-6, [-1e4, -1e4], [1e4, 1e4])
@@ -114,8 +114,8 @@ def test_their_metric_manager_and_plotter_take_the_tracks(kind: Any) -> None:
     assert 0.0 < np.mean([metric.value for metric in by_time[5:]]) < 15.0
     assert made["siap"]["SIAP Completeness"].value > 0.9
 
-    # OSPA of this library, of what `truth_of` and the tracks say, is the same.
-    ours = truth_of(there, times, models.layout)
+    # OSPA of this library, of what `convert_truth` and the tracks say, is the same.
+    ours = convert_truth(there, times, models.layout)
     for k, time in enumerate(times):
         _, states = ours.at(k)
         found = [track[time].state_vector for track in tracks if any(state.timestamp == time for state in track)]
@@ -194,7 +194,7 @@ def test_scans_are_those_of_the_table_of_detections() -> None:
         found = {Detection(StateVector(row), timestamp=START, measurement_model=radar) for row in rows}
         given.append((START.replace(tzinfo=datetime.UTC) + k * SECOND, found))
     clutter = measurement_space_clutter(1.0, [-math.pi, 0.0], [math.pi, 3e3], angular=[True, False])
-    reader = ScansOf(convert(MOTION, {"radar": radar}, births=PRIOR, clutter=clutter))
+    reader = ScanConverter(convert(MOTION, {"radar": radar}, births=PRIOR, clutter=clutter))
     table = table_of_detections(given, ("bearing", "range"), sensor="radar")
     recording = parse_scans(table, [Site("radar", "bearing_range", (0.0, 0.0, 0.0))], Conventions({}, {}))
     for k, (time, found) in enumerate(given):
@@ -237,7 +237,7 @@ def test_truth_goes_by_times() -> None:
     pairs = [(time, set(paths)) for time, paths in truth]
     times = [time for time, _ in pairs]
     paths = set().union(*(found for _, found in pairs))
-    made = truth_of(paths, times, models.layout)
+    made = convert_truth(paths, times, models.layout)
     assert made.times.tolist() == list(range(8))
     for k, (time, found) in enumerate(pairs):
         _, states = made.at(k)

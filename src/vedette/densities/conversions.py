@@ -17,7 +17,7 @@ from vedette.densities.labelled import LMB, LabelledDensity
 from vedette.densities.tracks import TrackTable, single_gaussians, take_tracks
 from vedette.errors import InputError
 from vedette.internal.probabilities import log_expit
-from vedette.kernels.association.names import settled_names
+from vedette.kernels.association.label_resolution import settled_names
 from vedette.kernels.base.types import Lmb
 from vedette.kernels.gaussian.pooling import reduced_tracks
 from vedette.kernels.gaussian.reduction import MixtureCaps

@@ -41,7 +41,7 @@ from vedette.filters.undetected import (
 from vedette.kernels.base.types import Bools, FactoredGlmb, Ints, Lmb
 from vedette.kernels.steps.factor_updates import Factoring
 from vedette.kernels.steps.factored import FactoredReport, step_factored
-from vedette.kernels.steps.in_view import in_view
+from vedette.kernels.steps.field_of_view import in_view
 from vedette.kernels.steps.undetected import Arrivals
 from vedette.models.arguments import dimension, non_negative, one_of, step_number
 from vedette.models.fields import Count, L1Error

@@ -18,7 +18,7 @@ from vedette.filters.multi_sensor import MultiSensorFilter, SequentialUpdate
 from vedette.filters.protocols import Filter, FilterInfo
 from vedette.kernels.association.marginals import Association
 from vedette.kernels.base.types import Bools, Ints, Lmb
-from vedette.kernels.steps.in_view import in_view, marked, put_back
+from vedette.kernels.steps.field_of_view import in_view, marked, put_back
 from vedette.kernels.steps.lmb import LmbReport, step_lmb
 from vedette.kernels.steps.multi_sensor_combinations import predict_combinations, standing_combinations
 from vedette.kernels.steps.multi_sensor_lmb import update_lmb

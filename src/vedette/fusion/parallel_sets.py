@@ -86,7 +86,7 @@ class GroupedSets(NamedTuple):
     """
 
     labels: Ints  # (num_labels, 2) increasing
-    log_weights: Floats  # (num_sets,) of the prediction times what the scans said, but for the places
+    log_weights: Floats  # (num_sets,) of the prediction times what the scans evidence, but for the places
     places: Ints  # (num_sets, num_labels) place of each member; -1 of those that are absent
     place_labels: Ints  # (num_places,) into `labels`
     chosen: Ints  # (num_places, num_sensors) track of each sensor, -1 where it has nothing to say
@@ -116,11 +116,11 @@ def grouped_sets(
         lacking = np.ones(len(labels), np.bool_)
         for factor in np.flatnonzero(groups == group).tolist() if power > 0.0 else ():
             start = first_tracks[s] + density.track_offsets[factor]
-            said = _Said.of(density.factor(factor), labels, members, prior)
-            lacking[said.columns] = False
-            log_weights += power * said.log_ratios
-            tracks = np.where(said.tracks >= 0, said.tracks + start, -1)
-            chosen[:, said.columns, s] = tracks
+            evidence = _FactorEvidence.of(density.factor(factor), labels, members, prior)
+            lacking[evidence.columns] = False
+            log_weights += power * evidence.log_ratios
+            tracks = np.where(evidence.tracks >= 0, evidence.tracks + start, -1)
+            chosen[:, evidence.columns, s] = tracks
         for label in np.flatnonzero(lacking & (power > 0.0)).tolist():
             num_missing[s] += 1
             log_weights += power * _of_dropped(members[:, label], prior, missing_existence)
@@ -141,7 +141,7 @@ def _members(glmb: GLMB, labels: Ints) -> Bools:
     return members
 
 
-class _Said(NamedTuple):
+class _FactorEvidence(NamedTuple):
     """What one factor of a posterior says of each of the prediction's sets."""
 
     columns: Ints  # (num_own,) its labels
@@ -149,7 +149,7 @@ class _Said(NamedTuple):
     tracks: Ints  # (num_sets, num_own) of the factor's; -1 of those absent, and where it lacks the set
 
     @classmethod
-    def of(cls, factor: GLMB, labels: Ints, members: Bools, prior: Floats) -> _Said:
+    def of(cls, factor: GLMB, labels: Ints, members: Bools, prior: Floats) -> _FactorEvidence:
         own_labels = np.unique(factor.tracks.labels, axis=0)
         columns = places_of(own_labels, labels)
         parts, part_of = np.unique(members[:, columns], axis=0, return_inverse=True)
@@ -172,8 +172,8 @@ def _of_dropped(member: Bools, prior: Floats, missing_existence: float) -> Float
     sums = group_log_sums(prior, number, 2)
     log_odds = min(sums[1] - sums[0], logit(missing_existence))
     with np.errstate(invalid="ignore"):  # of a side without sets
-        said = log_expit(np.array([-log_odds, log_odds])) - (sums - np.logaddexp(*sums))
-    return np.asarray(said[number])
+        evidence = log_expit(np.array([-log_odds, log_odds])) - (sums - np.logaddexp(*sums))
+    return np.asarray(evidence[number])
 
 
 def check_single(prediction: FactoredGLMB) -> None:

@@ -10,9 +10,9 @@ require_packages("an environment", "gymnasium", "pettingzoo")
 import gymnasium
 
 from vedette.gym.episodes import expected_loss
-from vedette.gym.observing import Observation, Observer
+from vedette.gym.observing import Observation, ObservationEncoder
 from vedette.gym.parallel import ScenarioParallelEnv
-from vedette.gym.policies import PolicyPlanner, planner_of
+from vedette.gym.policies import PolicyPlanner, policy_planner
 from vedette.gym.single import ScenarioEnv
 
 if "vedette/Scenario-v0" not in gymnasium.registry:  # which a module that is loaded again would tell of
@@ -20,10 +20,10 @@ if "vedette/Scenario-v0" not in gymnasium.registry:  # which a module that is lo
 
 __all__ = [
     "Observation",
-    "Observer",
+    "ObservationEncoder",
     "PolicyPlanner",
     "ScenarioEnv",
     "ScenarioParallelEnv",
     "expected_loss",
-    "planner_of",
+    "policy_planner",
 ]

@@ -13,7 +13,7 @@ from vedette.control import Plan
 from vedette.densities import LabelledDensity
 from vedette.errors import InputError
 from vedette.evaluation.runs import score_of
-from vedette.gym.observing import Observer, Outlook, deciding_of
+from vedette.gym.observing import DecisionContext, ObservationEncoder, deciding_sensors
 from vedette.gym.windows import Window
 from vedette.internal.extras import require_packages
 from vedette.internal.unit_warnings import suppress_unit_warnings
@@ -32,10 +32,10 @@ Reward: TypeAlias = Callable[[Sequence[Moment], Truth], float]
 AnyReward: TypeAlias = Literal["ospa", "expected_loss"] | Reward
 RENDER_MODES = ["rgb_array", "human"]
 # These grow with every scan, or are -inf where nothing fits: of a stretch of time their mean says little.
-_NOT_TOLD = ("log_likelihood", "fusion_log_normaliser")
+_NOT_AVERAGED = ("log_likelihood", "fusion_log_normaliser")
 
 
-class Built:
+class BuiltScenario:
     """A scenario with what its episodes share."""
 
     def __init__(self, scenario: AnyScenario, num_labels: int) -> None:
@@ -46,7 +46,7 @@ class Built:
                 f"{self.scenario.name}: expected decisions, as of control.decision_steps; got a scenario without any"
             )
         parts = build_parts(self.scenario, build_sensors(self.scenario), Strategy())
-        self.observer = Observer.of(parts._asdict(), num_labels)
+        self.encoder = ObservationEncoder.of(parts._asdict(), num_labels)
         score = score_of(self.scenario)
         assert score is not None  # only the targets of recordings are unknown
         self.score = score
@@ -54,7 +54,7 @@ class Built:
     @property
     def layout(self) -> Layout:
         """Of its observations and actions."""
-        return Layout.of(self.observer.outlook(self.experiment.tracker.initial(), self.experiment.poses))
+        return Layout.of(self.encoder.decision_context(self.experiment.tracker.initial(), self.experiment.poses))
 
 
 class Layout(NamedTuple):
@@ -65,10 +65,10 @@ class Layout(NamedTuple):
     deciding: tuple[int, ...]  # places of these sensors
 
     @classmethod
-    def of(cls, outlook: Outlook) -> Layout:
+    def of(cls, context: DecisionContext) -> Layout:
         """Of a decision."""
-        options, shown = outlook.options, outlook.observation
-        deciding = deciding_of(options)
+        options, shown = context.options, context.observation
+        deciding = deciding_sensors(options)
         sizes = tuple(len(options[s].actions) for s in deciding)
         return cls({name: array.shape for name, array in shown.items()}, sizes, deciding)
 
@@ -80,7 +80,7 @@ class Episodes:
         built: the scenario of the present run.
         layout: of all observations and actions.
         render_mode: how pictures are shown.
-        world, outlook: the present run, and the decision at hand.
+        world, context: the present run, and the decision at hand.
         num_moved: actions of the last decision that constraints have moved.
     """
 
@@ -93,7 +93,7 @@ class Episodes:
             raise reject("reward", "ospa, expected_loss or a function of moments and truth", reward)
         self._num_labels, self._reward, self.render_mode = num_labels, reward, render_mode
         self._window: Window | None = None
-        self._draw = scenario if callable(scenario) else _one_of(scenario, num_labels)
+        self._draw = scenario if callable(scenario) else _scenario_sampler(scenario, num_labels)
         self._seed: int | None = None
         self._run, self.num_moved = 0, 0
         self.built = self._drawn(0, 0)
@@ -123,9 +123,9 @@ class Episodes:
             raise InputError(
                 f"step: expected a reset first, as {'there is no run' if self._seed is None else 'the run is over'}"
             )
-        chosen, self.num_moved = self.built.observer.chosen(self.outlook, actions)
+        chosen, self.num_moved = self.built.encoder.resolve_actions(self.context, actions)
         with suppress_unit_warnings():
-            plan = plan_of("policy", self.outlook, chosen)
+            plan = policy_plan("policy", self.context, chosen)
             self._journal.decide(plan, explain=self.built.experiment.explain)
             self.world.follow(plan.chosen_actions)
             self._advance()
@@ -134,10 +134,10 @@ class Episodes:
         with suppress_unit_warnings():
             self._moments = advance(self.world, self._journal)
             last = self._moments[-1]
-            self.outlook: Outlook = self.built.observer.outlook(last.state, last.poses)
+            self.context: DecisionContext = self.built.encoder.decision_context(last.state, last.poses)
         if self.render_mode == "human":
             self.render()
-        found = Layout.of(self.outlook)
+        found = Layout.of(self.context)
         if found != self.layout:
             expected = f"{self.built.scenario.name}: expected arrays and actions of one layout at every decision"
             raise InputError(f"{expected}, {self.layout}; got {found}")
@@ -167,7 +167,7 @@ class Episodes:
         told: dict[str, Any] = {"seed": self._seed, "run": self._run, "step": last, "time": self._moments[-1].time}
         told |= {"num_moved": self.num_moved}
         kept = {name: getattr(self._journal.health, name)[first:last] for name in Health.__match_args__}
-        means = {name: own.mean(axis=0) for name, own in kept.items() if name not in _NOT_TOLD}
+        means = {name: own.mean(axis=0) for name, own in kept.items() if name not in _NOT_AVERAGED}
         told["health"] = {name: np.asarray(own) for name, own in means.items() if np.isfinite(own).all()}
         return told
 
@@ -195,25 +195,27 @@ class Episodes:
             self._window.close()
             self._window = None
 
-    def _drawn(self, seed: int, run: int) -> Built:
+    def _drawn(self, seed: int, run: int) -> BuiltScenario:
         """The scenario of a run, built."""
         found = self._draw(run_stream(seed, run, SCENES))
-        return found if isinstance(found, Built) else Built(found, self._num_labels)
+        return found if isinstance(found, BuiltScenario) else BuiltScenario(found, self._num_labels)
 
 
-def _one_of(scenario: AnyScenario | Sequence[AnyScenario], num_labels: int) -> Callable[[np.random.Generator], Built]:
+def _scenario_sampler(
+    scenario: AnyScenario | Sequence[AnyScenario], num_labels: int
+) -> Callable[[np.random.Generator], BuiltScenario]:
     """What draws one of several scenarios, each built once."""
     given = [scenario] if isinstance(scenario, str | Path | Scenario) else list(scenario)
     if not given:
         raise reject("scenario", "at least one scenario", "none")
-    built = [Built(own, num_labels) for own in given]
+    built = [BuiltScenario(own, num_labels) for own in given]
     return lambda rng: built[int(rng.integers(len(built)))]
 
 
-def plan_of(name: str, outlook: Outlook, chosen: tuple[int, ...]) -> Plan:
+def policy_plan(name: str, context: DecisionContext, chosen: tuple[int, ...]) -> Plan:
     """The plan of a policy."""
-    notes = outlook.mask.notes if outlook.mask is not None else ()
-    return Plan(name, tuple(own.actions for own in outlook.options), chosen, (), {}, notes)
+    notes = context.mask.notes if context.mask is not None else ()
+    return Plan(name, tuple(own.actions for own in context.options), chosen, (), {}, notes)
 
 
 def expected_loss(belief: Any, cutoff: float) -> float:

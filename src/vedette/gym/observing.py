@@ -23,7 +23,7 @@ from vedette.tracking import State
 Observation: TypeAlias = dict[str, NDArray[Any]]
 
 
-class Outlook(NamedTuple):
+class DecisionContext(NamedTuple):
     """A decision that is to be made.
 
     state, poses: what is believed, and (num_sensors, 3 or more) where the sensors are. options: of each sensor what it
@@ -38,7 +38,7 @@ class Outlook(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Observer:
+class ObservationEncoder:
     """What shows decisions to a policy, and takes its answers; environments and planners have the same.
 
     Attributes:
@@ -62,45 +62,45 @@ class Observer:
         dimension("num_labels", self.num_labels)
 
     @classmethod
-    def of(cls, parts: Mapping[str, Any], num_labels: int = 10) -> Observer:
+    def of(cls, parts: Mapping[str, Any], num_labels: int = 10) -> ObservationEncoder:
         """Of what a planner of a scenario is made of (`vedette.scenarios.build.build_parts`)."""
         timetable = parts["oracle"]["timetable"]
         return cls(parts["sensors"], parts["settings"], parts["constraints"], timetable, num_labels)
 
-    def outlook(self, state: State, poses: Floats) -> Outlook:
+    def decision_context(self, state: State, poses: Floats) -> DecisionContext:
         """The decision at hand.
 
         Raises `InputError` for poses that do not fit, or no sensor with a choice.
         """
         options = options_of(self.sensors, poses, self.settings)
         mask = mask_of_decision(self.constraints, self.sensors, options, state.fused, poses, self.settings)
-        return Outlook(state, poses, options, mask, self._observation(state, poses, options, mask))
+        return DecisionContext(state, poses, options, mask, self._observation(state, poses, options, mask))
 
-    def chosen(self, outlook: Outlook, actions: ArrayLike) -> tuple[tuple[int, ...], int]:
+    def resolve_actions(self, context: DecisionContext, actions: ArrayLike) -> tuple[tuple[int, ...], int]:
         """The index of each sensor's action, of those that decide as a policy says, and how many were moved.
 
         A joint action that constraints forbid is moved to one near it, as that of `vedette.control.RandomPlanner` is.
         actions: (num_deciding,) indices. Raises `InputError` for what are none.
         """
-        deciding = deciding_of(outlook.options)
+        deciding = deciding_sensors(context.options)
         given = np.atleast_1d(as_array("actions", actions, "iu", "indices of actions"))
-        sizes = np.array([len(outlook.options[s].actions) for s in deciding])
+        sizes = np.array([len(context.options[s].actions) for s in deciding])
         if given.shape != sizes.shape or (given < 0).any() or (given >= sizes).any():
             raise reject("actions", f"{len(sizes)} indices below {sizes.tolist()}", given)
         indices = dict(zip(deciding, given.tolist(), strict=True))
-        every = [indices.get(s, 0) for s in range(len(outlook.options))]
-        if outlook.mask is None:
+        every = [indices.get(s, 0) for s in range(len(context.options))]
+        if context.mask is None:
             return tuple(every), 0
-        wanted = [int(own.which[index]) for own, index in zip(outlook.options, every, strict=True)]
-        courses = nearest_feasible(outlook.mask, wanted)
+        wanted = [int(own.which[index]) for own, index in zip(context.options, every, strict=True)]
+        courses = nearest_feasible(context.mask, wanted)
         kept = [
             index if course == before else own.first_action(course)
-            for own, index, course, before in zip(outlook.options, every, courses, wanted, strict=True)
+            for own, index, course, before in zip(context.options, every, courses, wanted, strict=True)
         ]
         return tuple(kept), sum(course != before for course, before in zip(courses, wanted, strict=True))
 
     def _observation(self, state: State, poses: Floats, options: tuple[Options, ...], mask: Mask | None) -> Observation:
-        deciding = deciding_of(options)
+        deciding = deciding_sensors(options)
         most = max(len(options[s].actions) for s in deciding)
         masks = np.zeros((len(deciding), most), np.int8)
         ends = np.zeros((len(deciding), most, poses.shape[1]), np.float32)
@@ -122,7 +122,7 @@ class Observer:
         return np.asarray(times[[due - 1, -1]] - times[step - 1], np.float32)
 
 
-def deciding_of(options: tuple[Options, ...]) -> tuple[int, ...]:
+def deciding_sensors(options: tuple[Options, ...]) -> tuple[int, ...]:
     """The sensors that have more than one action; `InputError` where none has."""
     found = tuple(s for s, own in enumerate(options) if len(own.actions) > 1)
     if not found:

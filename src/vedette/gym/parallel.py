@@ -96,13 +96,13 @@ class ScenarioParallelEnv(ParallelEnv):  # type: ignore[misc]  # which has no ty
         return self._observations(), rewards, dict.fromkeys(self._sensors, False), ended, infos
 
     def _observations(self) -> dict[str, Observation]:
-        outlook, found = self.episodes.outlook, {}
+        context, found = self.episodes.context, {}
         for (agent, (row, s)), num in zip(self._sensors.items(), self.episodes.layout.num_actions, strict=True):
-            shown, poses = outlook.observation, outlook.observation["poses"]
+            shown, poses = context.observation, context.observation["poses"]
             own = {name: shown[name][row, :num] for name in ("ends", "action_mask")}
             own["poses"] = np.concatenate([poses[s : s + 1], poses[:s], poses[s + 1 :]])
             if self._own:
-                own |= belief_arrays(outlook.state.local[s], outlook.state.step, self._num_labels)
+                own |= belief_arrays(context.state.local[s], context.state.step, self._num_labels)
             found[agent] = {name: array.copy() for name, array in (shown | own).items()}
         return found
 

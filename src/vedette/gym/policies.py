@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.control import Plan
-from vedette.gym.episodes import plan_of
-from vedette.gym.observing import Observation, Observer
+from vedette.gym.episodes import policy_plan
+from vedette.gym.observing import Observation, ObservationEncoder
 from vedette.kernels.base.types import Floats
 from vedette.tracking import State
 
@@ -24,12 +24,12 @@ class PolicyPlanner:
 
     Attributes:
         policy: gives the index of an action of each sensor that decides, for an observation of `ScenarioEnv`.
-        observer: shows the decision.
+        encoder: shows the decision.
         name: of the strategy.
     """
 
     policy: Policy
-    observer: Observer
+    encoder: ObservationEncoder
     name: str = "policy"
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
@@ -37,19 +37,19 @@ class PolicyPlanner:
 
         Raises `InputError` for what are no actions.
         """
-        outlook = self.observer.outlook(state, np.asarray(poses, np.float64))
-        chosen, _ = self.observer.chosen(outlook, self.policy(outlook.observation))
-        return plan_of(self.name, outlook, chosen)
+        context = self.encoder.decision_context(state, np.asarray(poses, np.float64))
+        chosen, _ = self.encoder.resolve_actions(context, self.policy(context.observation))
+        return policy_plan(self.name, context, chosen)
 
 
-def planner_of(policy: Policy, *, num_labels: int = 10) -> Callable[..., PolicyPlanner]:
+def policy_planner(policy: Policy, *, num_labels: int = 10) -> Callable[..., PolicyPlanner]:
     """What makes a planner of a policy in a scenario.
 
-    In `mine.py` beside a scenario, `steer = planner_of(policy)`; in the scenario
+    In `mine.py` beside a scenario, `steer = policy_planner(policy)`; in the scenario
     `planners: {mine: {kind: custom, function: "mine.py:steer"}}`. num_labels: as of the environment.
     """
 
     def make(**parts: Any) -> PolicyPlanner:
-        return PolicyPlanner(policy, Observer.of(parts, num_labels))
+        return PolicyPlanner(policy, ObservationEncoder.of(parts, num_labels))
 
     return make

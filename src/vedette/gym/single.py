@@ -21,8 +21,8 @@ class ScenarioEnv(gymnasium.Env[dict[str, Any], Any]):
     A step sends the sensors and takes their scans up to and including that after which the next decision is due, or the
     last of the scenario. The end is a limit of time, as targets live on: `truncated`, never `terminated`.
 
-    Observation: see `vedette.gym.Observer`, and docs/gym.md for its layout. Action: the index of an action of each
-    sensor that decides (`MultiDiscrete`), of a single one a number (`Discrete`).
+    Observation: see `vedette.gym.ObservationEncoder`, and docs/gym.md for its layout. Action: the index of an action of
+    each sensor that decides (`MultiDiscrete`), of a single one a number (`Discrete`).
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": RENDER_MODES, "render_fps": 2}  # type: ignore[misc]
@@ -65,7 +65,7 @@ class ScenarioEnv(gymnasium.Env[dict[str, Any], Any]):
 
     def action_masks(self) -> NDArray[np.bool_]:
         """(sum of numbers of actions,) which action of each sensor constraints allow, one sensor's after another's."""
-        mask = self.episodes.outlook.observation["action_mask"].astype(np.bool_)
+        mask = self.episodes.context.observation["action_mask"].astype(np.bool_)
         return np.concatenate([row[:num] for row, num in zip(mask, self.episodes.layout.num_actions, strict=True)])
 
     def reset(
@@ -80,13 +80,13 @@ class ScenarioEnv(gymnasium.Env[dict[str, Any], Any]):
         """
         super().reset(seed=seed)
         self.episodes.start(seed, (options or {}).get("run"))
-        return self.episodes.outlook.observation, self.episodes.info()
+        return self.episodes.context.observation, self.episodes.info()
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Send the sensors, and go on to the next decision or the end; raises `InputError` after the end."""
         self.episodes.decide(action)
         episodes = self.episodes
-        return episodes.outlook.observation, episodes.reward(), False, episodes.is_over, episodes.info()
+        return episodes.context.observation, episodes.reward(), False, episodes.is_over, episodes.info()
 
     def render(self) -> NDArray[np.uint8] | None:
         """The last scan, as a frame of `vedette video`: (height, width, 3) for "rgb_array", else in a window."""

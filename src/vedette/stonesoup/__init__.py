@@ -4,25 +4,31 @@ from vedette.internal.extras import require_packages
 
 require_packages("vedette.stonesoup", "stonesoup")
 
-from vedette.stonesoup.converting import Converted, convert
+from vedette.stonesoup.converting import ConvertedModels, convert
 from vedette.stonesoup.manager import PlanningSensorManager
-from vedette.stonesoup.motions import Layout, motion_of
-from vedette.stonesoup.scans import ScansOf, truth_of
-from vedette.stonesoup.sensors import clutter_of, detection_of, measurement_of, noise_of, pose_of
+from vedette.stonesoup.motions import StateLayout, convert_motion
+from vedette.stonesoup.scans import ScanConverter, convert_truth
+from vedette.stonesoup.sensors import (
+    convert_clutter,
+    convert_detection,
+    convert_measurement,
+    convert_noise,
+    convert_pose,
+)
 from vedette.stonesoup.tracker import LabelledTracker
 
 __all__ = [
-    "Converted",
+    "ConvertedModels",
     "LabelledTracker",
-    "Layout",
     "PlanningSensorManager",
-    "ScansOf",
-    "clutter_of",
+    "ScanConverter",
+    "StateLayout",
     "convert",
-    "detection_of",
-    "measurement_of",
-    "motion_of",
-    "noise_of",
-    "pose_of",
-    "truth_of",
+    "convert_clutter",
+    "convert_detection",
+    "convert_measurement",
+    "convert_motion",
+    "convert_noise",
+    "convert_pose",
+    "convert_truth",
 ]

@@ -23,8 +23,15 @@ from vedette.models import (
 )
 from vedette.models.arguments import one_of, reject
 from vedette.models.functions import write_rows
-from vedette.stonesoup.motions import Layout, motion_of
-from vedette.stonesoup.sensors import clutter_of, detection_of, measurement_of, model_of, noise_of, quantities_of
+from vedette.stonesoup.motions import StateLayout, convert_motion
+from vedette.stonesoup.sensors import (
+    convert_clutter,
+    convert_detection,
+    convert_measurement,
+    convert_noise,
+    measured_quantities,
+    measurement_model_of,
+)
 from vedette.tracking import Central, Distributed, Tracker
 
 _FILTERS = {"lmb": LmbFilter, "glmb": DeltaGlmbFilter}
@@ -33,7 +40,7 @@ Births: TypeAlias = BirthModel | MeasurementBirth | GaussianState | Sequence[Any
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Converted:
+class ConvertedModels:
     """What `convert` makes of Stone Soup's models.
 
     Attributes:
@@ -46,7 +53,7 @@ class Converted:
 
     targets: TargetModel
     sensors: tuple[SensorModel, ...]
-    layout: Layout
+    layout: StateLayout
     sources: tuple[Any, ...]
     names: tuple[str, ...]
 
@@ -85,19 +92,19 @@ def convert(
     prob_survival: float = 0.99,
     expected_births: float = 0.5,
     max_existence: float = 0.03,
-) -> Converted:
+) -> ConvertedModels:
     """Models of Stone Soup as those of this library that are equal to them.
 
     Args:
-        transition_model: see `motion_of`.
-        sensors: sensors or measurement models (see `measurement_of`), one or more; of several by the names that
+        transition_model: see `convert_motion`.
+        sensors: sensors or measurement models (see `convert_measurement`), one or more; of several by the names that
             detections call them in their `metadata["sensor"]`, or in a list, for names "0", "1", ...
         births: where targets appear. A `GaussianState`, as the prior of a `SimpleMeasurementInitiator`: wherever
             something is measured that no track explains, its variances those of a birth about it. A list of
             `WeightedGaussianState`: at these places, each with its weight as the probability of a birth at a scan. Or a
             `BirthModel` or `MeasurementBirth` of `vedette.models`.
-        clutter: see `clutter_of`; None: the `clutter_model` of each sensor.
-        prob_detection: where a sensor looks (`detection_of`), or a detection model.
+        clutter: see `convert_clutter`; None: the `clutter_model` of each sensor.
+        prob_detection: where a sensor looks (`convert_detection`), or a detection model.
         prob_survival: probability of living on to the next scan.
         expected_births, max_existence: of births from measurements, see `vedette.models.MeasurementBirth`.
 
@@ -110,28 +117,30 @@ def convert(
         raise reject("sensors", "a list of them, or a mapping from their names", type(sensors).__name__) from None
     if not named:
         raise reject("sensors", "one or more", "none")
-    motion, layout = motion_of(transition_model)
+    motion, layout = convert_motion(transition_model)
     birth = _births(births, layout, motion.state_dim, expected_births, max_existence)
     made = []
     for source in named.values():
-        model = model_of(source)
-        measured = measurement_of(model, layout)
-        seen = prob_detection if isinstance(prob_detection, DetectionModel) else detection_of(source, prob_detection)
+        model = measurement_model_of(source)
+        measured = convert_measurement(model, layout)
+        seen = (
+            prob_detection if isinstance(prob_detection, DetectionModel) else convert_detection(source, prob_detection)
+        )
         unwanted = _clutter(source, clutter, model)
-        made.append(SensorModel(measured, noise_of(model), seen, unwanted))
+        made.append(SensorModel(measured, convert_noise(model), seen, unwanted))
     targets = TargetModel(motion, constant_survival(prob_survival), birth)
-    return Converted(targets, tuple(made), layout, tuple(named.values()), tuple(map(str, named)))
+    return ConvertedModels(targets, tuple(made), layout, tuple(named.values()), tuple(map(str, named)))
 
 
 def _clutter(sensor: Any, given: Any, model: Any) -> ClutterModel:
     source = getattr(sensor, "clutter_model", None) if given is None else given
     if source is None:
         what = f"a clutter_model of {type(sensor).__name__}, or here, as of vedette.models.measurement_space_clutter"
-        raise reject("clutter", what, f"none ({', '.join(quantities_of(model))} measured)")
-    return clutter_of(source, model)
+        raise reject("clutter", what, f"none ({', '.join(measured_quantities(model))} measured)")
+    return convert_clutter(source, model)
 
 
-def _births(given: Any, layout: Layout, dim: int, expected: float, most: float) -> BirthModel:
+def _births(given: Any, layout: StateLayout, dim: int, expected: float, most: float) -> BirthModel:
     if isinstance(given, BirthModel):
         return given
     if isinstance(given, GaussianState):

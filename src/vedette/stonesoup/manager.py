@@ -21,15 +21,15 @@ from vedette.fusion import ParallelUpdate
 from vedette.internal.probabilities import logit
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import one_of, reject
-from vedette.stonesoup.converting import Converted
-from vedette.stonesoup.sensors import pose_of
+from vedette.stonesoup.converting import ConvertedModels
+from vedette.stonesoup.sensors import convert_pose
 from vedette.tracking import State
 
 _STEERED = ("dwell_centre", "position")
 _PLANNERS = {"joint": JointPlanner, "independent": IndependentPlanner}
 
 
-class Choices:
+class StoneSoupActions:
     """What one sensor may do until a time, as Stone Soup's action generators have it: a platform of this library.
 
     Poses are those of copies that take the actions, by Stone Soup's own `move` and `act`.
@@ -40,7 +40,7 @@ class Choices:
     def __init__(self, sensor: Any, carrier: Any, now: datetime.datetime, until: datetime.datetime) -> None:
         self._actors = [actor for actor in (carrier, sensor) if actor is not None]
         self._sensor, self._now = sensor, now
-        self.pose = pose_of(sensor.measurement_model)
+        self.pose = convert_pose(sensor.measurement_model)
         generators = []
         for actor in self._actors:
             own = sorted(actor.actions(until), key=lambda generator: str(generator.attribute))
@@ -79,7 +79,7 @@ class Choices:
             for carrier in twins[:-1]:
                 carrier.move(then, noise=False)  # those that nobody steers do not go anywhere by `act`
             twins[-1].act(then, noise=False)
-            poses.append(pose_of(twins[-1].measurement_model))
+            poses.append(convert_pose(twins[-1].measurement_model))
         return np.array(poses)
 
 
@@ -106,7 +106,7 @@ class PlanningSensorManager(SensorManager):  # type: ignore[misc] # Stone Soup i
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        if not isinstance(self.models, Converted):
+        if not isinstance(self.models, ConvertedModels):
             raise InputError(f"models: expected what convert() made; got {type(self.models).__name__}")
         if self.reward_function is not None:
             raise reject("reward_function", "none: rewards are of vedette.control, as `reward`", self.reward_function)
@@ -147,7 +147,7 @@ class PlanningSensorManager(SensorManager):  # type: ignore[misc] # Stone Soup i
         settings = PlanningSettings(horizon_steps=1) if self.settings is None else self.settings
         settings = replace(settings, horizon_period=seconds / settings.horizon_steps)
         carriers = {sensor: platform for platform in self.platforms for sensor in platform.sensors}
-        choices = [Choices(s, carriers.get(s), now, timestamp) for s in self.models.sources]
+        choices = [StoneSoupActions(s, carriers.get(s), now, timestamp) for s in self.models.sources]
         mobile = tuple(
             MobileSensor(LmbFilter(self.models.targets, sensor), choice)
             for sensor, choice in zip(self.models.sensors, choices, strict=True)

@@ -28,7 +28,7 @@ from vedette.models.arguments import float_array, non_negative, reject
 
 
 @dataclass(frozen=True, slots=True)
-class Layout:
+class StateLayout:
     """Where the components of a state [px, py, vx, vy, ...] of this library stand in one of Stone Soup.
 
     Attributes:
@@ -50,9 +50,9 @@ class Layout:
         """(n, state_dim, state_dim) covariances in the order of this library."""
         return np.ascontiguousarray(np.asarray(covs, np.float64)[:, self.order][:, :, self.order])
 
-    def inverse(self) -> Layout:
+    def inverse(self) -> StateLayout:
         """The way back."""
-        return Layout(tuple(int(place) for place in np.argsort(self.order)))
+        return StateLayout(tuple(int(place) for place in np.argsort(self.order)))
 
 
 @model_function("transition")
@@ -120,7 +120,7 @@ def _known_turn_jacobian(state: Floats, dt: float, params: Floats, out: Floats) 
     out[3, 2], out[3, 3] = math.sin(angle), math.cos(angle)
 
 
-def _of_axes(model: Any) -> tuple[MotionModel, Layout]:
+def _of_axes(model: Any) -> tuple[MotionModel, StateLayout]:
     """Two axes of the same number of derivatives."""
     axes = list(model.model_list)
     kinds = (RandomWalk, ConstantVelocity, ConstantAcceleration, ConstantNthDerivative)
@@ -132,25 +132,25 @@ def _of_axes(model: Any) -> tuple[MotionModel, Layout]:
         raise reject("transition_model.model_list", "two models of one constant_derivative", str(orders))
     num = orders[0] + 1
     noise = _densities([axis.noise_diff_coeff for axis in axes], "model_list: noise_diff_coeff")
-    layout = Layout(tuple(axis * num + i for i in range(num) for axis in range(2)))
+    layout = StateLayout(tuple(axis * num + i for i in range(num) for axis in range(2)))
     if num == 2 and noise[0] == noise[1]:
         return constant_velocity(math.sqrt(noise[0]), acceleration="continuous"), layout
     return MotionModel(2 * num, _taylor, _integrated_noise, np.empty(0), noise, _taylor_jacobian), layout
 
 
-def _of_turn(model: Any) -> tuple[MotionModel, Layout]:
+def _of_turn(model: Any) -> tuple[MotionModel, StateLayout]:
     noise = _densities([*np.ravel(model.linear_noise_coeffs), model.turn_noise_coeff], "linear_noise_coeffs")
     turn = replace(coordinated_turn(), process_noise_cov=_integrated_noise, noise_params=noise)
-    return turn, Layout((0, 2, 1, 3, 4))
+    return turn, StateLayout((0, 2, 1, 3, 4))
 
 
-def _of_known_turn(model: Any) -> tuple[MotionModel, Layout]:
+def _of_known_turn(model: Any) -> tuple[MotionModel, StateLayout]:
     noise = _densities(np.ravel(model.turn_noise_diff_coeffs), "turn_noise_diff_coeffs")
     rate = float(model.turn_rate)
     if rate == 0.0:
         raise reject("transition_model.turn_rate", "a rate other than 0, by which it divides", 0.0)
     turn = MotionModel(4, _known_turn, _integrated_noise, np.array([rate]), noise, _known_turn_jacobian)
-    return turn, Layout((0, 2, 1, 3))
+    return turn, StateLayout((0, 2, 1, 3))
 
 
 def _densities(given: Any, field: str) -> Floats:
@@ -160,14 +160,14 @@ def _densities(given: Any, field: str) -> Floats:
     return values
 
 
-_MOTIONS: dict[type, Callable[[Any], tuple[MotionModel, Layout]]] = {
+_MOTIONS: dict[type, Callable[[Any], tuple[MotionModel, StateLayout]]] = {
     CombinedLinearGaussianTransitionModel: _of_axes,
     ConstantTurn: _of_turn,
     KnownTurnRate: _of_known_turn,
 }
 
 
-def motion_of(transition_model: Any) -> tuple[MotionModel, Layout]:
+def convert_motion(transition_model: Any) -> tuple[MotionModel, StateLayout]:
     """A transition model of Stone Soup as a motion model, and how its states are laid out.
 
     `CombinedLinearGaussianTransitionModel` of two `RandomWalk`, `ConstantVelocity`, `ConstantAcceleration` or

@@ -13,9 +13,9 @@ from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.recorded.detections import elements_of
 from vedette.simulation.truth import Truth
-from vedette.stonesoup.converting import Converted
-from vedette.stonesoup.motions import Layout
-from vedette.stonesoup.sensors import model_of, pose_of, quantities_of
+from vedette.stonesoup.converting import ConvertedModels
+from vedette.stonesoup.motions import StateLayout
+from vedette.stonesoup.sensors import convert_pose, measured_quantities, measurement_model_of
 
 
 class Scans(NamedTuple):
@@ -28,7 +28,7 @@ class Scans(NamedTuple):
 
 
 @dataclass(slots=True)
-class ScansOf:
+class ScanConverter:
     """Turns times with sets of detections into scans, one after the other.
 
     A detection is of the sensor that its `metadata["sensor"]` names; without one of the sensor that has its measurement
@@ -41,7 +41,7 @@ class ScansOf:
         start: the time that is 0 s; None: the first that comes.
     """
 
-    models: Converted
+    models: ConvertedModels
     every_sensor_scans: bool = True
     start: datetime.datetime | None = None
     _poses: dict[int, Floats] = field(default_factory=dict)
@@ -60,17 +60,17 @@ class ScansOf:
         for number, detection in enumerate(found, start=1):
             place = f"detections of {time}, detection {number}"
             s = self._sensor(detection, place)
-            model = getattr(detection, "measurement_model", None) or model_of(models.sources[s])
-            wanted = quantities_of(model_of(models.sources[s]))
+            model = getattr(detection, "measurement_model", None) or measurement_model_of(models.sources[s])
+            wanted = measured_quantities(measurement_model_of(models.sources[s]))
             rows[s].append((elements_of(detection, wanted, model, place), detection))
-            pose = pose_of(model)
+            pose = convert_pose(model)
             if not np.allclose(poses.setdefault(s, pose), pose, rtol=1e-12, atol=1e-9):
                 raise InputError(
                     f"{place}, measurement_model: expected one place of sensor {models.names[s]} at a time"
                 )
         for s, source in enumerate(models.sources):
-            if s not in poses and (source is not model_of(source) or s not in self._poses):
-                poses[s] = pose_of(model_of(source))
+            if s not in poses and (source is not measurement_model_of(source) or s not in self._poses):
+                poses[s] = convert_pose(measurement_model_of(source))
         self._poses |= poses
         scans, kept = [], []
         for s, own in enumerate(rows):
@@ -89,7 +89,7 @@ class ScansOf:
         if len(names) == 1:
             return 0
         model = getattr(detection, "measurement_model", None)
-        alike = [s for s, source in enumerate(self.models.sources) if _same(model, model_of(source))]
+        alike = [s for s, source in enumerate(self.models.sources) if _same(model, measurement_model_of(source))]
         if len(alike) != 1:
             wanted = f"{', '.join(names)}, or the measurement_model of one of them"
             raise InputError(f'{place}, metadata["sensor"]: expected one of {wanted}; got {told.get("sensor")}')
@@ -100,11 +100,15 @@ def _same(model: Any, other: Any) -> bool:
     """Whether two measurement models are of one sensor: kind, place, direction and noise."""
     if model is None or type(model) is not type(other):
         return False
-    return np.array_equal(pose_of(model), pose_of(other)) and np.array_equal(model.covar(), other.covar())
+    return np.array_equal(convert_pose(model), convert_pose(other)) and np.array_equal(model.covar(), other.covar())
 
 
-def truth_of(
-    paths: Iterable[Any], times: Iterable[datetime.datetime], layout: Layout, *, start: datetime.datetime | None = None
+def convert_truth(
+    paths: Iterable[Any],
+    times: Iterable[datetime.datetime],
+    layout: StateLayout,
+    *,
+    start: datetime.datetime | None = None,
 ) -> Truth:
     """Ground truth paths of Stone Soup as the truth of a run: each is there at the times that it has a state of.
 

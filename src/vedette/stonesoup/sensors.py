@@ -41,7 +41,7 @@ from vedette.models import (
     region_clutter,
 )
 from vedette.models.arguments import float_array, positive_definite, reject
-from vedette.stonesoup.motions import Layout
+from vedette.stonesoup.motions import StateLayout
 
 # What each measures, by the names of `vedette.recorded.table_of_detections`; how; and as which clutter knows it.
 _MEASURED: dict[type, tuple[tuple[str, ...], Any, str]] = {
@@ -61,17 +61,17 @@ def _entry(model: Any) -> tuple[tuple[str, ...], Any, str]:
     return _MEASURED[type(model)]
 
 
-def model_of(sensor: Any) -> Any:
+def measurement_model_of(sensor: Any) -> Any:
     """The measurement model of a sensor as it stands, or the model itself."""
     return getattr(sensor, "measurement_model", sensor)
 
 
-def quantities_of(model: Any) -> tuple[str, ...]:
+def measured_quantities(model: Any) -> tuple[str, ...]:
     """What the elements of a measurement are, by the names of `vedette.recorded.table_of_detections`."""
     return _entry(model)[0]
 
 
-def measurement_of(model: Any, layout: Layout) -> MeasurementModel:
+def convert_measurement(model: Any, layout: StateLayout) -> MeasurementModel:
     """A measurement model of Stone Soup's that has an equal here, once bearings are turned by its `rotation_offset`.
 
     `LinearGaussian` of the position, `CartesianToBearingRange` and `Cartesian2DToBearing`.
@@ -86,7 +86,7 @@ def measurement_of(model: Any, layout: Layout) -> MeasurementModel:
     return made
 
 
-def pose_of(model: Any) -> Floats:
+def convert_pose(model: Any) -> Floats:
     """[px, py, heading_rad] of the sensor that a measurement model is of; zeros of one that is nowhere.
 
     Raises:
@@ -109,13 +109,13 @@ def _constant_cov(state: Floats, pose: Floats, params: Floats, out: Floats) -> N
             out[i, j] = params[i * out.shape[1] + j]
 
 
-def noise_of(model: Any) -> NoiseModel:
+def convert_noise(model: Any) -> NoiseModel:
     """Its noise covariance, of independent components or not.
 
     Raises:
         InputError: a matrix that is not positive definite.
     """
-    num = len(quantities_of(model))
+    num = len(measured_quantities(model))
     cov = float_array("measurement_model.noise_covar", np.asarray(model.covar(), np.float64), (num, num))
     positive_definite("measurement_model.noise_covar", cov)
     stds = np.sqrt(np.diag(cov))
@@ -124,7 +124,7 @@ def noise_of(model: Any) -> NoiseModel:
     return NoiseModel(_constant_cov, cov.ravel(), num, stds)
 
 
-def detection_of(sensor: Any, prob_detection: float) -> DetectionModel:
+def convert_detection(sensor: Any, prob_detection: float) -> DetectionModel:
     """Detection with a probability wherever a sensor looks, and nowhere else; of a measurement model, everywhere.
 
     Stone Soup's radars detect all that is in their field of view; the probability says how far to trust that.
@@ -146,7 +146,7 @@ def detection_of(sensor: Any, prob_detection: float) -> DetectionModel:
     return limited_range(prob_detection, reach) if math.isfinite(reach) else constant_detection(prob_detection)
 
 
-def clutter_of(source: Any, model: Any) -> ClutterModel:
+def convert_clutter(source: Any, model: Any) -> ClutterModel:
     """Uniform clutter of a measurement model.
 
     Args:
@@ -173,5 +173,5 @@ def clutter_of(source: Any, model: Any) -> ClutterModel:
     bounds = float_array("clutter.meas_range", np.asarray(source.meas_range, np.float64), (len(quantities), 2))
     angular = [QUANTITIES[name].is_angle for name in quantities]
     if any(angular):
-        bounds[angular] += pose_of(model)[2]
+        bounds[angular] += convert_pose(model)[2]
     return measurement_space_clutter(float(source.clutter_rate), bounds[:, 0], bounds[:, 1], angular=angular)

@@ -20,8 +20,8 @@ from vedette.densities import marginal_estimate
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.models.measurement import wrap_angular
-from vedette.stonesoup.converting import Converted
-from vedette.stonesoup.scans import Scans, ScansOf
+from vedette.stonesoup.converting import ConvertedModels
+from vedette.stonesoup.scans import ScanConverter, Scans
 from vedette.tracking import State, TrackerInfo
 from vedette.tracking import Tracker as VedetteTracker
 
@@ -56,7 +56,7 @@ class LabelledTracker(_TrackerMixInUpdate, Tracker):  # type: ignore[misc] # Sto
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        if not isinstance(self.models, Converted):
+        if not isinstance(self.models, ConvertedModels):
             raise InputError(f"models: expected what convert() made; got {type(self.models).__name__}")
         if self.tracker is None:
             self.tracker = self.models.tracker()
@@ -66,7 +66,7 @@ class LabelledTracker(_TrackerMixInUpdate, Tracker):  # type: ignore[misc] # Sto
             raise InputError("tracker: expected one of models.targets and models.sensors; got one of others")
         self.state: State = self.tracker.initial()
         self.info: TrackerInfo | None = None
-        self._scans = ScansOf(self.models, self.every_sensor_scans)
+        self._scans = ScanConverter(self.models, self.every_sensor_scans)
         if not 0.0 <= self.end_threshold <= self.existence_threshold < 1.0:
             told = f"{self.end_threshold} and {self.existence_threshold}"
             raise InputError(f"end_threshold: expected 0 <= end_threshold <= existence_threshold < 1; got {told}")

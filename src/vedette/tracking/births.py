@@ -22,7 +22,7 @@ from vedette.fusion.matching import OWN_LABELS
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.types import Floats, Ints, Lmb, ScanInput
 from vedette.kernels.labelled.births import BirthsOfMeasurements, births_of_measurements
-from vedette.kernels.steps.explained import births_unexplained, prob_explained
+from vedette.kernels.steps.association_probability import births_unexplained, prob_explained
 from vedette.models import BirthModel, MeasurementBirth, SensorModel
 from vedette.models.arguments import pose_vector, reject
 from vedette.tracking.birth_velocities import at_scan_time, with_velocities

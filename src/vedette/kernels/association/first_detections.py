@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.kernels.association.assignment import ABSENT, Options
+from vedette.kernels.association.gating import near_measurements
 from vedette.kernels.association.joined_rows import copy_entry
-from vedette.kernels.association.near import near_measurements
 from vedette.kernels.association.options import Sight, make_room, room_for_updated, sort_row, weigh_detection
 from vedette.kernels.association.predicted import Rows, expect_rows, log_or_minus_inf, make_rows
 from vedette.kernels.base.arrays import group_members

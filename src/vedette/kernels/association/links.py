@@ -25,7 +25,7 @@ from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.mixtures import descending_order
 
 
-class Claims(NamedTuple):
+class MeasurementProbabilities(NamedTuple):
     """How probable it is that a factor takes a measurement, of every measurement that one of its labels may take."""
 
     offsets: Ints  # (num_factors + 1,) into the others
@@ -33,7 +33,7 @@ class Claims(NamedTuple):
     strengths: Floats  # the most that one of its labels takes it with
 
 
-class Contest(NamedTuple):
+class Contention(NamedTuple):
     """The two strongest claims to each measurement."""
 
     first: Floats  # (num_measurements,) the strongest claim, 0 for none
@@ -50,7 +50,7 @@ class Links(NamedTuple):
 
 
 @borrowing
-def _rank_claims(claims: Claims, contest: Contest) -> None:
+def _rank_measurements(claims: MeasurementProbabilities, contest: Contention) -> None:
     for j in range(len(contest.owner)):
         contest.first[j], contest.second[j], contest.owner[j] = 0.0, 0.0, -1
     for factor in range(len(claims.offsets) - 1):
@@ -63,12 +63,12 @@ def _rank_claims(claims: Claims, contest: Contest) -> None:
 
 
 @inlined
-def _others_claim(contest: Contest, factor: int, measurement: int) -> float:
+def _others_claim(contest: Contention, factor: int, measurement: int) -> float:
     return contest.second[measurement] if contest.owner[measurement] == factor else contest.first[measurement]
 
 
 @kernel
-def _claims(options: Options, alone: Alternatives, row_offsets: Ints) -> Claims:
+def _measurement_probabilities(options: Options, alone: Alternatives, row_offsets: Ints) -> MeasurementProbabilities:
     """What labels claim by themselves. row_offsets: (num_factors + 1,) rows of each factor."""
     num_factors, num, label = len(row_offsets) - 1, len(alone.weights), 0
     offsets, measurements, strengths = np.zeros(num_factors + 1, np.int64), np.empty(num, np.int64), np.empty(num)
@@ -85,7 +85,7 @@ def _claims(options: Options, alone: Alternatives, row_offsets: Ints) -> Claims:
                 strengths[place[j]] = max(strengths[place[j]], alone.weights[i] / total)
             label += 1
         offsets[factor + 1] = filled
-    return Claims(offsets, measurements[:filled], strengths[:filled])
+    return MeasurementProbabilities(offsets, measurements[:filled], strengths[:filled])
 
 
 @borrowing
@@ -93,10 +93,10 @@ def _strengthen(
     options: Options,
     alone: Alternatives,
     row_offsets: Ints,
-    contest: Contest,
+    contest: Contention,
     least: float,
     place: Ints,
-    claims: Claims,
+    claims: MeasurementProbabilities,
 ) -> None:
     """Raise each claim to what it is if a label's other contested measurements go to others.
 
@@ -119,7 +119,7 @@ def _strengthen(
 
 
 @kernel
-def _links(claims: Claims, contest: Contest, max_cut: float) -> Links:
+def _links(claims: MeasurementProbabilities, contest: Contention, max_cut: float) -> Links:
     """The pairs of factors to be linked: at each measurement those whose claims are not cut, with the strongest.
 
     A claim is cut, the weakest first, while the products of the pairs that are cut sum to `max_cut` at most.
@@ -174,11 +174,11 @@ def linked_factors(
     cut. most: labels of a group; links are made from the strongest on, and left out where they would join more.
     """
     num_factors, num = len(row_offsets) - 1, options.num_measurements
-    leaders, claims = counted_ints(num_factors), _claims(options, alone, row_offsets)
-    contest = Contest(np.empty(num), np.empty(num), np.empty(num, np.int64))
-    _rank_claims(claims, contest)
+    leaders, claims = counted_ints(num_factors), _measurement_probabilities(options, alone, row_offsets)
+    contest = Contention(np.empty(num), np.empty(num), np.empty(num, np.int64))
+    _rank_measurements(claims, contest)
     _strengthen(options, alone, row_offsets, contest, max_cut, filled_ints(num, -1), claims)
-    _rank_claims(claims, contest)
+    _rank_measurements(claims, contest)
     links = _links(claims, contest, max_cut)
     _join(links, descending_order(links.strengths), sizes, most, leaders)
     for factor in range(num_factors):

@@ -3,7 +3,7 @@
 This is what an LMB asks of a scan; who else may give it is an `Association`. Within a cluster the sum over all joint
 choices is exact: a forward-backward pass over the rows whose state is the set of measurements already taken. A cluster
 too large for that is summed over its heaviest joint choices, in exact order; what it leaves out is bounded, and no row
-is certain for want of a choice (`vedette.kernels.association.left_out`).
+is certain for want of a choice (`vedette.kernels.association.truncation_bound`).
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from vedette.kernels.association.clusters import (
     grown_marginal_work,
     make_marginal_work,
 )
-from vedette.kernels.association.left_out import has_closed_side, log_left_out_bound, open_sides
-from vedette.kernels.association.openings import size_search, start_search
 from vedette.kernels.association.ranked import run_search
 from vedette.kernels.association.search import HEAP, SearchCaps
+from vedette.kernels.association.search_start import size_search, start_search
+from vedette.kernels.association.truncation_bound import has_closed_side, log_left_out_bound, open_sides
 from vedette.kernels.base.bundle_types import typed_by_fields
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints

@@ -12,7 +12,7 @@ import numpy as np
 
 from vedette.errors import ModelError
 from vedette.kernels.association.assignment import ABSENT, MISSED, Options
-from vedette.kernels.association.near import Near, near_measurements
+from vedette.kernels.association.gating import Near, near_measurements
 from vedette.kernels.association.predicted import Rows, log_or_minus_inf
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import borrowing, inlined, kernel

@@ -22,7 +22,6 @@ from vedette.kernels.association.children import (
     make_children,
     widest_parent,
 )
-from vedette.kernels.association.openings import open_free, open_solved, start_search
 from vedette.kernels.association.search import (
     HEAP,
     NODES,
@@ -37,6 +36,7 @@ from vedette.kernels.association.search import (
     pop,
     push,
 )
+from vedette.kernels.association.search_start import open_free, open_solved, start_search
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Ints
 

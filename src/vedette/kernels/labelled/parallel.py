@@ -39,7 +39,7 @@ class _Work(NamedTuple):
     offset: Floats  # (dim,) z_s
 
 
-class _Said(NamedTuple):
+class _GaussianFactors(NamedTuple):
     """Factors exp(log_weight - u'A u / 2 + eta'u) of the standard normal: of a sensor's components, or of choices."""
 
     gains: Floats  # (room, dim, dim) A
@@ -56,8 +56,8 @@ def _make_work(dim: int) -> _Work:
 
 
 @kernel
-def _make_said(room: int, dim: int) -> _Said:
-    return _Said(np.empty((room, dim, dim)), np.empty((room, dim)), np.empty(room))
+def _make_factors(room: int, dim: int) -> _GaussianFactors:
+    return _GaussianFactors(np.empty((room, dim, dim)), np.empty((room, dim)), np.empty(room))
 
 
 @borrowing
@@ -84,9 +84,11 @@ def _gain(cov: Floats, work: _Work, gain: Floats) -> bool:
 
 
 @borrowing
-def _say(item: int, mean: Floats, cov: Floats, predicted: Floats, work: _Work, said: _Said) -> bool:
+def _factor_of_posterior(
+    item: int, mean: Floats, cov: Floats, predicted: Floats, work: _Work, factors: _GaussianFactors
+) -> bool:
     """What a posterior's component says, and its normaliser, in place `item`; whether it is a Gaussian."""
-    n, gain, pull = len(mean), said.gains[item], said.pulls[item]
+    n, gain, pull = len(mean), factors.gains[item], factors.pulls[item]
     if not _gain(cov, work, gain):
         return False
     for i in range(n):
@@ -101,12 +103,14 @@ def _say(item: int, mean: Floats, cov: Floats, predicted: Floats, work: _Work, s
         quadratic += pull[i] * work.offset[i]
     if not cholesky(work.whitened, work.factor):
         return False
-    said.log_weights[item] = 0.5 * (log_det_from_factor(work.factor) - quadratic)
+    factors.log_weights[item] = 0.5 * (log_det_from_factor(work.factor) - quadratic)
     return True
 
 
 @borrowing
-def _multiply(first: _Said, a: int, second: _Said, b: int, power: float, out: _Said, item: int) -> None:
+def _multiply(
+    first: _GaussianFactors, a: int, second: _GaussianFactors, b: int, power: float, out: _GaussianFactors, item: int
+) -> None:
     """The product of one factor and the power of another, in place `item`."""
     n = first.pulls.shape[1]
     for i in range(n):
@@ -117,36 +121,38 @@ def _multiply(first: _Said, a: int, second: _Said, b: int, power: float, out: _S
 
 
 @borrowing
-def _copy(said: _Said, source: int, out: _Said, item: int) -> None:
-    n = said.pulls.shape[1]
+def _copy(factors: _GaussianFactors, source: int, out: _GaussianFactors, item: int) -> None:
+    n = factors.pulls.shape[1]
     for i in range(n):
-        out.pulls[item, i] = said.pulls[source, i]
+        out.pulls[item, i] = factors.pulls[source, i]
         for j in range(n):
-            out.gains[item, i, j] = said.gains[source, i, j]
-    out.log_weights[item] = said.log_weights[source]
+            out.gains[item, i, j] = factors.gains[source, i, j]
+    out.log_weights[item] = factors.log_weights[source]
 
 
 @borrowing
-def _weigh(item: int, said: _Said, work: _Work) -> tuple[bool, float]:
+def _weigh(item: int, factors: _GaussianFactors, work: _Work) -> tuple[bool, float]:
     """Factor of I + A (-> work) and F^-1 eta (-> work.offset); whether it is definite, and the log of the integral."""
-    n = said.pulls.shape[1]
+    n = factors.pulls.shape[1]
     for i in range(n):
         for j in range(n):
-            work.rotated[i, j] = said.gains[item, i, j] + (1.0 if i == j else 0.0)
+            work.rotated[i, j] = factors.gains[item, i, j] + (1.0 if i == j else 0.0)
     if not cholesky(work.rotated, work.factor):
         return False, 0.0
-    solve_lower(work.factor, said.pulls[item], work.offset)
+    solve_lower(work.factor, factors.pulls[item], work.offset)
     quadratic = 0.0
     for i in range(n):
         quadratic += work.offset[i] * work.offset[i]
-    return True, said.log_weights[item] + 0.5 * (quadratic - log_det_from_factor(work.factor))
+    return True, factors.log_weights[item] + 0.5 * (quadratic - log_det_from_factor(work.factor))
 
 
 @borrowing
-def _solve(item: int, predicted: Floats, said: _Said, work: _Work, mean: Floats, cov: Floats) -> tuple[bool, float]:
+def _solve(
+    item: int, predicted: Floats, factors: _GaussianFactors, work: _Work, mean: Floats, cov: Floats
+) -> tuple[bool, float]:
     """m+ + C (I + A)^-1 eta and C (I + A)^-1 C'; whether that is definite, and the log of the integral."""
     n = len(mean)
-    positive, log_integral = _weigh(item, said, work)
+    positive, log_integral = _weigh(item, factors, work)
     if not positive:
         return False, 0.0
     solve_upper(work.factor, work.offset, work.offset)
@@ -171,16 +177,16 @@ def _solve(item: int, predicted: Floats, said: _Said, work: _Work, mean: Floats,
 
 
 @kernel
-def _likeliest(num: int, said: _Said, work: _Work, most: int, out: _Said) -> int:
+def _likeliest(num: int, factors: _GaussianFactors, work: _Work, most: int, out: _GaussianFactors) -> int:
     """The likeliest `most` of the first `num` choices (-> out), which take the weight of the others; their number."""
     weights = np.empty(num)
     for c in range(num):
-        positive, weights[c] = _weigh(c, said, work)
+        positive, weights[c] = _weigh(c, factors, work)
         if not positive:
             raise FloatingPointError("the product of the track densities of a label is not integrable")
     order, kept = descending_order(weights), 0
     while kept < min(num, most) and weights[order[kept]] >= weights[order[0]] + _LOG_LEAST:
-        _copy(said, order[kept], out, kept)
+        _copy(factors, order[kept], out, kept)
         kept += 1
     shift = log_sum(weights) - log_sum(weights[order[:kept]]) if kept < num else 0.0
     for c in range(kept):
@@ -204,8 +210,8 @@ def update_in_parallel(
     for track in range(len(own.labels)):
         largest = max(largest, own.offsets[track + 1] - own.offsets[track])
     out_means, out_covs, log_integrals = means.copy(), covs.copy(), np.zeros(num)
-    work, said, updated = _make_work(dim), _make_said(largest, dim), own.components
-    choices, longer = _make_said(max_choices, dim), _make_said(max_choices * largest, dim)
+    work, factors, updated = _make_work(dim), _make_factors(largest, dim), own.components
+    choices, longer = _make_factors(max_choices, dim), _make_factors(max_choices * largest, dim)
     for item in range(num):
         if not cholesky(covs[item], work.root):
             raise FloatingPointError("covariance of a predicted track is not positive definite")
@@ -217,12 +223,14 @@ def update_in_parallel(
                 continue
             first, size = own.offsets[track], own.offsets[track + 1] - own.offsets[track]
             for j in range(size):
-                if not _say(j, updated.means[first + j], updated.covs[first + j], means[item], work, said):
+                if not _factor_of_posterior(
+                    j, updated.means[first + j], updated.covs[first + j], means[item], work, factors
+                ):
                     raise FloatingPointError("covariance of a track is not positive definite")
-                said.log_weights[j] += updated.log_weights[first + j]
+                factors.log_weights[j] += updated.log_weights[first + j]
             for c in range(count):
                 for j in range(size):
-                    _multiply(choices, c, said, j, weights[s], longer if size > 1 else choices, c * size + j)
+                    _multiply(choices, c, factors, j, weights[s], longer if size > 1 else choices, c * size + j)
             if size > 1:
                 count = _likeliest(count * size, longer, work, max_choices, choices)
         if count > 1 or not _is_nothing(choices):
@@ -232,7 +240,7 @@ def update_in_parallel(
 
 
 @kernel
-def _merge(count: int, choices: _Said, predicted: Floats, work: _Work, mean: Floats, cov: Floats) -> float:
+def _merge(count: int, choices: _GaussianFactors, predicted: Floats, work: _Work, mean: Floats, cov: Floats) -> float:
     """Mean and covariance of the mixture of the choices, and the log of its integral."""
     n = len(predicted)
     log_weights, means, covs = np.empty(count), np.empty((count, n)), np.empty((count, n, n))
@@ -245,13 +253,13 @@ def _merge(count: int, choices: _Said, predicted: Floats, work: _Work, mean: Flo
 
 
 @borrowing
-def _is_nothing(said: _Said) -> bool:
+def _is_nothing(factors: _GaussianFactors) -> bool:
     """Whether the first factor is 1: nothing was added to the prediction."""
-    n = said.pulls.shape[1]
+    n = factors.pulls.shape[1]
     for i in range(n):
-        if said.pulls[0, i] != 0.0:
+        if factors.pulls[0, i] != 0.0:
             return False
         for j in range(n):
-            if said.gains[0, i, j] != 0.0:
+            if factors.gains[0, i, j] != 0.0:
                 return False
     return True

@@ -12,7 +12,7 @@ import numpy as np
 
 from vedette.kernels.association.assignment import Options
 from vedette.kernels.association.children import Children, Parents, grown_children, make_children
-from vedette.kernels.association.near import Near, all_measurements
+from vedette.kernels.association.gating import Near, all_measurements
 from vedette.kernels.association.options import make_options
 from vedette.kernels.association.predicted import Rows, make_rows
 from vedette.kernels.association.search import WIDEST, Search, grown_search, make_search

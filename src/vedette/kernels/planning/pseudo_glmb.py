@@ -14,11 +14,11 @@ from typing import NamedTuple
 from vedette.errors import NumericalError
 from vedette.kernels.association.assignment import Options
 from vedette.kernels.association.children import Parents
-from vedette.kernels.association.openings import start_search
 from vedette.kernels.association.options import view_options, weigh_options
 from vedette.kernels.association.predicted import Rows, leave_unseen, predict_rows, view_rows
 from vedette.kernels.association.ranked import add_missing_groups, run_search
 from vedette.kernels.association.search import SearchCaps
+from vedette.kernels.association.search_start import start_search
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Glmb, Ints, ScanInput
 from vedette.kernels.gaussian.mixtures import match_components

@@ -15,8 +15,8 @@ import numpy as np
 from vedette.errors import NumericalError
 from vedette.kernels.association.assignment import Options
 from vedette.kernels.association.clusters import MarginalWork, grown_marginal_work, make_marginal_work
+from vedette.kernels.association.gating import Near, all_measurements
 from vedette.kernels.association.marginals import Association, fill_marginals
-from vedette.kernels.association.near import Near, all_measurements
 from vedette.kernels.association.options import make_options, view_options, weigh_options
 from vedette.kernels.association.predicted import Rows, leave_unseen, make_rows, predict_rows
 from vedette.kernels.base.arrays import counted_ints

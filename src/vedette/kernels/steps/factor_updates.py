@@ -24,7 +24,7 @@ from vedette.kernels.gaussian.reduction import MixtureCaps, ReductionWork, make_
 from vedette.kernels.labelled.factor_store import FactorStore, append_part, append_single, next_component, with_room
 from vedette.kernels.labelled.renaming import with_known_names
 from vedette.kernels.labelled.splitting import Choices, choices_of, independent_parts
-from vedette.kernels.labelled.versions import merge_versions
+from vedette.kernels.labelled.track_merging import merge_versions
 from vedette.kernels.steps.assembly import assemble
 from vedette.kernels.steps.factor_groups import Group
 from vedette.kernels.steps.glmb import Associated, kept_children

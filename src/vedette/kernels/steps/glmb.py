@@ -20,7 +20,12 @@ import numpy as np
 
 from vedette.kernels.association.assignment import Options
 from vedette.kernels.association.children import Children, Parents
-from vedette.kernels.association.coverage import Associations, add_uncovered, associations_of_options, mark_heaviest
+from vedette.kernels.association.detection_coverage import (
+    Associations,
+    add_uncovered,
+    associations_of_options,
+    mark_heaviest,
+)
 from vedette.kernels.association.gibbs import sample_children
 from vedette.kernels.association.options import weighed_options
 from vedette.kernels.association.predicted import Rows, rows_of_scan

@@ -12,7 +12,7 @@ from vedette import models
 from vedette.densities import LMB, as_lmb
 from vedette.filters import Limits, SequentialFactoredFilter, SequentialLmbFilter, factored, lmb
 from vedette.kernels.base.types import ScanInput
-from vedette.kernels.steps.in_view import in_view
+from vedette.kernels.steps.field_of_view import in_view
 from vedette.kernels.steps.multi_sensor_combinations import standing_combinations
 from vedette.kernels.steps.multi_sensor_lmb import update_lmb
 

@@ -14,7 +14,7 @@ from vedette.kernels.base.types import Floats, Lmb, ScanInput, Sensor
 from vedette.kernels.gaussian.mixtures import descending_order
 from vedette.kernels.gaussian.scratch import make_scratch
 from vedette.kernels.labelled.births import BirthsOfMeasurements, births_of_measurements
-from vedette.kernels.steps.in_view import in_view, marked
+from vedette.kernels.steps.field_of_view import in_view, marked
 from vedette.kernels.steps.lmb import weigh_by_existence
 
 

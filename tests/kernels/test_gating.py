@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from vedette.kernels.association.near import near_measurements
+from vedette.kernels.association.gating import near_measurements
 from vedette.kernels.association.predicted import Rows, make_rows
 from vedette.models.measurement import wrap_angles
 
