@@ -1,4 +1,4 @@
-"""How several sensors' beliefs become one: covariance intersection, arithmetic average and parallel update."""
+"""Fusion of the densities of several sensors: covariance intersection, arithmetic average and parallel update."""
 
 from vedette.fusion.base import (
     Fusion,

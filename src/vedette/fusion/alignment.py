@@ -1,4 +1,4 @@
-"""Marginalised GLMBs, or products of them, group by group on the union of their label sets."""
+"""Alignment of marginalised GLMBs, or products of them: one factor for each group on the union of their label sets."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from vedette.kernels.base.types import Floats, Ints
 
 
 def side_by_side(beliefs: Sequence[FactoredGLMB], max_products: int) -> tuple[list[FactoredGLMB], Floats]:
-    """The beliefs with one factor for each of the smallest groups of labels of which no factor spans two.
+    """Return the beliefs with one factor for each of the smallest groups of labels that no factor crosses.
 
-    Factor g of each has labels of group g alone; where a belief has none of them it is certain that nobody is there.
-    Several factors become the heaviest `max_products` of their products. Hypotheses of weight zero are left out. Also
-    returns (num_groups,) the log of the product of the weights that were kept.
+    Factor g of each belief holds labels of group g alone; if a belief has none of them, its factor g is certain of no
+    target. Several factors of a belief in one group become the heaviest `max_products` of their products. Hypotheses of
+    weight zero are left out. Also returns the log of the product of the retained weights, shape (num_groups,).
     """
     joined = join_factors(beliefs)
     log_kept, regrouped = np.zeros(len(joined.alone)), []
@@ -31,7 +31,7 @@ def side_by_side(beliefs: Sequence[FactoredGLMB], max_products: int) -> tuple[li
 
 
 def _one_a_group(belief: FactoredGLMB, groups: Ints, num_groups: int, max_products: int) -> tuple[FactoredGLMB, Floats]:
-    """One factor a group, and the logs of the weights kept; groups: of each factor, or -1."""
+    """Return one factor for each group, and the logs of the retained weights; groups: of each factor, or -1."""
     order, log_kept = np.argsort(groups, kind="stable"), np.zeros(num_groups)
     ends = np.searchsorted(groups[order], np.arange(num_groups + 1))
     counts = np.diff(ends)
@@ -50,9 +50,9 @@ def _one_a_group(belief: FactoredGLMB, groups: Ints, num_groups: int, max_produc
 
 
 def sort_factors(marginalised: FactoredGLMB) -> FactoredGLMB:
-    """The factors in the order of their first labels; those of one label as `FactoredGLMB.from_lmb` lays them out.
+    """Return the factors in the order of their first labels; those of one label in the form of `FactoredGLMB.from_lmb`.
 
-    marginalised: of which every hypothesis has tracks of its own. Factors without tracks go.
+    marginalised: each hypothesis must have its own tracks. Factors without tracks are dropped.
     """
     counts, sizes = np.diff(marginalised.track_offsets), np.diff(marginalised.hyp_offsets)
     factor, log_odds = marginalised.factor_of, np.full((2, marginalised.num_factors), -np.inf)

@@ -1,4 +1,4 @@
-"""What all fusions share: the protocol, what they report, and the checks of what they are given."""
+"""Protocols of fusion rules, the report of a fusion, and checks of its input."""
 
 from __future__ import annotations
 
@@ -18,28 +18,29 @@ from vedette.kernels.labelled.set_fusion import LOST, SURE
 from vedette.kernels.labelled.validity import is_valid_lmb
 from vedette.models.arguments import real, reject, sequence
 
-# Type and number of dimensions of the arrays of an LMB: labels, offsets, log weights, means, covariances, logits.
+# Data type and number of dimensions of the arrays of an LMB: labels, offsets, log weights, means, covariances, logits.
 _INT, _FLOAT = np.dtype(np.int64), np.dtype(np.float64)
 _FORMS = ((_INT, 2), (_INT, 1), (_FLOAT, 1), (_FLOAT, 2), (_FLOAT, 3), (_FLOAT, 1))
 
 
 @dataclass(frozen=True, slots=True)
 class FusionInfo:
-    """What a fusion had to repair and what it threw away.
+    """Report of one fusion: repairs and truncations.
 
     Attributes:
-        missing_sets: one number a sensor, of label sets that another sensor has and this one does not, so that a floor
-            stood in for their weight there; of an LMB, of labels with a floor for the existence. 0 for a sensor of
-            weight 0, which takes no part.
-        missing_labels: one number a sensor, of labels that it does not know at all, so that its density was left out of
-            them.
-        num_sets: label sets (LMB: labels) that were fused, those of all sensors together.
-        num_lost_labels: labels that a sensor is sure of (existence of `SURE` or more) and the fused density has with an
-            existence below `LOST`: targets that one sensor sees, and that a sensor which lacks them, or does not see
-            where they are, pulled down.
-        empty_intersection: no label set (LMB: no label) is held by every sensor. False where there is none at all.
-        log_normaliser: log of the set integral of the product of the powers, at most 0 but for the floors and the
-            inflation of component-wise powers; far below 0 the sensors contradict each other.
+        missing_sets: for each sensor, number of label sets that another sensor has and this one lacks, so that a floor
+            replaced their weight; for LMBs, number of labels whose existence was replaced by a floor. 0 for a sensor
+            of weight 0, which takes no part.
+        missing_labels: for each sensor, number of labels that it lacks altogether, so that its density was left out of
+            their fused density.
+        num_sets: number of label sets (LMB: labels) that were fused, over all sensors.
+        num_lost_labels: number of labels that one sensor holds with an existence of `SURE` or more and the fused
+            density with an existence below `LOST`: targets that one sensor observes, and that were lost because another
+            sensor lacks them or does not observe their position.
+        empty_intersection: True if no label set (LMB: no label) is common to all sensors. False if there is none at
+            all.
+        log_normaliser: log of the set integral of the product of the powers. It is at most 0, apart from the effect of
+            floors and of the inflation of component-wise powers; far below 0 the sensors contradict each other.
         discarded_weight: probability of the fused label sets beyond the cap.
     """
 
@@ -53,23 +54,23 @@ class FusionInfo:
 
     @property
     def num_missing_sets(self) -> int:
-        """Label sets missing at a sensor, of all sensors together."""
+        """Number of missing label sets, summed over all sensors."""
         return sum(self.missing_sets)
 
     @property
     def num_missing_labels(self) -> int:
-        """Labels unknown to a sensor, of all sensors together."""
+        """Number of missing labels, summed over all sensors."""
         return sum(self.missing_labels)
 
 
 @runtime_checkable
 class Fusion(Protocol):
-    """One belief of all the sensors'. The order of `beliefs` is that of the fusion weights."""
+    """A rule that combines the densities of all sensors into one. `beliefs` are in the order of the fusion weights."""
 
     def fuse(self, beliefs: Sequence[Any], views: FieldsOfView | None = None) -> tuple[Any, FusionInfo]:
-        """The fused belief, and what had to be repaired or thrown away.
+        """Return the fused density and the report of the fusion.
 
-        views: what each sensor could see, and what they were updated from; None where that is not known, as in the
+        views: fields of view of the sensors, and the density that they were updated from; None if not known, as in the
         decisions of a planner.
         """
         ...
@@ -77,26 +78,26 @@ class Fusion(Protocol):
 
 @runtime_checkable
 class RequiresCommonPrior(Protocol):
-    """A fusion that says whether its beliefs must all be updated from one prediction; one that does not: no."""
+    """A fusion that declares whether its beliefs must all be updated from one prediction (default: no)."""
 
     @property
     def requires_common_prior(self) -> bool:
-        """Whether they must."""
+        """True if all beliefs must be updated from one prediction."""
         ...
 
 
 @runtime_checkable
 class SupportsLabelMatching(Protocol):
-    """A fusion that says whether labels need not agree across sensors; of one that does not they must."""
+    """A fusion that declares whether labels may differ across sensors (default: no)."""
 
     @property
     def matches_labels(self) -> bool:
-        """Whether they need not."""
+        """True if labels may differ across sensors."""
         ...
 
 
 def requires_common_prior(fusion: Any) -> bool:
-    """Whether the fusion is of beliefs that were all updated from one prediction, as `ParallelUpdate` is."""
+    """Return True if the fusion needs beliefs that were all updated from one prediction, as `ParallelUpdate` does."""
     return isinstance(fusion, RequiresCommonPrior) and bool(fusion.requires_common_prior)
 
 
@@ -105,8 +106,8 @@ class LogLinearPool(NamedTuple):
 
     In proportion to pi+^prior_power prod_s pi_s^(powers_s).
 
-    prior_power: of the common prediction; not 0 where the sensors' beliefs must be updated from one. powers: one a
-    sensor. missing_existence: stands in for the existence of a label that a sensor lacks.
+    prior_power: of the common prediction; not 0 if the sensors' beliefs must be updated from one. powers: one per
+    sensor. missing_existence: replaces the existence of a label that a sensor lacks.
     """
 
     prior_power: float
@@ -116,24 +117,24 @@ class LogLinearPool(NamedTuple):
 
 @runtime_checkable
 class LogLinearFusion(Protocol):
-    """A fusion whose decisions a planner can take by adding up what each sensor says of each label."""
+    """A fusion that a planner can evaluate by summing the contributions of the sensors to each label."""
 
     def log_linear_pool(self, num_sensors: int) -> LogLinearPool | None:
-        """The rule for so many sensors, of single Gaussians; None where the fusion is none such."""
+        """Return the pool for `num_sensors` sensors and single Gaussians; None if the fusion is not log-linear."""
         ...
 
 
 class PrevalidatedBeliefs(tuple[Any, ...]):
-    """Beliefs that need no check of their values, as filters of this library have made them at this step.
+    """A tuple of beliefs whose values need no check, because filters of this library made them at this step.
 
-    A fusion takes them like any other sequence. It still checks their kinds and state dimensions.
+    A fusion accepts them like any other sequence. It still checks their kinds and state dimensions.
     """
 
     __slots__ = ()
 
 
 def all_valid(beliefs: Sequence[Any]) -> bool:
-    """Whether all beliefs are valid LMBs of one state dimension: a fast check that does not report what is wrong."""
+    """Return True if all beliefs are valid LMBs of one state dimension; fast, without reporting faults."""
     if not beliefs or not all(isinstance(belief, LabelledDensity) and belief.is_lmb for belief in beliefs):
         return False
     if not all(map(_formed, beliefs)) or len({belief.state_dim for belief in beliefs}) > 1:
@@ -142,7 +143,7 @@ def all_valid(beliefs: Sequence[Any]) -> bool:
 
 
 def _formed(belief: Any) -> bool:
-    """Whether the arrays of an LMB have the types that kernels take."""
+    """Return True if the arrays of an LMB have the types that kernels expect."""
     tracks, logits = belief.tracks, belief.existence_logit
     arrays = tracks.labels, tracks.offsets, tracks.log_weights, tracks.means, tracks.covs, logits
     for array, (dtype, ndim) in zip(arrays, _FORMS, strict=True):
@@ -152,7 +153,7 @@ def _formed(belief: Any) -> bool:
 
 
 def check_weights(weights: Sequence[float] | Floats) -> tuple[float, ...]:
-    """The fusion weights as a tuple. Raises `InputError` unless they are non-negative and sum to one within 1e-9."""
+    """Return the fusion weights as a tuple. Raises `InputError` unless non-negative and summing to one within 1e-9."""
     given = sequence("fusion weights", weights, "non-negative numbers that sum to 1, one a sensor")
     checked = tuple(real(f"fusion weights[{s}]", weight) for s, weight in enumerate(given))
     if not checked or not all(weight >= 0.0 for weight in checked) or not abs(math.fsum(checked) - 1.0) <= 1e-9:
@@ -161,7 +162,7 @@ def check_weights(weights: Sequence[float] | Floats) -> tuple[float, ...]:
 
 
 def check_kinds(given: Sequence[type], kinds: tuple[type, ...], num_sensors: int) -> None:
-    """Raise `InputError` unless one belief a sensor is given, all of the kinds expected."""
+    """Raise `InputError` unless there is one belief per sensor and all are of the expected kinds."""
     if len(given) != num_sensors:
         raise InputError(f"beliefs: expected {num_sensors}, one for each fusion weight; got {len(given)}")
     expected = join_alternatives([kind.__name__ for kind in kinds])
@@ -171,9 +172,9 @@ def check_kinds(given: Sequence[type], kinds: tuple[type, ...], num_sensors: int
 
 
 def check_beliefs(beliefs: Sequence[Any], kinds: tuple[type, ...], num_sensors: int) -> None:
-    """Raise `InputError` unless there is one belief a sensor, all valid, of the given kinds and of one state dimension.
+    """Raise `InputError` unless there is one valid belief per sensor, of the given kinds and one state dimension.
 
-    `PrevalidatedBeliefs` are taken to be what they say.
+    The values of `PrevalidatedBeliefs` are not checked.
     """
     if not isinstance(beliefs, PrevalidatedBeliefs):
         beliefs = sequence("beliefs", beliefs, "densities, one a sensor")
@@ -191,12 +192,12 @@ def check_beliefs(beliefs: Sequence[Any], kinds: tuple[type, ...], num_sensors: 
 
 
 def count_lost(existence: Floats, fused: Floats) -> int:
-    """Labels lost by a fusion, of (num_labels, S) existence at the sensors and (num_labels,) fused."""
+    """Number of labels lost by a fusion, from existence (num_labels, S) at the sensors and (num_labels,) fused."""
     return int(np.count_nonzero((existence.max(axis=1, initial=0.0) >= SURE) & (fused < LOST)))
 
 
 def per_sensor_counts(counts: Ints, active: Sequence[int], num_sensors: int) -> tuple[int, ...]:
-    """A number for each sensor from those of the sensors that take part; 0 for the others."""
+    """Return one number per sensor, from the numbers of the active sensors; 0 for the others."""
     numbers = np.zeros(num_sensors, np.int64)
     numbers[list(active)] = counts
     return tuple(numbers.tolist())
@@ -205,9 +206,9 @@ def per_sensor_counts(counts: Ints, active: Sequence[int], num_sensors: int) -> 
 def label_fusion_info(
     lacking: Bools, active: Sequence[int], num_sensors: int, existence: Floats, fused: Floats, log_normaliser: float
 ) -> FusionInfo:
-    """The report of a fusion label by label.
+    """Return the report of a fusion that works label by label.
 
-    lacking: (num_labels, len(active)) whether a sensor that takes part at a label lacks it. existence: the same shape.
+    lacking: (num_labels, len(active)) True if a sensor that takes part at a label lacks it. existence: the same shape.
     fused: (num_labels,) existence.
     """
     missing = per_sensor_counts(np.count_nonzero(lacking, axis=0), active, num_sensors)
@@ -223,6 +224,6 @@ def label_fusion_info(
 
 
 def active_sensors(weights: Sequence[float] | Floats) -> tuple[list[int], Floats]:
-    """The sensors of positive weight, and their weights."""
+    """Return the indices of the sensors of positive weight, and their weights."""
     active = [i for i, weight in enumerate(weights) if weight > 0.0]
     return active, np.array([weights[i] for i in active])

@@ -31,30 +31,31 @@ _Glmb = TypeVar("_Glmb", GLMB, FactoredGLMB)
 class CmDeltaGlmb:
     """Consensus marginalised delta-GLMB fusion (paper eq. 11; Fantacci et al. 2015): GCI by label set and label.
 
-    The fused label sets are those that any sensor of positive weight has, not only those that all have, because a set
-    is missing where a cap cut it off as well as where the evidence speaks against it. Where a sensor lacks a set, its
-    weight there is a floor, the least of `missing_log_weight` and the weights of the sets that it has, and each
-    label's density is the sensor's marginal density of the label over the sets that it has. Where it does not know
-    the label at all, it is left out of the label's density and the other sensors' weights there are scaled to sum to
-    one. A hypothesis of weight zero counts as missing. All this is counted in the `FusionInfo`.
+    The fused label sets are those that any sensor of positive weight has, not only those common to all sensors, because
+    a set may be missing through a cap as well as through evidence against it. If a sensor lacks a set, a floor replaces
+    its weight: the least of `missing_log_weight` and the weights of the sets that the sensor has. The density of each
+    label is then the sensor's marginal density of that label over the sets that it has. If the sensor lacks the label
+    altogether, that sensor is left out of the label's density and the weights of the other sensors are scaled there to
+    sum to one. A hypothesis of weight zero counts as missing. `FusionInfo` counts all these cases.
 
-    Assumes that the sensors see the same part of the world and that a target has one label at all of them: what one
-    sensor surely sees is lost where another has no set with it, or does not see there.
+    The rule assumes that the sensors have the same field of view and that a target has the same label at all of them. A
+    target that one sensor surely observes is lost if another sensor has no set with it, or does not observe its
+    position.
 
     Attributes:
-        weights: fusion weights, one a sensor, in the order of the beliefs; non-negative, sum 1. A sensor of weight 0
+        weights: fusion weights, one per sensor, in the order of the beliefs; non-negative, sum 1. A sensor of weight 0
             takes no part.
-        mixture_power: how a power of a mixture is taken. "moment_matched": of the Gaussian of each mixture's mean and
-            covariance, as in the M-delta-GLMB; exact for single Gaussians. "component_wise": as the mixture of all
-            products of component powers; valid for well separated components, an upper bound of the integral
-            otherwise. "quadrature": the same with each Gaussian's mass and moments corrected by cubature. "auto":
-            component-wise, with so few components that the number of sensors allows it within
-            `limits.max_combinations`; one is as moment matching.
+        mixture_power: how the power of a mixture is computed. "moment_matched": as the power of the Gaussian with the
+            mean and covariance of each mixture, as in the M-delta-GLMB; exact for single Gaussians. "component_wise":
+            as the mixture of all products of component powers; valid for well separated components, an upper bound of
+            the integral otherwise. "quadrature": the same with each Gaussian's mass and moments corrected by cubature.
+            "auto": component-wise, with the number of components reduced until the number of combinations over all
+            sensors is within `limits.max_combinations`; a single component is the same as moment matching.
             docs/decisions/0003-power-of-mixtures.md has their errors.
         missing_log_weight: log of the floor for the weight of a label set that a sensor lacks.
         limits: caps on the cost.
 
-    Raises `InputError` for weights, a floor or limits that cannot be used.
+    Raises `InputError` for invalid weights, floor or limits.
     """
 
     weights: Sequence[float] | Floats
@@ -69,14 +70,15 @@ class CmDeltaGlmb:
             raise reject("missing_log_weight", "the log of a probability above 0 and below 1", self.missing_log_weight)
 
     def fuse(self, beliefs: Sequence[_Glmb], views: FieldsOfView | None = None) -> tuple[_Glmb, FusionInfo]:
-        """Fused marginalised GLMB of the sensors' GLMBs (delta or marginalised), heaviest set first, and what was done.
+        """Return the fused marginalised GLMB, heaviest label set first, and the report.
 
-        Label sets of equal weight come in the order of their first occurrence. Of products of GLMBs, where a GLMB is
-        one of a single factor, the product of the fusions of what belongs together: the smallest groups of labels of
-        which no sensor's factor spans two. A sensor without a label of a group is there certain that it is absent.
-        The caps are for each group, those of `max_hypotheses` also for each sensor's products of factors in it.
-        views: not used. Raises `InputError` for another number or kind of beliefs, for state dimensions that differ or
-        a density that is not valid, and `NumericalError` where a product of track densities cannot be integrated.
+        The sensors' GLMBs may be delta or marginalised. Label sets of equal weight are in the order of their first
+        occurrence. For products of GLMBs (a GLMB has a single factor), the result is the product of the fusions of each
+        group of labels; groups are the smallest that no sensor's factor crosses. A sensor without a label of a group is
+        certain that the group is empty. The caps apply to each group; `max_hypotheses` also applies to each sensor's
+        products of factors in it. views: not used. Raises `InputError` for a wrong number or kind of beliefs, state
+        dimensions that differ or an invalid density, and `NumericalError` if a product of track densities cannot be
+        integrated.
         """
         check_beliefs(beliefs, (GLMB, FactoredGLMB), len(self.weights))
         active, weights = active_sensors(self.weights)
@@ -100,7 +102,7 @@ class CmDeltaGlmb:
         return fused, self._info(report, active, log_kept)
 
     def _info(self, report: SetReport, active: Sequence[int], log_kept: float) -> FusionInfo:
-        """log_kept: of the weight that was left of the sensors' factors."""
+        """Return the report. log_kept: log of the retained weight of the sensors' factors."""
         num = len(self.weights)
         return FusionInfo(
             missing_sets=per_sensor_counts(report.missing_sets, active, num),
@@ -113,12 +115,11 @@ class CmDeltaGlmb:
         )
 
     def precompute(self, cases: Sequence[DensityBatch], prediction: LabelledDensity) -> PowerProducts | None:
-        """The fusions of any of the sensors' cases; None for an LMB prediction, or where the powers are not exact.
+        """Return the fusions of all combinations of cases; None for an LMB prediction, or if the powers are not exact.
 
-        cases: one a sensor. prediction: marginalised, of one Gaussian a track. Floors and stand-ins are as in
-        `fuse`, but that under `auto` the stand-ins are single Gaussians.
-        Raises `InputError` for another number or kind of cases, and where they share no label set with the
-        prediction.
+        cases: one batch per sensor. prediction: marginalised, with one Gaussian per track. Floors and substitutes are
+        as in `fuse`, except that under `auto` the substitutes are single Gaussians. Raises `InputError` for a wrong
+        number or kind of cases, and if they share no label set with the prediction.
         """
         check_kinds([own.kind for own in cases], (GLMB,), len(self.weights))
         active, _ = active_sensors(self.weights)
@@ -127,7 +128,7 @@ class CmDeltaGlmb:
         shares = [self._share(cases[i], self.weights[i]) for i in active]
         sets = {labels for share in shares for labels in share.cases.sets}
         whole = all(set(share.cases.sets) == sets and share.held.all() for share in shares)
-        # Stand-ins for missing sets are the only mixtures, and powers of single Gaussians are exact.
+        # Only the substitutes for missing sets are mixtures; powers of single Gaussians are exact.
         exact = self.mixture_power in ("auto", "moment_matched") or (whole and self.mixture_power != "quadrature")
         if not exact or len(sets) > self.limits.max_hypotheses:
             return None
@@ -140,7 +141,7 @@ class CmDeltaGlmb:
 
 
 def _stacked(beliefs: Sequence[LabelledDensity]) -> tuple[Glmb, Ints]:
-    """The hypotheses of all beliefs, and (num_hyps,) whose each is."""
+    """Return the hypotheses of all beliefs, and the sensor of each, shape (num_hyps,)."""
     hyps = [belief.as_hypotheses() for belief in beliefs]
     sensor_of = np.repeat(np.arange(len(hyps)), [len(own.hyp_log_weights) for own in hyps])
     return stack_glmbs(hyps), sensor_of

@@ -1,4 +1,4 @@
-"""Fusions of LMBs label by label: generalized covariance intersection, and the arithmetic average."""
+"""Fusion of LMBs label by label: generalised covariance intersection, and the arithmetic average."""
 
 from __future__ import annotations
 
@@ -43,32 +43,35 @@ from vedette.models.arguments import chance, flag
 class Clmb:
     """Consensus LMB fusion (paper eq. 12; Fantacci et al. 2015): GCI label by label.
 
-    The logit of a fused existence is the weighted mean of the sensors' logits and the log of the integral of prod_i
-    p_i^(w_i), which is at most 0: one blind sensor pulls a target down (0.98 and 0.1 give about 0.69).
+    The logit of a fused existence is the weighted mean of the sensors' logits plus the log of the integral of prod_i
+    p_i^(w_i), which is at most 0. One blind sensor therefore lowers the existence of a target (0.98 and 0.1 give about
+    0.69).
 
-    The fused labels are those that any sensor of positive weight has. Where a sensor lacks a label (or has it with
-    existence 0), its existence there is a floor, the least of `missing_existence` and the existences that it has, and
-    it is left out of the label's density, where the other sensors' weights are scaled to sum to one; counted in the
-    `FusionInfo`. A label in every hypothesis of a sensor's GLMB is certain there, and so in the fusion. (Truncation may
-    have cut off the rest; to bound its certainty as its absence is bounded makes joint decisions worse, not better.)
+    The fused labels are those that any sensor of positive weight has. If a sensor lacks a label (or has it with
+    existence 0), a floor replaces its existence: the least of `missing_existence` and the existences that the sensor
+    has. The sensor is then left out of the label's density, and the weights of the other sensors are scaled to sum to
+    one; `FusionInfo` counts this. A label in every hypothesis of a sensor's GLMB is certain there, and so in the
+    fusion. (Truncation may have removed the other hypotheses; a bound on its certainty, like the floor on its absence,
+    makes joint decisions worse, not better.)
 
-    With plain weights it assumes that the sensors see the same part of the world: what one sensor surely sees is lost
-    where another does not see there. By views, the weights at a label are w_sl proportional to w_s P / (1 - .999 P),
-    where P = E[P_D^s(l)]: to the information that a scan has of the existence of a target that is there. So a sensor
-    which cannot see where a target is (or did not scan) has no say in it, neither of its existence nor of its density;
-    one that sees there and lacks the label has its floor. Where nobody who scanned sees a label, sensors count by how
-    well they would; where nobody would, those that have it keep their plain weights. Both ways a target must have one
-    label at all sensors (see `match_labels`).
+    Plain weights assume that the sensors have the same field of view: a target that one sensor surely observes is lost
+    if another sensor does not observe its position. With `by_views`, the weights at a label are w_sl proportional to
+    w_s P / (1 - .999 P), where P = E[P_D^s(l)], that is, to the information that a scan has about the existence of a
+    target that is present. A sensor that cannot observe the position of a target (or did not scan) then affects neither
+    its existence nor its density; a sensor that observes the position and lacks the label contributes its floor. If no
+    sensor that scanned observes a label, sensors are weighted by how well they would observe it if they scanned; if no
+    sensor would, those that have the label keep their plain weights. In both modes a target must have one label at all
+    sensors (see `match_labels`).
 
     Attributes:
-        weights: fusion weights, one a sensor, in the order of the beliefs; non-negative, sum 1. A sensor of weight 0
+        weights: fusion weights, one per sensor, in the order of the beliefs; non-negative, sum 1. A sensor of weight 0
             takes no part.
-        mixture_power: how a power of a mixture is taken; see `CmDeltaGlmb`.
+        mixture_power: how the power of a mixture is computed; see `CmDeltaGlmb`.
         missing_existence: floor for the existence probability of a label that a sensor lacks, in (0, 1).
         limits: caps on the cost.
-        by_views: whether sensors count by how well they see each label; `fuse` then needs `views`.
+        by_views: whether sensors are weighted by how well they observe each label; `fuse` then needs `views`.
 
-    Raises `InputError` for weights, a floor or limits that cannot be used.
+    Raises `InputError` for invalid weights, floor or limits.
     """
 
     weights: Sequence[float] | Floats
@@ -84,11 +87,11 @@ class Clmb:
         flag("by_views", self.by_views)
 
     def fuse(self, beliefs: Sequence[LabelledDensity], views: FieldsOfView | None = None) -> tuple[LMB, FusionInfo]:
-        """Fused LMB of the sensors' LMBs (others are first converted), in increasing label order, and what was done.
+        """Return the fused LMB in increasing label order, and the report. Beliefs that are not LMBs are converted.
 
-        views: what the sensors could see; not used with plain weights. Raises `InputError` for another number or kind
-        of beliefs, for state dimensions that differ, a density that is not valid or views that are missing, and
-        `NumericalError` where a product of track densities cannot be integrated.
+        views: fields of view of the sensors; not used with plain weights. Raises `InputError` for a wrong number or
+        kind of beliefs, state dimensions that differ, an invalid density or missing views, and `NumericalError` if a
+        product of track densities cannot be integrated.
         """
         check_beliefs(beliefs, (LMB, GLMB, FactoredGLMB), len(self.weights))
         seen = require_views(self.by_views, views, len(self.weights))
@@ -108,17 +111,17 @@ class Clmb:
         return unchecked(LMB, TrackTable.from_kernel(tracks), logits), info
 
     def log_linear_pool(self, num_sensors: int) -> LogLinearPool | None:
-        """The weights; None by views."""
+        """Return the pool with these weights; None with `by_views`."""
         return None if self.by_views else LogLinearPool(0.0, tuple(self.weights), self.missing_existence)
 
     def precompute(self, cases: Sequence[DensityBatch], prediction: LabelledDensity) -> PowerProducts | None:
-        """The fusions of any of the sensors' cases; None by views, for a GLMB prediction, or inexact powers.
+        """Return the fusions of all combinations of cases; None with `by_views`, a GLMB prediction or inexact powers.
 
-        cases: one a sensor; a GLMB is first converted, as by `fuse`. prediction: of one Gaussian a track. Raises
-        `InputError` for another number of cases.
+        cases: one batch per sensor; a GLMB is converted first, as in `fuse`. prediction: with one Gaussian per track.
+        Raises `InputError` for a wrong number of cases.
         """
         check_kinds([own.kind for own in cases], (LMB, GLMB), len(self.weights))
-        # A GLMB's labels become mixtures, under auto matched by one; powers of an LMB's single Gaussians are exact.
+        # A GLMB's labels become mixtures, which auto replaces by one Gaussian; powers of single Gaussians are exact.
         exact = self.mixture_power in ("auto", "moment_matched") or all(own.is_lmb for own in cases)
         if self.by_views or not exact or not prediction.is_lmb:
             return None
@@ -134,37 +137,37 @@ class Clmb:
 
 
 class _Powers(NamedTuple):
-    """The powers to which the sensors' densities are raised, label by label."""
+    """Powers to which the sensors' densities are raised, label by label."""
 
-    of_labels: Floats  # (num_labels, num_sensors) rows that sum to one, or (num_sensors,) of all labels alike
-    of_tracks: Floats  # the same, for the tracks that are `chosen`
-    chosen: Ints  # (num_labels, num_sensors) tracks, -1 of those that are left out
+    of_labels: Floats  # (num_labels, num_sensors) rows that sum to one, or (num_sensors,) for all labels
+    of_tracks: Floats  # the same, for the tracks in `chosen`
+    chosen: Ints  # (num_labels, num_sensors) tracks, -1 if left out
     participating: Bools  # (num_labels, num_sensors)
 
     @classmethod
     def plain(cls, aligned: AlignedLmbs, weights: Floats) -> _Powers:
-        """The same weights at every label."""
+        """Return the same weights for every label."""
         return cls(weights, weights, aligned.chosen, np.ones(aligned.chosen.shape, np.bool_))
 
     @classmethod
     def by_view(cls, aligned: AlignedLmbs, weights: Floats, views: FieldsOfView, active: Sequence[int]) -> _Powers:
-        """By how well each sensor sees each label."""
+        """Return weights by how well each sensor observes each label."""
         shares = view_weights(aligned, weights, views, active)
         chosen = np.where(shares > 0.0, aligned.chosen, -1)
-        # Where all that see the place lack the label, its density is that of those that have it.
+        # If all sensors that observe the position lack the label, the other sensors give its density.
         bare = (chosen < 0).all(axis=1, keepdims=True)
         of_tracks = np.where(bare, weights, shares)
         return cls(shares, of_tracks, np.where(bare, aligned.chosen, chosen), shares > 0.0)
 
     def mean(self, values: Floats) -> Floats:
-        """(num_labels,) weighted mean of (num_labels, num_sensors) values, which may be infinite where none counts."""
+        """Weighted mean over sensors, shape (num_labels,); values of sensors left out may be infinite."""
         if self.of_labels.ndim == 1:
             return np.asarray(values @ self.of_labels)
         return sum_over_sensors(self.of_labels * np.where(self.participating, values, 0.0))
 
 
 def _reduced(belief: LabelledDensity, caps: MixtureCaps) -> Lmb:
-    """An LMB with reduced mixtures."""
+    """Return the LMB of a belief with reduced mixtures."""
     lmb = reduced_lmb(belief, caps)
     return Lmb(reduced_tracks(lmb.tracks, caps), lmb.existence_logit) if belief.is_lmb else lmb
 
@@ -173,20 +176,21 @@ def _reduced(belief: LabelledDensity, caps: MixtureCaps) -> Lmb:
 class ArithmeticAverage:
     """Arithmetic average of LMBs: r = sum_s w_s r_s, p = sum_s w_s r_s p_s / r.
 
-    The minimiser of the weighted sum of the divergences from the sensors' densities to the fused one. The mean number
-    of targets is the sensors' mean, so that a sensor which does not see a target (r = 0 where it lacks the label) takes
-    its share of the existence away; nothing that sensors agree on becomes surer or narrower than at one of them.
+    It minimises the weighted sum of the divergences from the sensors' densities to the fused one. The mean number of
+    targets is the mean over the sensors, so a sensor that does not observe a target (r = 0 if it lacks the label)
+    reduces the existence by its weight. The fused density is never more certain or narrower than the most certain
+    sensor, even if the sensors agree.
 
-    By views, the weights at a label are by how well each sensor sees it, as in `Clmb`: a sensor that cannot see the
-    label is left out of it. A target must have one label at all sensors (see `match_labels`).
+    With `by_views`, the weights at a label depend on how well each sensor observes it, as in `Clmb`: a sensor that
+    cannot observe the label is left out of it. A target must have one label at all sensors (see `match_labels`).
 
     Attributes:
-        weights: one a sensor, in the order of the beliefs; non-negative, sum 1. A sensor of weight 0 takes no part.
-        by_views: whether sensors count by how well they see each label; `fuse` then needs `views`.
+        weights: one per sensor, in the order of the beliefs; non-negative, sum 1. A sensor of weight 0 takes no part.
+        by_views: whether sensors are weighted by how well they observe each label; `fuse` then needs `views`.
         limits: caps on the fused mixtures (`log_min_component_weight`, `merge_distance`, None for 2,
             `max_components`); the others are not used.
 
-    Raises `InputError` for weights or limits that cannot be used.
+    Raises `InputError` for invalid weights or limits.
     """
 
     weights: Sequence[float] | Floats
@@ -199,11 +203,11 @@ class ArithmeticAverage:
         flag("by_views", self.by_views)
 
     def fuse(self, beliefs: Sequence[LabelledDensity], views: FieldsOfView | None = None) -> tuple[LMB, FusionInfo]:
-        """Fused LMB of the sensors' LMBs (others are first converted), in increasing label order, and what was done.
+        """Return the fused LMB in increasing label order, and the report. Beliefs that are not LMBs are converted.
 
-        views: what the sensors could see; not used with plain weights. Labels that no sensor with a say has are left
-        out. Raises `InputError` for another number or kind of beliefs, for state dimensions that differ, a density that
-        is not valid or views that are missing.
+        views: fields of view of the sensors; not used with plain weights. Labels that only sensors without weight there
+        have are left out. Raises `InputError` for a wrong number or kind of beliefs, state dimensions that differ, an
+        invalid density or missing views.
         """
         check_beliefs(beliefs, (LMB, GLMB, FactoredGLMB), len(self.weights))
         seen = require_views(self.by_views, views, len(self.weights))
@@ -224,7 +228,7 @@ class ArithmeticAverage:
 
 
 def _pooled(aligned: AlignedLmbs, kept: Bools, present: Floats, caps: MixtureCaps) -> TrackTable:
-    """The mixture of each kept label's tracks under their weights (num_labels, num_sensors), reduced by the caps."""
+    """Return the reduced mixture of the tracks of each kept label, weighted by `present` (num_labels, num_sensors)."""
     pooled = (present > 0.0) & kept[:, None]
     label, sensor = np.nonzero(pooled)
     offsets = offsets_of(np.count_nonzero(pooled, axis=1)[kept])

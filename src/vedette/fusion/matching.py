@@ -1,4 +1,4 @@
-"""Matching of labels across sensors, before a fusion that goes by labels."""
+"""Matching of labels across sensors, before a fusion that works by labels."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.distances import near_pairs
 from vedette.models.arguments import chance, instance, sequence
 
-GATE_PROBABILITY = 0.999  # that two estimates of one target are within the gate
-LIKELY = 0.5  # existence from which a label is matched before the others
-# Sensor s makes labels whose index is at least this times s + 1.
+GATE_PROBABILITY = 0.999  # probability that two estimates of one target are within the gate
+LIKELY = 0.5  # labels of at least this existence are matched first
+# New labels of sensor s have an index of at least this times s + 1.
 OWN_LABELS = 1_000_000
-_COMPONENTS = 10  # of a track whose names are settled
-_TIE = 1e-6  # between costs, in favour of equal labels
+_COMPONENTS = 10  # largest number of components of a track whose label is resolved
+_TIE = 1e-6  # cost advantage of equal labels
 
 
 class _Targets(NamedTuple):
@@ -45,22 +45,22 @@ class _Targets(NamedTuple):
 def match_labels(
     beliefs: Sequence[LabelledDensity], *, gate_probability: float = GATE_PROBABILITY
 ) -> list[LabelledDensity]:
-    """The sensors' beliefs with one label for what is one target by its place.
+    """Return the sensors' beliefs with one common label for tracks that agree in position, and so are one target.
 
-    The first sensor's labels stay as they are. Each further sensor's labels are assigned to those found so far, at the
-    least sum of d'S^-1 d + log det S with S = P_a + P_b over the whole state, of one Gaussian a label; those that are
-    likely to exist first, the others among what is left; of equal sums, equal labels. Only pairs with d'S^-1 d within
-    the gate are assigned, as many as can be. What is assigned takes the label that it is assigned to. What is not keeps
-    its own, unless that is taken: then it gets one of its birth step and an index of the sensor's own, from
-    1 000 000 (sensor + 1) on.
+    The first sensor keeps its labels. The labels of each further sensor are assigned to those found so far, at the
+    least sum of d'S^-1 d + log det S with S = P_a + P_b over the whole state, with one Gaussian per label. Labels that
+    are likely to exist are assigned first, then the others among the remaining ones; equal labels win ties. Only pairs
+    with d'S^-1 d within the gate are assigned, as many as possible. An assigned label takes the label it is assigned
+    to. An unassigned one keeps its own, unless that is in use: then it gets its birth step and a new index of this
+    sensor, at least 1 000 000 (sensor + 1).
 
-    A label is told by the density of the sensor that is surest of it so far. Beliefs that have been matched come back
-    as they are. Densities are not changed, and no two labels of a sensor become one.
+    The density of each label found so far is that of the sensor with its largest existence. Beliefs that are matched
+    already are returned unchanged. Densities are not changed, and no two labels of a sensor become one.
 
-    gate_probability: that two independent estimates of one target are within the gate.
+    gate_probability: probability that two independent estimates of one target are within the gate.
 
-    Raises `InputError` for something other than labelled densities of one state dimension, a density that is not valid,
-    or a probability outside (0, 1).
+    Raises `InputError` for beliefs other than labelled densities of one state dimension, an invalid density, or a
+    probability outside (0, 1).
     """
     names = common_names(beliefs, gate_probability=gate_probability)
     return [relabelled(belief, own) for belief, own in zip(beliefs, names, strict=True)]
@@ -69,7 +69,7 @@ def match_labels(
 def common_names(
     beliefs: Sequence[LabelledDensity], *, gate_probability: float = GATE_PROBABILITY
 ) -> list[dict[Label, Label]]:
-    """For each sensor, the label that `match_labels` gives to each of its labels. Raises as that."""
+    """For each sensor, the label that `match_labels` gives to each of its labels. Raises the same errors."""
     if not isinstance(beliefs, PrevalidatedBeliefs):
         beliefs = sequence("beliefs", beliefs, "densities, one a sensor")
     check_beliefs(beliefs, (GLMB, LMB, FactoredGLMB), len(beliefs))
@@ -88,7 +88,7 @@ def common_names(
 
 
 def _pairs(own: _Targets, found: _Targets, gate: float) -> dict[int, int]:
-    """Place in `found` of those of a sensor's labels that are assigned."""
+    """Return the place in `found` of each of a sensor's labels that is assigned."""
     near = near_pairs(own.means, own.covs, found.means, found.covs, gate)
     rows, columns, costs = near.firsts, near.seconds, near.squares + near.log_dets
     place = {label: i for i, label in enumerate(found.labels)}
@@ -103,19 +103,19 @@ def _pairs(own: _Targets, found: _Targets, gate: float) -> dict[int, int]:
 
 
 def _assign(rows: Ints, columns: Ints, costs: Floats, pairs: dict[int, int]) -> None:
-    """Add as many of the allowed pairs (num,) of rows and columns as can be, at the least sum of costs."""
+    """Add as many of the allowed pairs (num,) of rows and columns as possible, at the least sum of costs."""
     row_names, row = np.unique(rows, return_inverse=True)
     column_names, column = np.unique(columns, return_inverse=True)
-    alone = (np.bincount(row)[row] == 1) & (np.bincount(column)[column] == 1)  # nothing else is near either
+    alone = (np.bincount(row)[row] == 1) & (np.bincount(column)[column] == 1)  # no other candidate for either
     pairs.update(zip(rows[alone].tolist(), columns[alone].tolist(), strict=True))
     if alone.all():
         return
     if alone.any():
         _assign(rows[~alone], columns[~alone], costs[~alone], pairs)
         return
-    from scipy.optimize import linear_sum_assignment  # here, as it takes a third of a second to load
+    from scipy.optimize import linear_sum_assignment  # imported here because it takes a third of a second
 
-    # More than any change of the allowed pairs can save.
+    # More than any exchange of allowed pairs can save.
     forbidden = costs.max() + (np.ptp(costs) + 1.0) * min(len(row_names), len(column_names))
     block = np.full((len(row_names), len(column_names)), forbidden)
     block[row, column] = costs
@@ -125,7 +125,7 @@ def _assign(rows: Ints, columns: Ints, costs: Floats, pairs: dict[int, int]) -> 
 
 
 def _names(own: _Targets, found: _Targets, pairs: dict[int, int], sensor: int) -> list[Label]:
-    """The new label of each of a sensor's labels."""
+    """Return the new label of each of a sensor's labels."""
     taken = set(found.labels)
     names: dict[int, Label] = {i: found.labels[place] for i, place in pairs.items()}
     alone = [i for i in range(len(own.labels)) if i not in pairs]
@@ -135,7 +135,7 @@ def _names(own: _Targets, found: _Targets, pairs: dict[int, int], sensor: int) -
     for i in alone:
         if i not in names:
             step, index = own.labels[i]
-            # From its own index on, so that it gets the same label at every scan.
+            # Derived from its own index, so that it gets the same label at every scan.
             index = OWN_LABELS * (sensor + 1) + index % OWN_LABELS
             while (step, index) in taken:
                 index += 1
@@ -145,7 +145,7 @@ def _names(own: _Targets, found: _Targets, pairs: dict[int, int], sensor: int) -
 
 
 def _joined(found: _Targets, own: _Targets) -> _Targets:
-    """All labels so far, each with the density of the sensor that is surest of it; of equals the first."""
+    """Return all labels so far, each with the density of the sensor of largest existence; the first one on a tie."""
     place = {label: i for i, label in enumerate(found.labels)}
     new = [i for i, label in enumerate(own.labels) if label not in place]
     existence, means, covs = (
@@ -159,50 +159,50 @@ def _joined(found: _Targets, own: _Targets) -> _Targets:
 
 
 def relabelled(belief: LabelledDensity, names: dict[Label, Label]) -> LabelledDensity:
-    """The belief under other labels, of which no two are the same; labels without a new name keep theirs."""
+    """Return the belief under other labels, all distinct; labels without a new name are kept."""
     if all(old == new for old, new in names.items()):
         return belief
-    # A GLMB's table may have labels that are in no hypothesis.
+    # The track table of a GLMB may contain labels that no hypothesis uses.
     labels = [names.get(label, label) for label in map(tuple, belief.tracks.labels.tolist())]
     return belief.with_labels(np.array(labels, np.int64))
 
 
 @dataclass(frozen=True, slots=True)
 class LabelMatchedFusion:
-    """A fusion by labels of beliefs whose labels need not agree: they are matched first (`match_labels`).
+    """A fusion by labels that first matches labels across sensors (`match_labels`), so that they need not agree.
 
-    For sensors that take targets up at different steps, or make labels of their own, and do not go on from the fused
-    belief. A tracker that keeps what `match` gives as the sensors' beliefs keeps labels stable over time, also where
-    the sensor that led a label loses it, and lets decisions go by the labels of the `rule` alone.
+    For sensors that initiate targets at different steps or assign their own labels, and that do not continue from the
+    fused belief. A tracker that keeps the result of `match` as the sensors' beliefs has labels that are stable over
+    time, even if the sensor that introduced a label loses it, and decisions can then use the labels of `rule` directly.
 
     Attributes:
         rule: the fusion.
-        gate_probability: as of `match_labels`.
+        gate_probability: see `match_labels`.
 
-    Raises `InputError` for a gate that is no probability.
+    Raises `InputError` for a gate that is not a probability.
     """
 
     rule: Fusion
     gate_probability: float = GATE_PROBABILITY
-    matches_labels: ClassVar[bool] = True  # labels need not agree across sensors
+    matches_labels: ClassVar[bool] = True  # labels may differ across sensors
 
     def __post_init__(self) -> None:
         instance("rule", self.rule, Fusion)
         chance("gate_probability", self.gate_probability)
 
     def match(self, beliefs: Sequence[LabelledDensity]) -> list[LabelledDensity]:
-        """The beliefs under common labels; products of GLMBs with the names settled that they leave open.
+        """Return the beliefs under common labels; ambiguous labels of products of GLMBs are resolved first.
 
-        Of several labels that may be one target's, each by itself would be matched as an improbable target.
+        Otherwise, each of several candidate labels of one target would be matched as an improbable target.
         """
         given = sequence("beliefs", beliefs, "densities, one a sensor")
         settled = [with_resolved_labels(belief, _COMPONENTS) for belief in given]
         return match_labels(settled, gate_probability=self.gate_probability)
 
     def fuse(self, beliefs: Sequence[LabelledDensity], views: FieldsOfView | None = None) -> tuple[Any, FusionInfo]:
-        """The fusion of the beliefs under common labels; see the rule's. Raises as `match_labels` and the rule."""
+        """Return the fusion by `rule` of the beliefs under common labels. Raises as `match_labels` and `rule`."""
         return self.rule.fuse(PrevalidatedBeliefs(self.match(beliefs)), views)
 
     def precompute(self, cases: Sequence[DensityBatch], prediction: GLMB | LMB) -> None:
-        """None: which labels match differs from case to case. Of matched beliefs, ask the rule."""
+        """Return None, as matches differ between cases. For matched beliefs, call the method of `rule`."""
         return None

@@ -1,4 +1,4 @@
-"""Parallel update: posteriors of one common prediction, each by its sensor's own scan, become one."""
+"""Parallel update: fusion of posteriors that were updated from one common prediction, each by its sensor's own scan."""
 
 from __future__ import annotations
 
@@ -44,39 +44,40 @@ _Density = TypeVar("_Density", LMB, FactoredGLMB)
 class ParallelUpdate:
     """Fusion of posteriors that were updated from one prediction, each by its sensor's own scan alone.
 
-    With independent scans Bayes' rule gives pi+ prod_s (pi_s / pi+), of which each factor is what sensor s's scan said:
-    the common prediction counts once, whatever the number of sensors. Label by label, for single Gaussians with P+ = C
-    C':
+    With independent scans Bayes' rule gives pi+ prod_s (pi_s / pi+), where each factor is the likelihood ratio of
+    sensor s's scan. The common prediction counts once, whatever the number of sensors. Label by label, for single
+    Gaussians with P+ = C C':
 
         A_s = C' (P_s^-1 - P+^-1) C, negative eigenvalues set to 0;  z_s = C^-1 (m_s - m+);  eta_s = (I + A_s) z_s
         A = I + sum_s A_s;  eta = sum_s eta_s;  m = m+ + C A^-1 eta;  P = C A^-1 C'
         logit = l+ + sum_s (l_s - l+) - ln|A| / 2 + eta'A^-1 eta / 2 + sum_s (ln|I + A_s| / 2 - eta_s'z_s / 2)
 
-    The mixtures of an LMB are first replaced by Gaussians of their moments. A sensor that cannot see a target says
-    nothing of it, since its posterior is its prediction: it changes nothing, to the last bit.
+    The mixtures of an LMB are first replaced by Gaussians of their moments. A sensor that cannot observe a target has
+    its prediction as posterior, so it leaves the result unchanged to the last bit.
 
-    Of products of GLMBs the same for each label set I of the labels that belong together: w(I) is in proportion to
-    w+(I) prod_s (w_s(I) / w+(I)) times the integrals of the places of its labels, where w_s(I) is that of a sensor's
-    factor and w+(I) the prediction's of the labels in that factor. So sensors that each say that one of two labels is
-    of no target are taken to speak of the same one: LMBs have them all speak of both, and may lose both. A track that
-    is a mixture says a sum of such terms, and the product is the mixture of all choices of one component of each
-    sensor, of which the Gaussian of the moments is kept. (Where an exponent is not 1, that of each posterior's.)
+    For products of GLMBs the same holds for each label set I of a group of labels: w(I) is in proportion to w+(I)
+    prod_s (w_s(I) / w+(I)) times the integrals of the position densities of its labels, where w_s(I) is the weight in a
+    factor of sensor s and w+(I) the prediction's weight of I among the labels in that factor. If each sensor finds that
+    one of two labels has no target, the rule takes this as the same label at all sensors; LMBs would reduce both labels
+    at every sensor, and may lose both. A track that is a mixture contributes a sum of such terms. The product is then
+    the mixture over all choices of one component per sensor, of which the Gaussian of the moments is kept. (If an
+    exponent is not 1, the mixture of each posterior is first replaced by the Gaussian of its moments.)
 
-    Exact for LMBs of single Gaussians and for label sets in which places do not depend on each other; otherwise as good
-    as the moments are.
+    The rule is exact for LMBs of single Gaussians and for label sets in which positions do not depend on each other;
+    otherwise it is as accurate as the moments.
 
     Attributes:
-        weights: exponents v_s of (pi_s / pi+), non-negative, one a sensor; None for 1 each, which is Bayes' rule. Other
-            values serve consensus, where they go to 1.
-        missing_existence: existence, in (0, 1), of a predicted label that a sensor's posterior lacks because its filter
-            dropped it. That is at most this sure there, and if the prediction was surer, the difference counts; the
-            sensor then says nothing of where the target is. Counted in the `FusionInfo`. It should be the filters'
-            `min_existence`, or these 0, so that nothing is dropped.
-        limits: caps on the cost: `max_combinations` of components of one label, the likeliest after each sensor (those
-            lighter than 1e-6 of the likeliest go in any case), and `max_hypotheses` label sets of a group, predicted
-            and fused; the others are not used.
+        weights: exponents v_s of (pi_s / pi+), non-negative, one per sensor; None for 1 each, which is Bayes' rule.
+            Other values are for consensus, where they converge to 1.
+        missing_existence: upper bound, in (0, 1), on the existence of a predicted label that a sensor's posterior lacks
+            because its filter dropped it. If the prediction was higher, the difference counts; the sensor then adds no
+            information about the position. Counted in `FusionInfo`. It should be the filters' `min_existence`, or
+            `min_existence` should be 0, so that nothing is dropped.
+        limits: caps on the cost: `max_combinations` of components of one label, the likeliest after each sensor
+            (combinations lighter than 1e-6 of the likeliest are always dropped), and `max_hypotheses` label sets of a
+            group, predicted and fused; the others are not used.
 
-    Raises `InputError` for weights, a floor or limits that cannot be used.
+    Raises `InputError` for invalid weights, floor or limits.
     """
 
     weights: Sequence[float] | Floats | None = None
@@ -95,23 +96,23 @@ class ParallelUpdate:
         check_limits(self.limits)
 
     def log_linear_pool(self, num_sensors: int) -> LogLinearPool:
-        """pi+^(1 - sum of v) prod_s pi_s^(v_s)."""
+        """Return pi+^(1 - sum of v) prod_s pi_s^(v_s)."""
         powers = (1.0,) * num_sensors if self.weights is None else tuple(self.weights)
         return LogLinearPool(1.0 - math.fsum(powers), powers, self.missing_existence)
 
     def fuse(self, beliefs: Sequence[_Density], views: FieldsOfView | None = None) -> tuple[_Density, FusionInfo]:
-        """The fused density of the labels of the prediction, in increasing order, and what was done.
+        """Return the fused density of the labels of the prediction, in increasing order, and the report.
 
-        Of LMBs an LMB; where a belief or the prediction is a `FactoredGLMB`, one with a Gaussian a label, its factors
-        the smallest groups of labels of which neither the prediction nor a posterior has a factor that spans two.
+        LMBs give an LMB. If a belief or the prediction is a `FactoredGLMB`, the result is a `FactoredGLMB` with one
+        Gaussian per label; its factors are the smallest groups of labels that no factor of the prediction or of a
+        posterior crosses.
 
-        beliefs: posteriors, whose labels the prediction has. views: with the common `prediction`; of a product of GLMBs
-        one with a single Gaussian a label, whatever the hypothesis.
+        beliefs: posteriors, whose labels the prediction must have. views: with the common `prediction`; a product of
+        GLMBs must have one single Gaussian per label, the same in all hypotheses.
 
-        Raises `InputError` for a prediction that is missing or no such density, for another number or kind of beliefs,
-        state dimensions that differ, a density that is not valid or a label that the prediction lacks, and
-        `NumericalError` where a label is certain at one sensor and impossible at another, or a product cannot be
-        integrated.
+        Raises `InputError` for a missing or unsuitable prediction, a wrong number or kind of beliefs, state dimensions
+        that differ, an invalid density or a label that the prediction lacks, and `NumericalError` if a label is certain
+        at one sensor and impossible at another, or a product cannot be integrated.
         """
         prediction = _prediction_of(views, check=not isinstance(beliefs, PrevalidatedBeliefs))
         given: Sequence[LabelledDensity] = beliefs
@@ -132,7 +133,7 @@ class ParallelUpdate:
         return fused, info
 
     def _fused_lmbs(self, prediction: LMB, beliefs: Sequence[LMB], weights: Floats) -> tuple[LMB, FusionInfo]:
-        """Label by label; of a prediction of single Gaussians."""
+        """Fuse label by label; the prediction must have single Gaussians."""
         prior, given = prediction.tracks.to_kernel(), posteriors_of(prediction, beliefs, self.missing_existence)
         before = prior.components
         means, covs, log_overlaps = self._updated_tracks(before.means, before.covs, given.chosen, weights, given.tracks)
@@ -153,7 +154,7 @@ class ParallelUpdate:
     def _fused_factors(
         self, prediction: FactoredGLMB, beliefs: Sequence[FactoredGLMB], weights: Floats
     ) -> tuple[FactoredGLMB, FusionInfo]:
-        """Labels that are alone in their factors label by label, the others group by group."""
+        """Fuse labels that are alone in their factors label by label, the others group by group."""
         check_single(prediction)
         marginal = [
             marginalised_factors(belief, WHOLE if power == 1.0 else ONE)
@@ -200,7 +201,7 @@ class ParallelUpdate:
 
 
 def _moment_matched(belief: LMB) -> LMB:
-    """The LMB with one Gaussian a track."""
+    """Return the LMB with one Gaussian per track."""
     return belief.with_fields(tracks=TrackTable.from_kernel(reduced_tracks(belief.tracks.to_kernel(), ONE)))
 
 

@@ -1,4 +1,4 @@
-"""What posteriors of one common prediction say together: of single labels, and of label sets where labels contend."""
+"""Parallel update of posteriors of one common prediction: single labels, and label sets of labels that interact."""
 
 from __future__ import annotations
 
@@ -35,20 +35,20 @@ class Posteriors(NamedTuple):
 
 
 def posteriors_of(prediction: LMB, beliefs: Sequence[LMB], missing_existence: float) -> Posteriors:
-    """The posteriors aligned. Raises `InputError` for a label that the prediction lacks."""
+    """Return the aligned posteriors. Raises `InputError` for a label that the prediction lacks."""
     own = known_places(prediction.tracks.labels, [belief.tracks.labels for belief in beliefs])
     starts = offsets_of([belief.tracks.num_tracks for belief in beliefs])[:-1]
     floors = np.minimum(prediction.existence_logit, math.log(missing_existence) - math.log1p(-missing_existence))
     chosen = np.where(own >= 0, own + starts, -1)
-    logits = np.concatenate([*(belief.existence_logit for belief in beliefs), np.zeros(1)])  # the last is nobody's
+    logits = np.concatenate([*(belief.existence_logit for belief in beliefs), np.zeros(1)])  # last: for index -1
     tracks = stack_tracks([belief.tracks.to_kernel() for belief in beliefs])
     return Posteriors(chosen, tracks, np.where(chosen >= 0, logits[chosen], floors[:, None]))
 
 
 def known_places(prediction: Ints, posteriors: Sequence[Ints]) -> Ints:
-    """(num_labels, num_sensors) where posteriors have the labels of the prediction, in increasing order; -1: nowhere.
+    """Place of each label of the prediction in each posterior, shape (num_labels, num_sensors); -1 if absent.
 
-    Raises `InputError` where one has a label that the prediction lacks.
+    Labels are in increasing order. Raises `InputError` if a posterior has a label that the prediction lacks.
     """
     labels, places = place_labels([prediction, *posteriors])
     unknown = (places >= 0) & (places[:, :1] < 0)
@@ -62,7 +62,7 @@ def known_places(prediction: Ints, posteriors: Sequence[Ints]) -> Ints:
 
 
 def updated_logs(prior: Floats, posteriors: Floats, weights: Floats) -> Floats:
-    """prior + sum_s v_s (posterior_s - prior), where what is infinite and stays so adds nothing."""
+    """Return prior + sum_s v_s (posterior_s - prior); an infinite value that does not change contributes nothing."""
     base = prior[:, None]
     with np.errstate(invalid="ignore"):
         change = np.where((posteriors == base) | (weights == 0.0), 0.0, posteriors - base)
@@ -70,7 +70,7 @@ def updated_logs(prior: Floats, posteriors: Floats, weights: Floats) -> Floats:
 
 
 def check_evidence(labels: Ints, logits: Floats) -> None:
-    """Raise `NumericalError` where a label is certain to one and impossible to another."""
+    """Raise `NumericalError` if a label is certain in one density and impossible in another."""
     faulty = np.isnan(logits)
     if faulty.any():
         label = labels[int(np.flatnonzero(faulty)[0])].tolist()
@@ -80,31 +80,31 @@ def check_evidence(labels: Ints, logits: Floats) -> None:
 
 
 class GroupedSets(NamedTuple):
-    """Label sets of one group, what the scans said of their weights, and of where their targets are.
+    """Label sets of one group, with the change of their weights by the scans, and the fused positions of their targets.
 
-    A place is a label together with what each sensor says of it; in most sets a label has the same.
+    A place is a label together with the track of each sensor for it; in most sets a label has the same place.
     """
 
     labels: Ints  # (num_labels, 2) increasing
-    log_weights: Floats  # (num_sets,) of the prediction times what the scans evidence, but for the places
-    places: Ints  # (num_sets, num_labels) place of each member; -1 of those that are absent
+    log_weights: Floats  # (num_sets,) of the prediction times the scans' weight ratios, without the places' integrals
+    places: Ints  # (num_sets, num_labels) place of each member; -1 if absent
     place_labels: Ints  # (num_places,) into `labels`
-    chosen: Ints  # (num_places, num_sensors) track of each sensor, -1 where it has nothing to say
+    chosen: Ints  # (num_places, num_sensors) track of each sensor, -1 if it adds no information
     num_missing: Ints  # (num_sensors,) labels that a sensor's posterior has dropped
-    log_kept: float  # log of the weight of the prediction's sets that are here
+    log_kept: float  # log of the weight of the prediction's sets that were retained
 
 
 def grouped_sets(
     joined: JoinedFactors, group: int, first_tracks: Ints, weights: Floats, missing_existence: float, max_sets: int
 ) -> GroupedSets:
-    """The sets of a group: the prediction's, each with what the sensors' factors say of their part of it.
+    """Return the prediction's sets of a group, each with the weight ratios that the sensors' factors assign to them.
 
-    A factor says w_s(I) / w+(I) of a set I of its labels, where w+ is the prediction's weight of I among these labels:
-    nothing, where the posterior is the prediction, however it is factored.
+    A factor assigns w_s(I) / w+(I) to a set I of its labels, where w+ is the prediction's weight of I among these
+    labels. The ratio is 1 if the posterior is the prediction, however it is factored.
 
-    joined: of the prediction, of one Gaussian a label, and the posteriors, marginalised. first_tracks: (S,) place of
-    each posterior's first track in the table of all. weights: (S,) exponents of what the sensors say. max_sets: of the
-    prediction, kept.
+    joined: the prediction, with one Gaussian per label, and the posteriors, marginalised. first_tracks: (S,) place of
+    each posterior's first track in the table of all. weights: (S,) exponents of the sensors' ratios. max_sets: largest
+    number of the prediction's sets that are kept.
     """
     labels = np.unique(np.concatenate([part.tracks.labels for part in joined.parts(group)]), axis=0)
     product, lost = as_glmb(joined.parts(group)[0], max_hypotheses=max_sets)
@@ -134,7 +134,7 @@ def grouped_sets(
 
 
 def _members(glmb: GLMB, labels: Ints) -> Bools:
-    """(num_hyps, num_labels) who is in each hypothesis."""
+    """Return True for each label that is a member of each hypothesis, shape (num_hyps, num_labels)."""
     members = np.zeros((glmb.num_hyps, len(labels)), np.bool_)
     hyps = np.repeat(np.arange(glmb.num_hyps), np.diff(glmb.hyp_offsets))
     members[hyps, places_of(glmb.tracks.labels, labels)[glmb.hyp_tracks]] = True
@@ -142,11 +142,11 @@ def _members(glmb: GLMB, labels: Ints) -> Bools:
 
 
 class _FactorEvidence(NamedTuple):
-    """What one factor of a posterior says of each of the prediction's sets."""
+    """Weight ratios and tracks that one factor of a posterior assigns to each of the prediction's sets."""
 
     columns: Ints  # (num_own,) its labels
     log_ratios: Floats  # (num_sets,)
-    tracks: Ints  # (num_sets, num_own) of the factor's; -1 of those absent, and where it lacks the set
+    tracks: Ints  # (num_sets, num_own) tracks of the factor; -1 for absent labels, and if it lacks the set
 
     @classmethod
     def of(cls, factor: GLMB, labels: Ints, members: Bools, prior: Floats) -> _FactorEvidence:
@@ -157,7 +157,7 @@ class _FactorEvidence(NamedTuple):
         sets = _members(factor, own_labels)
         number = {row.tobytes(): i for i, row in enumerate(parts)}
         known = [(h, number[row.tobytes()]) for h, row in enumerate(sets) if row.tobytes() in number]
-        # A set that was cut off weighed at most as much as the lightest kept, and no more than was expected.
+        # A set that was cut off weighed at most as much as the lightest retained set, and as much as predicted.
         after = np.minimum(before, factor.hyp_log_weights.min())
         tracks = np.full(parts.shape, -1)
         for h, part in known:
@@ -167,11 +167,11 @@ class _FactorEvidence(NamedTuple):
 
 
 def _of_dropped(member: Bools, prior: Floats, missing_existence: float) -> Floats:
-    """(num_sets,) what a posterior says that has dropped a label: that it exists at most so surely."""
+    """Log weight ratios (num_sets,) of a posterior that dropped a label: its existence is at most `missing_existence`."""
     number = member.astype(np.int64)
     sums = group_log_sums(prior, number, 2)
     log_odds = min(sums[1] - sums[0], logit(missing_existence))
-    with np.errstate(invalid="ignore"):  # of a side without sets
+    with np.errstate(invalid="ignore"):  # if one side has no sets
         evidence = log_expit(np.array([-log_odds, log_odds])) - (sums - np.logaddexp(*sums))
     return np.asarray(evidence[number])
 
@@ -190,9 +190,9 @@ def check_single(prediction: FactoredGLMB) -> None:
 def fused_groups(
     groups: Sequence[GroupedSets], log_overlaps: Floats, means: Floats, covs: Floats, max_sets: int
 ) -> tuple[list[FactoredGLMB], float]:
-    """One density a group, with one Gaussian a label; and the log of the product of the sums of their weights.
+    """Return one density per group, with one Gaussian per label, and the log of the product of their total weights.
 
-    log_overlaps (num,), means (num, dim), covs (num, dim, dim): of the places of all groups, one after the other.
+    log_overlaps (num,), means (num, dim), covs (num, dim, dim): of the places of all groups, concatenated.
     """
     fused, log_normaliser, start = [], 0.0, 0
     for group in groups:
@@ -209,7 +209,7 @@ def fused_groups(
 
 
 def _group(labels: Ints, places: Ints, log_weights: Floats, means: Floats, covs: Floats) -> FactoredGLMB:
-    """A GLMB of weighted sets, of which each label has the Gaussian of the moments of its places."""
+    """Return a GLMB of weighted sets in which each label has the Gaussian of the moments of its places."""
     members = places >= 0
     held = np.flatnonzero(members.any(axis=0))
     num, columns = len(held), members[:, held]
@@ -225,7 +225,7 @@ def _group(labels: Ints, places: Ints, log_weights: Floats, means: Floats, covs:
 
 
 def lost_labels(posteriors: Sequence[FactoredGLMB], weights: Floats, fused: FactoredGLMB) -> int:
-    """Labels that a sensor is sure of and the fused density is not."""
+    """Return the number of labels that a sensor holds as sure and the fused density does not."""
     labels, existence = fused.label_existence()
     surest = np.zeros(len(labels))
     for posterior in [own for own, power in zip(posteriors, weights.tolist(), strict=True) if power > 0.0]:

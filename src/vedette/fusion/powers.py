@@ -1,4 +1,4 @@
-"""Powers of mixtures and what a fusion may spend on them, and the fusion of track densities label by label."""
+"""Powers of mixtures, the limits on the cost of a fusion, and the cubature rule of powers."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from vedette.models.fields import Count, NonNegative, check_fields
 MixturePower = Literal["auto", "moment_matched", "component_wise", "quadrature"]
 MIXTURE_POWERS: tuple[MixturePower, ...] = ("auto", "moment_matched", "component_wise", "quadrature")
 
-ONE = MixtureCaps(-math.inf, 0.0, 1)  # which make of a mixture the Gaussian of its moments
-# Within these distances a merged Gaussian is as near to the truth as the power is: docs/decisions/0003.
+ONE = MixtureCaps(-math.inf, 0.0, 1)  # replaces a mixture by the Gaussian of its moments
+# Merging within these distances is as accurate as the power itself: docs/decisions/0003.
 _MERGE_DISTANCE = {"auto": 2.0, "moment_matched": 0.0, "component_wise": 2.0, "quadrature": 0.5}
 
-MAX_DIM = 7  # of a state whose cubature rule has no negative weight
+MAX_DIM = 7  # largest state dimension whose cubature rule has no negative weight
 
 
 class FusionLimits(NamedTuple):
@@ -33,12 +33,12 @@ class FusionLimits(NamedTuple):
     Attributes:
         log_min_component_weight: log of the weight below which components of a track's mixture are dropped before it is
             raised to a power and after the fusion; unused when moment matched.
-        merge_distance: components within this Mahalanobis distance are merged then; none: 2 for component_wise, 0.5 for
-            quadrature powers.
-        max_components: most components of a track before its power is taken; unused when moment matched.
+        merge_distance: components within this Mahalanobis distance are merged at the same times; none: 2 for
+            component_wise, 0.5 for quadrature powers.
+        max_components: largest number of components of a track before its power is taken; unused when moment matched.
         max_combinations: bound on the combinations of components of one label at all sensors, max_components^sensors;
-            under `auto` so many fewer components are kept.
-        max_hypotheses: most label sets of the fused density.
+            `auto` reduces the number of components until it holds.
+        max_hypotheses: largest number of label sets of the fused density.
     """
 
     log_min_component_weight: float = math.log(1e-5)
@@ -49,7 +49,7 @@ class FusionLimits(NamedTuple):
 
 
 def check_power(mixture_power: str, limits: FusionLimits, num_sensors: int) -> None:
-    """Raise `InputError` for an unknown power of mixtures or limits that cannot be kept."""
+    """Raise `InputError` for an unknown power of mixtures or limits that cannot be met."""
     one_of("mixture_power", mixture_power, MIXTURE_POWERS)
     check_limits(limits)
     combinations = limits.max_components**num_sensors
@@ -62,7 +62,7 @@ def check_power(mixture_power: str, limits: FusionLimits, num_sensors: int) -> N
 
 
 def check_limits(limits: Any) -> None:
-    """Raise `InputError` unless these are caps that can be kept."""
+    """Raise `InputError` unless the limits are valid."""
     instance("limits", limits, FusionLimits)
     check_fields(limits, "limits.")
     least = limits.log_min_component_weight
@@ -71,7 +71,7 @@ def check_limits(limits: Any) -> None:
 
 
 def power_rule(mixture_power: str, limits: FusionLimits, state_dim: int, num_sensors: int = 1) -> PowerRule:
-    """The caps and the cubature rule of a power of mixtures. Raises `InputError` where there is no rule."""
+    """Return the caps and the cubature rule of a power of mixtures. Raises `InputError` if there is no rule."""
     points, point_weights, most = np.empty((0, state_dim)), np.empty(0), int(limits.max_components)
     if mixture_power == "auto":
         most = min(most, int(limits.max_combinations ** (1.0 / num_sensors)) + 1)
@@ -90,7 +90,7 @@ def power_rule(mixture_power: str, limits: FusionLimits, state_dim: int, num_sen
 
 @contextmanager
 def numerical_errors_of_tracks() -> Iterator[None]:
-    """Raise a `NumericalError` from what a kernel raises of a product of powers that is no density."""
+    """Convert a FloatingPointError of a kernel (a product of powers that is not a density) into a `NumericalError`."""
     try:
         yield
     except FloatingPointError as fault:
@@ -98,7 +98,7 @@ def numerical_errors_of_tracks() -> Iterator[None]:
 
 
 def _simplex(dim: int) -> Floats:
-    """(dim + 1, dim) corners of a regular simplex on the unit sphere."""
+    """Return the corners of a regular simplex on the unit sphere, shape (dim + 1, dim)."""
     corners = np.zeros((dim + 1, dim))
     for i in range(dim):
         corners[i, i] = math.sqrt((dim + 1) * (dim - i) / (dim * (dim - i + 1)))
@@ -110,10 +110,10 @@ def _simplex(dim: int) -> Floats:
 def fifth_degree_rule(dim: int) -> tuple[Floats, Floats]:
     """Points and weights that integrate all polynomials of degree 5 and less under the standard normal of `dim` <= 7.
 
-    The centre, the corners of a regular simplex and its opposite, and the midpoints of their edges pushed out to the
-    same sphere: dim^2 + 3 dim + 3 points (Lu and Darmofal 2004, "Higher-dimensional integration with Gaussian weight
-    for applications in probabilistic design", after Mysovskikh). No weight is negative, so a covariance taken with
-    these points is never indefinite; for larger `dim` one would be.
+    The points are the centre, the corners of a regular simplex and of its opposite, and the midpoints of their edges
+    projected to the same sphere: dim^2 + 3 dim + 3 points (Lu and Darmofal 2004, "Higher-dimensional integration with
+    Gaussian weight for applications in probabilistic design", after Mysovskikh). No weight is negative, so a covariance
+    computed with these points is never indefinite; for larger `dim` one weight would be negative.
     """
     corners = _simplex(dim)
     first, second = np.triu_indices(dim + 1, 1)

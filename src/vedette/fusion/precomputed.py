@@ -1,4 +1,4 @@
-"""Fusions laid out for a planner: the power integrals of all joint actions without forming a fused density."""
+"""Precomputed fusions for planners: power integrals of all joint actions without forming a fused density."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from vedette.densities.products import PowerProducts, SensorPower, precompute_pr
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
 
-_ALL_BUT_CERTAIN = 700.0  # logit; its exponential is still a number
+_ALL_BUT_CERTAIN = 700.0  # logit; its exponential is finite
 
 
 class PrecomputedFusion(Protocol):
-    """A prediction p and, for any choice of one case a sensor, the fused density q, ready for their power integrals."""
+    """A prediction p and, for any choice of one case per sensor, the fused density q, prepared for power integrals."""
 
     def z(self, actions: Ints, exponents: Sequence[tuple[float, float]], unit_volume: float = 1.0) -> Floats:
-        """(num_joint, num_samples, num_exponents) log of the set integral of K^((a + b - 1) |X|) p(X)^a q(X)^b.
+        """Log of the set integral of K^((a + b - 1) |X|) p(X)^a q(X)^b, shape (num_joint, num_samples, num_exponents).
 
-        Over the label sets (of an LMB: labels) that p and q both have. q need not be normalised: its scale cancels in
-        what is a reward. actions: (num_joint, num_sensors) one action of each sensor. exponents: pairs (a, b).
+        The integral is over the label sets (for LMBs: labels) that both p and q have. q need not be normalised: its
+        scale cancels in a reward. actions: (num_joint, num_sensors) one action of each sensor. exponents: pairs (a, b).
         unit_volume: K.
         """
         ...
@@ -35,18 +35,19 @@ class SupportsPrecomputation(Protocol):
     """A fusion that a planner need not call for every joint action and sample."""
 
     def precompute(self, cases: Sequence[DensityBatch], prediction: GLMB | LMB) -> PrecomputedFusion | None:
-        """The fusions of any of the sensors' cases, or None where they cannot be had this way.
+        """Return the fusions of all combinations of the sensors' cases, or None if they cannot be precomputed.
 
-        cases: one a sensor. prediction: what they are compared with, of one Gaussian a track; a GLMB marginalised. What
-        is laid out equals `fuse` of each choice, but for the scale.
+        cases: one batch per sensor. prediction: the density to compare with, with one Gaussian per track; a GLMB must
+        be marginalised. The result equals `fuse` of each combination, except for the scale.
         """
         ...
 
 
 def precompute_single_sensor(own: DensityBatch, prediction: GLMB | LMB) -> PowerProducts | None:
-    """A sensor's cases as they are; None for LMBs and a GLMB prediction.
+    """Return the precomputed cases of a single sensor; None for LMB cases and a GLMB prediction.
 
-    An LMB prediction is taken on a GLMB's label sets. Raises `InputError` for GLMBs without a label set in common.
+    An LMB prediction is evaluated on the label sets of GLMB cases. Raises `InputError` for GLMBs without a common label
+    set.
     """
     share = SensorPower.whole(own, np.ones_like(own.possible) if own.is_lmb else own.possible)
     if own.is_lmb:
@@ -58,9 +59,9 @@ def precompute_single_sensor(own: DensityBatch, prediction: GLMB | LMB) -> Power
 def precompute_glmbs(
     shares: Sequence[SensorPower], prediction: DensityBatch, sensors: Sequence[int] | None = None
 ) -> PowerProducts | None:
-    """GLMBs laid out; None where a choice may have no label set in common with the prediction.
+    """Return precomputed GLMB fusions; None if some combination may have no label set in common with the prediction.
 
-    Raises `InputError` where that is so of all.
+    Raises `InputError` if no combination has one.
     """
     common = set(prediction.sets)
     if not any(common.intersection(share.cases.sets) for share in shares):
@@ -72,10 +73,10 @@ def precompute_glmbs(
 
 
 def _on_label_sets(lmb: LMB, own: DensityBatch) -> GLMB:
-    """The LMB's hypotheses on those of the label sets that it has; their weights do not sum to one.
+    """Return the LMB's hypotheses on those label sets that it has; their weights do not sum to one.
 
-    A certain or impossible label is taken as all but that: a divergence on common label sets does not depend on the
-    scale of the weights, and so it is defined also where the GLMB lacks that label in every set.
+    The existence of a certain or impossible label is clipped to almost 1 or 0. A divergence on common label sets does
+    not depend on the scale of the weights, so it remains defined if the GLMB lacks that label in every set.
     """
     logits = np.clip(lmb.existence_logit, -_ALL_BUT_CERTAIN, _ALL_BUT_CERTAIN)
     return lmb_on_label_sets(lmb.with_fields(existence_logit=logits), own.sets)

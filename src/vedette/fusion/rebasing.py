@@ -1,4 +1,4 @@
-"""What a scan has said of the targets, added to another prediction than the one that it updated."""
+"""Rebasing: apply the information of a sensor's scan to a prediction other than the one that it updated."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from vedette.kernels.labelled.stacking import stack_tracks
 
 
 def with_labels_of(prediction: LMB, others: LMB) -> LMB:
-    """The prediction, and what it lacks of another's labels as the other has them."""
+    """Return the prediction, with the labels that it lacks added from another LMB."""
     _, places = place_labels([prediction.tracks.labels, others.tracks.labels])
     lacking = places[places[:, 0] < 0, 1]
     if len(lacking) == 0:
@@ -24,15 +24,16 @@ def with_labels_of(prediction: LMB, others: LMB) -> LMB:
 
 
 def rebase(posterior: LMB, own: LMB, prediction: LMB) -> LMB:
-    """A sensor's posterior as if its scan had updated `prediction` instead of `own`, label by label.
+    """Return a sensor's posterior as if its scan had updated `prediction` instead of `own`, label by label.
 
-    What the scan said is the ratio of the sensor's posterior to its own prediction, a Gaussian of information
+    The information of the scan is the ratio of the sensor's posterior to its own prediction, a Gaussian of information
     Y = P^-1 - P_own^-1, its negative eigenvalues set to 0. With p(x) the new prediction,
 
         logit = l_new + (l - l_own) + log integral of p(x) N(x; m, P) / N(x; m_own, P_own).
 
-    Labels that the sensor's own prediction or posterior lacks are as in the prediction: its scan said nothing of them.
-    Mixtures become Gaussians of their moments. The posterior itself is returned where the predictions are one object.
+    Labels that the sensor's own prediction or posterior lacks are taken from the prediction: the scan has no
+    information about them. Mixtures become Gaussians of their moments. If both predictions are the same object, the
+    posterior itself is returned.
     """
     if own is prediction:
         return posterior
@@ -44,7 +45,7 @@ def rebase(posterior: LMB, own: LMB, prediction: LMB) -> LMB:
     new_means, new_covs = (moment[after] for moment in track_moments(posterior.tracks))
     means[at], covs[at], gained = _updated((means[at], covs[at]), (own_means, own_covs), (new_means, new_covs))
     said, known = posterior.existence_logit[after], own.existence_logit[before]
-    with np.errstate(invalid="ignore"):  # what was impossible or certain, and stays so, is no news
+    with np.errstate(invalid="ignore"):  # an impossible or certain label that stays so carries no information
         logits[at] += np.where(said == known, 0.0, said - known) + gained
     return unchecked(LMB, gaussian_tracks(prediction.tracks.labels, means, covs), logits)
 
@@ -52,7 +53,7 @@ def rebase(posterior: LMB, own: LMB, prediction: LMB) -> LMB:
 def _updated(
     prediction: tuple[Floats, Floats], own: tuple[Floats, Floats], posterior: tuple[Floats, Floats]
 ) -> tuple[Floats, Floats, Floats]:
-    """(n, dim) means and (n, dim, dim) covariances of prediction times posterior over own, and log of its integral.
+    """Means (n, dim) and covariances (n, dim, dim) of prediction times posterior over own, and the log of its integral.
 
     About the prediction's mean: the ratio is exp(c + y'u - u'Yu / 2) of u = x - m.
     """
@@ -60,7 +61,7 @@ def _updated(
     before, after = _inverse(own[1]), _inverse(posterior[1])
     values, vectors = np.linalg.eigh(after - before)
     information: Floats = (vectors * np.maximum(values, 0.0)[:, None, :]) @ vectors.swapaxes(1, 2)
-    clipped = before + information  # the posterior's, as far as a scan can have brought it
+    clipped = before + information  # information of the posterior, with the scan's contribution clipped
     ahead, behind = posterior[0] - mean, own[0] - mean
     pull = _times(clipped, ahead) - _times(before, behind)
     constant = 0.5 * (_log_det(clipped) - _log_det(before) - _form(clipped, ahead) + _form(before, behind))

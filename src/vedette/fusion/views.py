@@ -1,4 +1,4 @@
-"""What each sensor could see when it scanned, and the weights that sensors then have at each label of their LMBs."""
+"""Fields of view of the sensors at their scans, and the fusion weights that follow for each label of their LMBs."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ from vedette.kernels.labelled.stacking import stack_tracks
 from vedette.models import SensorModel
 from vedette.models.arguments import float_array, instance, one_a_sensor, reject, sequence
 
-# At which existence a scan's information is taken: at 1 that of a sensor which misses nothing is infinite.
+# Existence at which the information of a scan is evaluated: at 1 it is infinite for a sensor that never misses.
 SURE_EXISTENCE = 0.999
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FieldsOfView:
-    """The sensors at one time, from where they scanned.
+    """Fields of view of all sensors at one time, each at the pose of its scan.
 
     Attributes:
-        sensors: what each sensor sees, in the order of the beliefs.
-        poses: (num_sensors, pose_dim) where each was.
-        scanned: whether each sensor scanned at this time; one that did not saw nothing.
-        prediction: the belief that all sensors' beliefs were updated from, each by its own scan alone; None where there
-            is no such belief.
+        sensors: sensor models, in the order of the beliefs.
+        poses: (num_sensors, pose_dim) pose of each sensor.
+        scanned: whether each sensor scanned at this time; a sensor that did not scan detected nothing.
+        prediction: the belief that all sensors' beliefs were updated from, each by its own scan alone; None if there is
+            no such belief.
 
     Raises:
-        InputError: no sensor, another number of poses or scans than of sensors, or poses that are not finite.
+        InputError: no sensor, a number of poses or scans other than of sensors, or poses that are not finite.
     """
 
     sensors: tuple[SensorModel, ...]
@@ -54,15 +54,15 @@ class FieldsOfView:
             raise reject("views.prediction", f"{LABELLED}, or None", type(self.prediction).__name__)
 
     def if_all_scanned(self) -> FieldsOfView:
-        """What the sensors would see if each had scanned."""
+        """Return the fields of view as if each sensor had scanned."""
         return replace(self, scanned=(True,) * len(self.sensors))
 
     def detection(self, tracks: TrackTable) -> Floats:
-        """(num_tracks, num_sensors) mean probability of detection over each track's density; 0 without a scan."""
+        """Mean probability of detection over each track's density, (num_tracks, num_sensors); 0 without a scan."""
         return np.stack([self.detection_by(sensor, tracks) for sensor in range(len(self.sensors))], axis=1)
 
     def detection_by(self, sensor: int, tracks: TrackTable) -> Floats:
-        """(num_tracks,) mean probability of detection by one sensor over each track's density; 0 without a scan."""
+        """Mean probability of detection by one sensor over each track's density, (num_tracks,); 0 without a scan."""
         if not self.scanned[sensor] or tracks.num_tracks == 0:
             return np.zeros(tracks.num_tracks)
         chances = self.sensors[sensor].mean_detection(tracks.means, tracks.covs, self.poses[sensor])
@@ -72,24 +72,24 @@ class FieldsOfView:
 
 
 class AlignedLmbs(NamedTuple):
-    """All sensors on the union of their labels of positive existence."""
+    """LMBs of all sensors on the union of their labels of positive existence."""
 
     labels: Ints  # (num_labels, 2) increasing
-    chosen: Ints  # (num_labels, num_sensors) place in `tracks`, -1 where the sensor lacks the label
+    chosen: Ints  # (num_labels, num_sensors) place in `tracks`, -1 if the sensor lacks the label
     tracks: Tracks  # of all sensors
-    logits: Floats  # (num_labels, num_sensors) of existence; a floor where the sensor lacks the label
+    logits: Floats  # (num_labels, num_sensors) of existence; a floor if the sensor lacks the label
 
     @property
     def held(self) -> Bools:
-        """(num_labels, num_sensors) whether the sensor has the label."""
+        """True if the sensor has the label, shape (num_labels, num_sensors)."""
         return np.asarray(self.chosen >= 0)
 
 
 def align_lmbs(sensors: Sequence[Lmb], missing_existence: float) -> AlignedLmbs:
-    """Sensors' LMBs on the union of their labels.
+    """Return the sensors' LMBs on the union of their labels.
 
-    Where a sensor lacks a label, its existence there is the least of `missing_existence`, in [0, 1), and of those that
-    it has.
+    If a sensor lacks a label, its existence there is the least of `missing_existence`, in [0, 1), and of the existences
+    that it has.
     """
     floor = math.log(missing_existence) - math.log1p(-missing_existence) if missing_existence > 0.0 else -math.inf
     table = stack_tracks([sensor.tracks for sensor in sensors])
@@ -104,16 +104,16 @@ def align_lmbs(sensors: Sequence[Lmb], missing_existence: float) -> AlignedLmbs:
 
 
 def view_weights(aligned: AlignedLmbs, weights: Floats, views: FieldsOfView, active: Sequence[int]) -> Floats:
-    """(num_labels, len(active)) weights that each sensor has at each label, made to sum to one.
+    """Return the normalised weight of each sensor at each label, shape (num_labels, len(active)).
 
-    In proportion to w_s P / (1 - .999 P), P = E[P_D^s(l)]. P / (1 - r P) is, up to a factor, the information (Fisher's)
-    that a scan has of an existence r: where a target is there, a sensor that detects it in .98 of its scans says 190
-    times as much by detecting it or not as one that does in .2, so that many of these do not outvote it. 0 for a sensor
-    that cannot see the label. The mean is over the density of the sensor that is surest of the label, among those that
-    see it where they have it (of all that have it, where none does; of equals the first), so that what a blind sensor
-    believes changes nothing. Where nobody who scanned sees a label, sensors count by how well they would see it if they
-    scanned; where nobody would, those that have it keep their plain weights.
-    weights: (len(active),) of the sensors `active`, positive.
+    In proportion to w_s P / (1 - .999 P), P = E[P_D^s(l)]. Up to a factor, P / (1 - r P) is the (Fisher) information
+    that a scan has about an existence r. For a present target, a sensor that detects it in .98 of its scans has 190
+    times the weight of one that detects it in .2, so that many of the latter do not outvote it. The weight is 0 for a
+    sensor that cannot observe the label. The mean is over the density of the sensor with the largest existence among
+    those that observe the label at their own density (if none does, among all that have it; the first on a tie), so
+    that the belief of a blind sensor has no influence. If no sensor that scanned observes a label, sensors are weighted
+    by how well they would observe it if they scanned; if none would, those that have the label keep their plain
+    weights. weights: (len(active),) of the sensors `active`, positive.
     """
     detection = _detection(aligned, views, active)
     unseen = ~(detection > 0.0).any(axis=1, keepdims=True)
@@ -125,7 +125,7 @@ def view_weights(aligned: AlignedLmbs, weights: Floats, views: FieldsOfView, act
 
 
 def _detection(aligned: AlignedLmbs, views: FieldsOfView, active: Sequence[int]) -> Floats:
-    """(num_labels, len(active)) E[P_D^s(l)] over the density of the surest that sees the label."""
+    """E[P_D^s(l)] over the density of the surest sensor that observes the label, shape (num_labels, len(active))."""
     table, held = TrackTable.from_kernel(aligned.tracks), aligned.held
     existence = np.where(held, aligned.logits, -math.inf)
     sure = np.full(held.shape, -math.inf)
@@ -139,9 +139,10 @@ def _detection(aligned: AlignedLmbs, views: FieldsOfView, active: Sequence[int])
 
 
 def sum_over_sensors(values: Floats) -> Floats:
-    """(num_labels,) sums of (num_labels, num_sensors) values, one sensor after the other.
+    """Sums of (num_labels, num_sensors) values over the sensors, added in sensor order, shape (num_labels,).
 
-    NumPy's own sums add in another order where there are more terms: a sensor of nothing but zeros would change them.
+    NumPy's own sums change the order of addition with the number of terms, so a sensor of zeros would change the
+    result.
     """
     total = np.zeros(len(values))
     for column in values.T:
@@ -150,7 +151,7 @@ def sum_over_sensors(values: Floats) -> Floats:
 
 
 def require_views(by_views: bool, views: FieldsOfView | None, num_sensors: int) -> FieldsOfView | None:
-    """The views that a fusion goes by, None where it goes by none. Raises `InputError` where they are missing."""
+    """Return the fields of view that a fusion uses, None if it uses none. Raises `InputError` if they are missing."""
     if not by_views:
         return None
     if views is None:
