@@ -1,4 +1,4 @@
-"""How a belief meets time and a scan."""
+"""Filters: prediction and update of a multi-target density with the scans of one or several sensors."""
 
 from typing import TypeAlias
 

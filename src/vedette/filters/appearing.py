@@ -26,15 +26,15 @@ from vedette.kernels.steps.undetected import Arrivals, Cells, Left
 from vedette.models import BirthModel, SurvivalModel, TargetModel, UndetectedModel
 from vedette.models.arguments import reject
 
-# Shape of the gamma prior of a learnt birth rate: half a target has been seen.
+# Shape of the gamma prior of a learnt birth rate: equivalent to half an observed birth.
 _SHAPE = 0.5
-# Nodes along each side of a cell by which P_D is averaged: of 16 x 16 cells, and of cells that a user has chosen.
+# Nodes along each side of a cell for the average of P_D: for 16 x 16 cells, and for cells that a user has chosen.
 _NODES, _NODES_OF_CHOSEN = 2, 3
 _STAY, _NO_BIRTHS = np.ones(1), np.zeros(2)
 
 
 class Appearing(NamedTuple):
-    """Targets that appear anywhere in a region, by cells."""
+    """Model and cells of targets that appear anywhere in a region."""
 
     model: UndetectedModel
     cells: Cells
@@ -42,7 +42,7 @@ class Appearing(NamedTuple):
 
 @lru_cache(maxsize=100)
 def appearing(birth: BirthModel) -> Appearing | None:
-    """The cells of targets that appear anywhere; None where the births have no region."""
+    """Return the cells of targets that appear anywhere; None if the births have no region."""
     measured, model, nodes = birth.from_measurements, birth.anywhere, _NODES_OF_CHOSEN
     if model is None:
         model, nodes = None if measured is None else measured.uniform(), _NODES
@@ -99,13 +99,13 @@ def _on_grid(before: UndetectedTargets, cells: UndetectedIntensity, places: Appe
 
 
 def _in_scans(birth: BirthModel) -> bool:
-    """Whether the number of births is one between scans, or within the births' period."""
+    """Return True if the number of births is given per scan interval, or per period of the births."""
     measured = birth.from_measurements
     return birth.anywhere is None and measured is not None and not measured.is_learnt
 
 
 def _rate_of(before: UndetectedTargets, birth: BirthModel, places: Appearing, dt: float) -> float:
-    """Births in the region, 1/s."""
+    """Return the rate of births in the region, 1/s."""
     if _in_scans(birth):
         return birth.from_measurements.expected / (dt if birth.period is None else birth.period)  # type: ignore[union-attr, operator]
     return places.model.first_rate if before.birth_rate is None else before.birth_rate.rate
@@ -149,7 +149,10 @@ def rate_after(learnt: LearntRate, left: Left, label: tuple[int, int]) -> Learnt
 def with_deaths(
     before: UndetectedTargets, belief: FactoredGLMB, survival: SurvivalModel, dt: float
 ) -> UndetectedTargets:
-    """The same, where targets of a learnt birth rate that died within `dt` seconds are still counted as detected."""
+    """Return the undetected targets after `dt` seconds of deaths of detected targets, for a learnt birth rate.
+
+    Targets that were born at this rate and died within `dt` seconds are still counted as detected.
+    """
     learnt = before.birth_rate
     if learnt is None or not len(learnt.labels):
         return before
@@ -164,11 +167,11 @@ def with_deaths(
 def with_learnt_rate(
     undetected: UndetectedTargets, before: FactoredGLMB, kept: FactoredGLMB, birth: BirthModel
 ) -> UndetectedTargets:
-    """The undetected targets with the posterior birth rate, and as many of them as it says.
+    """Return the undetected targets with the posterior birth rate, and their expected number at this rate.
 
-    Of a prior gamma density of shape a and mean 1/T, n expected first detections and an exposure E, the posterior mean
-    is (a + n) / (a T + E). A measurement counts with the probability that it was one. Labels that are not yet decided
-    then change nothing: they are as many as the rate has it.
+    For a gamma prior of shape a and mean 1/T, n expected first detections and an exposure E, the posterior mean is
+    (a + n) / (a T + E). Each measurement counts with the probability that it was a first detection. Labels that are
+    still undecided therefore change nothing: their expected number is the one that the rate predicts.
 
     before, kept: the belief with the labels that were dropped and without them.
     """
@@ -188,9 +191,9 @@ def with_learnt_rate(
 
 
 def with_faint_candidates(reduction: Reduction, undetected: UndetectedTargets, birth: BirthModel) -> Reduction:
-    """The same, with a least existence of labels that falls with a learnt birth rate.
+    """Return the reduction with a minimum existence of labels that falls with a learnt birth rate.
 
-    Otherwise no measurement could start a label, and none be counted, once the rate is low.
+    Otherwise, at a low rate, no measurement could start a label and none would be counted.
     """
     learnt, places = undetected.birth_rate, appearing(birth)
     if learnt is None or places is None:
@@ -200,6 +203,6 @@ def with_faint_candidates(reduction: Reduction, undetected: UndetectedTargets, b
 
 
 def _shares_of(learnt: LearntRate, labels: Ints) -> Floats:
-    """(num_labels,) probability that each label, if its target exists, is of one born after the first scan."""
+    """Probability that a label, if its target exists, is of a target born after the first scan, shape (num_labels,)."""
     known = dict(zip(map(tuple, learnt.labels.tolist()), learnt.shares.tolist(), strict=True))
     return np.array([known.get(tuple(label), 0.0) for label in labels.tolist()])

@@ -1,4 +1,4 @@
-"""How filters ask which measurement is of which target: data association, as an argument."""
+"""Data association methods of the filters."""
 
 from __future__ import annotations
 
@@ -19,33 +19,34 @@ from vedette.models.probe import probe_marginals
 
 @runtime_checkable
 class MarginalAssociation(Protocol):
-    """How an LMB filter has the probabilities of associations."""
+    """A method by which an LMB filter computes association probabilities."""
 
     def to_kernel(self) -> Association | None:
-        """Who gives them, as kernels take it; None: the sums over clusters."""
+        """Return the kernel form of the method; None for the sums over clusters."""
         ...
 
 
 @part("ranked", "assignment")
 @dataclass(frozen=True, slots=True)
 class RankedAssignment:
-    """Joint choices in exact order, as many as `Limits` lets; for an LMB the exact sum over all of them, but in
-    clusters too large for that.
+    """Joint associations in exact order, up to the number in `Limits`.
+
+    For an LMB, the exact sum over all of them, except in clusters too large for that.
     """
 
     finds: ClassVar[str] = "choices and marginals"
 
     def to_kernel(self) -> None:
-        """None: the sums over clusters."""
+        """Return None: the sums over clusters."""
 
 
 @part("gibbs", "assignment")
 @dataclass(frozen=True, slots=True)
 class Gibbs(Checked):
-    """Joint choices drawn by a Gibbs sampler (Vo, Vo, Hoang 2017, Algorithm 1), for scenes too busy to rank.
+    """Joint associations drawn by a Gibbs sampler (Vo, Vo, Hoang 2017, Algorithm 1), for scenes too dense to rank.
 
     Attributes:
-        num_samples: sweeps a scan, shared out over the prior hypotheses.
+        num_samples: sweeps per scan, divided among the prior hypotheses.
 
     Raises:
         InputError: a number of samples below 1.
@@ -57,25 +58,25 @@ class Gibbs(Checked):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CustomMarginals:
-    """Association marginals by a function of your own, for filters that ask no more of a scan: LMB filters.
+    """Association marginals by a custom function, for filters that need nothing else from a scan: LMB filters.
 
-    The function, of kind `association_marginals` (`vedette.models.model_function`), is told what may happen to each row
-    of a scan, a track or a birth: the options `offsets[i]:offsets[i + 1]` of row i, heaviest first. `columns` says what
-    an option is: the number of a measurement, from 0 on, which one row may take; -1, there and missed; -2, not there.
-    `log_weights` are relative to the measurement being clutter; a joint choice, one option a row, weighs their product.
-    It writes into `out` the log probability of each option and returns the log of the total weight of all joint
-    choices, on which the log likelihood of the scan goes; -inf where none is possible.
+    The function, of kind `association_marginals` (`vedette.models.model_function`), receives the options of each row of
+    a scan, which is a track or a birth: options `offsets[i]:offsets[i + 1]` of row i, heaviest first. `columns` gives
+    the meaning of an option: the index of a measurement, from 0 on, which one row may take; -1, present and missed; -2,
+    absent. `log_weights` are relative to the measurement being clutter; the weight of a joint choice, one option per
+    row, is their product. The function writes the log probability of each option into `out` and returns the log of the
+    total weight of all joint choices, which gives the log likelihood of the scan; -inf if none is possible.
 
-    What it gives is not known to be exact, so `FilterInfo.discarded_weight_bound` is NaN.
+    The result is not known to be exact, so `FilterInfo.discarded_weight_bound` is NaN.
 
     Attributes:
         function: the function.
-        params: its own vector.
+        params: its parameter vector.
 
     Raises:
-        InputError: a function of another kind, or params that are no vector.
-        ModelError: on a small scan of two rows the function raises, reads or writes outside its arrays, or gives rows
-            whose probabilities do not sum to 1; as at every scan thereafter.
+        InputError: a function of another kind, or params that are not a vector.
+        ModelError: on a small scan of two rows, and at every later scan, the function raises, reads or writes outside
+            its arrays, or gives rows whose probabilities do not sum to 1.
     """
 
     function: ModelFunction
@@ -87,13 +88,16 @@ class CustomMarginals:
         probe_marginals(self.function, self.params)
 
     def to_kernel(self) -> Association:
-        """The same, as kernels take it."""
+        """Return the method in kernel form."""
         return Association(self.function, self.params)
 
 
 @model_function("association_marginals")
 def belief_propagation(offsets: Ints, columns: Ints, log_weights: Floats, params: Floats, out: Floats) -> float:
-    """params: most sweeps, tolerance. See `vedette.kernels.association.propagation`."""
+    """Marginals by belief propagation; params: largest number of sweeps, tolerance.
+
+    See `vedette.kernels.association.propagation`.
+    """
     return propagate_beliefs(offsets, columns, log_weights, int(params[0]), params[1], out)
 
 
@@ -102,13 +106,13 @@ def belief_propagation(offsets: Ints, columns: Ints, log_weights: Floats, params
 class BeliefPropagation(Checked):
     """Association marginals by loopy belief propagation (Williams and Lau 2014), for an LMB.
 
-    Its cost grows with the number of options, however many tracks contend. Exact where the tracks and measurements that
-    may be of each other make no loop; elsewhere an approximation, and nothing says how good a one:
+    The cost grows with the number of options, however many tracks compete. The result is exact if the graph of tracks
+    and gated measurements has no loop. Otherwise it is an approximation of unknown accuracy:
     `FilterInfo.discarded_weight_bound` is NaN.
 
     Attributes:
-        max_sweeps: sweeps over all options at most.
-        tolerance: relative change of a message below which it stands still.
+        max_sweeps: largest number of sweeps over all options.
+        tolerance: relative change of a message below which it counts as converged.
 
     Raises:
         InputError: no sweep, a negative tolerance.
@@ -119,7 +123,7 @@ class BeliefPropagation(Checked):
     finds: ClassVar[str] = "marginals"
 
     def to_kernel(self) -> Association:
-        """The same, as kernels take it."""
+        """Return the method in kernel form."""
         return Association(belief_propagation, np.array([float(self.max_sweeps), float(self.tolerance)]))
 
 
@@ -128,7 +132,7 @@ Assignment: TypeAlias = JointAssociation | MarginalAssociation
 
 
 def check_marginals(value: Any) -> None:
-    """`InputError` unless an LMB filter can associate so."""
+    """Raise `InputError` unless an LMB filter can use this association method."""
     if not isinstance(value, MarginalAssociation):
         expected = "RankedAssignment, BeliefPropagation, CustomMarginals or another with to_kernel()"
         raise InputError(f"assignment: expected {expected}; got {type(value).__name__}")

@@ -1,4 +1,4 @@
-"""What the filters of one sensor share: models, checks, what they hand to their kernels."""
+"""Shared parts of the single-sensor filters: models, checks and kernel inputs."""
 
 from __future__ import annotations
 
@@ -43,11 +43,11 @@ StepInputs: TypeAlias = tuple[ScanInput, Motion | None, Sensor, Truncation]
 
 
 class SensorStep(NamedTuple):
-    """One sensor's scan, as it meets a belief.
+    """Inputs of one update with the scan of one sensor.
 
-    inputs: as kernels take them; the motion is None of a scan of the belief's own time. limits: caps and thresholds.
-    sensor: that took the scan.
-    num_scans: of that time, which go into one belief. rng: None where nothing is drawn.
+    inputs: in kernel form; the motion is None for a scan at the time of the belief. limits: caps and thresholds.
+    sensor: the sensor of the scan.
+    num_scans: number of scans at this time that update the belief. rng: None if nothing is drawn.
     """
 
     inputs: StepInputs
@@ -59,7 +59,7 @@ class SensorStep(NamedTuple):
 
 @cache
 def blind_sensor() -> SensorModel:
-    """One that never detects and has no clutter: with it a step is a prediction; any position will do for it."""
+    """Return a sensor without detections and clutter: a step with it is a prediction, from any pose."""
     return SensorModel(
         position(),
         constant_noise([1.0, 1.0]),
@@ -79,17 +79,17 @@ class WithBirths(SummaryRepr):
     targets: TargetModel
 
     def _births(self, dt: float, step: Any, prior: LabelledDensity | None, births: LMB | None) -> Lmb:
-        """The labels that begin within the `dt` seconds before a step, whatever is detected; see `births_for`."""
+        """Return the labels born within the `dt` seconds before a step, detected or not; see `births_for`."""
         return births_for(self.targets.birth, dt, step, prior, births)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class SingleSensorFilter(WithBirths):
-    """The parts of a filter of one sensor.
+    """Base of the filters of one sensor.
 
     Attributes:
-        targets: how targets move, live on and appear.
-        sensor: what the sensor sees of them.
+        targets: motion, survival and birth models.
+        sensor: model of the sensor.
         limits: caps and thresholds.
 
     Raises:
@@ -115,10 +115,10 @@ class SingleSensorFilter(WithBirths):
         prior: LabelledDensity | None = None,
         births: LMB | None = None,
     ) -> StepInputs:
-        """Scan, models and truncation as the kernels take them, in their order; of no time those of an update.
+        """Return the scan, models and truncation in kernel form and order; for a `dt` of 0 those of an update.
 
-        prior: whose labels those of the births must not repeat; None where there are none. births: instead of those of
-        the targets' model.
+        prior: density whose labels the births must not repeat; None if it has none. births: replace those of the
+        targets' model.
         """
         if is_zero_duration(dt):
             step_number(step)
@@ -128,7 +128,7 @@ class SingleSensorFilter(WithBirths):
         return ScanInput(born, scan, pose_vector("pose", pose), period), motion, sensor, truncation
 
     def _update_inputs(self, scan: Floats, pose: Any) -> StepInputs:
-        """As `_inputs_after`, of a scan of the prior's own time."""
+        """Return the inputs of `_inputs_after` for a scan at the time of the prior."""
         _, sensor, truncation = _models(self.targets, self.sensor, self.limits)
         given = ScanInput(no_births_for_kernel(self.targets.state_dim), scan, pose_vector("pose", pose), 0.0)
         return given, None, sensor, truncation
@@ -136,40 +136,40 @@ class SingleSensorFilter(WithBirths):
 
 @lru_cache(maxsize=1000)
 def _models(targets: TargetModel, sensor: SensorModel, limits: Limits) -> tuple[Motion, Sensor, Truncation]:
-    """As kernels take them; laid out once."""
+    """Return the models in kernel form, cached."""
     motion = kernel_motion(targets.motion, targets.survival)
     return motion, sensor.to_kernel(), limits.truncation(sensor.meas_dim)
 
 
 class LabelledFilterBase(WithBirths, ABC, Generic[BeliefT]):
-    """What filters of one kind of labelled belief have in common, whatever the number of their sensors."""
+    """Base of the filters of one kind of labelled belief, for any number of sensors."""
 
     __slots__ = ()
     kind: ClassVar[type[Any]]  # of the belief: a `GLMB`, an `LMB` or a `FactoredGLMB`
 
     def initial(self) -> BeliefT:
-        """The belief before the first scan: no target."""
+        """Return the belief before the first scan: no target."""
         empty: BeliefT = self.kind.empty(self.targets.state_dim)
         return empty
 
     def _before_scan(self, prior: BeliefT, dt: float, step: Any, births: LMB | None) -> Any:
-        """What `_stepped` takes of the prior. dt: seconds since; step: of the scan; None: of an update apart."""
+        """Return the prior as `_stepped` expects it. dt: seconds since it; step: of the scan, None for an update."""
         return prior.to_kernel()
 
     @abstractmethod
     def _check(self, posterior: Any, report: Any, place: str) -> float:
-        """The log total weight; `NumericalError`, after `place`, where nothing has positive weight."""
+        """Return the log total weight. Raises `NumericalError`, with `place` first, if nothing has positive weight."""
 
     @abstractmethod
     def _concluded(
         self, posterior: Any, reports: Sequence[Any], *, log_likelihood: float, repeats: Sequence[Ints]
     ) -> tuple[BeliefT, FilterInfo]:
-        """As they are given back, after updates with one report each. repeats: of each scan, the rows left out."""
+        """Return the posterior and the report, after one update per report. repeats: of each scan, the rows left out."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class LabelledFilter(SingleSensorFilter, LabelledFilterBase[BeliefT]):
-    """A filter of one sensor that labels its targets: what its step, its prediction and its update have in common.
+    """Base of the labelled filters of one sensor: step, prediction and update.
 
     Attributes and errors: as `SingleSensorFilter`.
     """
@@ -191,19 +191,19 @@ class LabelledFilter(SingleSensorFilter, LabelledFilterBase[BeliefT]):
             belief: posterior of the previous step.
             scan: (num, meas_dim) measurements in any order; angles in radians, in (-pi, pi].
             pose: (3 or more,) [px, py, heading_rad, ...] of the sensor.
-            dt: seconds since the previous step; 0: as `update`, nobody moves, dies or is born.
+            dt: seconds since the previous step; 0 is the same as `update`: no motion, deaths or births.
             step: number of this step, from 1 on; births at the sites of the targets' model are labelled with it.
-            rng: drawn from only by Gibbs sampling; taken by all so that filters are interchangeable.
-            births: who may have been born since the previous step, instead of at those sites; labels later than the
+            rng: used only by Gibbs sampling; all filters accept it, so that they are interchangeable.
+            births: birth density since the previous step, in place of those sites; its labels must be later than the
                 belief's.
 
         Returns:
-            The posterior, of a GLMB the hypotheses by descending weight, and a report.
+            The posterior (hypotheses of a GLMB by descending weight) and a report.
 
         Raises:
             InputError: a scan, pose, belief or births of the wrong shape or kind, an angle beyond a full turn, a step
                 below 1.
-            ModelError: a model function raised or gave a value that is none of its kind.
+            ModelError: a model function raised or returned a value that is invalid for its kind.
             NumericalError: no hypothesis has positive weight.
         """
         generator(rng)
@@ -216,9 +216,9 @@ class LabelledFilter(SingleSensorFilter, LabelledFilterBase[BeliefT]):
     def predict(
         self, belief: LabelledDensity, dt: float, step: int, *, births: LMB | None = None
     ) -> tuple[BeliefT, FilterInfo]:
-        """The belief `dt` seconds later, births included: a step without sight. Arguments and errors as of `step`.
+        """Return the belief `dt` seconds later, births included. Arguments and errors as for `step`.
 
-        What is cut here is cut as it weighs before the scan is seen, which in `step` is not so.
+        Truncation here uses the weights before the scan, unlike in `step`.
         """
         prior, blind = check_belief(belief, self.kind, self.targets.state_dim), self._blind()
         inputs = blind._inputs_after(dt, NO_SCAN, NO_POSE, step, prior, births)
@@ -227,7 +227,7 @@ class LabelledFilter(SingleSensorFilter, LabelledFilterBase[BeliefT]):
     def update(
         self, belief: LabelledDensity, scan: Any, pose: Any, *, rng: np.random.Generator
     ) -> tuple[BeliefT, FilterInfo]:
-        """The belief after a scan of its own time; nobody moves, dies or is born. Arguments and errors as of `step`."""
+        """Return the posterior after a scan at the time of the belief, with no motion, deaths or births; see `step`."""
         generator(rng)
         measurements, repeats = check_scan(scan, self.sensor)
         prior = check_belief(belief, self.kind, self.targets.state_dim)
@@ -252,8 +252,8 @@ class LabelledFilter(SingleSensorFilter, LabelledFilterBase[BeliefT]):
 
     @abstractmethod
     def _stepped(self, prior: Any, step: SensorStep) -> tuple[Any, Any]:
-        """Posterior and report of kernels."""
+        """Return the posterior and report in kernel form."""
 
     @abstractmethod
     def _blind(self) -> LabelledFilter[BeliefT]:
-        """The filter whose step is the prediction; its sensor sees nothing."""
+        """Return the filter whose step is the prediction: its sensor detects nothing."""

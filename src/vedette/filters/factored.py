@@ -1,4 +1,4 @@
-"""The factored GLMB filter: labels that contend are tracked together, all others apart."""
+"""The factored GLMB filter: labels that interact are tracked jointly, all others independently."""
 
 from __future__ import annotations
 
@@ -46,28 +46,28 @@ from vedette.kernels.steps.undetected import Arrivals
 from vedette.models.arguments import dimension, non_negative, one_of, step_number
 from vedette.models.fields import Count, L1Error
 
-# At a measurement, claims are cut while the sum over pairs of their products is at most the error of a split, or this.
+# At a measurement, associations are cut while the sum of pairwise products is at most the split error, or this.
 _MOST_CUT = 0.01
 
-# Where undetected targets are an intensity, hypotheses beyond a group's list hold more targets than those in it: they
-# are condensed and split up to this L1 error. Labels that other sensors have, too, would lose which of them is which.
+# If undetected targets are an intensity, hypotheses beyond the list of a group hold more targets than those in it: they
+# are condensed and split up to this L1 error. Labels shared with other sensors would lose their identity by it.
 _MAX_MERGING = 0.3
 
-# Of the largest factors, how many may take a scan together.
+# Number of factors of the largest size that may be updated jointly.
 _FACTORS_TOGETHER = 4
 
 
 class _Before(NamedTuple):
-    """What a scan finds: the density of the labels, and the undetected targets with what they were taken as."""
+    """Input of an update: the density of the labels, and the undetected targets with the error of their births."""
 
     density: FactoredGlmb
-    undetected: UndetectedTargets | None  # None where births are labelled
-    arrivals: Arrivals  # since the scan before
-    error: float = 0.0  # L1, of taking births at sites as Poisson
+    undetected: UndetectedTargets | None  # None if births are labelled
+    arrivals: Arrivals  # since the previous scan
+    error: float = 0.0  # L1 error of the Poisson approximation of births at sites
 
 
 class _FactoredFilterBase(LabelledFilterBase[FactoredGLMB]):
-    """What both have in common."""
+    """Base of the factored filters of one and of several sensors."""
 
     __slots__ = ()
     kind: ClassVar[type[FactoredGLMB]] = FactoredGLMB
@@ -78,11 +78,11 @@ class _FactoredFilterBase(LabelledFilterBase[FactoredGLMB]):
 
     @property
     def starts_tracks(self) -> bool:
-        """Whether births from measurements are its own: those of a region, with undetected targets as an intensity."""
+        """True if the filter makes births from measurements itself: births in a region, with a Poisson intensity."""
         return self.births == "poisson" and appearing(self.targets.birth) is not None
 
     def initial(self) -> FactoredGLMB:
-        """The belief before the first scan: no target."""
+        """Return the belief before the first scan: no target."""
         empty = FactoredGLMB.empty(self.targets.state_dim)
         return empty if self.births == "labelled" else empty.with_fields(undetected=self._none())
 
@@ -99,7 +99,7 @@ class _FactoredFilterBase(LabelledFilterBase[FactoredGLMB]):
         return born_at(born, number).to_kernel() if born.tracks.num_tracks else no_births_for_kernel(birth.state_dim)
 
     def _born(self, dt: float, step: int) -> SplitBirths:
-        """At the sites within the `dt` seconds before a step."""
+        """Return the births at the sites within the `dt` seconds before a step."""
         birth = self.targets.birth
         return split_births(birth, dt) if birth.is_active(step) else no_births(birth.state_dim)
 
@@ -109,7 +109,7 @@ class _FactoredFilterBase(LabelledFilterBase[FactoredGLMB]):
             return _Before(density, None, arrivals)
         undetected = self._none() if prior.undetected is None else prior.undetected
         if dt > 0.0:
-            # Births that a caller gives are instead of the model's, anywhere as at sites.
+            # Births given by the caller replace those of the model, both in the region and at sites.
             targets, appear = self.targets, births is None
             born = self._born(dt, step) if appear else no_births(targets.state_dim)
             most, error = most_components(self.limits, targets.birth), born.error
@@ -148,8 +148,8 @@ class _FactoredFilterBase(LabelledFilterBase[FactoredGLMB]):
         undetected = posterior.undetected
         whole = FactoredGLMB.from_kernel(posterior.density, undetected)
         found, dropped, is_full = self.limits.without_excess(whole)
-        # Where undetected targets are an intensity, dropped labels return to it: the caps' are counted as dropped all
-        # the same, those below `min_existence` are not.
+        # If undetected targets are an intensity, dropped labels return to it: labels dropped by the caps still count as
+        # dropped, those below `min_existence` do not.
         if undetected is not None:
             undetected = with_learnt_rate(with_dropped(undetected, whole, found), whole, found, self.targets.birth)
         lost = "dropped_existence" if undetected is None else "left_out"
@@ -176,33 +176,33 @@ class _FactoredFilterBase(LabelledFilterBase[FactoredGLMB]):
 class FactoredGlmbFilter(_FactoredFilterBase, LabelledFilter[FactoredGLMB]):
     """delta-GLMB filter of one sensor whose density is a product of independent factors.
 
-    At a scan, factors that lay claim to the same measurements are multiplied out and updated together, exactly as a
-    delta-GLMB; all others apart. Then each splits into the smallest factors that are independent within
-    `max_split_error`. So a list of `limits.max_hypotheses` is shared by a few targets that contend, not by all: what is
-    known of a far target does not depend on how long the list is, and the cost grows with the number of targets, not
-    with that of their combinations. With a `max_split_error` of 2 every label is a factor of its own, as in an LMB
-    filter; with 0, and `max_factor_labels` as large as the number of targets, none is split that depends on another, as
-    in a delta-GLMB filter. It draws nothing; its predictions are cut as a delta-GLMB filter's, factor by factor, but
-    drop no label.
+    At a scan, factors that may take the same measurements are multiplied out and updated jointly, exactly as a
+    delta-GLMB; all others are updated independently. Then each factor splits into the smallest factors that are
+    independent within `max_split_error`. A list of `limits.max_hypotheses` therefore serves a few interacting targets,
+    not all of them: the accuracy for a distant target does not depend on the length of the list, and the cost grows
+    with the number of targets, not with the number of their combinations. With a `max_split_error` of 2 every label is
+    its own factor, as in an LMB filter; with 0, and `max_factor_labels` at least the number of targets, no dependent
+    factors are split, as in a delta-GLMB filter. The filter draws no random numbers. Its predictions are truncated as
+    those of a delta-GLMB filter, factor by factor, but drop no label.
 
     Attributes:
-        targets: how targets move, live on and appear.
-        sensor: what the sensor sees of them.
+        targets: motion, survival and birth models.
+        sensor: model of the sensor.
         limits: caps and thresholds; those on hypotheses hold for each factor.
         max_split_error: of a factored_glmb: L1 error, of densities that each integrate to 1, up to which labels that
-            contended are taken as independent again, and versions of a label as one; 2: always, as an LMB; 0: where
-            they are. At each measurement the weakest claims of factors are cut while the sum over pairs of their
-            products is at most this, and at most .01; see `scans_together`.
-        max_factor_labels: of a factored_glmb: most labels of a factor, and a quarter of those that take a scan
-            together; where more contend, links are made from the strongest on and left out where they would join more.
-            What all this leaves out is in `FilterInfo.factoring_error`.
-        scans_together: scans of one time that go into one belief, of this sensor and others, as by `ParallelUpdate`.
-            What a weak link that is cut leaves out counts with each of them: so for S scans links are cut S^2 times
-            later.
+            interacted are treated as independent again, and versions of a label as one; 2: always, as an LMB; 0: only
+            if they are. At each measurement the weakest associations of factors are cut while the sum over pairs of
+            their products is at most this, and at most .01; see `scans_together`.
+        max_factor_labels: of a factored_glmb: largest number of labels of a factor, and a quarter of the largest number
+            updated jointly at a scan; if more labels interact, factors are linked from the strongest association on,
+            and links that would join more are left out. `FilterInfo.factoring_error` bounds the error.
+        scans_together: number of scans of one time that update one belief, of this sensor and others, as with
+            `ParallelUpdate`. The error of a weak link that is cut counts once for each: for S scans the cutting
+            threshold is S^2 times smaller.
         births: of a factored_glmb: poisson: targets that were never detected are a Poisson intensity, and a label
             begins with a first detection, except at sites with an existence of .15 or more; labelled: a label begins at
             each birth site at each scan. Filters whose beliefs are fused by label have labelled births, whatever this
-            says.
+            value is.
 
     Raises:
         InputError: a part of another kind, or a field out of range.
@@ -214,7 +214,7 @@ class FactoredGlmbFilter(_FactoredFilterBase, LabelledFilter[FactoredGLMB]):
     births: Literal["poisson", "labelled"] = "poisson"
 
     def __post_init__(self) -> None:
-        LabelledFilter.__post_init__(self)  # slots replace the class that super() looks for
+        LabelledFilter.__post_init__(self)  # super() fails here, as slots=True replaces the class
         _check_factoring(self.max_split_error, self.max_factor_labels, self.births)
         dimension("scans_together", self.scans_together)
 
@@ -227,12 +227,12 @@ class FactoredGlmbFilter(_FactoredFilterBase, LabelledFilter[FactoredGLMB]):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class SequentialFactoredFilter(_FactoredFilterBase, SequentialUpdate[FactoredGLMB]):
-    """Factored GLMB filter of several sensors that takes their scans in turn.
+    """Factored GLMB filter of several sensors that updates with their scans sequentially.
 
-    As `SequentialLmbFilter`, with the density of `FactoredGlmbFilter`: which of contending labels is which stays open
-    from one sensor to the next. Of one sensor it is the `FactoredGlmbFilter`.
+    Like `SequentialLmbFilter`, with the density of `FactoredGlmbFilter`: the identity of interacting labels stays open
+    from one sensor to the next. With one sensor it is the `FactoredGlmbFilter`.
 
-    Attributes and errors: as `MultiSensorGlmbFilter`, and `max_split_error` and `max_factor_labels` as of
+    Attributes and errors: as `MultiSensorGlmbFilter`, and `max_split_error` and `max_factor_labels` as in
     `FactoredGlmbFilter`.
     """
 
@@ -241,13 +241,13 @@ class SequentialFactoredFilter(_FactoredFilterBase, SequentialUpdate[FactoredGLM
     births: Literal["poisson", "labelled"] = "poisson"
 
     def __post_init__(self) -> None:
-        MultiSensorFilter.__post_init__(self)  # slots replace the class that super() looks for
+        MultiSensorFilter.__post_init__(self)  # super() fails here, as slots=True replaces the class
         _check_factoring(self.max_split_error, self.max_factor_labels, self.births)
 
     def _updated_in_view(
         self, prior: _Before, settled: Bools, step: SensorStep
     ) -> tuple[_Before, FactoredReport, Bools]:
-        """As `_stepped`, of the factors that the scan may say anything of; the others come first, as they were."""
+        """Return `_stepped` of the factors that the scan may affect; the other factors come first, unchanged."""
         scan, _, sensor, truncation = step.inputs
         density, marks = (
             FactoredGLMB.from_kernel(prior.density),
@@ -262,7 +262,7 @@ class SequentialFactoredFilter(_FactoredFilterBase, SequentialUpdate[FactoredGLM
 
 
 def _check_factoring(max_split_error: Any, max_factor_labels: Any, births: Any) -> None:
-    """`InputError` for a field out of its range."""
+    """Raise `InputError` for a field out of its range."""
     if non_negative("max_split_error", max_split_error) > 2.0:
         raise InputError(f"max_split_error: expected at most 2; got {max_split_error!r}")
     dimension("max_factor_labels", max_factor_labels)
@@ -270,15 +270,15 @@ def _check_factoring(max_split_error: Any, max_factor_labels: Any, births: Any) 
 
 
 def _factoring(max_split_error: float, max_factor_labels: int, num_scans: int, max_merging: float) -> Factoring:
-    """The fields of a filter as kernels take them."""
+    """Return the fields of a filter in kernel form."""
     error, most = float(max_split_error), int(max_factor_labels)
     max_cut = min(error, _MOST_CUT) / num_scans**2
     return Factoring(error, max_cut, most, _FACTORS_TOGETHER * most, max_merging)
 
 
 def with_labelled_births(local: Any) -> Any:
-    """The filter with a label at each birth site, for beliefs that are fused by label; any other filter as it is.
+    """Return the filter with a label at each birth site, for beliefs that are fused by label; other filters unchanged.
 
-    Two sensors' first detections of one target would be two labels.
+    Otherwise the first detections of one target by two sensors would be two labels.
     """
     return replace(local, births="labelled") if isinstance(local, _FactoredFilterBase) else local  # type: ignore[type-var]

@@ -1,4 +1,4 @@
-"""The delta-GLMB ("Vo-Vo") filter, of one sensor and of several whose scans it takes in turn."""
+"""The delta-GLMB ("Vo-Vo") filter, of one sensor and of several sensors with sequential updates."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from vedette.models.arguments import flag
 
 
 class _GlmbFilterBase(LabelledFilterBase[GLMB]):
-    """What both have in common."""
+    """Base of the delta-GLMB filters of one and of several sensors."""
 
     __slots__ = ()
     kind: ClassVar[type[GLMB]] = GLMB
@@ -63,13 +63,13 @@ class _GlmbFilterBase(LabelledFilterBase[GLMB]):
 
 
 def _sources(reports: Sequence[StepReport], repeats: Sequence[Ints]) -> Ints | None:
-    """As of a `TrackTable`; of several updates in turn nothing is kept."""
+    """Return the sources of tracks as in `TrackTable`; None after several sequential updates."""
     if len(reports) > 1:
         return None
     sources = reports[0].sources
     if len(repeats) == 0:  # a prediction
         return np.column_stack([sources[:, 0], np.full(len(sources), UNSCANNED)])
-    if len(repeats[0]):  # from rows of what was taken to those of what was given
+    if len(repeats[0]):  # from rows of the deduplicated scan to those of the given scan
         rows = np.setdiff1d(np.arange(sources[:, 1].max(initial=-1) + 1 + len(repeats[0])), repeats[0])
         return np.column_stack([sources[:, 0], np.append(rows, -1)[sources[:, 1]]])
     return sources
@@ -79,14 +79,16 @@ def _sources(reports: Sequence[StepReport], repeats: Sequence[Ints]) -> Ints | N
 class DeltaGlmbFilter(_GlmbFilterBase, LabelledFilter[GLMB]):
     """delta-GLMB filter of one sensor (Vo, Vo, Hoang 2017; paper, Algorithm 1, local prediction and update).
 
-    Predictions and updates apart are ranked, whatever `assignment`; a prediction is cut by `limits` as after a scan.
+    Separate predictions and updates are ranked, whatever `assignment`; `limits` truncates a prediction as it does a
+    posterior.
 
     Attributes:
-        targets: how targets move, live on and appear.
-        sensor: what the sensor sees of them.
+        targets: motion, survival and birth models.
+        sensor: model of the sensor.
         limits: caps and thresholds.
-        assignment: how joint choices are found: `RankedAssignment`, the heaviest in exact order, or drawn, `Gibbs`.
-        marginalised: collapse the posterior to one hypothesis a label set after each step (M-delta-GLMB filter,
+        assignment: how joint associations are found: `RankedAssignment`, the heaviest in exact order, or drawn,
+            `Gibbs`.
+        marginalised: reduce the posterior to one hypothesis per label set after each step (M-delta-GLMB filter,
             Fantacci and Vo 2015); track mixtures are then reduced to `limits.max_components`.
 
     Raises:
@@ -97,7 +99,7 @@ class DeltaGlmbFilter(_GlmbFilterBase, LabelledFilter[GLMB]):
     marginalised: bool = False
 
     def __post_init__(self) -> None:
-        LabelledFilter.__post_init__(self)  # slots replace the class that super() looks for
+        LabelledFilter.__post_init__(self)  # super() fails here, as slots=True replaces the class
         if not isinstance(self.assignment, JointAssociation):
             raise InputError(f"assignment: expected RankedAssignment or Gibbs; got {type(self.assignment).__name__}")
         flag("marginalised", self.marginalised)
@@ -114,21 +116,21 @@ class DeltaGlmbFilter(_GlmbFilterBase, LabelledFilter[GLMB]):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class MultiSensorGlmbFilter(_GlmbFilterBase, SequentialUpdate[GLMB]):
-    """delta-GLMB filter of several sensors: one prediction, then an update by each sensor's scan in turn.
+    """delta-GLMB filter of several sensors: one prediction, then sequential updates with each sensor's scan.
 
     Without caps the posterior is the multi-sensor delta-GLMB (Vo, Vo and Beard 2019), whatever the order of the
-    sensors, where models are linear and neither noise nor detection depends on the state; else a later sensor's model
-    is linearised, and its noise and detection are taken, at what the earlier ones have left.
+    sensors, if models are linear and neither noise nor detection depends on the state. Otherwise the model of a later
+    sensor is linearised, and its noise and detection are evaluated, at the result of the earlier ones.
 
-    With caps, hypotheses are cut after every sensor as they weigh then. One that the first sensors make unlikely is
-    gone even where a later one would have raised it, so that the order of the sensors matters a little.
-    `discarded_weight_bound` counts what is left out at each sensor by its weight there.
+    With caps, hypotheses are truncated after every sensor by their weights at that point. A hypothesis that the first
+    sensors make unlikely is lost even if a later sensor would have raised its weight, so the order of the sensors
+    matters a little. `discarded_weight_bound` counts the weight that is discarded at each sensor.
 
     Attributes:
-        targets: how targets move, live on and appear.
-        sensors: what each sensor sees of them; they may measure different things.
+        targets: motion, survival and birth models.
+        sensors: model of each sensor; they may measure different quantities.
         limits: caps and thresholds.
-        marginalised: collapse the posterior to one hypothesis a label set after each step, as `DeltaGlmbFilter`.
+        marginalised: reduce the posterior to one hypothesis per label set after each step, as in `DeltaGlmbFilter`.
 
     Raises:
         InputError: a part of another kind, or no sensor.

@@ -1,4 +1,4 @@
-"""Checks of what a filter step is given, and the translation of what its kernels raise."""
+"""Checks of the input of a filter step, and translation of kernel errors."""
 
 from __future__ import annotations
 
@@ -25,20 +25,21 @@ from vedette.models import BirthModel, SensorModel
 from vedette.models.arguments import as_array, reject, step_number
 from vedette.models.measurement import MeasurementModel, wrap_angular
 
-_MOST_STDS = 10.0  # of noise below the least that a measurement is without it
+_MOST_STDS = 10.0  # standard deviations of noise below the least noise-free measurement
 _NO_ROWS = np.empty(0, np.int64)
 _PACKAGE = Path(__file__).parents[1]
 _Density = TypeVar("_Density", GLMB, LMB, FactoredGLMB, Poisson, IidCluster, MultiBernoulli)
 
 
 def check_scan(scan: Any, sensor: SensorModel) -> tuple[Floats, Ints]:
-    """The scan as a contiguous (num, meas_dim) array without repeated rows, and which rows were repeats.
+    """Return the scan as a contiguous (num, meas_dim) array without repeated rows, and the rows that were repeats.
 
-    Angles come out in (-pi, pi]. Warns of what noise alone can hardly bring below the least, such as a negative range.
+    Angles are returned in (-pi, pi]. Warns of values too far below the least possible value for noise, such as a
+    negative range.
 
     Raises:
         InputError: not an array of that shape, a value that is not finite, or an angle beyond a full turn either way,
-            which is in other units. A scan without measurements is an empty array; None is refused, since a sensor
+            which has other units. A scan without measurements is an empty array; None is refused, since a sensor
             that did not scan must not be updated at all.
     """
     measurement, meas_dim = sensor.measurement, sensor.meas_dim
@@ -58,7 +59,7 @@ def check_scan(scan: Any, sensor: SensorModel) -> tuple[Floats, Ints]:
         raise InputError(f"scan: expected finite numbers; got {array[bad].tolist()} in row {bad}")
     if is_below:
         _warn_negative(array, measurement, sensor.noise.least_stds)
-    if largest > 3.14:  # few scans
+    if largest > 3.14:  # rare
         array, may_repeat = _in_one_turn(array, measurement.angular), True
     if not may_repeat:  # most scans
         return array, _NO_ROWS
@@ -87,7 +88,7 @@ def _in_one_turn(scan: Floats, angular: Bools) -> Floats:
 
 
 def check_belief(belief: object, kind: type[_Density], state_dim: int, name: str = "belief") -> _Density:
-    """The belief; `InputError` unless it is of the filter's kind and dimension."""
+    """Return the belief. Raises `InputError` unless it is of the filter's kind and dimension."""
     if not isinstance(belief, kind):
         raise InputError(f"{name}: expected a {kind.__name__}; got {type(belief).__name__}")
     if belief.state_dim != state_dim:
@@ -98,11 +99,11 @@ def check_belief(belief: object, kind: type[_Density], state_dim: int, name: str
 def births_for(
     birth: BirthModel, dt: float, step: Any, belief: LabelledDensity | None = None, births: LMB | None = None
 ) -> Lmb:
-    """Who may be born within the `dt` seconds of a step, as kernels take it: `births`; at the model's sites where None.
+    """Return the birth density for a step of `dt` seconds in kernel form: `births`, or the model's birth sites if None.
 
     Raises:
         InputError: a step below 1; births of another kind or dimension; a belief with labels of that step or later
-            ones, which those of the births could repeat.
+            ones, which the labels of the births could repeat.
     """
     number = step_number(step)
     if births is not None:
@@ -117,7 +118,7 @@ def births_for(
 
 
 def check_new(belief: LabelledDensity, first: int, step: Any) -> None:
-    """`InputError` where labels born at steps from `first` on could repeat those of a belief. step: that was given."""
+    """Raise `InputError` if labels born at steps from `first` on could repeat those of a belief. step: as given."""
     steps = belief.tracks.labels[:, 0]
     newest = steps.max() if len(steps) else first - 1
     if newest >= first:
@@ -125,31 +126,31 @@ def check_new(belief: LabelledDensity, first: int, step: Any) -> None:
 
 
 def is_zero_duration(dt: Any) -> bool:
-    """Whether it is the number 0; what is no number is told of where it is taken."""
+    """Return True if `dt` is the number 0; other types are rejected where they are used."""
     return not isinstance(dt, bool) and isinstance(dt, Real) and dt == 0.0
 
 
 @cache
 def no_births(state_dim: int) -> LMB:
-    """Return an LMB without targets; made once for each dimension."""
+    """Return an LMB without targets, cached for each dimension."""
     return LMB.empty(state_dim)
 
 
 @cache
 def no_births_for_kernel(state_dim: int) -> Lmb:
-    """No births, as kernels take them; made once for each dimension."""
+    """Return an empty birth density in kernel form, cached for each dimension."""
     return no_births(state_dim).to_kernel()
 
 
 def births_at(birth: BirthModel, step: int) -> LMB:
-    """The LMB of the targets that may be born at `step`, or within the model's period, labelled (step, site)."""
+    """Return the LMB of the births at `step`, or within the model's period, labelled (step, site)."""
     if not birth.is_active(step):
         return no_births(birth.state_dim)
     return born_at(births_of(birth), step)
 
 
 def born_at(born: LMB, step: int) -> LMB:
-    """The same targets with the labels of a step."""
+    """Return the same targets with the labels of a step."""
     tracks, labels = born.tracks, born.tracks.labels.copy()
     labels[:, 0] = step
     return unchecked(LMB, relabelled_tracks(tracks, labels), born.existence_logit)
@@ -169,7 +170,7 @@ def births_within(born: LMB, period: float | None, dt: float, others: LMB | None
 
 @lru_cache(maxsize=1000)
 def births_of(birth: BirthModel) -> LMB:
-    """The births at the sites, of step 0; laid out once a model."""
+    """Return the births at the sites, labelled with step 0, cached for each model."""
     labels = np.column_stack([np.zeros(birth.num_sites, np.int64), np.arange(birth.num_sites)])
     tracks = gaussian_tracks(labels, birth.means, birth.covs)
     return unchecked(LMB, tracks, np.log(birth.existence) - np.log1p(-birth.existence))
@@ -177,7 +178,7 @@ def births_of(birth: BirthModel) -> LMB:
 
 @contextmanager
 def model_errors() -> Iterator[None]:
-    """As `raise_model_error`, of what is raised inside."""
+    """Context manager that applies `raise_model_error` to errors raised inside."""
     try:
         yield
     except Exception as error:
@@ -186,9 +187,9 @@ def model_errors() -> Iterator[None]:
 
 
 def raise_model_error(error: Exception) -> None:
-    """Raise a `ModelError` from what a model function raised inside a kernel.
+    """Raise a `ModelError` for an error that a model function raised inside a kernel.
 
-    Numba leaves the place in the traceback. What a kernel raises itself (`MemoryError`), or Numba, is let be.
+    Numba keeps the place in the traceback. Errors that a kernel (`MemoryError`) or Numba itself raises are left alone.
     """
     if isinstance(error, VedetteError):
         return

@@ -1,4 +1,4 @@
-"""What a filter keeps and what it throws away; every cap and threshold is a named field here."""
+"""Caps and thresholds of the filters; each is a named field of `Limits`."""
 
 from __future__ import annotations
 
@@ -37,29 +37,30 @@ class Limits:
     """Caps and thresholds of the filters. `Limits.none()` switches them all off (for small exact problems).
 
     Attributes:
-        max_hypotheses: hypotheses kept, of a factored density in each factor; for an LMB, joint choices summed in a
-            cluster too large for the exact sum.
+        max_hypotheses: largest number of hypotheses, for a factored density in each factor; for an LMB, of joint
+            choices summed in a cluster too large for the exact sum.
         min_relative_weight: hypotheses lighter than this times the heaviest are dropped; in a CPHD filter the large
             numbers of targets less probable than this times the most probable.
-        min_track_weight: for every label and what the scan may have done to it (missed, or detected as this
-            measurement), the heaviest such hypothesis is kept, in up to half of `max_hypotheses`, while it weighs at
-            least this times the heaviest of all; 1 switches this off. Without it a target whose first measurements fit
-            its birth badly is crowded out by variations of the heaviest hypotheses, and lost for good.
+        min_track_weight: for every label and each association with the scan (missed, or detected as a given
+            measurement), the heaviest such hypothesis is kept, in up to half of `max_hypotheses`, while its weight is
+            at least this times the heaviest of all; 1 switches this off. Without it, a target whose first measurements
+            fit its birth badly is displaced by variations of the heaviest hypotheses, and lost for good.
         gate_probability: probability that a target's measurement falls inside its gate; 1 switches gating off.
-        min_log_clutter: floor of the log clutter intensity. A measurement where the model says that clutter is
-            impossible (outside the region) would otherwise forbid every hypothesis that leaves it unexplained.
-        max_search_nodes: bound on the ranking search, a guard against scenes of hopeless ambiguity.
+        min_log_clutter: floor of the log clutter intensity. A measurement where the clutter model gives intensity 0
+            (outside the region) would otherwise rule out every hypothesis that leaves it unexplained.
+        max_search_nodes: bound on the ranking search, a safeguard for scenes of extreme ambiguity.
         min_component_weight: mixture components lighter than this share of their track, or of the intensity of a PHD
             or CPHD filter, are dropped.
         merge_distance: Mahalanobis distance within which components of a track are merged; 0 merges none.
-        max_components: components a track; 1 keeps one moment-matched Gaussian.
+        max_components: largest number of components per track; 1 keeps one moment-matched Gaussian.
         min_existence: labels of an LMB or alone in their factor, or Bernoullis, less probable than this are dropped.
-        max_labels: labels of an LMB or a factored density, or Bernoullis of a multi-Bernoulli, kept.
-        max_position_std: labels whose position is less certain than this along both axes are dropped after the scan:
-            targets that nobody has seen for long; infinite, in a file none: never [m].
-        max_intensity_components: components of the intensity of a PHD or CPHD filter, all targets together.
-        max_existence: Bernoullis of the CB-MeMBer filter surer than this are taken as this sure; below 1, because the
-            update weighs them by r / (1 - r), and leaves one that is certain as it was, whatever the scan says.
+        max_labels: largest number of labels of an LMB or a factored density, or of Bernoullis of a multi-Bernoulli.
+        max_position_std: labels whose position std exceeds this along both axes are dropped after the scan: targets
+            without detections for a long time; infinite, in a file none: never [m].
+        max_intensity_components: largest number of components of the intensity of a PHD or CPHD filter, over all
+            targets.
+        max_existence: upper bound on the existence of Bernoullis of the CB-MeMBer filter; below 1, because the update
+            weights them by r / (1 - r), and leaves a certain one unchanged, whatever the scan.
 
     Raises:
         InputError: a field out of range.
@@ -85,7 +86,7 @@ class Limits:
 
     @classmethod
     def none(cls) -> Limits:
-        """Nothing is dropped, gated or merged."""
+        """Return limits that drop, gate and merge nothing."""
         return cls(
             max_hypotheses=2**62,
             min_relative_weight=0.0,
@@ -102,35 +103,37 @@ class Limits:
         )
 
     def truncation(self, meas_dim: int) -> Truncation:
-        """The fields that bound hypotheses, as kernels take them."""
+        """Return the fields that bound hypotheses, in kernel form."""
         return _truncation(self, meas_dim)
 
     def track_caps(self) -> MixtureCaps:
-        """The fields that bound the mixture of a track, as kernels take them."""
+        """Return the fields that bound the mixture of a track, in kernel form."""
         log_min_weight = math.log(self.min_component_weight) if self.min_component_weight > 0.0 else -math.inf
         return MixtureCaps(log_min_weight, float(self.merge_distance), int(self.max_components))
 
     def intensity_caps(self) -> MixtureCaps:
-        """As `track_caps`, with the cap of a whole intensity in the place of a track's."""
+        """Return `track_caps` with the cap of a whole intensity in place of a track's."""
         return self.track_caps()._replace(max_components=int(self.max_intensity_components))
 
     def reduction(self) -> Reduction:
-        """The fields that bound tracks and labels, as kernels take them."""
+        """Return the fields that bound tracks and labels, in kernel form."""
         return _reduction(self)
 
     def without_spread(self, belief: _Labelled) -> tuple[_Labelled, float]:
-        """The belief without the labels that `max_position_std` drops, and their summed existence."""
+        """Return the belief without the labels that `max_position_std` drops, and their summed existence."""
         if math.isinf(self.max_position_std):
             return belief, 0.0
         return without_labels(belief, _spread_labels(belief, self.max_position_std))
 
     def keeping_labels(self) -> Limits:
-        """The same, but that no label is dropped."""
+        """Return the same limits, but with no label dropped."""
         return _keeping_labels(self)
 
     def without_excess(self, belief: FactoredGLMB) -> tuple[FactoredGLMB, float, bool]:
-        """The belief without the least probable labels beyond `max_labels` and without those of `without_spread`; the
-        summed existence of these, and whether there were as many as `max_labels`.
+        """Return the belief without the labels that `max_labels` and `without_spread` drop, and what was dropped.
+
+        That is the summed existence of the dropped labels, and True if the number of labels reached `max_labels`. Of
+        more than `max_labels` labels, the least probable ones are dropped.
         """
         excess, is_full = np.empty((0, 2), np.int64), False
         if belief.tracks.num_tracks >= self.max_labels:  # labels may have several
@@ -142,7 +145,7 @@ class Limits:
         return kept, dropped + spread, is_full
 
     def kept(self, belief: _Labelled) -> _Labelled:
-        """The belief without the labels that `min_existence`, `max_labels` and `max_position_std` drop."""
+        """Return the belief without the labels that `min_existence`, `max_labels` and `max_position_std` drop."""
         labels, existence = existence_probabilities(belief)
         likeliest = np.argsort(-existence, kind="stable")
         gone = np.union1d(likeliest[self.max_labels :], np.flatnonzero(existence < self.min_existence))
@@ -176,7 +179,7 @@ def _keeping_labels(limits: Limits) -> Limits:
 
 
 def _spread_labels(belief: LabelledDensity, max_position_std: float) -> Ints:
-    """(num, 2) labels whose position has more than this standard deviation along both axes."""
+    """Return the labels (num, 2) whose position has more than this standard deviation along both axes."""
     lmb = as_lmb(belief)
     variances = np.diagonal(track_moments(lmb.tracks)[1], axis1=1, axis2=2)[:, :2]
     wide: Bools = variances.min(axis=1, initial=np.inf) > max_position_std**2

@@ -1,4 +1,4 @@
-"""The labelled multi-Bernoulli filter, of one sensor and of several whose scans it takes in turn."""
+"""The labelled multi-Bernoulli filter, of one sensor and of several sensors with sequential updates."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from vedette.kernels.steps.multi_sensor_lmb import update_lmb
 
 
 class LmbFilterBase(LabelledFilterBase[LMB]):
-    """What filters of an LMB have in common."""
+    """Base of the filters of an LMB."""
 
     __slots__ = ()
     kind: ClassVar[type[LMB]] = LMB
@@ -46,7 +46,7 @@ class LmbFilterBase(LabelledFilterBase[LMB]):
             log_likelihood=log_likelihood,
             num_hypotheses=1,
             num_tracks=len(kept.tracks.labels),
-            discarded_weight_bound=max(-math.expm1(sum(log_kept)), 0.0),  # NaN stays
+            discarded_weight_bound=max(-math.expm1(sum(log_kept)), 0.0),  # keeps NaN
             dropped_existence=sum(dropped) + spread,
             num_clutter_raised=sum(num_raised),
             num_duplicates=sum(map(len, repeats)),
@@ -60,13 +60,13 @@ class LmbFilterBase(LabelledFilterBase[LMB]):
 class LmbFilter(LmbFilterBase, LabelledFilter[LMB]):
     """LMB filter of one sensor (Reuter, Vo, Vo, Dietmayer 2014), cheaper than the delta-GLMB filter.
 
-    It draws nothing, and its predictions drop nothing.
+    It draws no random numbers, and its predictions drop nothing.
 
     Attributes:
-        targets: how targets move, live on and appear.
-        sensor: what the sensor sees of them.
+        targets: motion, survival and birth models.
+        sensor: model of the sensor.
         limits: caps and thresholds.
-        assignment: how the probabilities of associations are had: the exact sum, belief propagation, your own.
+        assignment: how association probabilities are computed: the exact sum, belief propagation, or a custom method.
 
     Raises:
         InputError: a part of another kind.
@@ -75,7 +75,7 @@ class LmbFilter(LmbFilterBase, LabelledFilter[LMB]):
     assignment: MarginalAssociation = field(default_factory=RankedAssignment)
 
     def __post_init__(self) -> None:
-        LabelledFilter.__post_init__(self)  # slots replace the class that super() looks for
+        LabelledFilter.__post_init__(self)  # super() fails here, as slots=True replaces the class
         check_marginals(self.assignment)
 
     def _blind(self) -> LmbFilter:
@@ -90,22 +90,22 @@ class LmbFilter(LmbFilterBase, LabelledFilter[LMB]):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class SequentialLmbFilter(LmbFilterBase, SequentialUpdate[LMB]):
-    """LMB filter of several sensors that takes their scans in turn ("iterated corrector").
+    """LMB filter of several sensors with sequential updates ("iterated corrector").
 
-    After each scan the posterior is projected to an LMB again, so that the order of the sensors matters a little. In
-    return the cost grows in proportion to the number of sensors, whatever they see, where that of
-    `MultiSensorLmbFilter` grows exponentially; a scan costs what it may say anything of, not all labels. Of one sensor
-    it is the `LmbFilter`. Labels are dropped, by `Limits.min_existence`, `max_labels` and `max_position_std`, after the
-    last scan alone: one sensor's missed detection does not lose a target that the next one sees. What is cut is counted
-    as by `MultiSensorLmbFilter`.
+    After each scan the posterior is projected to an LMB again, so the order of the sensors matters a little. In return
+    the cost grows in proportion to the number of sensors, whatever their fields of view, while that of
+    `MultiSensorLmbFilter` grows exponentially; the cost of a scan depends on the labels that it may affect, not on all
+    labels. With one sensor it is the `LmbFilter`. Labels are dropped, by `Limits.min_existence`, `max_labels` and
+    `max_position_std`, only after the last scan, so that a missed detection of one sensor does not lose a target that
+    the next one detects. Truncation is counted as by `MultiSensorLmbFilter`.
 
-    Attributes and errors: as `MultiSensorGlmbFilter`, and `assignment` as of `LmbFilter`.
+    Attributes and errors: as `MultiSensorGlmbFilter`, and `assignment` as in `LmbFilter`.
     """
 
     assignment: MarginalAssociation = field(default_factory=RankedAssignment)
 
     def __post_init__(self) -> None:
-        MultiSensorFilter.__post_init__(self)  # slots replace the class that super() looks for
+        MultiSensorFilter.__post_init__(self)  # super() fails here, as slots=True replaces the class
         check_marginals(self.assignment)
 
     def _stepped(self, prior: Lmb, step: SensorStep) -> tuple[Lmb, LmbReport]:
@@ -115,7 +115,7 @@ class SequentialLmbFilter(LmbFilterBase, SequentialUpdate[LMB]):
         return step_lmb(prior, *step.inputs, step.limits.reduction(), association)
 
     def _updated_in_view(self, prior: Lmb, settled: Bools, step: SensorStep) -> tuple[Lmb, LmbReport, Bools]:
-        """As `_stepped`, of the labels that the scan may say anything of; settled: as of `put_back`, empty of none."""
+        """Return `_stepped` of the labels that the scan may affect; settled: see `put_back`, empty if none."""
         scan, _, sensor, truncation = step.inputs
         marks = in_view(prior.tracks, scan, sensor, truncation)
         updated, report = self._stepped(marked(prior, marks), step)
@@ -125,12 +125,12 @@ class SequentialLmbFilter(LmbFilterBase, SequentialUpdate[LMB]):
 
 
 def _by_combinations(prior: Lmb, step: SensorStep) -> tuple[Lmb, LmbReport]:
-    """Exact sums as of several sensors, which cut what is surely improbable (docs/decisions/0014)."""
+    """Update by the exact sums of the multi-sensor filter, which drop surely improbable terms (docs/decisions/0014)."""
     scan, motion, sensor, truncation = step.inputs
     before = standing_combinations(prior, 1) if motion is None else predict_combinations(prior, scan, 1, motion)
     return update_lmb(before, scan, sensor, truncation, step.limits.reduction())
 
 
 def association_of(tracker: Filter) -> Association | None:
-    """Who gives the association marginals of a filter, as kernels take it; None: the sums over clusters, or nobody."""
+    """Return the kernel form of a filter's association marginals; None for sums over clusters and other filters."""
     return tracker.assignment.to_kernel() if isinstance(tracker, LmbFilter) else None

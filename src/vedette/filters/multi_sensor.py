@@ -1,4 +1,4 @@
-"""What central filters share: one belief, updated by the scans that several sensors have taken at one time."""
+"""Shared parts of the central filters: one belief, updated with the scans of several sensors at one time."""
 
 from __future__ import annotations
 
@@ -21,26 +21,26 @@ from vedette.models.arguments import generator, one_a_sensor, pose_vector, posit
 
 
 class SensorScans(NamedTuple):
-    """The scans of one time, by the sensors that scanned."""
+    """The scans of one time, of the sensors that scanned."""
 
     names: list[str]
     sensors: list[SensorModel]
     scans: list[Floats]
     poses: list[Floats]
-    repeats: list[Ints]  # rows of each scan that repeat another; none where no sensor scanned
+    repeats: list[Ints]  # rows of each scan that repeat another; empty if no sensor scanned
 
     def inputs(self, born: Lmb, dt: float) -> list[ScanInput]:
-        """As kernels take them: each with the births and the period."""
+        """Return the scans in kernel form, each with the births and the period."""
         return [ScanInput(born, *own, dt) for own in zip(self.scans, self.poses, strict=True)]
 
     def inputs_in_turn(self, born: Lmb, dt: float) -> list[ScanInput]:
-        """As `inputs`, with births and a period for the first alone."""
+        """Return `inputs` with births and a period for the first scan only."""
         none = no_births_for_kernel(born.tracks.components.means.shape[1])
         first, *others = self.inputs(born, dt)
         return [first, *(own._replace(birth=none, dt=0.0) for own in others)]
 
     def log_likelihood(self, log_total: float, log_clutters: Sequence[float]) -> float:
-        """From joint weights relative to clutter to a density of the scans."""
+        """Convert a joint log weight relative to clutter to the log density of the scans."""
         return log_total + sum(
             log_clutter - sensor.clutter.rate for log_clutter, sensor in zip(log_clutters, self.sensors, strict=True)
         )
@@ -48,11 +48,11 @@ class SensorScans(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class MultiSensorFilter(LabelledFilterBase[BeliefT]):
-    """The parts of a filter of several sensors.
+    """Base of the filters of several sensors.
 
     Attributes:
-        targets: how targets move, live on and appear.
-        sensors: what each sensor sees of them; they may measure different things.
+        targets: motion, survival and birth models.
+        sensors: model of each sensor; they may measure different quantities.
         limits: caps and thresholds.
 
     Raises:
@@ -90,21 +90,21 @@ class MultiSensorFilter(LabelledFilterBase[BeliefT]):
 
         Args:
             belief: posterior of the previous step.
-            scans: one a sensor, in their order: (num, meas_dim) measurements in any order; angles in radians, in
-                (-pi, pi]; None of a sensor that did not scan.
-            poses: one a sensor: [px, py, heading_rad, ...].
-            dt: seconds since the previous step; 0: nobody moves, dies or is born.
+            scans: one per sensor, in their order: (num, meas_dim) measurements in any order; angles in radians, in
+                (-pi, pi]; None for a sensor that did not scan.
+            poses: one per sensor: [px, py, heading_rad, ...].
+            dt: seconds since the previous step; 0: no motion, deaths or births.
             step: number of this step, from 1 on; births are labelled with it.
-            rng: nothing is drawn from it; it is taken so that filters are interchangeable.
-            births: as of `DeltaGlmbFilter.step`.
+            rng: not used; accepted so that filters are interchangeable.
+            births: as in `DeltaGlmbFilter.step`.
 
         Returns:
-            The posterior and a report on all scans together: log likelihoods, counts and bounds of all sensors.
+            The posterior and one report on all scans: log likelihoods, counts and bounds of all sensors.
 
         Raises:
-            InputError: not one scan and one pose a sensor, or one of the wrong shape or kind; an angle beyond a full
+            InputError: not one scan and one pose per sensor, or one of the wrong shape or kind; an angle beyond a full
                 turn; a step below 1.
-            ModelError: a model function raised or gave a value that is none of its kind.
+            ModelError: a model function raised or returned a value that is invalid for its kind.
             NumericalError: no association has positive weight.
         """
         taken = self._checked_scans(scans, poses, rng)
@@ -118,17 +118,17 @@ class MultiSensorFilter(LabelledFilterBase[BeliefT]):
         return self._updated(self._before_scan(prior, period, step, births), born, taken, period, f"step {step}")
 
     def _motion(self, dt: float) -> Motion | None:
-        """As kernels take it; None of scans of the belief's own time."""
+        """Return the motion in kernel form; None for scans at the time of the belief."""
         return kernel_motion(self.targets.motion, self.targets.survival) if dt > 0.0 else None
 
     @abstractmethod
     def _updated(self, prior: Any, born: Lmb, taken: SensorScans, dt: float, place: str) -> tuple[BeliefT, FilterInfo]:
-        """Update the predicted prior (see `_before_scan`), births added, with all scans. place: begins messages."""
+        """Update the predicted prior (see `_before_scan`), births added, with all scans. place: prefix of messages."""
 
     def _checked_scans(self, scans: Any, poses: Any, rng: Any) -> SensorScans:
-        """What each sensor that scanned saw and from where.
+        """Return the checked scans and poses of the sensors that scanned.
 
-        Where none scanned, a blind look, with which an update is the prediction.
+        If no sensor scanned, return an empty scan of a blind sensor, with which an update is the prediction.
         """
         generator(rng)
         one_a_sensor(len(self.sensors), scans=scans, poses=poses)
@@ -150,7 +150,7 @@ class MultiSensorFilter(LabelledFilterBase[BeliefT]):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class SequentialUpdate(MultiSensorFilter[BeliefT]):
-    """One prediction, then an update by each sensor's scan in turn.
+    """Base of filters with one prediction, then an update with each sensor's scan in order.
 
     Attributes and errors: as `MultiSensorFilter`.
     """
@@ -165,7 +165,7 @@ class SequentialUpdate(MultiSensorFilter[BeliefT]):
             own = sensor.to_kernel(), limits.truncation(sensor.meas_dim)
             step = SensorStep((scan, motion if s == 0 else None, *own), limits, sensor, len(taken.names))
             with model_errors():
-                if s in (0, last):  # by the last one every label is told whether it stays
+                if s in (0, last):  # the last update decides for every label whether it is kept
                     posterior, report = self._stepped(posterior, step)
                 else:
                     posterior, report, settled = self._updated_in_view(posterior, settled, step)
@@ -176,8 +176,8 @@ class SequentialUpdate(MultiSensorFilter[BeliefT]):
 
     @abstractmethod
     def _stepped(self, prior: Any, step: SensorStep) -> tuple[Any, Any]:
-        """Posterior and report of kernels."""
+        """Return the posterior and report in kernel form."""
 
     def _updated_in_view(self, prior: Any, settled: Bools, step: SensorStep) -> tuple[Any, Any, Bools]:
-        """As `_stepped`; it may leave alone what the scan says nothing of. settled: what it left behind before."""
+        """Return `_stepped`; subclasses may skip what the scan cannot affect. settled: result of the previous call."""
         return (*self._stepped(prior, step), settled)

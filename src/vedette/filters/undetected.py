@@ -22,9 +22,9 @@ from vedette.models import BirthModel, SensorModel
 from vedette.models.arguments import reject, step_number
 from vedette.models.turns import is_turn, longest_lag
 
-# Existence of a birth from which on it is a label from the start: as Poisson, its number would be wrong by 2 r^2.
+# Births of at least this existence are labels from the start: the Poisson approximation has an error of 2 r^2.
 FROM_THE_START = 0.15
-# Components of the intensity that a birth site may have, where these are more than `Limits.max_intensity_components`.
+# Intensity components per birth site, if these are more than `Limits.max_intensity_components` in total.
 _COMPONENTS_A_SITE = 3
 
 
@@ -42,21 +42,21 @@ def no_arrivals(state_dim: int) -> Arrivals:
 
 
 def most_components(limits: Limits, birth: BirthModel) -> int:
-    """Components that the intensity of undetected targets may have."""
+    """Return the largest number of components of the intensity of undetected targets."""
     return max(limits.max_intensity_components, _COMPONENTS_A_SITE * birth.num_sites)
 
 
 class SplitBirths(NamedTuple):
-    """Births at sites, as the default filter takes them."""
+    """Births at sites, split into labels and Poisson intensity as in the default filter."""
 
-    labels: LMB  # that are there from the start, of step 0
+    labels: LMB  # labels from the start, of step 0
     undetected: Mixture  # intensity of the others
-    error: float  # L1, of taking these as Poisson
+    error: float  # L1 error of the Poisson approximation of these
 
 
 @lru_cache(maxsize=100)
 def split_births(birth: BirthModel, dt: float) -> SplitBirths:
-    """The births at all sites within `dt` seconds."""
+    """Return the births at all sites within `dt` seconds."""
     born = births_within(births_of(birth), birth.period, dt)
     existence = expit(born.existence_logit)
     strong, weak = (np.flatnonzero(chosen) for chosen in (existence >= FROM_THE_START, existence < FROM_THE_START))
@@ -66,12 +66,12 @@ def split_births(birth: BirthModel, dt: float) -> SplitBirths:
 
 @cache
 def no_births(state_dim: int) -> SplitBirths:
-    """Return no births, of either kind."""
+    """Return empty births of both kinds."""
     return SplitBirths(LMB.empty(state_dim), Poisson.empty(state_dim).to_kernel(), 0.0)
 
 
 def with_dropped(undetected: UndetectedTargets, before: FactoredGLMB, kept: FactoredGLMB) -> UndetectedTargets:
-    """The undetected targets, and those whose labels a belief no longer holds, each as the Gaussians of its label.
+    """Return the undetected targets with those of dropped labels added, each as the Gaussians of its label.
 
     before, kept: the belief with these labels and without them.
     """
@@ -83,14 +83,14 @@ def with_dropped(undetected: UndetectedTargets, before: FactoredGLMB, kept: Fact
 
 
 def _intensity_of(labels: Lmb) -> Mixture:
-    """The tracks of labels, weighed by their existence."""
+    """Return the tracks of labels, weighted by their existence."""
     existence, tracks = expit(labels.existence_logit), labels.tracks
     weighed = tracks.components.log_weights + np.repeat(np.log(existence), np.diff(tracks.offsets))
     return tracks.components._replace(log_weights=weighed)
 
 
 def named_at(undetected: UndetectedTargets, step: Any, num_sites: int) -> UndetectedTargets:
-    """The same with the labels of a scan of this step. Raises `InputError` for a step before the last one."""
+    """Return the undetected targets with new labels at this step. Raises `InputError` for a step before the last."""
     number, last = step_number(step), undetected.next_label[0]
     if number < last:
         raise reject("step", f"at least {last}, the step of the belief", step)
@@ -112,7 +112,7 @@ def before_scan(
     if measured is None or not len(scan):
         return before
     std = measured.std
-    if is_turn(pose) and len(std) >= 4:  # until the beam passes it a target moves as far as its velocity lets it
+    if is_turn(pose) and len(std) >= 4:  # a target moves until the beam passes it
         std = np.concatenate([np.hypot(std[:2], longest_lag(pose) * std[2:4]), std[2:]])
     return before._replace(places=sensor.measurement.positions(scan, pose), std=std)
 

@@ -24,7 +24,7 @@ _Density = TypeVar("_Density", Poisson, IidCluster, MultiBernoulli)
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class UnlabelledFilter(SingleSensorFilter, ABC, Generic[_Density]):
-    """A filter of one sensor without labels: what they have in common.
+    """Base of the filters of one sensor without labels.
 
     Attributes and errors: as `SingleSensorFilter`.
     """
@@ -32,7 +32,7 @@ class UnlabelledFilter(SingleSensorFilter, ABC, Generic[_Density]):
     kind: ClassVar[type[Any]]  # of the belief
 
     def initial(self) -> _Density:
-        """The belief before the first scan: no target."""
+        """Return the belief before the first scan: no target."""
         empty: _Density = self.kind.empty(self.targets.state_dim)
         return empty
 
@@ -41,7 +41,7 @@ class UnlabelledFilter(SingleSensorFilter, ABC, Generic[_Density]):
     ) -> tuple[_Density, FilterInfo]:
         """Predict over `dt` seconds and update with a scan; arguments, results and errors as `DeltaGlmbFilter.step`.
 
-        Nothing is drawn from `rng`; it is taken so that filters are interchangeable.
+        `rng` is not used; it is accepted so that filters are interchangeable.
         """
         generator(rng)
         measurements, repeats = check_scan(scan, self.sensor)
@@ -53,10 +53,10 @@ class UnlabelledFilter(SingleSensorFilter, ABC, Generic[_Density]):
 
     @abstractmethod
     def _updated(self, prior: _Density, inputs: StepInputs, place: str) -> tuple[_Density, FilterInfo]:
-        """The posterior and a report without `num_duplicates`. place: of errors."""
+        """Return the posterior and a report without `num_duplicates`. place: prefix of errors."""
 
     def _info(self, report: Any, num_tracks: int, most: int, log_likelihood: float, discarded: float) -> FilterInfo:
-        """What is alike in all reports. most: as many as the posterior may have."""
+        """Return the part of the report that all filters share. most: largest allowed size of the posterior."""
         return FilterInfo(
             log_likelihood=log_likelihood,
             num_hypotheses=1,
@@ -75,7 +75,7 @@ class UnlabelledFilter(SingleSensorFilter, ABC, Generic[_Density]):
 class PhdFilter(UnlabelledFilter[Poisson]):
     """Gaussian-mixture PHD filter of one sensor (Vo and Ma 2006).
 
-    Believes in a Poisson density; its intensity after a scan is that of the exact posterior of such a prior. Births
+    The belief is a Poisson density; its intensity after a scan is that of the exact posterior of such a prior. Births
     enter with their intensity, the existence of each site times its density, which is exact as well.
 
     Attributes and errors: as `LmbFilter`.
@@ -94,9 +94,9 @@ class PhdFilter(UnlabelledFilter[Poisson]):
 class CphdFilter(UnlabelledFilter[IidCluster]):
     """Gaussian-mixture CPHD filter of one sensor (Vo, Vo and Cantoni 2007).
 
-    Believes in an iid cluster; its cardinality distribution and intensity after a scan are those of the exact posterior
-    of such a prior. The cardinality distribution of the births is that of the multi-Bernoulli birth (not a Poisson one
-    of the same mean), so that the predicted cardinality distribution is exact too.
+    The belief is an iid cluster; its cardinality distribution and intensity after a scan are those of the exact
+    posterior of such a prior. The cardinality distribution of the births is that of the multi-Bernoulli birth (not a
+    Poisson one of the same mean), so that the predicted cardinality distribution is exact too.
 
     Attributes and errors: as `LmbFilter`.
     """
@@ -118,10 +118,10 @@ class CphdFilter(UnlabelledFilter[IidCluster]):
 class CbMemberFilter(UnlabelledFilter[MultiBernoulli]):
     """Gaussian-mixture cardinality-balanced multi-target multi-Bernoulli filter (Vo, Vo and Cantoni 2009).
 
-    Believes in a multi-Bernoulli density, to which the births are added as they are; prediction is exact. The update
-    approximates the posterior by a Bernoulli for each one missed and for each measurement. It takes detection to be
-    probable and clutter not too dense; then the expected number of targets is not biased, as Mahler's plain
-    multi-Bernoulli update is.
+    The belief is a multi-Bernoulli density, to which the births are added unchanged; prediction is exact. The update
+    approximates the posterior by a Bernoulli for each missed one and for each measurement. It assumes that detection is
+    probable and clutter not too dense; then the expected number of targets is unbiased, unlike in Mahler's original
+    multi-Bernoulli update.
 
     Attributes and errors: as `LmbFilter`.
     """

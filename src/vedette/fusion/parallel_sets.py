@@ -167,7 +167,7 @@ class _FactorEvidence(NamedTuple):
 
 
 def _of_dropped(member: Bools, prior: Floats, missing_existence: float) -> Floats:
-    """Log weight ratios (num_sets,) of a posterior that dropped a label: its existence is at most `missing_existence`."""
+    """Log weight ratios (num_sets,) of a posterior that dropped a label: existence is at most `missing_existence`."""
     number = member.astype(np.int64)
     sums = group_log_sums(prior, number, 2)
     log_odds = min(sums[1] - sums[0], logit(missing_existence))
