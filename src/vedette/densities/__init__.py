@@ -1,4 +1,4 @@
-"""What is believed about the targets: labelled and unlabelled multi-target densities with Gaussian-mixture tracks."""
+"""Multi-target densities, labelled and unlabelled, with Gaussian-mixture tracks."""
 
 from vedette.densities.conversions import (
     as_glmb,

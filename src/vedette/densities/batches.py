@@ -1,4 +1,4 @@
-"""One shape of labelled density, for many of them at once: what a sensor would believe, case by case."""
+"""Batches of labelled densities on the same label sets, such as the possible posteriors of a sensor."""
 
 from __future__ import annotations
 
@@ -20,26 +20,26 @@ from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.labelled.case_conversions import LmbCases, glmb_cases_to_lmb
 from vedette.kernels.labelled.power_integrals import SensorCases
 
-# A label set, and the factor that it belongs to: of an LMB the label, of a GLMB nothing.
+# A label set, and the name of its factor: for an LMB the label, for a GLMB nothing.
 Place: TypeAlias = tuple[LabelSet, LabelSet]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DensityBatch:
-    """Labelled densities of one kind on the same label sets, of one Gaussian a track.
+    """Labelled densities of one kind on the same label sets, with one Gaussian per track.
 
-    Each is a product of factors, and a factor a weighted list of label sets with a Gaussian for each (set, label): a
-    marginalised GLMB has one factor, an LMB one a label, with the sets {} and {l}.
+    Each is a product of factors, and a factor is a weighted list of label sets with a Gaussian for each (set, label): a
+    marginalised GLMB has one factor, an LMB one per label, with the sets {} and {l}.
 
     Attributes:
-        kind: the container that a case is taken out as.
-        factors: names of the factors: of an LMB each its label, of a GLMB the one `()`.
+        kind: container class of a single case.
+        factors: names of the factors: for an LMB each its label, for a GLMB the single name `()`.
         factor_offsets: (num_factors + 1,) into `sets`.
         sets: label sets, factor after factor.
         log_weights: (num_cases, num_sets) log weight of each set in its factor.
         means, covs: (num_cases, num_members, ...) one Gaussian for each label of each set, in order; without meaning
-            where a GLMB's set has log weight -inf.
-        num_samples: of a planner: case `action * num_samples + sample` is of this action and this sample.
+            if a GLMB's set has log weight -inf.
+        num_samples: for planners: case `action * num_samples + sample` is of this action and this sample.
         num_threads: threads that may share work on the cases; the result does not depend on it.
     """
 
@@ -57,14 +57,14 @@ class DensityBatch:
     def of_glmbs(
         cls, sets: Sequence[LabelSet], log_weights: Floats, means: Floats, covs: Floats, **counts: int
     ) -> DensityBatch:
-        """Marginalised GLMBs on distinct label sets, log_weights (num_cases, num_sets)."""
+        """Return a batch of marginalised GLMBs on distinct label sets, log_weights (num_cases, num_sets)."""
         return cls(GLMB, ((),), np.array([0, len(sets)]), tuple(sets), log_weights, means, covs, **counts)
 
     @classmethod
     def of_lmbs(
         cls, labels: Sequence[Label], existence_logits: Floats, means: Floats, covs: Floats, **counts: int
     ) -> DensityBatch:
-        """LMBs of these labels, existence_logits (num_cases, num_labels)."""
+        """Return a batch of LMBs of these labels, existence_logits (num_cases, num_labels)."""
         log_weights = np.empty((len(existence_logits), 2 * len(labels)))
         log_weights[:, 0::2], log_weights[:, 1::2] = log_expit(-existence_logits), log_expit(existence_logits)
         factors = tuple((label,) for label in labels)
@@ -74,7 +74,7 @@ class DensityBatch:
 
     @classmethod
     def of(cls, density: LabelledDensity) -> DensityBatch:
-        """One LMB or marginalised GLMB as the only case; a mixture is replaced by one Gaussian of its moments."""
+        """Return a batch of one LMB or marginalised GLMB; mixtures are replaced by one Gaussian of their moments."""
         tracks = single_gaussians(density.tracks).to_kernel()
         gaussians = tracks.components
         if isinstance(density, LMB):
@@ -87,7 +87,7 @@ class DensityBatch:
 
     @property
     def is_lmb(self) -> bool:
-        """Whether every label is a factor of its own."""
+        """True if every label is a factor of its own."""
         return self.kind.is_lmb
 
     @property
@@ -102,31 +102,30 @@ class DensityBatch:
 
     @property
     def set_offsets(self) -> Ints:
-        """(num_sets + 1,) members of each label set."""
+        """Offsets of the members of each label set, shape (num_sets + 1,)."""
         return offsets_of([len(labels) for labels in self.sets])
 
     @property
     def places(self) -> tuple[Place, ...]:
-        """Each label set with the name of its factor, by which the sets of several cases are matched."""
+        """Each label set with the name of its factor; the sets of several batches are matched by it."""
         sizes = np.diff(self.factor_offsets).tolist()
         names = (name for name, size in zip(self.factors, sizes, strict=True) for _ in range(size))
         return tuple(zip(names, self.sets, strict=True))
 
     @property
     def existence_logits(self) -> Floats:
-        """(num_cases, num_labels) log-odds of existence, of LMBs."""
+        """Log-odds of existence of LMBs, shape (num_cases, num_labels)."""
         return np.asarray(self.log_weights[:, 1::2] - self.log_weights[:, 0::2])
 
     @property
     def possible(self) -> Bools:
-        """(num_cases, num_sets) false for the sets of weight zero of a GLMB, and for a label of an LMB that cannot
-        exist."""
+        """Mask (num_cases, num_sets), False for a GLMB's sets of weight zero and an LMB's labels that cannot exist."""
         if not self.is_lmb:
             return np.asarray(self.log_weights > -np.inf)
         return np.repeat(self.log_weights[:, 1::2] > -np.inf, 2, axis=1)
 
     def density(self, case: int) -> GLMB | LMB:
-        """One case as a container: an LMB, or a marginalised GLMB without sets of weight zero."""
+        """Return one case as a container: an LMB, or a marginalised GLMB without sets of weight zero."""
         labels = np.array([label for labels in self.sets for label in labels], np.int64).reshape(-1, 2)
         tracks = gaussian_tracks(labels, self.means[case].copy(), self.covs[case].copy())
         if self.is_lmb:
@@ -136,7 +135,7 @@ class DensityBatch:
 
 
 def lmb_batch(own: DensityBatch) -> DensityBatch:
-    """GLMBs as LMBs of the same existence probabilities and of one Gaussian a label, in increasing label order."""
+    """Return GLMBs as LMBs of the same existence probabilities and one Gaussian per label, in label order."""
     members = np.array([label for labels in own.sets for label in labels], np.int64).reshape(-1, 2)
     labels = np.unique(members, axis=0)
     shape, dim = (own.num_cases, len(labels)), own.state_dim

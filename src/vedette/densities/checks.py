@@ -1,9 +1,9 @@
-"""Checks that the containers share. Each raises with the field's name, what was expected and what came.
+"""Checks that the containers share. Each error names the field, the expected value and the actual one.
 
-A container checks itself when it is made, see `vedette.densities.containers`.
+A container checks itself when it is created, see `vedette.densities.containers`.
 
 Faults of form (type, shape, order) raise `InputError`. Faults of value (not finite, not normalised, not positive
-definite) raise the `error` given: `NumericalError` where a computation left them, `InputError` for a user's data.
+definite) raise the `error` given: `NumericalError` for the result of a computation, `InputError` for a user's data.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def check_logits(field: str, logits: Floats, error: type[VedetteError] = Numeric
 
 
 def check_offsets(field: str, offsets: Any, count: int, total: int, *, empty_allowed: bool) -> None:
-    """Raise `InputError` unless `offsets` cuts `total` entries into `count` runs."""
+    """Raise `InputError` unless `offsets` divides `total` entries into `count` runs."""
     check_array(field, offsets, np.int64, (count + 1,))
     if offsets[0] != 0 or offsets[-1] != total:
         raise InputError(f"{field}: expected to go from 0 to {total}; got {offsets[0]} to {offsets[-1]}")
@@ -82,12 +82,12 @@ def check_offsets(field: str, offsets: Any, count: int, total: int, *, empty_all
 
 
 def offsets_of(sizes: Sequence[int] | Ints) -> Ints:
-    """(len(sizes) + 1,) offsets of runs of these sizes."""
+    """Return the offsets of runs of these sizes, shape (len(sizes) + 1,)."""
     return np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes, dtype=np.int64)])
 
 
 def check_sources(field: str, sources: Any, count: int) -> None:
-    """Raise `InputError` unless `sources` has a track or -1, and a measurement, -1 or -2, for each of `count`."""
+    """Raise `InputError` unless `sources` has a track or -1 and a measurement, -1 or -2, for each of `count` tracks."""
     check_array(field, sources, np.int64, (count, 2))
     faulty = (sources < [-1, -2]).any(axis=1)
     if faulty.any():
@@ -96,13 +96,16 @@ def check_sources(field: str, sources: Any, count: int) -> None:
 
 
 def take_runs(offsets: Ints, places: Ints) -> tuple[Ints, Ints]:
-    """Offsets of the runs at `places` when they are put one after another, and the entries that they then have."""
+    """Return the offsets of the runs at `places` after concatenation, and the indices of their entries."""
     taken = offsets_of(np.diff(offsets)[places])
     return taken, np.repeat(offsets[places] - taken[:-1], np.diff(taken)) + np.arange(taken[-1])
 
 
 def distinct_labels(labels: Ints) -> tuple[Ints, Ints]:
-    """(num_distinct, 2) the distinct ones of (num, 2) labels in increasing order, and (num,) the place of each."""
+    """Return the distinct labels (num_distinct, 2) in increasing order, and the place of each label among them, (num,).
+
+    labels: (num, 2).
+    """
     order = np.lexsort(labels.T[::-1])
     ordered, place = labels[order], np.empty(len(labels), np.int64)
     new = np.ones(len(labels), np.bool_)
@@ -112,7 +115,7 @@ def distinct_labels(labels: Ints) -> tuple[Ints, Ints]:
 
 
 def run_log_sums(log_weights: Floats, offsets: Ints) -> Floats:
-    """log-sum-exp of each run of `log_weights`; runs are not empty."""
+    """Return the log-sum-exp of each run of `log_weights`; runs must not be empty."""
     if len(offsets) == 1:
         return np.empty(0)
     peaks = np.maximum.reduceat(log_weights, offsets[:-1])
@@ -159,7 +162,7 @@ def check_covariances(field: str, covs: Floats, error: type[VedetteError] = Nume
 def check_components(
     field: str, log_weights: Any, means: Any, covs: Any, error: type[VedetteError] = NumericalError
 ) -> None:
-    """Raise unless these are weights, means and covariances of Gaussians; arguments and errors as `check_mixtures`."""
+    """Raise unless the arrays are weights, means and covariances of Gaussians; arguments as in `check_mixtures`."""
     check_array(f"{field}means", means, np.float64, (None, None))
     num_components, dim = means.shape
     if dim == 0:
@@ -180,9 +183,9 @@ def check_mixtures(
     count: int,
     error: type[VedetteError] = NumericalError,
 ) -> None:
-    """Raise unless these are `count` Gaussian mixtures, flat with offsets, each a probability density.
+    """Raise unless the arrays are `count` Gaussian mixtures, flat with offsets, each a probability density.
 
-    field: what goes before the names of the arrays. `InputError` for faults of form, `error` for faults of value.
+    field: prefix of the names of the arrays. `InputError` for faults of form, `error` for faults of value.
     """
     check_components(field, log_weights, means, covs, error)
     check_offsets(f"{field}offsets", offsets, count, len(log_weights), empty_allowed=False)
@@ -190,13 +193,13 @@ def check_mixtures(
 
 
 def label_step_up(labels: Ints) -> Bools:
-    """(len(labels) - 1,) whether each label is followed by a greater one."""
+    """Mask (len(labels) - 1,), True if a label is followed by a greater one."""
     before, after = labels[:-1], labels[1:]
     return np.asarray((before[:, 0] < after[:, 0]) | ((before[:, 0] == after[:, 0]) & (before[:, 1] < after[:, 1])))
 
 
 def labels_increase(labels: Ints, offsets: Ints) -> Bools:
-    """(len(labels) - 1,) whether each label is followed by a greater one, or is the last of its run."""
+    """Mask (len(labels) - 1,), True if a label is followed by a greater one, or is the last of its run."""
     in_order = label_step_up(labels)
     starts = offsets[(offsets > 0) & (offsets < len(labels))]
     in_order[starts - 1] = True
@@ -204,18 +207,18 @@ def labels_increase(labels: Ints, offsets: Ints) -> Bools:
 
 
 def as_floats(field: str, values: Any, shape: Sequence[int | None]) -> Floats:
-    """A fresh float64 array of a user's numbers. Raises `InputError` for another shape or for what is no number."""
+    """Return a new float64 array of a user's numbers. Raises `InputError` for another shape or non-numeric values."""
     return np.array(_given(field, values, "fiu", "numbers", shape), dtype=np.float64, order="C")
 
 
 def as_gaussians(means: Any, covs: Any, num: int) -> tuple[Floats, Floats]:
-    """Fresh (num, dim) and (num, dim, dim) arrays of a user's means and covariances, which are not checked further."""
+    """Return new (num, dim) and (num, dim, dim) arrays of a user's means and covariances, without further checks."""
     checked = as_floats("means", means, (num, None))
     return checked, as_floats("covs", covs, (num, checked.shape[1], checked.shape[1]))
 
 
 def as_logits(field: str, probabilities: Any, num: int | None) -> Floats:
-    """(num,) log-odds of a user's probabilities. Raises `InputError` for numbers that are none."""
+    """Return the log-odds (num,) of a user's probabilities. Raises `InputError` for values outside [0, 1]."""
     checked = as_floats(field, probabilities, (num,))
     if not np.all((checked >= 0.0) & (checked <= 1.0)):
         raise InputError(f"{field}: expected probabilities; got {checked.tolist()}")
@@ -224,7 +227,7 @@ def as_logits(field: str, probabilities: Any, num: int | None) -> Floats:
 
 
 def as_ints(field: str, values: Any, shape: Sequence[int | None]) -> Ints:
-    """A fresh int64 array of a user's integers. Raises `InputError` for another shape or for what is no integer."""
+    """Return a new int64 array of a user's integers. Raises `InputError` for another shape or non-integer values."""
     given = _given(field, values, "iu", "integers", shape)
     if given.dtype.kind == "u" and np.any(given > np.iinfo(np.int64).max):
         raise InputError(f"{field}: expected integers below 2^63; got {given.max()}")

@@ -1,7 +1,7 @@
-"""What all densities are: frozen bundles of arrays that are their own and read-only, checked when they are made.
+"""Base classes of all densities: frozen bundles of their own read-only arrays, checked at creation.
 
-Kernels go by a density's offsets and indices without looking, so that what was checked must stay as it was: a number
-written into one of them later would have a kernel read memory that is not its own.
+Kernels use a density's offsets and indices without checks, so what was checked must not change: a number written into
+one of the arrays later could make a kernel read memory that it does not own.
 """
 
 from __future__ import annotations
@@ -24,26 +24,26 @@ _Made = TypeVar("_Made", bound=SummaryRepr)
 class Container(SummaryRepr):
     """A frozen dataclass of arrays and other containers.
 
-    The arrays of its fields are read-only views of arrays that nobody else holds. Those are what kernels take (see
-    `for_kernel`): a read-only array is of another type to Numba, which would compile everything anew for it.
+    The arrays of its fields are read-only views of arrays that have no other owner. Kernels receive the latter (see
+    `for_kernel`): a read-only array has another type in Numba, which would compile everything again for it.
     """
 
     __slots__ = ()
 
     def _own_arrays(self) -> None:
-        """Take copies of the arrays that were given; for a public constructor, before its checks."""
+        """Replace the given arrays by copies; a public constructor calls this before its checks."""
         for name in self.__match_args__:  # type: ignore[attr-defined]
             value = getattr(self, name)
             if type(value) is np.ndarray:
                 object.__setattr__(self, name, _held(np.array(value, order="C")))
 
     def with_fields(self, **changed: Any) -> Self:
-        """The same with other values of some fields, which are the library's own; see `unchecked`."""
+        """Return a copy with other values of some fields, without checks; see `unchecked`."""
         names = self.__match_args__  # type: ignore[attr-defined]
         return unchecked(type(self), *(changed[name] if name in changed else getattr(self, name) for name in names))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Through the constructor and its checks: what is unpickled may have been written by anybody."""
+        """Unpickle through the constructor and its checks, as a pickle may come from any source."""
         return type(self), tuple(getattr(self, name) for name in self.__match_args__)  # type: ignore[attr-defined]
 
 
@@ -51,26 +51,26 @@ class MultiTarget(Container, TabularRepr):
     """A density of a set of targets."""
 
     __slots__ = ()
-    _weight: ClassVar[str] = "existence"  # what the weights of `_targets` are called
+    _weight: ClassVar[str] = "existence"  # name of the weights of `_targets`
 
     @abstractmethod
     def _targets(self) -> Targets:
-        """Its labels, or else its Bernoullis or components, with what each is worth and its mean and covariance."""
+        """Return the labels (or Bernoullis, or components) with the weight, mean and covariance of each."""
 
     def to_table(self) -> dict[str, list[Any]]:
-        """A row a label, or else a Bernoulli or a component, by columns, as `pandas.DataFrame` takes them.
+        """Return a table by columns, as for `pandas.DataFrame`, with one row per label (or Bernoulli, or component).
 
-        `label` (`birth step.index`) where there are labels, `existence` (of an intensity's components
-        `expected_number`), the likeliest `measurement` of the last scan (None: missed) where it is known (see
-        `TrackTable`), mean and standard deviations as in the table of a run's tracks: `x_m`, `y_m`, `vx_mps`, `vy_mps`,
+        Columns: `label` (`birth step.index`) if there are labels; `existence` (for the components of an intensity
+        `expected_number`); the likeliest `measurement` of the last scan (None: missed) if it is known (see
+        `TrackTable`); mean and standard deviations as in the table of a run's tracks: `x_m`, `y_m`, `vx_mps`, `vy_mps`,
         `std_x_m` and so on, those of the marginal density.
         """
         return self._targets().columns(self._weight)
 
     def plot(self, ax: Any) -> None:
-        """Draw places (m) into axes of Matplotlib, with ellipses of two standard deviations, and labels.
+        """Draw positions (m) into axes of Matplotlib, with labels and ellipses of two standard deviations.
 
-        What is unlikely is faint. Raises `InputError` for states of one number.
+        Improbable targets are faint. Raises `InputError` for one-dimensional states.
         """
         self._targets().draw(ax)
 
@@ -84,20 +84,20 @@ class MultiTarget(Container, TabularRepr):
 
     @abstractmethod
     def cardinality(self) -> Floats:
-        """Probabilities of 0, 1, ..., n targets; see `vedette.densities.cardinality_distribution`."""
+        """Return the probabilities of 0, 1, ..., n targets; see `vedette.densities.cardinality_distribution`."""
 
 
 def unchecked(container: type[_Made], *fields: Any) -> _Made:
-    """A container (or what holds some) of the library's own making, whose checks would cost more than some steps.
+    """Return a container (or an object that holds some) of internal arrays, without the checks, which can be slow.
 
-    It takes arrays as they are: those that no caller of the library holds.
+    The arrays are used as they are: no caller of the library may hold them.
     """
     made = object.__new__(container)
     for name, value in zip(container.__match_args__, fields, strict=True):  # type: ignore[attr-defined]
         if type(value) is np.ndarray:
-            if type(value.base) is not np.ndarray and value.flags.carray:  # most: without the call
+            if type(value.base) is not np.ndarray and value.flags.carray:  # the common case, without a call of _held
                 value = value.view()
-                value.setflags(False)  # type: ignore[call-arg]  # by name it takes three times as long
+                value.setflags(False)  # type: ignore[call-arg]  # three times as fast as by keyword
             else:
                 value = _held(value)
         object.__setattr__(made, name, value)
@@ -105,23 +105,23 @@ def unchecked(container: type[_Made], *fields: Any) -> _Made:
 
 
 def for_kernel(array: NDArray[Any]) -> Any:
-    """A container's array as kernels take it; an array that is nobody's field, as it is."""
+    """Return the writeable array behind a container's field, for kernels; other arrays are returned as they are."""
     return array if array.flags.writeable else array.base
 
 
 def kernel_arrays(*fields: str) -> Callable[[Container], tuple[Any, ...]]:
-    """What takes the arrays of these fields (two or more) as kernels do; in a fraction of the time of `for_kernel`."""
+    """Return a function that gives the kernel arrays of these fields (two or more), faster than `for_kernel`."""
     return attrgetter(*(f"{field}.base" for field in fields))
 
 
 def _held(array: NDArray[Any]) -> NDArray[Any]:
-    """An array as a field: as it is where it is one already, and without a copy where it stands alone."""
+    """Return an array as a read-only field, without a copy if possible."""
     base, flags = array.base, array.flags
     if type(base) is not np.ndarray:
         view = array.view() if flags.carray else np.array(array, order="C").view()
     elif not flags.writeable and array.size == base.size and array.strides == base.strides:
         return array
-    else:  # a part of another, whose base is not of its shape
+    else:  # a part of another array, whose base has another shape
         view = np.array(array, order="C").view()
-    view.setflags(False)  # type: ignore[call-arg]  # by name, or as an attribute, it takes three times as long
+    view.setflags(False)  # type: ignore[call-arg]  # three times as fast as by keyword or attribute
     return view

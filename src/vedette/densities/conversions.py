@@ -29,7 +29,7 @@ _Labelled = TypeVar("_Labelled", bound=LabelledDensity)
 DEFAULT_LOG_MIN_WEIGHT = math.log(1e-5)
 DEFAULT_MERGE_DISTANCE = 2.0
 
-# Targets further apart than this, in standard deviations of their difference, are two.
+# Targets further apart than this, in standard deviations of their difference, are distinct.
 _APART = 4.0
 
 
@@ -50,18 +50,17 @@ def marginalise(
     log_min_weight: float = DEFAULT_LOG_MIN_WEIGHT,
     merge_distance: float = DEFAULT_MERGE_DISTANCE,
 ) -> _Glmb:
-    """Marginalised delta-GLMB of a delta-GLMB: one hypothesis a label set (paper eq. 10; Fantacci and Vo 2015).
+    """Return the marginalised form of a delta-GLMB: one hypothesis per label set (paper eq. 10; Fantacci and Vo 2015).
 
-    Keeps the probability of every label set, and so the cardinality distribution and the existence probabilities. Each
-    track of a label set becomes the mixture of its label's tracks in the set's hypotheses. With `max_components` 1 (the
-    default) that is one Gaussian of the mixture's mean and covariance. Otherwise components lighter than
-    `log_min_weight` (log, relative to the track) are dropped, those within the Mahalanobis distance `merge_distance`
-    are merged, and the heaviest `max_components` stay; a `merge_distance` of 0 merges nothing.
+    The probability of every label set is preserved, and so are the cardinality distribution and the existence
+    probabilities. Each track of a label set becomes the mixture of its label's tracks in the set's hypotheses. With
+    `max_components` 1 (the default) that is one Gaussian of the mixture's mean and covariance. Otherwise components
+    lighter than `log_min_weight` (log, relative to the track) are dropped, those within the Mahalanobis distance
+    `merge_distance` are merged, and the heaviest `max_components` are kept; a `merge_distance` of 0 merges nothing.
 
-    Hypotheses come out by descending weight, equal weights in the order of their first occurrence. A product of GLMBs
-    is marginalised factor by factor, in their order; factors of one label laid out as by
-    `FactoredGLMB.from_lmb` keep the order of their hypotheses.
-    Raises `InputError` for a limit outside its range.
+    Hypotheses are returned by descending weight, equal weights in the order of their first occurrence. A product of
+    GLMBs is marginalised factor by factor, in their order; factors of one label in the form of `FactoredGLMB.from_lmb`
+    keep the order of their hypotheses. Raises `InputError` for a limit outside its range.
     """
     caps = _checked_caps(max_components, log_min_weight, merge_distance)
     if isinstance(glmb, FactoredGLMB):
@@ -70,7 +69,7 @@ def marginalise(
 
 
 def marginalised_factors(density: FactoredGLMB, caps: MixtureCaps) -> FactoredGLMB:
-    """The density with every factor marginalised, in their order; those laid out as `from_lmb` does stay so."""
+    """Return the density with every factor marginalised, in order; factors in the form of `from_lmb` keep that form."""
     bernoulli = density.is_bernoulli
     if bernoulli.all() and len(density.tracks.log_weights) == density.num_factors:
         return density
@@ -83,7 +82,7 @@ def marginalised_factors(density: FactoredGLMB, caps: MixtureCaps) -> FactoredGL
 
 
 def _marginalised_glmbs(density: FactoredGLMB, caps: MixtureCaps) -> FactoredGLMB:
-    """All factors marginalised at once, each one's hypotheses by descending weight."""
+    """Return all factors marginalised at once, with each one's hypotheses by descending weight."""
     num, hypotheses, factor_of = density.num_factors, density.as_hypotheses(), density.factor_of
     set_of, first = sets_of_factors(hypotheses, factor_of)
     marginal, number = kernels.marginalise_sets(hypotheses, set_of, first, caps)
@@ -110,10 +109,11 @@ def as_lmb(
     log_min_weight: float = DEFAULT_LOG_MIN_WEIGHT,
     merge_distance: float = DEFAULT_MERGE_DISTANCE,
 ) -> LMB:
-    """LMB with the existence probability and track density of every label (Reuter et al. 2014, eq. 43-45).
+    """Return the LMB with the existence probability and density of every label (Reuter et al. 2014, eq. 43-45).
 
-    Keeps the existence probabilities and so the mean cardinality, not its whole distribution. Mixtures are reduced as
-    by `marginalise`; an LMB is as it was. Raises `InputError` for a limit outside its range.
+    The existence probabilities and so the mean cardinality are preserved, but not the whole cardinality distribution.
+    Mixtures are reduced as by `marginalise`; an LMB is returned unchanged. Raises `InputError` for a limit outside its
+    range.
     """
     if isinstance(density, LMB):
         return density
@@ -122,7 +122,10 @@ def as_lmb(
 
 
 def reduced_lmb(density: LabelledDensity, caps: MixtureCaps, *, resolved: bool = False) -> Lmb:
-    """The LMB of a density, its mixtures reduced where it is not one; resolved: under the names of `resolve_labels`."""
+    """Return the LMB of a density, with reduced mixtures unless it is an LMB.
+
+    resolved: use the labels of `resolve_labels`.
+    """
     if isinstance(density, LMB):
         return density.to_kernel()
     factors, hypotheses = density.to_factors(), density.as_hypotheses()
@@ -130,7 +133,7 @@ def reduced_lmb(density: LabelledDensity, caps: MixtureCaps, *, resolved: bool =
     place_of_entry = place[factors.hyp_tracks]
     if resolved:
         place_of_entry = settled_names(hypotheses, factors.factor_offsets, factors.track_offsets, place, _APART)
-    used = np.bincount(place_of_entry, minlength=len(all_labels)) > 0  # a table may have more
+    used = np.bincount(place_of_entry, minlength=len(all_labels)) > 0  # the table may contain unused labels
     factor = np.empty(len(all_labels), np.int64)
     factor[place] = np.repeat(np.arange(len(factors.factor_offsets) - 1), np.diff(factors.track_offsets))
     firsts, ends = factors.factor_offsets[factor[used]], factors.factor_offsets[factor[used] + 1]
@@ -145,14 +148,14 @@ def resolve_labels(
     log_min_weight: float = DEFAULT_LOG_MIN_WEIGHT,
     merge_distance: float = DEFAULT_MERGE_DISTANCE,
 ) -> LMB:
-    """The LMB of the same targets with one name each, where a GLMB leaves open which of several names is whose.
+    """Return the LMB of the same targets with a single label each, where GLMB hypotheses disagree on labels.
 
-    Hypotheses may differ in nothing but names: two targets swapped, or one that was born either at one step or at
-    another. The labels' own marginals (`as_lmb`) then put every label half here and half there, or call none
-    probable. As a set of targets without names it is all the same, so within each factor the heaviest hypothesis keeps
-    its names and the targets of the others go by those of the targets that they are likeliest to be. Keeps what
-    `as_lmb` keeps, the mean number of targets, but not the labels' own probabilities of existence. An LMB is as it
-    was. Mixtures are reduced as by `marginalise`.
+    Hypotheses may differ only in labels: two targets swapped, or one target born at one of two steps. The marginals of
+    the labels (`as_lmb`) then put every label half at each position, or make no label probable. The density of the
+    unlabelled set of targets is the same in both. Therefore, within each factor, the heaviest hypothesis keeps its
+    labels, and each target of the other hypotheses takes the label of the target that it is most likely to be. Like
+    `as_lmb`, this preserves the mean number of targets, but not the existence probabilities of the original labels. An
+    LMB is returned unchanged. Mixtures are reduced as by `marginalise`.
     """
     if isinstance(density, LMB):
         return density
@@ -161,7 +164,7 @@ def resolve_labels(
 
 
 def with_single_gaussians(density: _Labelled) -> _Labelled:
-    """The density with one Gaussian for each mixture: that of its moments; GLMBs are marginalised."""
+    """Return the density with each mixture replaced by the Gaussian of its moments; GLMBs are marginalised."""
     if density.is_lmb:
         return density.with_fields(tracks=single_gaussians(density.tracks))
     given: Any = density
@@ -169,25 +172,26 @@ def with_single_gaussians(density: _Labelled) -> _Labelled:
 
 
 def with_resolved_labels(density: LabelledDensity, max_components: int) -> LabelledDensity:
-    """The density; where it is a product of GLMBs that leave names open, that of its `resolve_labels`."""
+    """Return the density; a product of GLMBs with ambiguous labels is replaced by its `resolve_labels`."""
     if not isinstance(density, FactoredGLMB) or density.is_bernoulli.all():
         return density
     return FactoredGLMB.of(resolve_labels(density, max_components=max_components))
 
 
 def as_glmb(density: LabelledDensity, *, max_hypotheses: int) -> tuple[GLMB, float]:
-    """GLMB of the `max_hypotheses` heaviest products of one hypothesis of each factor, and the weight of the others.
+    """Return the GLMB of the `max_hypotheses` heaviest hypotheses of all factors, and the weight of the others.
 
-    Of an LMB these are its most probable label subsets; a GLMB is one factor. The GLMB shares the track table, and its
-    weights are normalised over what is kept, which comes by descending weight. Products of weight zero are not listed.
-    Raises `InputError` for a `max_hypotheses` below 1.
+    A hypothesis of the product combines one hypothesis of each factor. For an LMB these are its most probable label
+    subsets; a GLMB is one factor. The GLMB shares the track table; its weights are normalised over the kept hypotheses,
+    which are in order of descending weight. Products of weight zero are left out. Raises `InputError` for a
+    `max_hypotheses` below 1.
     """
     glmb, discarded_weight = density.heaviest_sets(max_hypotheses)
     return GLMB.from_kernel(glmb), discarded_weight
 
 
 def lmb_on_label_sets(lmb: LMB, sets: Sequence[Sequence[tuple[int, ...]]]) -> GLMB:
-    """The LMB's hypotheses on those of the label sets that it has, in their order; their weights do not sum to one."""
+    """Return the LMB's hypotheses on those label sets that it has, in their order; their weights do not sum to one."""
     place = {tuple(label): i for i, label in enumerate(lmb.tracks.labels.tolist())}
     hyps = [[place[label] for label in labels] for labels in sets if all(label in place for label in labels)]
     exists = np.zeros((len(hyps), len(place)), np.bool_)

@@ -1,4 +1,4 @@
-"""Estimates read off a density, and the histories that they make under stable labels."""
+"""Estimates extracted from a density, and track histories under stable labels."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from vedette.kernels.labelled.least_ospa import least_ospa_tracks
 from vedette.models.arguments import no_gaussians
 
 _MARGINAL_COMPONENTS = 10
-# A component of weight 1.5 to 2 is more often one target with two measurements than two: docs/evidence/estimates.md.
+# A component of weight 1.5 to 2 is more often one target with fits two measurements than two targets: docs/evidence/estimates.md.
 _RANK_OF_HALF_LEFT = 0.2
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Estimate(TabularRepr):
-    """Estimated targets at one moment, in increasing label order.
+    """Estimated targets at one time, in increasing label order.
 
     Attributes:
         labels: (num_targets, 2) birth step and birth index.
@@ -58,17 +58,17 @@ class Estimate(TabularRepr):
         return len(self.labels)
 
     def targets(self) -> Iterator[Target]:
-        """Label, probability of existence, mean and covariance of each, in increasing label order."""
+        """Iterate over label, existence probability, mean and covariance of each target, in increasing label order."""
         return self._targets().each()
 
     def to_table(self) -> dict[str, list[Any]]:
-        """A row a target, by columns: those of the table of a density."""
+        """Return a table by columns, with one row per target; the columns are those of the table of a density."""
         return self._targets().columns("existence")
 
     def plot(self, ax: Any) -> None:
-        """Draw places (m) into axes of Matplotlib, with ellipses of two standard deviations, and labels.
+        """Draw positions (m) into axes of Matplotlib, with labels and ellipses of two standard deviations.
 
-        What is unlikely is faint. Raises `InputError` for states of one number.
+        Improbable targets are faint. Raises `InputError` for one-dimensional states.
         """
         self._targets().draw(ax)
 
@@ -83,11 +83,11 @@ class Estimate(TabularRepr):
 
     @classmethod
     def empty(cls, state_dim: int) -> Estimate:
-        """No target."""
+        """Return an estimate without targets."""
         return cls(np.empty((0, 2), np.int64), *no_gaussians(state_dim), np.empty(0))
 
     def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
-        """Raise `InputError` for faults of form, `error` for what is no state, covariance or probability."""
+        """Raise `InputError` for faults of form, `error` for invalid states, covariances or probabilities."""
         checks.check_array("labels", self.labels, np.int64, (None, 2))
         checks.check_array("means", self.means, np.float64, (self.num_targets, None))
         dim = self.means.shape[1]
@@ -102,20 +102,20 @@ class Estimate(TabularRepr):
 
 
 class Estimator(Protocol):
-    """How the targets are read off a density after a scan."""
+    """A function that estimates the targets from a density after a scan."""
 
     def __call__(self, density: Any, step: int) -> Estimate:
-        """The estimate of scan `step`, counted from 1, by which targets without labels are named."""
+        """Return the estimate at scan `step`, counted from 1, which labels targets of an unlabelled density."""
         ...
 
 
 def map_estimate(density: LabelledDensity) -> Estimate:
-    """The most probable number of targets with labels, then the most probable ones of that number (paper, Algorithm 1).
+    """Return the most probable number of labelled targets, and the most probable ones of it (paper, Algorithm 1).
 
     GLMB: the heaviest hypothesis of that cardinality. LMB: that many labels of highest existence. Product of GLMBs: the
     heaviest hypothesis of that cardinality among all products of one of each factor. Ties: the smaller number; the
-    earlier hypothesis; the smaller label. A track that is a mixture is estimated by its heaviest component,
-    as the mean of two rival components may lie where the target cannot be.
+    earlier hypothesis; the smaller label. A track that is a mixture is estimated by its heaviest component, since the
+    mean of two rival components may lie where the target cannot be.
     """
     given: Any = check_labelled(density)
     if not isinstance(given, GLMB | LMB):
@@ -128,15 +128,15 @@ def map_estimate(density: LabelledDensity) -> Estimate:
 
 
 def least_ospa_estimate(density: LabelledDensity) -> Estimate:
-    """The targets whose expected OSPA is least where a target is either in place or not.
+    """Return the targets of least expected OSPA, if each target counts as either in place or not.
 
     With n estimated targets of which M are in place, and N targets that exist, OSPA of order p and cutoff c is then
-    c (1 - M / max(n, N))^(1/p). Estimated are the targets of the heaviest hypothesis of n targets (as by
+    c (1 - M / max(n, N))^(1/p). The estimate consists of the targets of the heaviest hypothesis of n targets (as by
     `map_estimate`), for the n with the largest mean of M / max(n, N). A target is in place if its label is estimated,
     or if it is within a Mahalanobis distance of 3 of an estimated label whose own target does not exist.
 
-    The most probable number instead counts candidates that have nothing to do with each other: of nine of probability
-    0.11 it shows one, which is wrong in eight cases of nine. Targets without a label are not counted.
+    The most probable number, in contrast, counts candidates that are unrelated: of nine targets of probability 0.11 it
+    reports one, which is wrong in eight cases of nine. Targets without a label are not counted.
     Ties: the smaller number; then as `map_estimate`. A mixture is estimated by its heaviest component.
     """
     given = check_labelled(density)
@@ -144,25 +144,24 @@ def least_ospa_estimate(density: LabelledDensity) -> Estimate:
 
 
 def best_estimate(density: Any, step: int) -> Estimate:
-    """An `Estimator` of every density: of products of GLMBs `least_ospa_estimate`, of others as `map_or_unlabelled`."""
+    """`Estimator` for every density: `least_ospa_estimate` for products of GLMBs, else `map_or_unlabelled`."""
     if isinstance(density, FactoredGLMB):
         return least_ospa_estimate(density)
     return map_or_unlabelled(density, step)
 
 
 def map_or_unlabelled(density: Any, step: int) -> Estimate:
-    """An `Estimator` of every density: `map_estimate` if it has labels, else `unlabelled_estimate`."""
+    """`Estimator` for every density: `map_estimate` if it has labels, else `unlabelled_estimate`."""
     return map_estimate(density) if isinstance(density, LabelledDensity) else unlabelled_estimate(density, step)
 
 
 def marginal_estimate(density: LabelledDensity, threshold: float = 0.5) -> Estimate:
-    """Every target whose probability of existence exceeds `threshold`, each estimated by the heaviest component of its
-    marginal density.
+    """Return every target whose existence probability exceeds `threshold`, at the heaviest component of its marginal.
 
-    Of GLMBs these are the targets of `resolve_labels`: one that may go by several names is one target, as probable as
-    all of them, and two whose names may be swapped stand in two places. Near components (Mahalanobis distance 2) are
-    merged before they are weighed.
-    Raises `InputError` for a threshold outside [0, 1).
+    For GLMBs these are the targets of `resolve_labels`: a target with several possible labels is one target, as
+    probable as all of them together, and two targets whose labels may be swapped have two positions. Near components
+    (Mahalanobis distance 2) are merged before their weights are compared. Raises `InputError` for a threshold outside
+    [0, 1).
     """
     if not 0.0 <= threshold < 1.0:
         raise InputError(f"threshold: expected a probability below 1; got {threshold}")
@@ -172,16 +171,16 @@ def marginal_estimate(density: LabelledDensity, threshold: float = 0.5) -> Estim
 
 
 def _peaks(tracks: TrackTable, chosen: Ints, existence: Floats) -> Estimate:
-    """The heaviest component of each chosen track."""
+    """Return the estimate at the heaviest component of each chosen track."""
     heaviest = heaviest_components(tracks.log_weights, tracks.offsets, chosen)
     return Estimate(tracks.labels[chosen], tracks.means[heaviest], tracks.covs[heaviest], existence)
 
 
 def at_dominant_components(density: LMB) -> LMB:
-    """Each label at the heaviest component of its mixture, the first of several.
+    """Return the density with each label at the heaviest component of its mixture, the first on a tie.
 
-    The mean of two rival components may lie where the target cannot be, and their spread is no error that scans make
-    less: no scan tells two targets' names apart that have been together.
+    The mean of two rival components may lie where the target cannot be, and their spread is an error that scans cannot
+    reduce: after two targets have been close, no scan can distinguish their labels.
     """
     tracks, num = density.tracks, density.tracks.num_tracks
     if len(tracks.log_weights) == num:
@@ -191,14 +190,14 @@ def at_dominant_components(density: LMB) -> LMB:
 
 
 def unlabelled_estimate(density: Poisson | IidCluster | MultiBernoulli, step: int) -> Estimate:
-    """The targets of a density that names none; at every step they get new labels (step, 0), (step, 1), ...
+    """Return the targets of an unlabelled density; at every step they get new labels (step, 0), (step, 1), ...
 
     Multi-Bernoulli: the most probable number of targets, and that many Bernoullis of highest existence, each estimated
     by its heaviest component. Iid cluster: the most probable number; Poisson: the expected number, rounded; that many
-    of the heaviest components, each one target. A component from which one was taken counts again with what is left in
-    it where that is a whole target or more (weight 2 stands for two); half a target or more comes only before
-    components lighter than 0.2. Components are fewer than targets where these are all in one place. Existence is what
-    the component had left, at most 1. Ties: the smaller number; the earlier Bernoulli or component.
+    of the heaviest components, each one target. A component that was chosen is ranked again by its remaining weight if
+    that is a whole target or more (weight 2 stands for two); with half a target or more it only precedes components
+    lighter than 0.2. There are fewer components than targets if all targets are at one position. Existence is the
+    remaining weight of the component, at most 1. Ties: the smaller number; the earlier Bernoulli or component.
     """
     if isinstance(density, MultiBernoulli):
         number = int(np.argmax(cardinality_distribution(density)))
@@ -217,7 +216,7 @@ def unlabelled_estimate(density: Poisson | IidCluster | MultiBernoulli, step: in
 
 
 def _by_units(weights: Floats, number: int) -> tuple[Ints, Floats]:
-    """The component of highest rank, up to `number` times, and how much it had, as probabilities."""
+    """Return the component of highest rank, up to `number` times, and its remaining weights as probabilities."""
     remaining, rank = weights.copy(), weights.copy()
     chosen: list[int] = []
     had: list[float] = []
@@ -233,7 +232,7 @@ def _by_units(weights: Floats, number: int) -> tuple[Ints, Floats]:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class TrackHistory(TabularRepr):
-    """All estimates of one label, in order of time; scans at which it was not estimated are left out.
+    """All estimates of one label in order of time; scans at which it was not estimated are left out.
 
     Attributes:
         label: birth step and birth index.
@@ -252,17 +251,17 @@ class TrackHistory(TabularRepr):
     existence: Floats
 
     def to_table(self) -> dict[str, list[Any]]:
-        """A row a scan, by columns: `step`, `time_s`, and those of the table of a density."""
+        """Return a table by columns, with one row per scan: `step`, `time_s`, and those of the table of a density."""
         scans: dict[str, list[Any]] = {"step": self.steps.tolist(), "time_s": self.times.tolist()}
         return scans | Targets(None, self.existence, self.means, self.covs).columns("existence")
 
 
 def track_histories(estimates: Sequence[Estimate], times: Floats) -> tuple[TrackHistory, ...]:
-    """Estimates of successive scans at `times` (s), gathered by label; labels in increasing order.
+    """Return the estimates of successive scans at `times` (s), grouped by label; labels in increasing order.
 
     The first estimate is that of step 1.
 
-    Raises `InputError` unless there is one time an estimate.
+    Raises `InputError` unless there is one time per estimate.
     """
     if len(estimates) != len(times):
         raise InputError(f"times: expected {len(estimates)}, one an estimate; got {len(times)}")

@@ -30,20 +30,20 @@ _FACTORS = kernel_arrays("track_offsets", "hyp_offsets", "hyp_tracks", "hyp_log_
 class FactoredGLMB(Hypotheses):
     """Product of independent GLMBs (factors), no two of which share a label.
 
-    A GLMB is one factor, an LMB one factor a label. What one factor says of its targets does not depend on another's:
-    the probability of a label set is the product of those of its parts, so that a list of a few hypotheses a factor
-    stands for all their combinations.
+    A GLMB is one factor, an LMB one factor per label. The factors are independent: the probability of a label set is
+    the product of the probabilities of its parts, so that a short list of hypotheses per factor represents all their
+    combinations.
 
     Attributes:
-        tracks: track table of all factors; those of a factor together.
+        tracks: track table of all factors; the tracks of a factor are adjacent.
         track_offsets: (num_factors + 1,) tracks of factor `f` are `track_offsets[f]:track_offsets[f + 1]`.
         hyp_offsets: (num_hyps + 1,) tracks of hypothesis `h` are `hyp_tracks[hyp_offsets[h]:hyp_offsets[h + 1]]`.
         hyp_tracks: indices into `tracks`, in increasing label order within a hypothesis.
         hyp_log_weights: (num_hyps,) log weights, normalised within each factor.
         factor_offsets: (num_factors + 1,) hypotheses of factor `f` are `factor_offsets[f]:factor_offsets[f + 1]`.
-        undetected: targets without a label, independent of all others; None: there are none.
+        undetected: targets without a label, independent of all others; None if there are none.
 
-    The arrays are copied, checked once, here, and read-only from then on.
+    The arrays are copied, checked once at creation, and read-only afterwards.
 
     Raises:
         InputError: as `validate`.
@@ -69,38 +69,41 @@ class FactoredGLMB(Hypotheses):
 
     @property
     def is_bernoulli(self) -> Bools:
-        """(num_factors,) which factors are of one label; see `bernoulli_factors`."""
+        """Mask (num_factors,) of the factors of one label; see `bernoulli_factors`."""
         return bernoulli_factors(self.to_kernel())
 
     @property
     def factor_of(self) -> Ints:
-        """(num_hyps,) number of the factor of each hypothesis."""
+        """Index of the factor of each hypothesis, shape (num_hyps,)."""
         return np.repeat(np.arange(self.num_factors), np.diff(self.factor_offsets))
 
     @property
     def is_marginalised(self) -> bool:
-        """Whether every label set occurs once in its factor."""
+        """True if every label set occurs once in its factor."""
         return len(sets_of_factors(self.as_hypotheses(), self.factor_of)[1]) == self.num_hyps
 
     def cardinality(self) -> Floats:
-        """Probabilities of 0, 1, ... targets, with and without labels."""
+        """Return the probabilities of 0, 1, ... targets, labelled or not."""
         labels = self.cardinality_of_labels()
         return labels if self.undetected is None else np.convolve(labels, self.undetected.cardinality())
 
     def cardinality_of_labels(self) -> Floats:
-        """Probabilities of as many targets as the largest hypotheses of all factors have together, and of fewer."""
+        """Return the probabilities of 0, 1, ...
+
+        Labelled targets, up to the total of the factors' largest hypotheses.
+        """
         sizes, offsets = np.diff(self.hyp_offsets), self.size_offsets()
         chances = np.bincount(offsets[self.factor_of] + sizes, np.exp(self.hyp_log_weights), minlength=offsets[-1])
         return convolved(np.asarray(chances, np.float64), offsets)
 
     def size_offsets(self) -> Ints:
-        """(num_factors + 1,) offsets of runs with a place for each number of targets of a factor, from 0 up."""
+        """Offsets (num_factors + 1,) of runs with one entry for each number of targets of a factor, from 0 up."""
         sizes = np.diff(self.hyp_offsets)
         largest = np.maximum.reduceat(sizes, self.factor_offsets[:-1]) if self.num_factors else sizes
         return checks.offsets_of(largest + 1)
 
     def factor(self, index: int) -> GLMB:
-        """One factor, as a GLMB."""
+        """Return one factor as a GLMB."""
         low, high = self.track_offsets[index], self.track_offsets[index + 1]
         first, last = self.factor_offsets[index], self.factor_offsets[index + 1]
         table, begin, end = self.tracks, self.hyp_offsets[first], self.hyp_offsets[last]
@@ -119,25 +122,25 @@ class FactoredGLMB(Hypotheses):
 
     @property
     def factors(self) -> tuple[GLMB, ...]:
-        """All factors, in their order."""
+        """All factors as GLMBs, in order."""
         return tuple(self.factor(index) for index in range(self.num_factors))
 
     def to_kernel(self) -> kt.FactoredGlmb:
-        """The same arrays as the bundle that kernels take."""
+        """Return the arrays as a kernel bundle."""
         return kt.FactoredGlmb(self.tracks.to_kernel(), *_FACTORS(self))
 
     def to_factors(self) -> kt.FactoredGlmb:
-        """The same arrays."""
+        """Return the arrays as a kernel bundle."""
         return self.to_kernel()
 
     @classmethod
     def from_kernel(cls, density: kt.FactoredGlmb, undetected: UndetectedTargets | None = None) -> FactoredGLMB:
-        """The arrays of a bundle as they are; a kernel's own need no check."""
+        """Return a density with the arrays of a kernel bundle, without copies and checks."""
         return unchecked(cls, TrackTable.from_kernel(density.tracks), *density[1:], undetected)
 
     @classmethod
     def empty(cls, state_dim: int) -> FactoredGLMB:
-        """The density that is certain of no target: no factor."""
+        """Return the density that is certain of no target, without factors."""
         zero, none = np.zeros(1, np.int64), np.empty(0, np.int64)
         return unchecked(
             cls, TrackTable.empty(state_dim), zero, zero.copy(), none, np.empty(0), np.zeros(1, np.int64), None
@@ -145,7 +148,7 @@ class FactoredGLMB(Hypotheses):
 
     @classmethod
     def from_factors(cls, factors: Sequence[GLMB], state_dim: int) -> FactoredGLMB:
-        """The product of GLMBs of which no two share a label.
+        """Return the product of GLMBs, no two of which may share a label.
 
         Raises `InputError` for a label in two factors, or a factor of another state dimension.
         """
@@ -157,24 +160,24 @@ class FactoredGLMB(Hypotheses):
 
     @classmethod
     def of(cls, density: LabelledDensity) -> FactoredGLMB:
-        """The same density: a GLMB as one factor, an LMB as one a label (that it is absent, then that it is there)."""
+        """Return the same density: a GLMB as one factor, an LMB as one per label (hypotheses: absent, then present)."""
         return density if isinstance(density, cls) else unchecked(cls, density.tracks, *density.to_factors()[1:], None)
 
     @classmethod
     def from_glmb(cls, glmb: GLMB) -> FactoredGLMB:
-        """The same density, as one factor."""
+        """Return the same density as one factor."""
         return cls.of(glmb)
 
     @classmethod
     def from_lmb(cls, lmb: LMB) -> FactoredGLMB:
-        """The same density: a factor a label, with the hypotheses that it is absent and that it is there."""
+        """Return the same density with one factor per label, whose hypotheses are absence and presence."""
         return cls.of(lmb)
 
     @classmethod
     def product(cls, parts: Sequence[FactoredGLMB], state_dim: int) -> FactoredGLMB:
-        """The product of densities of which no two share a label: their factors, one density's after another's.
+        """Return the product of densities, no two of which may share a label: their factors, concatenated.
 
-        state_dim: of all of them. Raises `InputError` for a label in two of them.
+        state_dim: of all densities. Raises `InputError` for a label in two of them.
         """
         parts = [part for part in parts if part.num_factors > 0]
         if len(parts) < 2:
@@ -202,7 +205,7 @@ class FactoredGLMB(Hypotheses):
         checks.check_offsets("track_offsets", self.track_offsets, num, num_tracks, empty_allowed=True)
         checks.check_offsets("hyp_offsets", self.hyp_offsets, self.num_hyps, len(self.hyp_tracks), empty_allowed=True)
         if self._factors_fit():
-            num = 0  # there is no fault to be named
+            num = 0  # no fault to report
         for index in range(num):
             try:
                 self.factor(index)._validate_form(error)
@@ -211,7 +214,7 @@ class FactoredGLMB(Hypotheses):
         self._validate_labels()
 
     def _factors_fit(self) -> bool:
-        """Whether each factor by itself is a normalised GLMB; all at once, for there may be thousands."""
+        """Return True if each factor is a normalised GLMB; checks all at once, as there may be thousands."""
         owner = np.repeat(self.factor_of, np.diff(self.hyp_offsets))
         if not (
             (self.track_offsets[owner] <= self.hyp_tracks) & (self.hyp_tracks < self.track_offsets[owner + 1])
@@ -225,7 +228,7 @@ class FactoredGLMB(Hypotheses):
         return bool((np.abs(sums) <= checks.NORMALISATION_TOLERANCE).all())
 
     def _validate_labels(self) -> None:
-        """Raise `InputError` where two factors share a label."""
+        """Raise `InputError` if two factors share a label."""
         factor_of = np.repeat(np.arange(self.num_factors), np.diff(self.track_offsets))
         labels = self.tracks.labels
         order = np.lexsort((factor_of, labels[:, 1], labels[:, 0]))
@@ -239,7 +242,7 @@ class FactoredGLMB(Hypotheses):
 
 
 def sets_of_factors(hypotheses: kt.Glmb, factor_of: Ints) -> tuple[Ints, Ints]:
-    """As `group_by_label_set`, where hypotheses of different factors (num_hyps,) have different sets."""
+    """Return `group_by_label_set` with separate sets for hypotheses of different factors; factor_of: (num_hyps,)."""
     set_of, first = group_by_label_set(hypotheses)
     if (factor_of == factor_of[:1]).all():
         return set_of, first
@@ -250,7 +253,7 @@ def sets_of_factors(hypotheses: kt.Glmb, factor_of: Ints) -> tuple[Ints, Ints]:
 
 
 def bernoulli_factors(density: kt.FactoredGlmb) -> Bools:
-    """(num_factors,) which factors are of one label and laid out as by `from_lmb`: absent, then there."""
+    """Mask (num_factors,) of the factors of one label in the form of `from_lmb`: absent, then present."""
     tracks, factors, hyps = density.track_offsets, density.factor_offsets, density.hyp_offsets
     alone = np.flatnonzero((tracks[1:] - tracks[:-1] == 1) & (factors[1:] - factors[:-1] == 2))
     first, found = factors[alone], np.zeros(len(factors) - 1, np.bool_)

@@ -1,4 +1,4 @@
-"""Densities in files: NumPy's .npz, every bit of every array kept."""
+"""Density files in NumPy's .npz format, with every array stored exactly."""
 
 from __future__ import annotations
 
@@ -58,8 +58,8 @@ def save_density(path: str | os.PathLike[str], density: Density) -> None:
 def load_density(path: str | os.PathLike[str]) -> Density:
     """Read a density that `save_density` wrote.
 
-    Raises `InputError` for a file that is missing, damaged, of another origin or a later version, or that holds no
-    valid density. Compressed arrays are refused: what a file unpacks to is never more than the file.
+    Raises `InputError` for a file that is missing, damaged, of another origin or a later version, or without a valid
+    density. Compressed arrays are refused, so that the content of a file is never larger than the file.
     """
     source = Path(path)
     try:
@@ -91,7 +91,7 @@ def _kind_of(source: Path, arrays: Mapping[str, Any]) -> str:
 
 
 def _names(container: type[Any]) -> list[str]:
-    """Of a container's arrays in a file, in the order of its fields, those of its track table first."""
+    """Return the names of a container's arrays in a file, in the order of its fields, the track table first."""
     of_tracks = (
         [f"tracks.{field.name}" for field in fields(TrackTable)] if issubclass(container, LabelledDensity) else []
     )

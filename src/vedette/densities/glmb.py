@@ -1,4 +1,4 @@
-"""Densities of listed hypotheses, and the one of a single list: the generalized labelled multi-Bernoulli."""
+"""Densities of listed hypotheses, and the generalised labelled multi-Bernoulli, which is a single list."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _HYPOTHESES = kernel_arrays("hyp_offsets", "hyp_tracks", "hyp_log_weights")
 
 
 class Hypotheses(LabelledDensity):
-    """Factors of listed hypotheses, each a set of tracks with its weight in its factor."""
+    """Base of densities whose factors are lists of hypotheses, each a set of tracks with its weight in the factor."""
 
     __slots__ = ()
     hyp_offsets: Ints
@@ -35,7 +35,7 @@ class Hypotheses(LabelledDensity):
 
     @property
     def num_hyps(self) -> int:
-        """Number of hypotheses, of all factors together."""
+        """Number of hypotheses, over all factors."""
         return len(self.hyp_log_weights)
 
     def _parts(self) -> str:
@@ -44,7 +44,7 @@ class Hypotheses(LabelledDensity):
 
     @property
     def track_existence(self) -> Floats:
-        """(num_tracks,) probability that there is a target and that it has this track."""
+        """Probability that a target exists and has this track, shape (num_tracks,)."""
         weights = np.repeat(np.exp(self.hyp_log_weights), np.diff(self.hyp_offsets))
         return np.bincount(self.hyp_tracks, weights, self.tracks.num_tracks).astype(np.float64)
 
@@ -53,11 +53,11 @@ class Hypotheses(LabelledDensity):
         labels, place = checks.distinct_labels(self.tracks.labels)
         label_of = place[self.hyp_tracks]
         weights = np.repeat(np.exp(self.hyp_log_weights), np.diff(self.hyp_offsets))
-        held = np.bincount(label_of, minlength=len(labels)) > 0  # a table may have more
+        held = np.bincount(label_of, minlength=len(labels)) > 0  # the table may contain unused labels
         return labels[held], np.minimum(np.bincount(label_of, weights, len(labels))[held], 1.0)
 
     def with_labels(self, labels: Ints) -> Self:
-        """The same under other labels (num_tracks, 2), of which no two that differed are the same."""
+        """Return the density with other labels (num_tracks, 2); distinct labels must stay distinct."""
         members, hyps = labels[self.hyp_tracks], np.repeat(np.arange(self.num_hyps), np.diff(self.hyp_offsets))
         order = np.lexsort((members[:, 1], members[:, 0], hyps))
         return self.with_fields(tracks=self.tracks.with_fields(labels=labels), hyp_tracks=self.hyp_tracks[order])
@@ -65,7 +65,7 @@ class Hypotheses(LabelledDensity):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class GLMB(Hypotheses):
-    """delta-GLMB density (paper eq. 4); marginalised delta-GLMB (eq. 10) where every label set occurs once.
+    """delta-GLMB density (paper eq. 4); marginalised delta-GLMB (eq. 10) if every label set occurs once.
 
     Attributes:
         tracks: track table shared by all hypotheses.
@@ -73,7 +73,7 @@ class GLMB(Hypotheses):
         hyp_tracks: indices into `tracks`, in increasing label order within a hypothesis.
         hyp_log_weights: (num_hyps,) normalised log weights.
 
-    The arrays are copied, checked once, here, and read-only from then on.
+    The arrays are copied, checked once at creation, and read-only afterwards.
 
     Raises:
         InputError: as `validate`.
@@ -87,15 +87,15 @@ class GLMB(Hypotheses):
 
     @property
     def is_marginalised(self) -> bool:
-        """Whether every label set occurs once."""
+        """True if every label set occurs once."""
         return len(group_by_label_set(self.to_kernel())[1]) == self.num_hyps
 
     def cardinality(self) -> Floats:
-        """Probabilities of 0, 1, ... targets, up to the size of the largest hypothesis."""
+        """Return the probabilities of 0, 1, ... targets, up to the size of the largest hypothesis."""
         return np.asarray(np.bincount(np.diff(self.hyp_offsets), np.exp(self.hyp_log_weights)), np.float64)
 
     def heaviest(self, number: int) -> tuple[Ints, Floats]:
-        """(number,) tracks of the heaviest hypothesis of so many targets, and how probably each one's label exists."""
+        """Return the heaviest hypothesis of `number` targets: tracks and existence probability of each one's label."""
         candidates = np.flatnonzero(np.diff(self.hyp_offsets) == number)
         best = int(candidates[np.argmax(self.hyp_log_weights[candidates])])
         chosen = self.hyp_tracks[self.hyp_offsets[best] : self.hyp_offsets[best + 1]]
@@ -104,32 +104,32 @@ class GLMB(Hypotheses):
         return chosen, np.minimum(self.track_existence @ same, 1.0)
 
     def to_kernel(self) -> kt.Glmb:
-        """The same arrays as the bundle that kernels take."""
+        """Return the arrays as a kernel bundle."""
         return kt.Glmb(self.tracks.to_kernel(), *_HYPOTHESES(self))
 
     def to_factors(self) -> kt.FactoredGlmb:
-        """The one factor, as kernels take several."""
+        """Return the density as a kernel bundle with one factor."""
         own = self.to_kernel()
         tracks_end, hyps_end = np.array([0, len(own.tracks.labels)]), np.array([0, len(own.hyp_log_weights)])
         return kt.FactoredGlmb(own.tracks, tracks_end, *own[1:], hyps_end)
 
     @classmethod
     def from_kernel(cls, glmb: kt.Glmb, sources: Ints | None = None) -> GLMB:
-        """The arrays of a bundle, and the sources of its tracks, as they are; a kernel's own need no check."""
+        """Return a density with the arrays of a kernel bundle and its track sources, without copies and checks."""
         return unchecked(cls, TrackTable.from_kernel(glmb.tracks, sources), *glmb[1:])
 
     @classmethod
     def empty(cls, state_dim: int) -> GLMB:
-        """The density that is certain of no target."""
+        """Return the density that is certain of no target."""
         none = TrackTable.empty(state_dim)
         return unchecked(cls, none, np.zeros(2, np.int64), np.empty(0, np.int64), np.zeros(1))
 
     @classmethod
     def from_hypotheses(cls, tracks: TrackTable, hypotheses: Sequence[Sequence[int]], weights: Any) -> GLMB:
-        """Density from hypotheses, each a sequence of indices into `tracks` in any order, and their linear weights.
+        """Return the density of hypotheses, each a sequence of indices into `tracks`, and their linear weights.
 
-        Raises `InputError` for an index that is not in the table, for a label twice in one hypothesis, and for weights
-        that are negative or do not sum to one.
+        The indices may be in any order. Raises `InputError` for an index outside the table, a label twice in one
+        hypothesis, and weights that are negative or do not sum to one.
         """
         hyp_log_weights = log_weights("weights", weights)
         if len(hyp_log_weights) != len(hypotheses):

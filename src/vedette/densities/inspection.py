@@ -1,4 +1,4 @@
-"""Targets one by one, in words and by columns: what densities and estimates say of those that they hold."""
+"""Inspection of densities and estimates: their targets one by one, in words, and as columns."""
 
 from __future__ import annotations
 
@@ -12,45 +12,45 @@ from vedette.internal.text import pluralise
 from vedette.kernels.base.types import HEIGHT, Floats, Ints
 
 _MOST_TOLD = 3
-_LARGE = 1e7  # m, from which on a place is told in powers of ten
+_LARGE = 1e7  # m, from which on a position is shown in powers of ten
 _CORNERS, _FAINTEST = 73, 0.15
 _COLUMNS = ("x_m", "y_m", "vx_mps", "vy_mps")
 
 
 class Target(NamedTuple):
-    """One target that there may be."""
+    """One possible target."""
 
     label: tuple[int, int] | None  # birth step and birth index; None in a density without labels
-    existence: float  # probability that it is there
-    mean: Floats  # (state_dim,) of its state, if it is
+    existence: float  # existence probability
+    mean: Floats  # (state_dim,) of its state, if it exists
     cov: Floats  # (state_dim, state_dim)
 
 
 class Hypothesis(NamedTuple):
-    """One set of targets that there may be, each with its density."""
+    """One possible set of targets, each with its density."""
 
     weight: float  # its probability
     labels: tuple[tuple[int, int], ...]  # in increasing order
     tracks: Ints  # (num_targets,) for each label, the row of the density's track table
-    measurements: tuple[int | None, ...] | None  # for each label, its row of the last scan, or None; None: not known
+    measurements: tuple[int | None, ...] | None  # per label, row of the last scan, None if missed; None: not known
 
 
 class Targets(NamedTuple):
-    """Targets, or of an intensity its components, row by row."""
+    """Targets, or components of an intensity, one per row."""
 
     labels: Ints | None  # (num, 2)
     weights: Floats  # (num,) probability of existence, or expected number
     means: Floats  # (num, state_dim)
     covs: Floats  # (num, state_dim, state_dim)
-    measurements: Ints | None = None  # (num,) the likeliest of the last scan, -1: missed; None: not known
+    measurements: Ints | None = None  # (num,) likeliest measurement of the last scan, -1: missed; None: not known
 
     def each(self) -> Iterator[Target]:
-        """One by one."""
+        """Iterate over the targets."""
         labels = [None] * len(self.weights) if self.labels is None else map(tuple, self.labels.tolist())
         return map(Target, labels, self.weights.tolist(), self.means, self.covs)
 
     def in_words(self) -> str:
-        """The likeliest few: label, probability (or expected number), place and its standard deviation."""
+        """Return the likeliest few in words: label, probability (or expected number), position and its std."""
         first = np.argsort(-self.weights, kind="stable")[:_MOST_TOLD]
         told = []
         for target in self._at(first).each():
@@ -62,13 +62,13 @@ class Targets(NamedTuple):
         return "; ".join(told + ([f"{more} more"] if more else []))
 
     def columns(self, weight: str) -> dict[str, list[Any]]:
-        """By columns, as `MultiTarget.to_table` has them."""
+        """Return the columns of `MultiTarget.to_table`."""
         names = {} if self.labels is None else {"label": [f"{step}.{index}" for step, index in self.labels.tolist()]}
         taken = {} if self.measurements is None else {"measurement": indices_or_none(self.measurements)}
         return {**names, weight: self.weights.tolist(), **taken, **state_columns(self.means, self.covs)}
 
     def draw(self, axes: Any) -> None:
-        """Ellipses of two standard deviations of the places into axes of Matplotlib, the fainter the less is there."""
+        """Draw position ellipses of two standard deviations into axes of Matplotlib; improbable targets are faint."""
         if self.means.shape[1] < 2:
             raise InputError(
                 f"plot: expected states that begin with x and y; got {pluralise(self.means.shape[1], 'number')}"
@@ -93,16 +93,15 @@ class Targets(NamedTuple):
 
 
 def indices_or_none(measurements: Ints) -> list[int | None]:
-    """The indices, None in the place of -1."""
+    """Return the indices, with None in place of -1."""
     return [None if index < 0 else index for index in measurements.tolist()]
 
 
 def state_columns(means: Floats, covs: Floats, *, has_height: bool = False) -> dict[str, list[float]]:
-    """Return the columns `x_m`, `y_m`, `vx_mps`, `vy_mps` of states and `std_...`, their standard deviations.
+    """Return the columns `x_m`, `y_m`, `vx_mps`, `vy_mps` of states and their stds `std_...`.
 
     Args:
-        means: (num, state_dim). With four components or more the third and fourth are velocities.
-        covs: (num, state_dim, state_dim).
+        means: (num, are included only for states of (num, state_dim, state_dim).
         has_height: True if components 4 and 5 are height and vertical velocity: `z_m` and `vz_mps`.
     """
     names = _COLUMNS[: 4 if means.shape[1] >= 4 else min(2, means.shape[1])]

@@ -1,4 +1,4 @@
-"""Label sets of a GLMB, and parts of densities: some of their hypotheses, labels or factors, side by side."""
+"""Label sets of a GLMB, and parts of densities: subsets of their hypotheses, labels or factors."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from vedette.kernels.labelled.labels import group_by_label_set
 Label: TypeAlias = tuple[int, ...]
 LabelSet: TypeAlias = tuple[Label, ...]
 _Labelled = TypeVar("_Labelled", bound=LabelledDensity)
-WHOLE = MixtureCaps(-math.inf, 0.0, 2**62)  # which leave mixtures as they are
+WHOLE = MixtureCaps(-math.inf, 0.0, 2**62)  # leaves mixtures unchanged
 
 
 class LabelSets(NamedTuple):
@@ -34,7 +34,7 @@ class LabelSets(NamedTuple):
 
 
 def label_sets(belief: LabelledDensity) -> LabelSets:
-    """The label sets of a GLMB and which of them each hypothesis has."""
+    """Return the label sets of a GLMB and the set of each hypothesis."""
     hyps, labels = belief.as_hypotheses(), belief.tracks.labels.tolist()
     groups, firsts = group_by_label_set(hyps)
     members = [hyps.hyp_tracks[hyps.hyp_offsets[h] : hyps.hyp_offsets[h + 1]] for h in firsts.tolist()]
@@ -43,7 +43,7 @@ def label_sets(belief: LabelledDensity) -> LabelSets:
 
 
 def take_hypotheses(belief: GLMB, places: Ints) -> GLMB:
-    """The hypotheses at `places`, in that order, with their tracks only; their weights are not normalised."""
+    """Return the hypotheses at `places`, in that order, with only their tracks; their weights are not normalised."""
     offsets, entries = take_runs(belief.hyp_offsets, places)
     used, renumbered = np.unique(belief.hyp_tracks[entries], return_inverse=True)
     return unchecked(
@@ -56,7 +56,7 @@ def take_hypotheses(belief: GLMB, places: Ints) -> GLMB:
 
 
 def take_factors(density: FactoredGLMB, places: Ints) -> FactoredGLMB:
-    """The factors at `places`, in that order."""
+    """Return the factors at `places`, in that order."""
     track_offsets, tracks = take_runs(density.track_offsets, places)
     factor_offsets, hyps = take_runs(density.factor_offsets, places)
     hyp_offsets, entries = take_runs(density.hyp_offsets, hyps)
@@ -75,7 +75,7 @@ def take_factors(density: FactoredGLMB, places: Ints) -> FactoredGLMB:
 
 
 def in_label_order(density: FactoredGLMB) -> FactoredGLMB:
-    """The factors, each of at least one track, in increasing order of their first labels."""
+    """Return the factors, each of at least one track, in increasing order of their first labels."""
     if density.num_factors == 0:
         return density
     _, place = distinct_labels(density.tracks.labels)
@@ -83,16 +83,17 @@ def in_label_order(density: FactoredGLMB) -> FactoredGLMB:
 
 
 def lmb_of_factors(density: FactoredGLMB, factors: Ints) -> LMB:
-    """Factors of one label each, laid out as by `FactoredGLMB.from_lmb` and in label order, with their tracks."""
+    """Return factors of one label each, in the form of `FactoredGLMB.from_lmb` and in label order, as an LMB."""
     first = density.factor_offsets[factors]
     logits = density.hyp_log_weights[first + 1] - density.hyp_log_weights[first]
     return unchecked(LMB, take_tracks(density.tracks, density.track_offsets[factors]), logits)
 
 
 def as_single_factor(glmb: GLMB) -> FactoredGLMB:
-    """A GLMB as one factor; of one label, as `FactoredGLMB.from_lmb` lays it out, of none, no factor at all.
+    """Return a GLMB as one factor.
 
-    Nothing is lost: the tracks of one label become one mixture of all their components.
+    With one label it has the form of `FactoredGLMB.from_lmb`; with no label there is no factor. Nothing is lost: the
+    tracks of one label become one mixture of all their components.
     """
     labels, _ = distinct_labels(glmb.tracks.labels[glmb.hyp_tracks])
     whole = LMB.from_kernel(glmb_to_lmb(glmb.to_kernel(), WHOLE)) if len(labels) < 2 else glmb
@@ -100,7 +101,7 @@ def as_single_factor(glmb: GLMB) -> FactoredGLMB:
 
 
 def possible(belief: _Labelled) -> _Labelled:
-    """The belief without hypotheses of weight zero; of a product, all tracks stay."""
+    """Return the belief without hypotheses of weight zero; a product keeps all tracks."""
     given: Any = belief
     if belief.is_lmb or (kept := given.hyp_log_weights > -math.inf).all():
         return belief
@@ -116,9 +117,9 @@ def possible(belief: _Labelled) -> _Labelled:
 
 
 def without_labels(belief: _Labelled, labels: Ints) -> tuple[_Labelled, float]:
-    """The belief of the targets that have none of (num, 2) `labels`, and the summed existence of those that do.
+    """Return the belief of the targets with none of (num, 2) `labels`, and the summed existence of those that have one.
 
-    Hypotheses of a GLMB that then hold the same tracks become one. Factors of which no label is left go.
+    Hypotheses of a GLMB that then hold the same tracks are merged. Factors without remaining labels are dropped.
     """
     if len(labels) == 0:
         return belief, 0.0
@@ -133,7 +134,7 @@ def without_labels(belief: _Labelled, labels: Ints) -> tuple[_Labelled, float]:
 
 
 def are_among(labels: Ints, table: Ints) -> Bools:
-    """(num_labels,) whether each label is in a table."""
+    """Mask (num_labels,), True if a label is in a table."""
     distinct, place = distinct_labels(np.concatenate([table, labels]))
     known = np.zeros(len(distinct), np.bool_)
     known[place[: len(table)]] = True
@@ -155,9 +156,10 @@ def _glmb_without(belief: GLMB, kept: Bools) -> GLMB:
 
 
 def relinked(belief: GLMB, links: Ints) -> GLMB:
-    """The GLMB with each track replaced by that of its label that `links` (num_tracks,) has, or left out where -1.
+    """Return the GLMB with each track replaced by the track in `links` (num_tracks,), or left out if that is -1.
 
-    Hypotheses that then hold the same tracks become one, of the sum of their weights, in the order of the first.
+    Both tracks must have the same label. Hypotheses that then hold the same tracks are merged, with the sum of their
+    weights, in the order of the first.
     """
     weights: dict[tuple[int, ...], float] = {}
     for hyp, log_weight in enumerate(belief.hyp_log_weights.tolist()):
@@ -171,12 +173,13 @@ def relinked(belief: GLMB, links: Ints) -> GLMB:
 
 
 class JoinedFactors(NamedTuple):
-    """The smallest groups of the factors of several densities of which no two share a label, in increasing order of
-    their first labels. Each density is the product of its parts in the groups; factors without labels are in none.
+    """The smallest groups of the factors of several densities such that no two groups share a label.
 
-    densities: whose factors they are. groups: for each density, (num_factors,) the group of each factor, or -1.
-    alone: (num_groups,) whether all factors in the group are of its only label, laid out as by
-    `FactoredGLMB.from_lmb`.
+    Groups are in increasing order of their first labels. Each density is the product of its parts in the groups;
+    factors without labels are in none.
+
+    densities: the densities of the factors. groups: for each density, (num_factors,) the group of each factor, or -1.
+    alone: (num_groups,) True if all factors in the group are of its only label, in the form of `FactoredGLMB.from_lmb`.
     """
 
     densities: tuple[FactoredGLMB, ...]
@@ -184,7 +187,7 @@ class JoinedFactors(NamedTuple):
     alone: Bools
 
     def lmbs_alone(self) -> list[LMB]:
-        """What each density says of the labels that are alone in all their factors."""
+        """Return for each density the LMB of the labels that are alone in all their factors."""
         found = []
         for density, groups in zip(self.densities, self.groups, strict=True):
             factors = np.argsort(groups, kind="stable")[np.count_nonzero(groups < 0) :]
@@ -192,7 +195,7 @@ class JoinedFactors(NamedTuple):
         return found
 
     def parts(self, group: int) -> list[FactoredGLMB]:
-        """What each density has in a group."""
+        """Return the part of each density in a group."""
         return [
             take_factors(density, np.flatnonzero(groups == group))
             for density, groups in zip(self.densities, self.groups, strict=True)
@@ -200,7 +203,7 @@ class JoinedFactors(NamedTuple):
 
 
 def join_factors(densities: Sequence[FactoredGLMB]) -> JoinedFactors:
-    """The factors of densities of one state dimension, at least one, gathered."""
+    """Group the factors of densities of one state dimension, at least one."""
     distinct, place = distinct_labels(np.concatenate([density.tracks.labels for density in densities]))
     firsts = offsets_of([density.tracks.num_tracks for density in densities])
     places = [place[low:high] for low, high in pairwise(firsts.tolist())]
@@ -212,7 +215,7 @@ def join_factors(densities: Sequence[FactoredGLMB]) -> JoinedFactors:
             if len(own):
                 least = np.minimum.reduceat(root[own], density.track_offsets[:-1][counts > 0])
                 np.minimum.at(root, own, np.repeat(least, counts[counts > 0]))
-        root = root[root]  # a shortcut through those that are joined already
+        root = root[root]  # path compression
     _, group_of_label = np.unique(root, return_inverse=True)
     groups = []
     for density, own, counts in zip(densities, places, sizes, strict=True):

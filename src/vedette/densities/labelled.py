@@ -1,4 +1,4 @@
-"""What densities that name their targets have in common, and the simplest of them, the labelled multi-Bernoulli."""
+"""Base of the labelled densities, and the simplest of them, the labelled multi-Bernoulli."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.labelled.cardinality import convolved
 from vedette.kernels.labelled.conversions import factored_to_glmb
 
-LABELLED = "a GLMB, an LMB or a FactoredGLMB"  # how messages call one
+LABELLED = "a GLMB, an LMB or a FactoredGLMB"  # description in messages
 
 
 class LabelledDensity(MultiTarget):
-    """A density that names its targets: a product of factors, each a weighted list of label sets, over one track table.
+    """A labelled multi-target density: a product of factors, each a weighted list of label sets, over one track table.
 
-    An LMB is one factor a label, with the sets {} and {l}; a GLMB is one factor; a FactoredGLMB any number of them.
-    What is asked of all of them is asked here: nobody needs to know which of them one is.
+    An LMB is one factor per label, with the sets {} and {l}; a GLMB is one factor; a FactoredGLMB any number of them.
+    Operations that all of them support are methods of this class, so that callers need not distinguish them.
 
     Attributes:
         tracks: track table of all factors.
         is_lmb: whether every label is a factor of its own, of one track.
-        is_product: whether it is kept as a product of GLMBs, whatever their number.
+        is_product: whether it is stored as a product of GLMBs, whatever their number.
     """
 
     __slots__ = ()
@@ -55,15 +55,15 @@ class LabelledDensity(MultiTarget):
     @property
     @abstractmethod
     def is_marginalised(self) -> bool:
-        """Whether every label set occurs once in its factor."""
+        """True if every label set occurs once in its factor."""
 
     @property
     @abstractmethod
     def track_existence(self) -> Floats:
-        """(num_tracks,) probability that there is a target and that it has this track."""
+        """Probability that a target exists and has this track, shape (num_tracks,)."""
 
     def cardinality_of_labels(self) -> Floats:
-        """Probabilities of 0, 1, ... targets with labels."""
+        """Return the probabilities of 0, 1, ... labelled targets."""
         return self.cardinality()
 
     @abstractmethod
@@ -71,28 +71,28 @@ class LabelledDensity(MultiTarget):
         """See `vedette.densities.existence_probabilities`."""
 
     def __len__(self) -> int:
-        """Number of labels, whether their targets are likely or not."""
+        """Number of labels, probable or not."""
         return len(self.label_existence()[0])
 
     def targets(self) -> Iterator[Target]:
-        """Label, probability of existence, mean and covariance of each target, in increasing label order.
+        """Iterate over label, existence probability, mean and covariance of each target, in increasing label order.
 
-        Mean and covariance are those of the label's marginal density, over all hypotheses and components; of an
-        estimate that keeps rivals apart see `vedette.densities.map_estimate`.
+        Mean and covariance are those of the label's marginal density, over all hypotheses and components; for an
+        estimate that keeps rival components apart see `vedette.densities.map_estimate`.
         """
         return self._targets().each()
 
     def hypotheses(self, max_hypotheses: int = 1000) -> Iterator[Hypothesis]:
-        """The likeliest hypotheses, by descending weight: `weight`, `labels`, and `tracks`, their rows of the table.
+        """Iterate over the likeliest hypotheses by descending weight: `weight`, `labels`, and `tracks` (table rows).
 
-        `measurements` has, label by label, the row of the last scan that the hypothesis takes for the target's, None
-        where it was missed. It is known, and not None as a whole, after the scan of a `DeltaGlmbFilter` that is not
-        marginalised; of which tracks those were before, see `TrackTable.sources`. In an LMB and in a product of
-        GLMBs a track is what all measurements together have left.
+        `measurements` has, label by label, the row of the last scan that the hypothesis associates with the target,
+        None if it was missed. It is known, and not None as a whole, after the scan of a `DeltaGlmbFilter` that is not
+        marginalised; `TrackTable.sources` gives the previous track of each. In an LMB and in a product of GLMBs a track
+        combines the effect of all measurements.
 
-        Of a product, and an LMB is one, these are products of one hypothesis of each factor. The weights are
-        probabilities: where there are more than `max_hypotheses`, they sum to less than one.
-        Raises `InputError` for a `max_hypotheses` below 1.
+        For a product, such as an LMB, these are products of one hypothesis of each factor. The weights are
+        probabilities: with more than `max_hypotheses` hypotheses, they sum to less than one. Raises `InputError` for a
+        `max_hypotheses` below 1.
         """
         (listed, left_out), taken = self.heaviest_sets(max_hypotheses), self.tracks.measurements
         weights, ends = np.exp(listed.hyp_log_weights) * (1.0 - left_out), listed.hyp_offsets.tolist()
@@ -120,18 +120,18 @@ class LabelledDensity(MultiTarget):
         shares = np.where(totals > 0.0, weights / np.where(totals > 0.0, totals, 1.0), 1.0 / counts[place])
         order = np.argsort(place, kind="stable")
         moments = run_moments(shares[order], means[order], covs[order], checks.offsets_of(counts))
-        _, row = checks.distinct_labels(np.concatenate([table, labels]))  # a table may have more
+        _, row = checks.distinct_labels(np.concatenate([table, labels]))  # the table may contain unused labels
         own = row[len(table) :]
         taken = self.tracks.measurements
         if taken is not None:
-            chances = np.zeros((len(table), taken.max() + 2))  # of each label, that it was missed, and by measurement
+            chances = np.zeros((len(table), taken.max() + 2))  # per label: missed, then by measurement
             np.add.at(chances, (place, taken + 1), weights)
             taken = chances.argmax(axis=1)[own] - 1
         means, covs = (part[own] for part in moments)
         return Targets(labels, existence, means, covs, taken)
 
     def _parts(self) -> str:
-        """What it is made of beside labels."""
+        """Return the part of the summary after the labels."""
         return ""
 
     def _summary(self) -> str:
@@ -140,23 +140,23 @@ class LabelledDensity(MultiTarget):
 
     @abstractmethod
     def to_kernel(self) -> Any:
-        """The same arrays as the bundle that kernels take."""
+        """Return the arrays as a kernel bundle."""
 
     @abstractmethod
     def to_factors(self) -> kt.FactoredGlmb:
-        """The factors as kernels take them."""
+        """Return the factors as a kernel bundle."""
 
     def as_hypotheses(self) -> kt.Glmb:
-        """The hypotheses of all factors as one list; its weights sum to the number of factors."""
+        """Return the hypotheses of all factors as one list; its weights sum to the number of factors."""
         factors = self.to_factors()
         return kt.Glmb(factors.tracks, factors.hyp_offsets, factors.hyp_tracks, factors.hyp_log_weights)
 
     @abstractmethod
     def with_labels(self, labels: Ints) -> Self:
-        """The same under other labels (num_tracks, 2), of which no two that differed are the same."""
+        """Return the density with other labels (num_tracks, 2); distinct labels must stay distinct."""
 
     def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
-        """Raise unless tracks are probability densities and sets of them normalised, in label order, as the class says.
+        """Raise unless the tracks are probability densities, and hypotheses are normalised and in label order.
 
         `InputError` for faults of form; `error` for values that are not finite, not normalised to 1e-9 or covariances
         that are not symmetric positive definite.
@@ -166,7 +166,7 @@ class LabelledDensity(MultiTarget):
 
     @abstractmethod
     def _validate_form(self, error: type[VedetteError]) -> None:
-        """Raise where what is not in the track table is not as it should be."""
+        """Raise if an array outside the track table is invalid."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -174,11 +174,11 @@ class LMB(LabelledDensity):
     """Labelled multi-Bernoulli density: independent tracks, each with a probability of existence.
 
     Attributes:
-        tracks: one track a label, in increasing label order.
-        existence_logit: (num_tracks,) log r - log(1 - r); keeps full precision near r = 0 and r = 1, where it may be
+        tracks: one track per label, in increasing label order.
+        existence_logit: (num_tracks,) log r - log(1 - r), with full precision near r = 0 and r = 1, where it may be
             -inf and inf.
 
-    The arrays are copied, checked once, here, and read-only from then on.
+    The arrays are copied, checked once at creation, and read-only afterwards.
 
     Raises:
         InputError: as `validate`.
@@ -194,17 +194,17 @@ class LMB(LabelledDensity):
 
     @property
     def existence(self) -> Floats:
-        """(num_tracks,) probabilities of existence r."""
+        """Existence probabilities r, shape (num_tracks,)."""
         return expit(self.existence_logit)
 
     @property
     def track_existence(self) -> Floats:
-        """(num_tracks,) the same: of one track a label."""
+        """Existence probabilities r, shape (num_tracks,), as each label has one track."""
         return self.existence
 
     @property
     def is_marginalised(self) -> bool:
-        """Yes."""
+        """Always True."""
         return True
 
     def label_existence(self) -> tuple[Ints, Floats]:
@@ -212,15 +212,15 @@ class LMB(LabelledDensity):
         return self.tracks.labels, self.existence
 
     def cardinality(self) -> Floats:
-        """Probabilities of 0, 1, ..., num_tracks targets."""
+        """Return the probabilities of 0, 1, ..., num_tracks targets."""
         return poisson_binomial(self.existence_logit)
 
     def to_kernel(self) -> kt.Lmb:
-        """The same arrays as the bundle that kernels take."""
+        """Return the arrays as a kernel bundle."""
         return kt.Lmb(self.tracks.to_kernel(), for_kernel(self.existence_logit))
 
     def to_factors(self) -> kt.FactoredGlmb:
-        """A factor a label, with the hypotheses that it is absent and that it is there."""
+        """Return a kernel bundle with one factor per label, whose hypotheses are absence and presence."""
         num = self.tracks.num_tracks
         log_weights = np.empty((num, 2))
         log_weights[:, 0] = -np.logaddexp(0.0, self.existence_logit)
@@ -230,26 +230,26 @@ class LMB(LabelledDensity):
         return kt.FactoredGlmb(self.tracks.to_kernel(), each, ends, np.arange(num), log_weights.ravel(), 2 * each)
 
     def with_labels(self, labels: Ints) -> LMB:
-        """The same under other labels, put in increasing order."""
+        """Return the density with other labels, sorted in increasing order."""
         return self.with_fields(tracks=self.tracks.with_fields(labels=labels)).take(np.lexsort(labels.T[::-1]))
 
     def take(self, places: Ints) -> LMB:
-        """The labels at `places`, in that order."""
+        """Return the labels at `places`, in that order."""
         return unchecked(LMB, take_tracks(self.tracks, places), self.existence_logit[places])
 
     @classmethod
     def from_kernel(cls, lmb: kt.Lmb) -> LMB:
-        """The arrays of a bundle as they are; a kernel's own need no check."""
+        """Return a density with the arrays of a kernel bundle, without copies and checks."""
         return unchecked(cls, TrackTable.from_kernel(lmb.tracks), lmb.existence_logit)
 
     @classmethod
     def empty(cls, state_dim: int) -> LMB:
-        """The density that is certain of no target."""
+        """Return the density that is certain of no target."""
         return unchecked(cls, TrackTable.empty(state_dim), np.empty(0))
 
     @classmethod
     def from_bernoullis(cls, labels: Any, existence: Any, means: Any, covs: Any) -> LMB:
-        """Density of one Gaussian a label, in any order; it is put in increasing label order.
+        """Return a density of one Gaussian per label. The labels may be in any order and are sorted.
 
         labels: (num_tracks, 2) integers. existence: (num_tracks,) in [0, 1]. means: (num_tracks, state_dim).
         covs: (num_tracks, state_dim, state_dim). Raises `InputError` for another shape, a label twice, a probability
@@ -271,6 +271,6 @@ class LMB(LabelledDensity):
 
 
 def poisson_binomial(existence_logit: Floats) -> Floats:
-    """Distribution of the number of independent targets that exist."""
+    """Return the distribution of the number of independent targets that exist."""
     chances = np.stack([expit(-existence_logit), expit(existence_logit)], axis=1)
     return convolved(chances.ravel(), 2 * np.arange(len(chances) + 1))

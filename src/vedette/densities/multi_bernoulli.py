@@ -1,4 +1,4 @@
-"""Multi-Bernoulli density with Gaussian-mixture components, without labels."""
+"""Unlabelled multi-Bernoulli density with Gaussian-mixture components."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _ARRAYS = kernel_arrays("existence_logit", "offsets", *kt.Mixture._fields)
 
 @dataclass(frozen=True, slots=True, repr=False)
 class MultiBernoulli(Unlabelled):
-    """Independent Bernoullis: each is a target with its probability of existence, or nothing. An LMB without labels.
+    """Independent Bernoullis, each a target with its existence probability: an LMB without labels.
 
     Attributes:
         existence_logit: (num_bernoullis,) log r - log(1 - r), which may be -inf and inf.
@@ -34,7 +34,7 @@ class MultiBernoulli(Unlabelled):
         means: (num_components, state_dim).
         covs: (num_components, state_dim, state_dim), symmetric positive definite.
 
-    The arrays are copied, checked once, here, and read-only from then on.
+    The arrays are copied, checked once at creation, and read-only afterwards.
 
     Raises:
         InputError: as `validate`.
@@ -48,7 +48,7 @@ class MultiBernoulli(Unlabelled):
     _weight: ClassVar[str] = "existence"
 
     def targets(self) -> Iterator[Target]:
-        """Probability of existence, mean and covariance of each Bernoulli; their labels are None."""
+        """Iterate over existence probability, mean and covariance of each Bernoulli; their labels are None."""
         return self._targets().each()
 
     def _targets(self) -> Targets:
@@ -64,7 +64,7 @@ class MultiBernoulli(Unlabelled):
 
     @property
     def existence(self) -> Floats:
-        """(num_bernoullis,) probabilities of existence r."""
+        """Existence probabilities r, shape (num_bernoullis,)."""
         return expit(self.existence_logit)
 
     @property
@@ -73,28 +73,28 @@ class MultiBernoulli(Unlabelled):
         return float(self.existence.sum())
 
     def cardinality(self) -> Floats:
-        """Probabilities of 0, 1, ..., num_bernoullis targets."""
+        """Return the probabilities of 0, 1, ..., num_bernoullis targets."""
         return poisson_binomial(self.existence_logit)
 
     def to_kernel(self) -> kt.Lmb:
-        """The same arrays as the bundle that kernels take, every label (-1, -1)."""
+        """Return the arrays as a kernel bundle, with label (-1, -1) for all."""
         labels = np.full((self.num_bernoullis, 2), -1, np.int64)
         existence_logit, offsets, *columns = _ARRAYS(self)
         return kt.Lmb(kt.Tracks(labels, offsets, kt.Mixture(*columns)), existence_logit)
 
     @classmethod
     def from_kernel(cls, lmb: kt.Lmb) -> MultiBernoulli:
-        """The Bernoullis of a bundle, whatever their labels; a kernel's own need no check."""
+        """Return the Bernoullis of a kernel bundle, ignoring labels, without copies and checks."""
         return unchecked(cls, lmb.existence_logit, lmb.tracks.offsets, *lmb.tracks.components)
 
     @classmethod
     def empty(cls, state_dim: int) -> MultiBernoulli:
-        """The density that is certain of no target."""
+        """Return the density that is certain of no target."""
         return cls(np.empty(0), np.zeros(1, np.int64), np.empty(0), *no_gaussians(state_dim))
 
     @classmethod
     def from_gaussians(cls, existence: Any, means: Any, covs: Any) -> MultiBernoulli:
-        """Density of one Gaussian a Bernoulli.
+        """Return a density of one Gaussian per Bernoulli.
 
         existence: (num_bernoullis,) in [0, 1]. means: (num_bernoullis, state_dim). covs: (num_bernoullis, state_dim,
         state_dim). Raises `InputError` for another shape, a probability outside [0, 1], or a covariance that is not
@@ -107,8 +107,8 @@ class MultiBernoulli(Unlabelled):
     def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
         """Raise unless existences are logits and every Bernoulli's mixture is a probability density.
 
-        `InputError` for faults of form; `error` for values that are not numbers, not normalised to 1e-9 or covariances
-        that are not symmetric positive definite.
+        `InputError` for faults of form; `error` for NaN values, values not normalised to 1e-9 or covariances that are
+        not symmetric positive definite.
         """
         checks.check_array("existence_logit", self.existence_logit, np.float64, (None,))
         num = self.num_bernoullis

@@ -1,4 +1,4 @@
-"""Products of powers of labelled densities, laid out so that their power integrals with another are sums of rows."""
+"""Products of powers of labelled densities, prepared so that their power integrals with another are sums of rows."""
 
 from __future__ import annotations
 
@@ -22,31 +22,31 @@ from vedette.kernels.labelled.power_integrals import Laid, Places, SensorCases, 
 
 
 class SensorPower(NamedTuple):
-    """What one sensor gives to a product."""
+    """Factor of one sensor in a product: its cases raised to a power."""
 
     cases: DensityBatch
     power: float  # above 0
-    held: Bools  # (num_cases, num_sets) false where the case counts as lacking the set
-    floors: Floats  # (num_cases, n) log weights of stand-ins for the 1st, ..., n-th, 1st, ... set that a case lacks
+    held: Bools  # (num_cases, num_sets) False if the case counts as lacking the set
+    floors: Floats  # (num_cases, n) log weights of substitutes for the 1st, ..., n-th, 1st, ... set that a case lacks
 
     @classmethod
     def whole(cls, cases: DensityBatch, held: Bools) -> SensorPower:
-        """A sensor alone, of which nothing is lacking."""
+        """Return the factor of a single sensor, with nothing missing."""
         return cls(cases, 1.0, held, np.zeros((cases.num_cases, 1)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PowerProducts:
-    """A prediction and the cases of some sensors, ready for the power integrals of any of their products.
+    """A prediction and the cases of some sensors, prepared for the power integrals of any of their products.
 
     Attributes:
-        laid: the cases, one sensor's after another's.
+        laid: the cases, concatenated over the sensors.
         log_weights, log_dets: (num_sets,), (num_members,) log weights of the prediction and of the determinants of its
             covariances.
         rows: (num_members, row_size) its information rows.
         sensors: columns of a joint action whose sensors take part.
         first_cases: the first case of each of these sensors.
-        num_samples, num_threads: as the cases have them.
+        num_samples, num_threads: as in the cases.
         state_dim: length of a target's state.
     """
 
@@ -61,9 +61,9 @@ class PowerProducts:
     state_dim: int
 
     def z(self, actions: Ints, exponents: Sequence[tuple[float, float]], unit_volume: float = 1.0) -> Floats:
-        """(num_joint, num_samples, num_exponents) Z(a, b) of joint actions (num_joint, num_sensors).
+        """Z(a, b) of joint actions (num_joint, num_sensors), shape (num_joint, num_samples, num_exponents).
 
-        Raises `InputError` for exponents that are not finite or of a single density to no positive power.
+        Raises `InputError` for exponents that are not finite, or of a single density to a power that is not positive.
         """
         pairs = check_exponents(exponents)
         kinds = [pairs[:, 0] == 0.0, (pairs != 0.0).all(axis=1), pairs[:, 1] == 0.0]
@@ -97,13 +97,13 @@ class PowerProducts:
 
 
 def _given(pairs: Floats, log_weights: Floats) -> Floats:
-    """a w_p, where 0 to the power of 0 is 1."""
+    """Return a w_p, where 0 to the power of 0 is 1."""
     powers = pairs[:, :1]
     return np.where(powers == 0.0, 0.0, np.where(powers == 0.0, 1.0, powers) * log_weights)
 
 
 def check_exponents(exponents: Sequence[tuple[float, float]]) -> Floats:
-    """(num, 2) exponents; `InputError` unless they are pairs of finite numbers, positive where the other one is 0."""
+    """Return exponents (num, 2). Raises `InputError` unless finite pairs, with one positive if the other is 0."""
     try:
         pairs = np.array(exponents, np.float64).reshape(len(exponents), 2)
     except (TypeError, ValueError, OverflowError):
@@ -118,12 +118,12 @@ def check_exponents(exponents: Sequence[tuple[float, float]]) -> Floats:
 def precompute_products(
     shares: Sequence[SensorPower], prediction: DensityBatch, sensors: Sequence[int] | None = None
 ) -> PowerProducts:
-    """Lay out products of one case of each sensor, to be compared with the prediction on the sets that any sensor has.
+    """Prepare products of one case per sensor, for integrals with the prediction on the sets that any sensor has.
 
-    Where a case does not hold a set, its floor stands in for the weight, and for the Gaussians those of the moments of
-    the label over the sets that it holds; a label that it does not know is left out there, and the other sensors'
-    powers are scaled to sum to one. sensors: their columns in joint actions, all by default. A set that no chosen case
-    holds is left out of the integrals.
+    If a case lacks a set, its floor replaces the weight, and the Gaussians are those of the label's moments over the
+    sets that the case has. A label that the case lacks altogether is left out there, and the other sensors' powers are
+    scaled to sum to one. sensors: their columns in joint actions, all by default. A set that no chosen case has is left
+    out of the integrals.
 
     Raises `NumericalError` for a covariance that is not positive definite.
     """
@@ -147,7 +147,7 @@ def precompute_products(
 
 
 def _restricted(cases: DensityBatch, chosen: Ints) -> DensityBatch:
-    """The cases on some of their sets, not renormalised; factors without a set go."""
+    """Return the cases on some of their sets, without normalisation; factors without a set are dropped."""
     counts = np.histogram(chosen, cases.factor_offsets)[0] if len(cases.factors) else np.empty(0, np.int64)
     starts = cases.set_offsets
     members = np.array([m for i in chosen.tolist() for m in range(starts[i], starts[i + 1])], np.int64)
@@ -163,11 +163,11 @@ def _restricted(cases: DensityBatch, chosen: Ints) -> DensityBatch:
 
 
 def _lay_out(share: SensorPower, target: DensityBatch, references: Floats) -> tuple[Floats, Bools, Floats]:
-    """Log weights, what is held, and rows of a sensor's cases on the sets of `target`."""
+    """Return log weights, masks of held sets, and rows of a sensor's cases on the sets of `target`."""
     cases = share.cases
     own = {place: i for i, place in enumerate(cases.places)}
     places = np.array([own.get(place, -1) for place in target.places], np.int64)
-    lacking = np.zeros((cases.num_cases, 1))  # the last column, which the places of -1 take
+    lacking = np.zeros((cases.num_cases, 1))  # an additional last column for places of -1
     held = np.concatenate([share.held, lacking > 0.0], axis=1)[:, places]
     floors = share.floors[:, np.arange(len(places)) % share.floors.shape[1]]
     weights = np.concatenate([cases.log_weights, lacking], axis=1)[:, places]

@@ -28,7 +28,7 @@ class MultiTargetSamples(SummaryRepr):
 
     Attributes:
         offsets: (num_samples + 1,) targets of sample `i` are `offsets[i]:offsets[i + 1]`.
-        labels: (num_targets, 2) label of each target, in increasing order within a sample; -1, -1 where the density
+        labels: (num_targets, 2) label of each target, in increasing order within a sample; -1, -1 if the density
             has no labels.
         states: (num_targets, state_dim).
     """
@@ -43,14 +43,14 @@ class MultiTargetSamples(SummaryRepr):
         return len(self.offsets) - 1
 
     def sample(self, index: int) -> tuple[Ints, Floats]:
-        """Labels (num, 2) and states (num, state_dim) of one sample."""
+        """Return the labels (num, 2) and states (num, state_dim) of one sample."""
         if not 0 <= index < self.num_samples:
             raise InputError(f"index: expected one of {self.num_samples} samples; got {index}")
         targets = slice(self.offsets[index], self.offsets[index + 1])
         return self.labels[targets], self.states[targets]
 
     def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
-        """Raise `InputError` unless the arrays fit each other, `error` unless the states are finite."""
+        """Raise `InputError` unless the arrays are consistent, `error` unless the states are finite."""
         checks.check_array("states", self.states, np.float64, (None, None))
         checks.check_array("labels", self.labels, np.int64, (len(self.states), 2))
         checks.check_array("offsets", self.offsets, np.int64, (None,))
@@ -61,7 +61,7 @@ class MultiTargetSamples(SummaryRepr):
 
 
 def sample_glmb(density: GLMB, num_samples: int, *, rng: np.random.Generator) -> MultiTargetSamples:
-    """Independent samples of a GLMB: a hypothesis, then a state of each of its tracks."""
+    """Draw independent samples of a GLMB: a hypothesis, then a state of each of its tracks."""
     _check(num_samples, rng)
     hyps = _choose(density.hyp_log_weights, np.array([0, density.num_hyps]), np.zeros(num_samples, np.int64), rng)
     offsets, entries = checks.take_runs(density.hyp_offsets, hyps)
@@ -69,12 +69,12 @@ def sample_glmb(density: GLMB, num_samples: int, *, rng: np.random.Generator) ->
 
 
 def sample_lmb(density: LMB, num_samples: int, *, rng: np.random.Generator) -> MultiTargetSamples:
-    """Independent samples of an LMB: each track exists or not, then a state of each that does."""
+    """Draw independent samples of an LMB: the existing tracks, then a state of each of them."""
     return _independent(density.to_kernel(), density.existence, num_samples, rng)
 
 
 def sample_labelled(density: LabelledDensity, num_samples: int, *, rng: np.random.Generator) -> MultiTargetSamples:
-    """Independent samples of an LMB or of a GLMB."""
+    """Draw independent samples of an LMB or a GLMB."""
     if isinstance(density, LMB):
         return sample_lmb(density, num_samples, rng=rng)
     assert isinstance(density, GLMB)
@@ -82,9 +82,9 @@ def sample_labelled(density: LabelledDensity, num_samples: int, *, rng: np.rando
 
 
 def sample_poisson(density: Poisson, num_samples: int, *, rng: np.random.Generator) -> MultiTargetSamples:
-    """Independent samples of a Poisson density: a number of targets, then independent states.
+    """Draw independent samples of a Poisson density: a number of targets, then independent states.
 
-    Raises `InputError` where more than 10^9 targets are to be expected in all.
+    Raises `InputError` if the expected number of targets in all samples is more than 10^9.
     """
     _check(num_samples, rng)
     expected = density.expected_number
@@ -97,7 +97,7 @@ def sample_poisson(density: Poisson, num_samples: int, *, rng: np.random.Generat
 
 
 def sample_iid_cluster(density: IidCluster, num_samples: int, *, rng: np.random.Generator) -> MultiTargetSamples:
-    """Independent samples of an iid cluster: a number of targets, then independent states."""
+    """Draw independent samples of an iid cluster: a number of targets, then independent states."""
     _check(num_samples, rng)
     all_numbers = np.array([0, len(density.log_cardinality)])
     return _alike(density, _choose(density.log_cardinality, all_numbers, np.zeros(num_samples, np.int64), rng), rng)
@@ -106,26 +106,26 @@ def sample_iid_cluster(density: IidCluster, num_samples: int, *, rng: np.random.
 def sample_multi_bernoulli(
     density: MultiBernoulli, num_samples: int, *, rng: np.random.Generator
 ) -> MultiTargetSamples:
-    """Independent samples of a multi-Bernoulli: each Bernoulli exists or not, then a state of each that does."""
+    """Draw independent samples of a multi-Bernoulli: the existing Bernoullis, then a state of each of them."""
     return _independent(density.to_kernel(), density.existence, num_samples, rng)
 
 
 def _independent(density: Lmb, existence: Floats, num_samples: int, rng: np.random.Generator) -> MultiTargetSamples:
-    """Samples of independent targets of these probabilities of existence."""
+    """Draw samples of independent targets with these existence probabilities."""
     _check(num_samples, rng)
     exists = rng.random((num_samples, len(existence))) < existence
     return _drawn(checks.offsets_of(exists.sum(axis=1)), density.tracks, np.nonzero(exists)[1], rng)
 
 
 def _alike(density: Poisson | IidCluster, numbers: Ints, rng: np.random.Generator) -> MultiTargetSamples:
-    """Samples of these numbers of targets, all drawn from the density's one mixture."""
+    """Draw samples of these numbers of targets, all from the density's one mixture."""
     offsets, whole = checks.offsets_of(numbers), np.array([0, len(density.log_weights)])
     mixture = Tracks(np.full((1, 2), -1), whole, components_of(density.log_weights, density.means, density.covs))
     return _drawn(offsets, mixture, np.zeros(int(offsets[-1]), np.int64), rng)
 
 
 def _drawn(offsets: Ints, tracks: Tracks, chosen: Ints, rng: np.random.Generator) -> MultiTargetSamples:
-    """Samples of the `chosen` tracks (num_targets,), cut by offsets: one state of each."""
+    """Draw one state for each of the `chosen` tracks (num_targets,), which offsets divide into samples."""
     states = np.empty((0, tracks.components.means.shape[1]))
     if len(chosen):
         components = _choose(tracks.components.log_weights, tracks.offsets, chosen, rng)
@@ -140,7 +140,7 @@ def _check(num_samples: Any, rng: Any) -> None:
 
 
 def _choose(log_weights: Floats, offsets: Ints, runs: Ints, rng: np.random.Generator) -> Ints:
-    """One entry of each of `runs` (indices of runs of `log_weights`), with probability proportional to its weight."""
+    """Draw one entry of each of `runs` (indices of runs of `log_weights`), in proportion to its weight."""
     lengths = np.diff(offsets)
     peaks = np.maximum.reduceat(log_weights, offsets[:-1])
     cumulative = np.cumsum(np.exp(log_weights - np.repeat(peaks, lengths)))
@@ -150,7 +150,7 @@ def _choose(log_weights: Floats, offsets: Ints, runs: Ints, rng: np.random.Gener
     edges = np.repeat(np.arange(len(lengths)), lengths) + np.minimum(
         (cumulative - np.repeat(before[:-1], lengths)) / np.repeat(totals, lengths), 1.0
     )
-    # Strictly inside the run's interval, which the sum may round out of.
+    # Strictly inside the run's interval, from which rounding could move the sum.
     points = np.minimum(runs + rng.random(len(runs)), np.nextafter(runs + 1.0, 0.0))
     return np.asarray(np.searchsorted(edges, points, side="right"), np.int64)
 

@@ -1,4 +1,4 @@
-"""Distribution of the number of targets of a density, and existence probabilities of its labels."""
+"""Summary statistics of a density: cardinality distribution and existence probabilities."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from vedette.kernels.base.types import Floats, Ints
 
 
 def cardinality_distribution(density: MultiTarget) -> Floats:
-    """Probabilities of 0, 1, ..., n targets; they sum to one.
+    """Return the probabilities of 0, 1, ..., n targets; they sum to one.
 
-    n is the size of the largest hypothesis of a GLMB (of a product of GLMBs, the sum of theirs), the number of labels
-    of an LMB and of Bernoullis of a multi-Bernoulli, and the largest number that an iid cluster holds. A Poisson
-    density has no largest number: n is one beyond which less than 1e-20 remains.
+    n is the size of the largest hypothesis of a GLMB (for a product of GLMBs, the sum over factors), the number of
+    labels of an LMB and of Bernoullis of a multi-Bernoulli, and the largest number in an iid cluster. A Poisson density
+    has no largest number: beyond n, a probability of less than 1e-20 remains.
     """
     if not isinstance(density, MultiTarget):
         raise InputError(f"density: expected a multi-target density; got {type(density).__name__}")
@@ -23,12 +23,12 @@ def cardinality_distribution(density: MultiTarget) -> Floats:
 
 
 def existence_probabilities(density: LabelledDensity) -> tuple[Ints, Floats]:
-    """(num_labels, 2) labels in increasing order and (num_labels,) the probability that each one's target exists."""
+    """Return the labels (num_labels, 2) in increasing order and the existence probability of each, (num_labels,)."""
     return check_labelled(density).label_existence()
 
 
 def check_labelled(density: Any) -> LabelledDensity:
-    """The density. Raises `InputError` where it does not name its targets."""
+    """Return the density. Raises `InputError` if it is not labelled."""
     if not isinstance(density, LabelledDensity):
         raise InputError(f"density: expected {LABELLED}, which have labels; got {type(density).__name__}")
     return density

@@ -1,4 +1,4 @@
-"""The track table that labelled densities share: labels and Gaussian mixtures, flat with offsets; parts and moments."""
+"""The track table of labelled densities: labels and Gaussian mixtures, flat with offsets; parts and moments."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from vedette.kernels.gaussian.components import components_of, taken_components
 from vedette.kernels.gaussian.mixtures import heaviest_of_runs
 from vedette.models.arguments import no_gaussians
 
-UNSCANNED = -2  # in the place of a measurement
+UNSCANNED = -2  # replaces a measurement index
 _ARRAYS = kernel_arrays("labels", "offsets", *kt.Mixture._fields)
 _MIXTURES = attrgetter("offsets", *kt.Mixture._fields)
 
@@ -36,11 +36,11 @@ class TrackTable(Container):
         log_weights: (num_components,) log mixture weights, normalised within each track.
         means: (num_components, state_dim).
         covs: (num_components, state_dim, state_dim), symmetric positive definite.
-        sources: (num_tracks, 2) what each track was made of by a `DeltaGlmbFilter`: its track in the belief before, -1
-            where it was born; and its measurement's row in the scan, -1 where it was missed, -2 where there was no scan
-            (a prediction). None of tracks that are made of several, or by another filter, and where nothing is known.
+        sources: (num_tracks, 2) origin of each track in a `DeltaGlmbFilter`: its track in the previous belief, -1 if it
+            was born; and the row of its measurement in the scan, -1 if it was missed, -2 if there was no scan (a
+            prediction). None for tracks made of several, or by another filter, and if the origin is unknown.
 
-    The arrays are copied, checked once, here, and read-only from then on.
+    The arrays are copied, checked once at creation, and read-only afterwards.
 
     Raises:
         InputError: as `validate`.
@@ -73,28 +73,28 @@ class TrackTable(Container):
 
     @property
     def measurements(self) -> Ints | None:
-        """(num_tracks,) those in `sources`; None where they are not known or there was no scan."""
+        """Measurements in `sources`, shape (num_tracks,); None if they are unknown or there was no scan."""
         return None if self.sources is None or (self.sources[:, 1] == UNSCANNED).any() else self.sources[:, 1]
 
     def to_kernel(self) -> kt.Tracks:
-        """The same arrays as the bundle that kernels take."""
+        """Return the arrays as a kernel bundle."""
         labels, offsets, *columns = _ARRAYS(self)
         return kt.Tracks(labels, offsets, kt.Mixture(*columns))
 
     @classmethod
     def from_kernel(cls, tracks: kt.Tracks, sources: Ints | None = None) -> TrackTable:
-        """The arrays of a bundle as they are; a kernel's own need no check."""
+        """Return a table with the arrays of a kernel bundle, without copies and checks."""
         return unchecked(cls, tracks.labels, tracks.offsets, *tracks.components, sources)
 
     @classmethod
     def empty(cls, state_dim: int) -> TrackTable:
-        """A table without tracks. Raises `InputError` for what is no dimension of a state."""
+        """Return a table without tracks. Raises `InputError` for an invalid state dimension."""
         labels, offsets = np.empty((0, 2), np.int64), np.zeros(1, np.int64)
         return cls.from_kernel(kt.Tracks(labels, offsets, components_of(np.empty(0), *no_gaussians(state_dim))))
 
     @classmethod
     def from_gaussians(cls, labels: Any, means: Any, covs: Any) -> TrackTable:
-        """Tracks of one Gaussian each.
+        """Return tracks of one Gaussian each.
 
         labels: (num_tracks, 2) integers. means: (num_tracks, state_dim). covs: (num_tracks, state_dim, state_dim).
         Raises `InputError` for another shape, or for a covariance that is not symmetric positive definite.
@@ -105,7 +105,7 @@ class TrackTable(Container):
 
     @classmethod
     def from_mixtures(cls, labels: Any, mixtures: Sequence[tuple[Any, Any, Any]]) -> TrackTable:
-        """Tracks of one Gaussian mixture each, given as (weights, means, covs) with linear weights that sum to one.
+        """Return tracks of one Gaussian mixture each, as (weights, means, covs) with linear weights that sum to one.
 
         Raises `InputError` for another shape, for weights that are negative or do not sum to one, or for a covariance
         that is not symmetric positive definite.
@@ -136,7 +136,7 @@ class TrackTable(Container):
 
 
 def log_weights(field: str, weights: Any) -> Floats:
-    """Logs of a user's linear weights. Raises `InputError` for a weight that is negative or not finite."""
+    """Return the logs of a user's linear weights. Raises `InputError` for a weight that is negative or not finite."""
     linear = checks.as_floats(field, weights, (None,))
     if not np.all((linear >= 0.0) & (linear < np.inf)):
         raise InputError(f"{field}: expected numbers of at least 0; got {linear.tolist()}")
@@ -145,7 +145,7 @@ def log_weights(field: str, weights: Any) -> Floats:
 
 
 def take_tracks(tracks: TrackTable, places: Ints) -> TrackTable:
-    """The tracks at `places`, in that order."""
+    """Return the tracks at `places`, in that order."""
     offsets, components = checks.take_runs(tracks.offsets, places)
     taken = taken_components(tracks.to_kernel().components, components)
     sources = None if tracks.sources is None else tracks.sources[places]
@@ -153,26 +153,26 @@ def take_tracks(tracks: TrackTable, places: Ints) -> TrackTable:
 
 
 def relabelled_tracks(tracks: TrackTable, labels: Ints) -> TrackTable:
-    """The same mixtures with other labels."""
+    """Return the same mixtures with other labels."""
     return unchecked(TrackTable, labels, *_MIXTURES(tracks), None)
 
 
 def places_of(labels: Ints, table: Ints) -> Ints:
-    """(num_labels,) place of each label among the distinct labels of a table, -1 where it is none of them."""
+    """Return the place of each label among the distinct labels of a table, shape (num_labels,); -1 if absent."""
     place = {tuple(label): i for i, label in enumerate(table.tolist())}
     return np.array([place.get(tuple(label), -1) for label in labels.tolist()], np.int64)
 
 
 def gaussian_tracks(labels: Ints, means: Floats, covs: Floats) -> TrackTable:
-    """As `TrackTable.from_gaussians`, of arrays of the library's own."""
+    """Return `TrackTable.from_gaussians` of internal arrays, without copies and checks."""
     num = len(labels)
     return TrackTable.from_kernel(kt.Tracks(labels, np.arange(num + 1), components_of(np.zeros(num), means, covs)))
 
 
 def place_labels(tables: Sequence[Ints]) -> tuple[Ints, Ints]:
-    """(num_labels, 2) the labels of several tables in increasing order, and (num_labels, num_tables) their places.
+    """Labels (num_labels, 2) of several tables in increasing order, and their places (num_labels, num_tables).
 
-    A table has no label twice. The place is -1 where it lacks the label.
+    A table must not have a label twice. The place is -1 if the table lacks the label.
     """
     labels, row = checks.distinct_labels(np.concatenate(tables))
     places, ends = np.full((len(labels), len(tables)), -1), checks.offsets_of([len(table) for table in tables])
@@ -182,14 +182,14 @@ def place_labels(tables: Sequence[Ints]) -> tuple[Ints, Ints]:
 
 
 def single_gaussians(tracks: TrackTable) -> TrackTable:
-    """The tracks with each mixture replaced by one Gaussian of its moments."""
+    """Return the tracks with each mixture replaced by one Gaussian of its moments."""
     if len(tracks.log_weights) == tracks.num_tracks:
         return tracks
     return gaussian_tracks(tracks.labels, *track_moments(tracks))
 
 
 def mixture_moments(log_weights: Floats, means: Floats, covs: Floats) -> tuple[Floats, Floats]:
-    """Mean (state_dim,) and covariance (state_dim, state_dim) of one Gaussian mixture of any total weight.
+    """Return the mean (state_dim,) and covariance (state_dim, state_dim) of one Gaussian mixture of any total weight.
 
     Raises `InputError` for a mixture of weight zero.
     """
@@ -202,14 +202,14 @@ def mixture_moments(log_weights: Floats, means: Floats, covs: Floats) -> tuple[F
 
 
 def track_moments(tracks: TrackTable) -> tuple[Floats, Floats]:
-    """Mean (num_tracks, state_dim) and covariance (num_tracks, state_dim, state_dim) of every track."""
+    """Return the mean (num_tracks, state_dim) and covariance (num_tracks, state_dim, state_dim) of every track."""
     if len(tracks.log_weights) == tracks.num_tracks:
         return tracks.means.copy(), tracks.covs.copy()
     return run_moments(np.exp(tracks.log_weights), tracks.means, tracks.covs, tracks.offsets)
 
 
 def run_moments(weights: Floats, means: Floats, covs: Floats, offsets: Ints) -> tuple[Floats, Floats]:
-    """Moments of consecutive mixtures of linear weights that sum to one, none of them empty."""
+    """Return the moments of consecutive mixtures of linear weights that sum to one, none of them empty."""
     starts, lengths = offsets[:-1], np.diff(offsets)
     run_means = np.add.reduceat(weights[:, None] * means, starts)
     deviations = means - np.repeat(run_means, lengths, axis=0)
@@ -218,5 +218,5 @@ def run_moments(weights: Floats, means: Floats, covs: Floats, offsets: Ints) -> 
 
 
 def heaviest_components(log_weights: Floats, offsets: Ints, chosen: Ints) -> Ints:
-    """(len(chosen),) the heaviest component of each chosen mixture of a density; the first of several."""
+    """Heaviest component of each chosen mixture of a density, shape (len(chosen),); the first on a tie."""
     return heaviest_of_runs(for_kernel(log_weights), for_kernel(offsets), np.array(chosen, np.int64))

@@ -1,4 +1,4 @@
-"""Poisson densities of the targets that no sensor has detected: beside the labels of a belief, and on a grid."""
+"""Poisson densities of targets that were never detected: next to the labels of a belief, and on a grid."""
 
 from __future__ import annotations
 
@@ -20,10 +20,11 @@ class UndetectedTargets(SummaryRepr):
     """Poisson density of the targets that were never detected, and the label of the next first detection.
 
     Attributes:
-        intensity: expected number of undetected targets by state, of those from birth sites and of dropped labels.
+        intensity: expected number of undetected targets by state, from birth sites and from dropped labels.
         next_label: birth step and index of the label that the next measurement may begin.
-        cells: expected number of those that appeared anywhere in a region, by place; None: there are none.
-        birth_rate: what is known of the birth rate of these, where it is learnt; None: it is given.
+        cells: expected number of undetected targets that appeared anywhere in a region, by cell; None if there are
+            none.
+        birth_rate: posterior of their birth rate if it is learnt; None if it is given.
 
     Raises:
         InputError: a part of another kind, no label, or a birth rate of another number of cells.
@@ -62,7 +63,7 @@ class UndetectedTargets(SummaryRepr):
 
     @classmethod
     def none(cls, state_dim: int) -> UndetectedTargets:
-        """No target, before the first scan."""
+        """Return the density without targets, before the first scan."""
         return cls(Poisson.empty(state_dim), (0, 0))
 
 
@@ -70,16 +71,16 @@ class UndetectedTargets(SummaryRepr):
 class LearntRate(SummaryRepr):
     """Posterior of the rate of Poisson births, a gamma density, given the first detections of the targets.
 
-    Of births at a rate of 1/s, scans are expected to have detected `exposure` targets; the number of first detections
+    At a birth rate of 1/s, the expected number of targets detected so far is `exposure`; the number of first detections
     is then Poisson with mean rate times exposure.
 
     Attributes:
-        rate: posterior mean of the birth rate, by which targets are predicted [1/s].
+        rate: posterior mean of the birth rate, used for prediction [1/s].
         exposure: expected number of first detections per unit of the rate [s].
         unit: (num_cells,) expected number of undetected targets in each cell per unit of the rate [s].
         past: expected number of first detections of targets whose labels have ended.
         labels: (num, 2) labels that may be of targets born after the first scan.
-        shares: (num,) probability that each is one, if it exists.
+        shares: (num,) probability of this for each label, if its target exists.
 
     Raises:
         InputError: an array of another shape, or a number that is negative or not finite.
@@ -111,11 +112,11 @@ class LearntRate(SummaryRepr):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class UndetectedIntensity(SummaryRepr):
-    """Poisson density of undetected targets: any number in each cell, independent of the others, and anywhere in it.
+    """Poisson density of undetected targets that is uniform in each cell, with independent cells.
 
     Attributes:
         grid: the cells of a region.
-        expected: (num_cells,) mean number of undetected targets in each; a copy of what is given.
+        expected: (num_cells,) mean number of undetected targets in each; copied.
 
     Raises:
         InputError: another number of cells, or a number that is negative or not finite.
@@ -140,12 +141,12 @@ class UndetectedIntensity(SummaryRepr):
 
     @classmethod
     def uniform(cls, grid: CellGrid, total: float) -> UndetectedIntensity:
-        """So many in all, spread evenly. Raises `InputError` for a number that is negative or not finite."""
+        """Return a uniform density of `total` targets. Raises `InputError` for a negative or infinite number."""
         return cls(grid, np.full(grid.num_cells, non_negative("total", total) / grid.num_cells))
 
     @property
     def region(self) -> Region:
-        """Where they may be."""
+        """Region of the cells."""
         return self.grid.region
 
     @property
@@ -155,7 +156,7 @@ class UndetectedIntensity(SummaryRepr):
 
     @property
     def centres(self) -> Floats:
-        """(num_cells, 2) middle of each cell in m."""
+        """Centre of each cell in m, shape (num_cells, 2)."""
         return self.grid.centres
 
     @property
@@ -165,5 +166,5 @@ class UndetectedIntensity(SummaryRepr):
 
     @property
     def table(self) -> Floats:
-        """(rows, columns) the same, as on a map whose first row is the southern one; for drawing."""
+        """Expected numbers as a map (rows, columns) whose first row is the southern one; for drawing."""
         return self.expected.reshape(self.grid.rows, self.grid.columns).copy()

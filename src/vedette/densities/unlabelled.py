@@ -1,4 +1,4 @@
-"""Densities of targets without names that are all drawn alike: Poisson, independent identically distributed cluster."""
+"""Unlabelled densities of identically distributed targets: Poisson, independent identically distributed cluster."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _CLUSTER = kernel_arrays("log_cardinality", *kt.Mixture._fields)
 
 
 class Unlabelled(MultiTarget):
-    """A density of Gaussian components that name no target. The arrays are copied, checked once, and read-only."""
+    """Base of the unlabelled densities of Gaussian components. The arrays are copied, checked once, and read-only."""
 
     __slots__ = ()
     log_weights: Floats
@@ -37,7 +37,7 @@ class Unlabelled(MultiTarget):
         self.validate(error=InputError)
 
     def __len__(self) -> int:
-        """Number of components, or of a multi-Bernoulli of Bernoullis."""
+        """Number of components, or of Bernoullis of a multi-Bernoulli."""
         return len(self._targets().weights)
 
     def _summary(self) -> str:
@@ -56,7 +56,7 @@ class Unlabelled(MultiTarget):
 
     @abstractmethod
     def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
-        """Raise unless the arrays fit each other and are a density."""
+        """Raise unless the arrays are consistent and form a density."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -64,11 +64,11 @@ class Poisson(Unlabelled):
     """Poisson density of intensity sum over i of exp(log_weights[i]) N(.; means[i], covs[i]).
 
     Attributes:
-        log_weights: (num_components,) log of the expected number of targets that each component carries.
+        log_weights: (num_components,) log of the expected number of targets of each component.
         means: (num_components, state_dim).
         covs: (num_components, state_dim, state_dim).
 
-    The arrays are copied, checked once, here, and read-only from then on.
+    The arrays are copied, checked once at creation, and read-only afterwards.
 
     Raises:
         InputError: as `validate`.
@@ -81,7 +81,7 @@ class Poisson(Unlabelled):
     @property
     def expected_number(self) -> float:
         """Mean number of targets."""
-        with np.errstate(over="ignore"):  # more than any number
+        with np.errstate(over="ignore"):  # may overflow to infinity
             return float(np.exp(self.log_weights).sum())
 
     def _targets(self) -> Targets:
@@ -89,26 +89,26 @@ class Poisson(Unlabelled):
             return Targets(None, np.exp(self.log_weights), self.means, self.covs)
 
     def cardinality(self) -> Floats:
-        """Probabilities of 0, 1, ... targets, up to a number beyond which less than 1e-20 remains."""
+        """Return the probabilities of 0, 1, ... targets, up to a number beyond which less than 1e-20 remains."""
         return poisson_numbers(self.expected_number)
 
     def to_kernel(self) -> kt.Mixture:
-        """The same arrays as the bundle that kernels take."""
+        """Return the arrays as a kernel bundle."""
         return kt.Mixture(*_POISSON(self))
 
     @classmethod
     def from_kernel(cls, mixture: kt.Mixture) -> Poisson:
-        """The arrays of a bundle as they are; a kernel's own need no check."""
+        """Return a density with the arrays of a kernel bundle, without copies and checks."""
         return unchecked(cls, *mixture)
 
     @classmethod
     def empty(cls, state_dim: int) -> Poisson:
-        """The density that is certain of no target."""
+        """Return the density that is certain of no target."""
         return cls(np.empty(0), *no_gaussians(state_dim))
 
     @classmethod
     def from_gaussians(cls, expected_numbers: Any, means: Any, covs: Any) -> Poisson:
-        """Density from the expected number, mean and covariance of each component.
+        """Return the density with the expected number, mean and covariance of each component.
 
         expected_numbers: (num_components,) linear. means: (num_components, state_dim).
         covs: (num_components, state_dim, state_dim). Raises `InputError` for another shape, a negative number, or a
@@ -127,7 +127,7 @@ class Poisson(Unlabelled):
 
 
 def poisson_numbers(mean: float) -> Floats:
-    """Poisson probabilities of 0, 1, ..., up to a number beyond which less than 1e-20 remains."""
+    """Return the Poisson probabilities of 0, 1, ..., up to a number beyond which less than 1e-20 remains."""
     from scipy.special import gammaln
 
     if not mean > 0.0:
@@ -138,18 +138,18 @@ def poisson_numbers(mean: float) -> Floats:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class IidCluster(Unlabelled):
-    """A number of targets from a cardinality distribution, each drawn from one density by itself.
+    """Iid cluster: a number of targets from a cardinality distribution, each drawn independently from one density.
 
     The intensity is the expected number times that density.
 
     Attributes:
         log_cardinality: (most + 1,) log probabilities of 0, 1, ..., most targets, normalised.
         log_weights: (num_components,) log mixture weights of the density of one target, normalised; there may be none
-            where the density is certain of no target.
+            if the density is certain of no target.
         means: (num_components, state_dim).
         covs: (num_components, state_dim, state_dim).
 
-    The arrays are copied, checked once, here, and read-only from then on.
+    The arrays are copied, checked once at creation, and read-only afterwards.
 
     Raises:
         InputError: as `validate`.
@@ -169,27 +169,27 @@ class IidCluster(Unlabelled):
         return Targets(None, self.expected_number * np.exp(self.log_weights), self.means, self.covs)
 
     def cardinality(self) -> Floats:
-        """Probabilities of 0, 1, ..., most targets."""
+        """Return the probabilities of 0, 1, ..., most targets."""
         return np.asarray(np.exp(self.log_cardinality))
 
     def to_kernel(self) -> tuple[Floats, kt.Mixture]:
-        """Log cardinality distribution and density of one target, as kernels take them."""
+        """Return the log cardinality distribution and the density of one target in kernel form."""
         log_cardinality, *mixture = _CLUSTER(self)
         return log_cardinality, kt.Mixture(*mixture)
 
     @classmethod
     def from_kernel(cls, log_cardinality: Floats, mixture: kt.Mixture) -> IidCluster:
-        """The arrays of a bundle as they are; a kernel's own need no check."""
+        """Return a density with the arrays of a kernel bundle, without copies and checks."""
         return unchecked(cls, log_cardinality, *mixture)
 
     @classmethod
     def empty(cls, state_dim: int) -> IidCluster:
-        """The density that is certain of no target."""
+        """Return the density that is certain of no target."""
         return cls(np.zeros(1), np.empty(0), *no_gaussians(state_dim))
 
     @classmethod
     def from_gaussians(cls, cardinality: Any, weights: Any, means: Any, covs: Any) -> IidCluster:
-        """Density from linear probabilities of 0, 1, ... targets and the Gaussian mixture of one target.
+        """Return the density with linear probabilities of 0, 1, ... targets and the Gaussian mixture of one target.
 
         cardinality: (most + 1,). weights: (num_components,), summing to one. means: (num_components, state_dim).
         covs: (num_components, state_dim, state_dim). Raises `InputError` for another shape, probabilities or weights
@@ -202,7 +202,7 @@ class IidCluster(Unlabelled):
         """Raise unless the cardinalities and the weights are normalised and every component is a Gaussian.
 
         `InputError` for faults of form; `error` for values that are not finite, not normalised to 1e-9 or covariances
-        that are not symmetric positive definite, and where there may be targets but no density of one.
+        that are not symmetric positive definite, and if targets are possible without a density for them.
         """
         checks.check_array("log_cardinality", self.log_cardinality, np.float64, (None,))
         if len(self.log_cardinality) == 0:

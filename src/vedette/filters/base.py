@@ -164,7 +164,7 @@ class LabelledFilterBase(WithBirths, ABC, Generic[BeliefT]):
     def _concluded(
         self, posterior: Any, reports: Sequence[Any], *, log_likelihood: float, repeats: Sequence[Ints]
     ) -> tuple[BeliefT, FilterInfo]:
-        """Return the posterior and the report, after one update per report. repeats: of each scan, the rows left out."""
+        """Return the posterior and the report, after one update per report. repeats: per scan, the rows left out."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
