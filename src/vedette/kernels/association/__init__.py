@@ -1,1 +1,1 @@
-"""What each track may have caused in a scan, and the best, sampled or summed choices of all tracks together."""
+"""Options of a scan and their combination: assignment, ranking, sampling, marginals and truncation."""

@@ -1,11 +1,11 @@
-"""What each label of a belief may be at a scan, its versions taken together and labels independent of each other.
+"""Options of each label of a belief at a scan, combined over its versions, with labels treated as independent.
 
-A label with the rows v of probability p_v takes measurement j, if that were left to it alone, with probability
+A label with the rows v of probability p_v takes measurement j, if no other label competes for it, with probability
 
     sum over v of p_v w_vj / (1 - sum over v of p_v (1 - sum over options o of w_vo)),
 
-where w_vo are the weights of the options of a row. Versions of a label exclude each other; what labels of one factor
-exclude is left out.
+where w_vo are the weights of the options of a row. Versions of a label exclude each other; exclusions between labels of
+one factor are ignored.
 """
 
 from __future__ import annotations
@@ -20,26 +20,26 @@ from vedette.kernels.base.arrays import filled_ints
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Ints
 
-LEAST_MISSED = 1e-12  # probability that a measurement is not taken, so that odds and logs are finite
+LEAST_MISSED = 1e-12  # least probability that a measurement is not taken, for finite odds and logs
 _LEAST_PEAK = -700.0  # log weight; ratios to it are finite
 
 
 class Alternatives(NamedTuple):
-    """Detections of each label, and all else that it may be, in weights of one scale for each label."""
+    """Detections of each label, and the weight of all its other options, on one scale per label."""
 
     rows: Ints  # (num_labels + 1,) rows of each label, its versions
     offsets: Ints  # (num_labels + 1,) detections of each label, into the next two
     options: Ints  # (num_detections,) an option that takes the measurement, of one of the versions
-    weights: Floats  # (num_detections,) of all versions together
-    undetected: Floats  # (num_labels,) of all else: missed, dead, or not there
+    weights: Floats  # (num_detections,) summed over all versions
+    undetected: Floats  # (num_labels,) of all other options: missed, dead, or absent
 
 
 @kernel
 def alternatives_of(options: Options, labels: Ints, presence: Floats) -> Alternatives:
-    """What the labels may be.
+    """Return the options of the labels.
 
     labels: (num_rows, 2) of the rows; versions of a label are adjacent. presence: (num_rows,) probability of each row
-    in its factor; 1 where options say whether it is there.
+    in its factor; 1 if absence is one of its options.
     """
     num_rows, num_options = len(labels), options.offsets[-1]
     rows, offsets, undetected = np.zeros(num_rows + 1, np.int64), np.zeros(num_rows + 1, np.int64), np.empty(num_rows)
@@ -74,7 +74,7 @@ def alternatives_of(options: Options, labels: Ints, presence: Floats) -> Alterna
 
 @kernel
 def log_unclaimed(options: Options, alone: Alternatives) -> Floats:
-    """(num_measurements,) log probability that no track takes each measurement."""
+    """Log probability that no track takes each measurement, shape (num_measurements,)."""
     unclaimed = np.zeros(options.num_measurements)
     for label in range(len(alone.undetected)):
         first, last = alone.offsets[label], alone.offsets[label + 1]

@@ -1,8 +1,8 @@
 """Assignment of the rows (predicted tracks) of a hypothesis to columns (measurements): optimum and dual variables.
 
-Minimise the sum of the costs c[i, o(i)] = -log weight over a choice of one option o(i) a row, no column taken twice.
-Every row lists its options by descending log weight. An option's column is a measurement, which at most one row may
-take, or negative (absent, missed), which any row may take: as if each row had a column of its own for it.
+Minimise the sum of the costs c[i, o(i)] = -log weight over a choice of one option o(i) per row, with no column taken
+twice. Every row lists its options by descending log weight. The column of an option is a measurement, which at most one
+row may take, or negative (absent, missed), which any row may take: as if each row had its own column for it.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ MISSED = -1
 
 
 class Options(NamedTuple):
-    """What may happen to each row of a scan, heaviest first."""
+    """Options of each row of a scan, heaviest first."""
 
     offsets: Ints  # (num_rows + 1,) into the options
     columns: Ints  # (num_options,) ABSENT, MISSED or a measurement
     log_weights: Floats  # (num_options,) relative to clutter alone
-    entries: Ints  # (num_options,) where the option's components start in the next two, -1 if absent
-    component_log_weights: Floats  # (num_entries,) those of an option sum to its weight; -inf outside the gate
+    entries: Ints  # (num_options,) start of the option's components in the next two, -1 if absent
+    component_log_weights: Floats  # (num_entries,) of an option they sum to its weight; -inf outside the gate
     whitened: Floats  # (num_entries, meas_dim) whitened residuals of the components of a detection
-    updated: Floats  # (num_entries, state_dim + 1, state_dim) mean and covariance of those that bend or are at an edge
+    updated: Floats  # (num_entries, state_dim + 1, state_dim) mean, covariance of those that bend or are at an edge
     num_measurements: int  # of the scan
 
 
@@ -37,7 +37,7 @@ class DualWork(NamedTuple):
 
     row_dual: Floats  # (num_rows,) u
     row_option: Ints  # (num_rows,) chosen option of each row
-    row_gap: Floats  # (num_rows,) reduced cost of the second best option, of the ranking search
+    row_gap: Floats  # (num_rows,) reduced cost of the second best option, for the ranking search
     column_dual: Floats  # (num_columns,) v <= 0
     column_row: Ints  # (num_columns,) row that holds the column, -1 for none
     slack: Floats  # (num_columns,) least reduced cost from the rows of the alternating tree
@@ -61,16 +61,16 @@ def make_dual_work(num_rows: int, num_columns: int) -> DualWork:
 
 @borrowing
 def solve_assignment(options: Options, rows: Ints, work: DualWork) -> float:
-    """Cost of the best joint choice, minus its log weight; +inf where none exists.
+    """Return the cost (minus the log weight) of the best joint choice; +inf if none exists.
 
-    Leaves the chosen option of each row in `work.row_option` and optimal dual variables u, v <= 0 in `work.row_dual`
+    Writes the chosen option of each row to `work.row_option` and optimal dual variables u, v <= 0 to `work.row_dual`
     and `work.column_dual`: c - u - v >= 0 for every option, with equality on the optimum (complementary slackness),
     and v = 0 for a column that the optimum leaves unused. Shortest augmenting paths (Jonker and Volgenant 1987).
     """
     total = 0.0
     collision = False
     num_columns = options.num_measurements
-    # Where no two rows want the same measurement first, everyone gets its best option and all v are 0.
+    # If the best options of the rows do not collide, each row gets its best option and all v are 0.
     for column in range(num_columns):
         work.column_dual[column] = 0.0
         work.column_row[column] = -1
@@ -109,7 +109,7 @@ def _augment(options: Options, rows: Ints, start: int, work: DualWork) -> bool:
     own_slack, own_option, own_row = math.inf, -1, -1
     row = start
     while True:
-        # Dijkstra's algorithm over columns, with reduced costs as lengths: relax the edges of the row reached last.
+        # Dijkstra's algorithm over columns, with reduced costs as lengths: relax the edges of the last row.
         for option in range(options.offsets[rows[row]], options.offsets[rows[row] + 1]):
             column = options.columns[option]
             reduced = -options.log_weights[option] - work.row_dual[row]
@@ -118,9 +118,9 @@ def _augment(options: Options, rows: Ints, start: int, work: DualWork) -> bool:
                     own_slack, own_option, own_row = reduced, option, row
             elif work.visited[column] == 0 and reduced - work.column_dual[column] < work.slack[column]:
                 work.slack[column] = reduced - work.column_dual[column]
-                # One number for both, so that the path back needs a single array.
+                # Option and row in one number, so that the path back needs a single array.
                 work.slack_option[column] = option * len(rows) + row
-        # A row's own column (absent, missed) is always free, so that it ends the path as a free measurement does.
+        # A row's own column (absent, missed) is always free, so it ends the path like a free measurement.
         best, best_column = own_slack, -1
         for column in range(num_columns):
             if work.visited[column] == 0 and work.slack[column] < best:

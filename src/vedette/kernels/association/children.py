@@ -15,14 +15,14 @@ class Parents(NamedTuple):
     """Hypotheses over the rows of a scan."""
 
     offsets: Ints  # (num_parents + 1,) into rows
-    rows: Ints  # those of one parent in label order
+    rows: Ints  # rows of each parent, in label order
     log_weights: Floats  # (num_parents,)
 
 
 class Children(NamedTuple):
-    """Joint choices of one option for every row of a parent, as many as have been found so far."""
+    """Joint choices of one option for every row of a parent, as found so far."""
 
-    filled: Ints  # (2,) number of children, and of all their options; the arrays have room for more
+    filled: Ints  # (2,) number of children, and of all their options; the arrays may be larger
     parents: Ints  # (num_children,)
     offsets: Ints  # (num_children + 1,) into options
     options: Ints  # in the order of the parent's rows
@@ -31,7 +31,7 @@ class Children(NamedTuple):
 
 @kernel
 def make_children(num: int, num_options: int) -> Children:
-    """None yet, and room for `num` of so many options in all."""
+    """Return an empty list with room for `num` children of `num_options` options in total."""
     return Children(
         np.zeros(2, np.int64),
         np.empty(num, np.int64),
@@ -43,7 +43,7 @@ def make_children(num: int, num_options: int) -> Children:
 
 @kernel
 def grown_children(children: Children, num_rows: int) -> Children:
-    """The same children with room for at least one more of `num_rows` rows."""
+    """Return the same children with room for at least one more of `num_rows` rows."""
     num, num_options = children.filled[0], children.filled[1]
     parents = grown_ints(children.parents, num + 1)
     return Children(
@@ -57,14 +57,14 @@ def grown_children(children: Children, num_rows: int) -> Children:
 
 @inlined
 def is_full(children: Children, num_rows: int) -> bool:
-    """Whether one more child of `num_rows` rows needs room."""
+    """Return True if there is no room for one more child of `num_rows` rows."""
     filled = children.filled
     return filled[0] == len(children.parents) or filled[1] + num_rows > len(children.options)
 
 
 @inlined
 def append_child(children: Children, parent: int, num_rows: int, log_weight: float) -> int:
-    """Enter one more child; returns where its options are to be written."""
+    """Append one more child; return the position for its options."""
     filled = children.filled
     num, start = filled[0], filled[1]
     children.parents[num] = parent
@@ -77,7 +77,7 @@ def append_child(children: Children, parent: int, num_rows: int, log_weight: flo
 
 @borrowing
 def widest_parent(parents: Parents) -> int:
-    """Number of rows of the parent that has most."""
+    """Return the largest number of rows of a parent."""
     most = 0
     for parent in range(len(parents.log_weights)):
         most = max(most, parents.offsets[parent + 1] - parents.offsets[parent])

@@ -1,4 +1,4 @@
-"""Clusters of rows that contend for the same measurements, and the arrays in which their marginals are computed."""
+"""Clusters of rows that compete for the same measurements, and working arrays for their marginals."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from vedette.kernels.base.types import Floats, Ints
 
 
 class MarginalWork(NamedTuple):
-    """Arrays in which the clusters of a scan are found and summed; made once, grown when a cluster needs more."""
+    """Working arrays for the clusters of a scan and their sums; made once, grown if a cluster needs more."""
 
-    leaders: Ints  # (num_rows,) a row of the same cluster, not after this one; the first of a cluster leads itself
+    leaders: Ints  # (num_rows,) a row of the same cluster, not after this one; the first row is its own leader
     followers: Ints  # (num_rows,) the next row of the same cluster, -1 for none
-    members: Ints  # (num_rows,) rows of the cluster at hand
-    gated_before: Ints  # (num_rows + 1,) how many of its measurements the members before each gate
-    owners: Ints  # (num_measurements,) the first row that each measurement is gated by, or -1
+    members: Ints  # (num_rows,) rows of the current cluster
+    gated_before: Ints  # (num_rows + 1,) number of its measurements that the members before each gate
+    owners: Ints  # (num_measurements,) the first row that gates each measurement, or -1
     bits: Ints  # (num_measurements,) number of each measurement within its cluster, or -1
     tables: Floats  # of the exact sum
-    needed: Ints  # (1,) how many numbers of `tables` a cluster has asked for
+    needed: Ints  # (1,) required size of `tables` for the last cluster
     search: Search  # of the ranked sum
     children: Children  # of the ranked sum
-    single: Ints  # (2,) offsets of the ranked sum's one parent, which holds the rows of the cluster
+    single: Ints  # (2,) offsets of the single parent of the ranked sum, with the rows of the cluster
     no_weight: Floats  # (1,) its log weight, 0
 
 
 @kernel
 def make_marginal_work(num_rows: int, num_measurements: int) -> MarginalWork:
-    """Room for the clusters of so many rows and measurements, and for a small exact sum."""
+    """Return arrays for the clusters of this number of rows and measurements, and for a small exact sum."""
     return MarginalWork(
         np.empty(num_rows, np.int64),
         np.empty(num_rows, np.int64),
@@ -52,7 +52,7 @@ def make_marginal_work(num_rows: int, num_measurements: int) -> MarginalWork:
 
 @kernel
 def grown_marginal_work(work: MarginalWork) -> MarginalWork:
-    """Room for what the last cluster has asked for."""
+    """Return larger arrays, as required by the last cluster."""
     return MarginalWork(
         work.leaders,
         work.followers,
@@ -71,9 +71,10 @@ def grown_marginal_work(work: MarginalWork) -> MarginalWork:
 
 @borrowing
 def find_clusters(options: Options, work: MarginalWork) -> bool:
-    """Lead the rows that share a gated measurement, directly or not, to the first of them; false where none does.
+    """Assign each row the first row of its cluster as leader; False if no rows share a gated measurement.
 
-    Leaders, followers and owners are written (union-find, the lesser root leads).
+    A cluster consists of rows that share gated measurements, directly or not. Writes leaders, followers and owners
+    (union-find, the lesser root leads).
     """
     shared = lead_rows(options, work.leaders, work.owners)
     if shared:
@@ -83,7 +84,7 @@ def find_clusters(options: Options, work: MarginalWork) -> bool:
 
 @borrowing
 def lead_rows(options: Options, leaders: Ints, owners: Ints) -> bool:
-    """Write leaders (num_rows,) and owners (num_measurements,) as of `MarginalWork`; false where no rows share."""
+    """Write leaders (num_rows,) and owners (num_measurements,) as in `MarginalWork`; return False if no rows share."""
     shared = False
     for column in range(options.num_measurements):
         owners[column] = -1
@@ -93,7 +94,7 @@ def lead_rows(options: Options, leaders: Ints, owners: Ints) -> bool:
             column = options.columns[option]
             if column < 0:
                 continue
-            # The first row that gates a measurement stands for all that do: one union a pair is enough.
+            # The first row that gates a measurement represents all that do: one union per pair is enough.
             if owners[column] < 0:
                 owners[column] = row
             else:
@@ -107,7 +108,7 @@ def lead_rows(options: Options, leaders: Ints, owners: Ints) -> bool:
 def _link_followers(leaders: Ints, followers: Ints, num_rows: int) -> None:
     for row in range(num_rows):
         followers[row] = -1
-    # From behind, each right after its leader: they come to stand in order.
+    # In reverse, each directly after its leader: the result is in order.
     for row in range(num_rows - 1, -1, -1):
         leader = root_of(leaders, row)
         if leader != row:
@@ -117,16 +118,19 @@ def _link_followers(leaders: Ints, followers: Ints, num_rows: int) -> None:
 
 @inlined
 def root_of(leaders: Ints, item: int) -> int:
-    """Who leads the set of an item, in a union-find where `leaders` names for each another of its set, not after it."""
+    """Return the leader of an item in a union-find.
+
+    `leaders` names for each item another one of its set, not after it.
+    """
     while leaders[item] != item:
-        leaders[item] = leaders[leaders[item]]  # halves the way for the next
+        leaders[item] = leaders[leaders[item]]  # path halving
         item = leaders[item]
     return item
 
 
 @inlined
 def gather_cluster(options: Options, leader: int, work: MarginalWork) -> tuple[int, int]:
-    """Write the rows of a cluster and number its measurements, in order; how many there are of both."""
+    """Write the rows of a cluster and number its measurements, in order; return the numbers of both."""
     count, num_bits, row = 0, 0, leader
     while row >= 0:
         work.members[count], work.gated_before[count] = row, num_bits

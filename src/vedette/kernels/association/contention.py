@@ -1,15 +1,14 @@
-"""What groups of factors that take a scan apart leave each other of the measurements that more than one claims.
+"""Measurements that several groups of factors may take: the share of each that other groups leave to a group.
 
-To a group, the others are one more source of measurements, beside clutter: if group g takes measurement j with odds
-o_g(j), a row of group h that takes j weighs
+For a group, the others are one more source of measurements, next to clutter: if group g takes measurement j with odds
+o_g(j), the weight of a row of group h that takes j is multiplied by
 
-    mu_h(j) = 1 / (1 + sum over g != h of o_g(j))
+    mu_h(j) = 1 / (1 + sum over g != h of o_g(j)).
 
-times as much. The odds depend on what is left for the other measurements of a group, so that both are iterated: belief
-propagation over groups and measurements (Williams and Lau 2014). Where groups and measurements make no cycle,
-each group has its exact marginals afterwards; what is lost is that groups exclude each other. With marginals a_g(j),
-two groups that meet at one measurement are then wrong by an L1 error of 4 a_1(j) a_2(j), and more groups by no more
-than this summed over pairs.
+The odds depend on the shares of the other measurements of a group, so both are iterated: belief propagation over groups
+and measurements (Williams and Lau 2014). If groups and measurements form no cycle, each group then has its exact
+marginals; only the mutual exclusion of groups is lost. With marginals a_g(j), two groups that meet at one measurement
+then have an L1 error of 4 a_1(j) a_2(j), and more groups at most this summed over pairs.
 """
 
 from __future__ import annotations
@@ -27,20 +26,20 @@ from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints
 
 _MOST_ROUNDS = 50
-_SETTLED = 1e-6  # change of a message after which it is taken as final
+_SETTLED = 1e-6  # change of a message below which the iteration has converged
 
 
 class Meetings(NamedTuple):
-    """Each group at each measurement that it and another group claim."""
+    """Pairs of a group and a measurement that another group may also take."""
 
-    of_option: Ints  # (num_options,) the meeting of an option, -1 where no other group claims its measurement
+    of_option: Ints  # (num_options,) the meeting of an option, -1 if no other group may take its measurement
     measurements: Ints  # (num_meetings,)
     messages: Floats  # (num_meetings,) mu
 
 
 @kernel
 def _meetings(options: Options, group_of: Ints) -> Meetings:
-    """Find where groups meet. group_of: (num_rows,)."""
+    """Find the measurements that several groups may take. group_of: (num_rows,)."""
     num, num_options = options.num_measurements, options.offsets[-1]
     owner, is_contested = filled_ints(num, -1), filled_ints(num, 0)
     for row in range(len(group_of)):
@@ -68,7 +67,7 @@ def _meetings(options: Options, group_of: Ints) -> Meetings:
 
 @borrowing
 def _write_odds(alone: Alternatives, meetings: Meetings, odds: Floats) -> None:
-    """(num_meetings,) the odds that each group takes each measurement, if that were left to it alone."""
+    """Write the odds that each group takes each measurement without competition, shape (num_meetings,)."""
     for meeting in range(len(odds)):
         odds[meeting] = 1.0
     for label in range(len(alone.undetected)):
@@ -88,7 +87,7 @@ def _write_odds(alone: Alternatives, meetings: Meetings, odds: Floats) -> None:
 
 @borrowing
 def _renew(meetings: Meetings, odds: Floats, totals: Floats) -> float:
-    """Write the messages that belong to the odds; the largest change. totals: (num_measurements,) summed odds."""
+    """Write the messages for the odds; return the largest change. totals: (num_measurements,) summed odds."""
     change = 0.0
     for j in range(len(totals)):
         totals[j] = 0.0
@@ -104,9 +103,9 @@ def _renew(meetings: Meetings, odds: Floats, totals: Floats) -> float:
 
 @inlined
 def _log_counted_twice(meetings: Meetings, totals: Floats) -> float:
-    """Log of what the product of the groups' total weights is too small by (Bethe's approximation, exact on trees).
+    """Log of the factor missing in the product of the groups' total weights (Bethe's approximation, exact on trees).
 
-    That of a measurement with n groups is product of 1 / mu_g over (1 + sum of odds)^(n - 1).
+    For a measurement with n groups it is product of 1 / mu_g over (1 + sum of odds)^(n - 1).
     """
     log_weight = 0.0
     for meeting in range(len(meetings.messages)):
@@ -119,7 +118,7 @@ def _log_counted_twice(meetings: Meetings, totals: Floats) -> float:
 
 @borrowing
 def _weigh(options: Options, components: Ints, meetings: Meetings) -> None:
-    """Multiply what options weigh by the messages, and order rows anew, heaviest first."""
+    """Multiply the weights of options by the messages, and sort rows again, heaviest first."""
     columns, log_weights, entries = options.columns, options.log_weights, options.entries
     for row in range(len(components) - 1):
         start, stop = options.offsets[row], options.offsets[row + 1]
@@ -136,7 +135,7 @@ def _weigh(options: Options, components: Ints, meetings: Meetings) -> None:
 
 @kernel
 def leave_to_others(options: Options, group_of: Ints, alone: Alternatives, components: Ints) -> float:
-    """Weigh the options of rows by what other groups leave of their measurements.
+    """Multiply the options of rows by the shares of their measurements that other groups leave.
 
     Args:
         options: written; rows stay in order, heaviest option first.
@@ -145,7 +144,7 @@ def leave_to_others(options: Options, group_of: Ints, alone: Alternatives, compo
         components: (num_rows + 1,) offsets of the components of each row.
 
     Returns:
-        The log of the factor by which the product of the groups' total weights is then smaller than that of all.
+        The log of the factor by which the product of the groups' total weights is then too small.
     """
     meetings = _meetings(options, group_of)
     num = len(meetings.messages)

@@ -1,9 +1,9 @@
-"""A hypothesis for every way in which a target may be seen, so that an unlikely track lives until evidence decides.
+"""Retention of one hypothesis for every possible association of a label, so that improbable tracks survive a scan.
 
 The heaviest hypotheses are many variations on a few associations. A target whose first measurements fit its birth
-badly starts in a hypothesis far down the list; cut there, it is lost for good, since no later hypothesis holds its
-track. So the heaviest hypothesis of every association is kept besides. An association is a label together with what the
-scan did to it: missed, or detected as this measurement; theta(label) of Vo, Vo, Hoang 2017.
+badly starts in a hypothesis far down the list; if it is cut there, it is lost for good, since no later hypothesis holds
+its track. Therefore the heaviest hypothesis of every association is kept as well. An association is a label together
+with its result at the scan: missed, or detected as a given measurement; theta(label) of Vo, Vo, Hoang 2017.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ from vedette.kernels.base.types import Floats, Ints
 
 
 class Associations(NamedTuple):
-    """The associations of a scan, numbered."""
+    """The numbered associations of a scan."""
 
     of_option: Ints  # (num_options,) number of each option's association, -1 if absent
-    num: int  # how many there may be
+    num: int  # upper bound on their number
 
 
 @kernel
 def associations_of_options(labels: Ints, options: Options) -> Associations:
-    """Options of rows of one label as one measurement share an association. labels: (num_rows, 2)."""
+    """Number the associations; options of rows of one label with one measurement share one. labels: (num_rows, 2)."""
     firsts, num_labels = np.empty(len(labels), np.int64), 0
     numbers, places = np.empty(options.offsets[len(labels)], np.int64), options.num_measurements + 1
     for row in range(len(labels)):
@@ -58,7 +58,7 @@ def associations_of_options(labels: Ints, options: Options) -> Associations:
 
 @kernel
 def _best_parents(options: Options, parents: Parents) -> tuple[Ints, Floats]:
-    """For each row, the parent that may give it the heaviest choice and the bound, ignoring collisions; -1: none."""
+    """For each row, the parent that may give it the heaviest choice (-1: none), and the bound, ignoring collisions."""
     best_parent = filled_ints(len(options.offsets) - 1, -1)
     best_bound = np.empty(len(best_parent))
     for parent in range(len(parents.log_weights)):
@@ -77,8 +77,9 @@ def _best_parents(options: Options, parents: Parents) -> tuple[Ints, Floats]:
 def _candidates(
     options: Options, numbers: Ints, best_parent: Ints, best_bound: Floats, is_covered: Ints, floor: float
 ) -> tuple[Ints, Ints]:
-    """Row and option (-1: none) that may give each uncovered association its heaviest choice, of those bounded by
-    `floor`. numbers: association of each option.
+    """Row and option (-1: none) that may give each uncovered association its heaviest choice.
+
+    Only those whose bound is at least `floor`. numbers: association of each option.
     """
     its_row, its_option = filled_ints(len(is_covered), -1), filled_ints(len(is_covered), -1)
     bounds = np.empty(len(is_covered))
@@ -87,7 +88,7 @@ def _candidates(
             continue
         first = options.offsets[row]
         for option in range(first, options.offsets[row + 1]):
-            # The best parent's bound with this row's best option exchanged for this one.
+            # The best parent's bound, with this option in place of the row's best option.
             bound = best_bound[row] - options.log_weights[first] + options.log_weights[option]
             number = numbers[option]
             if number < 0 or is_covered[number] == 1 or bound < floor:
@@ -99,7 +100,7 @@ def _candidates(
 
 @kernel
 def _with_spare_row(options: Options) -> Options:
-    """The same options and one more row, the last, of one option that is to be filled in."""
+    """Return the same options and one more row, the last, with one option that the caller fills in."""
     num_rows = len(options.offsets) - 1
     num = options.offsets[num_rows]
     offsets, columns, log_weights = np.empty(num_rows + 2, np.int64), np.empty(num + 1, np.int64), np.empty(num + 1)
@@ -117,10 +118,10 @@ def _with_spare_row(options: Options) -> Options:
 def add_uncovered(
     options: Options, associations: Associations, parents: Parents, children: Children, max_log_gap: float
 ) -> Children:
-    """The children and, for every association that none of them holds, a heavy choice that holds it.
+    """Return the children and, for every association that none of them holds, a heavy choice that holds it.
 
-    That is the best one with the track and the parent of the largest bound; none more than `max_log_gap` under the
-    heaviest child.
+    It is the best choice with the track and the parent of the largest bound, at most `max_log_gap` below the heaviest
+    child.
     """
     numbers, best = associations.of_option, -math.inf
     for child in range(children.filled[0]):
@@ -131,7 +132,7 @@ def add_uncovered(
             is_covered[numbers[children.options[i]]] = 1
     best_parent, best_bound = _best_parents(options, parents)
     its_row, its_option = _candidates(options, numbers, best_parent, best_bound, is_covered, best - max_log_gap)
-    # A row that must take one option is a row that has no other: the spare one stands in for it in the assignment.
+    # A row that must take one option is a row with no other option: the spare row replaces it in the assignment.
     forced = _with_spare_row(options)
     spare_row, spare = len(options.offsets) - 1, options.offsets[len(options.offsets) - 1]
     widest = widest_parent(parents)
@@ -169,9 +170,9 @@ def mark_heaviest(
     max_log_gap: float,
     marks: Ints,
 ) -> int:
-    """Mark with 1 the heaviest child of each association that the `num_safe` heaviest do not hold, at most `most`
-    children, none more than `max_log_gap` under the first; their number. order: the children in question, heaviest
-    first.
+    """Mark with 1 the heaviest child of each association that the `num_safe` heaviest do not hold; return their number.
+
+    At most `most` children, each at most `max_log_gap` below the first. order: the candidate children, heaviest first.
     """
     seen = filled_ints(associations.num, 0)
     num_marked = 0
@@ -186,7 +187,7 @@ def mark_heaviest(
             if number >= 0 and seen[number] == 0:
                 seen[number] = 1
                 is_needed = 1
-        # What is safe covers its associations already; marking starts with what would be cut.
+        # Safe children cover their associations already; marking starts with those that would be cut.
         if place >= num_safe:
             marks[child] = is_needed
             num_marked += is_needed

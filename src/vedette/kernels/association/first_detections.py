@@ -1,12 +1,12 @@
 """First detections: each measurement may be the first of a target that was not detected before.
 
 Undetected targets are a Poisson intensity D, and clutter another with intensity kappa. A measurement z is then the
-first detection of one with the odds
+first detection of a target with the odds
 
     rho / kappa,   rho = integral of P_D(x) g(z | x) D(x) dx,
 
 against clutter, and its density is P_D g(z | .) D / rho (Williams 2015, eq. 36-38). In the rows of a scan it is a
-candidate label with two options, absent or detected as that measurement, and none of being missed.
+candidate label with two options, absent or detected as that measurement, and no option of a miss.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ from vedette.kernels.gaussian.linalg import log_add
 from vedette.kernels.gaussian.relinearisation import make_pair_work
 from vedette.kernels.gaussian.scratch import make_scratch
 
-_LEAST_SHARE = math.log(1e-5)  # of a candidate's density, below which a component of the intensity is not in it
+_LEAST_SHARE = math.log(1e-5)  # least share of a component of the intensity in a candidate's density
 # A candidate at a measurement that is unclaimed with less than this probability needs ten times the usual odds:
-# else it stays for good as an improbable second label of a tracked target.
+# otherwise it would remain as an improbable second label of a tracked target.
 _LOG_CLAIMED, _LOG_WORTH = math.log(0.05), math.log(10.0)
 
 
@@ -42,7 +42,7 @@ class Candidates(NamedTuple):
 
     rows: Rows
     options: Options
-    log_left_out: float  # log of the factor of the total weight that candidates below the least odds would have made
+    log_left_out: float  # log of the factor by which candidates below the least odds would raise the total weight
     left_out: float  # their expected number
 
 
@@ -52,12 +52,15 @@ class _Pairs(NamedTuple):
     components: Ints  # (num_pairs,)
     measurements: Ints  # (num_pairs,)
     log_odds: Floats  # (num_pairs,)
-    options: Options  # whose entries are those of the pairs
+    options: Options  # with the entries of the pairs
 
 
 @kernel
 def seen_intensity(intensity: Mixture, scan: ScanInput, sensor: Sensor) -> Rows:
-    """The components of an intensity as rows of one component each, never absent, with what they expect of the scan."""
+    """Return the components of an intensity as rows of one component each, with their expected measurements.
+
+    The rows are never absent.
+    """
     num, state_dim, meas_dim = len(intensity.log_weights), intensity.means.shape[1], len(sensor.angular)
     rows = make_rows(num, num, state_dim, meas_dim)
     for c in range(num):
@@ -70,9 +73,9 @@ def seen_intensity(intensity: Mixture, scan: ScanInput, sensor: Sensor) -> Rows:
 
 @kernel
 def missed_intensity(seen: Rows, scan: ScanInput, sensor: Sensor, num: int) -> tuple[Mixture, float]:
-    """The intensity of the targets that the scan did not detect, and the log probability that it detected none.
+    """Return the intensity of the targets that the scan did not detect, and the log probability of no detection at all.
 
-    num: components that are of the intensity. The log probability is minus the integral of P_D D, as the number of
+    num: number of components of the intensity. The log probability is minus the integral of P_D D, as the number of
     detections is Poisson.
     """
     components = seen.components
@@ -109,18 +112,18 @@ def _gated_pairs(seen: Rows, num_local: int, scan: Floats, log_clutter: Floats, 
 
 
 class _Chosen(NamedTuple):
-    """The measurements that are candidates, and how the pairs are grouped by measurement."""
+    """The measurements that are candidates, and the pairs grouped by measurement."""
 
     measurements: Ints  # (num_candidates,)
     num_pairs: int  # of all candidates
-    offsets: Ints  # (num_measurements + 1,) into the next
+    offsets: Ints  # (num_measurements + 1,) into the next array
     pairs: Ints  # (num_pairs,) of each measurement
     log_odds: Floats  # (num_measurements,) log rho / kappa
 
 
 @kernel
 def _chosen(pairs: _Pairs, unclaimed: Floats, least_logit: float) -> tuple[_Chosen, float, float]:
-    """The candidates, and `log_left_out` and `left_out` of `Candidates`. unclaimed: see `log_unclaimed`."""
+    """Return the candidates, and `log_left_out` and `left_out` of `Candidates`. unclaimed: see `log_unclaimed`."""
     num_measurements = len(unclaimed)
     offsets, members = group_members(pairs.measurements, num_measurements)
     log_odds, kept = np.full(num_measurements, -math.inf), np.empty(num_measurements, np.int64)
@@ -152,16 +155,16 @@ def candidates_of(
     least_logit: float,
     label: tuple[int, int],
 ) -> Candidates:
-    """The candidate labels of a scan, in the order of its measurements.
+    """Return the candidate labels of a scan, in the order of its measurements.
 
     Args:
-        seen: the intensity and what there is about each measurement, as of `seen_intensity`.
-        num_local: components, the last ones, of which each is about one measurement and serves that alone.
-        scan: whose measurements are asked about.
-        sensor: that took it.
+        seen: the intensity and the components at each measurement, as in `seen_intensity`.
+        num_local: number of components, the last ones, that are each at one measurement and used for that one only.
+        scan: the scan of the measurements.
+        sensor: the sensor of the scan.
         log_clutter: (num_measurements,) log clutter intensity at each measurement.
         unclaimed: (num_measurements,) log probability that no track takes each, see `log_unclaimed`. The candidate's
-            odds are rho / kappa times it, exactly if one track alone claims the measurement.
+            odds are rho / kappa times it; exact if only one track may take the measurement.
         gate: squared Mahalanobis distance beyond which a component does not explain a measurement.
         least_logit: log of the least odds of a candidate.
         label: birth step and index of the candidate of the first measurement.

@@ -1,8 +1,9 @@
-"""Which measurements can be in the gate of which row, found without meeting every measurement with every row.
+"""Measurements that can be in the gate of each row, found without comparing all measurements with all rows.
 
 A gate is an ellipsoid of squared Mahalanobis distance g about the expected measurement, with the innovation covariance
-S: along each axis a it reaches sqrt(g S_aa). Measurements are sorted along the axis on which gates are smallest for the
-spread of the scan; a row looks at those between the ends of its gates there, and compares the other axes.
+S: along each axis a its half-width is sqrt(g S_aa). Measurements are sorted along the axis on which gates are smallest
+relative to the spread of the scan; a row considers those between the ends of its gates there, and compares the other
+axes.
 """
 
 from __future__ import annotations
@@ -19,26 +20,26 @@ from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.gaussian.mixtures import descending_order
 from vedette.kernels.gaussian.scratch import wrap_angle
 
-# The ends of gates, and a little more for what rounding does to a distance.
+# Margin of the ends of gates for rounding of distances.
 _SLACK = 1.0 + 1e-9
 
 
 class Near(NamedTuple):
-    """The measurements that each row is weighed with."""
+    """The measurements that are compared with each row."""
 
-    offsets: Ints  # (num_rows + 1,) into these; (0,) where every row is weighed with all
+    offsets: Ints  # (num_rows + 1,) into the next array; (0,) if every row is compared with all
     measurements: Ints  # of each row in increasing order
 
 
 @kernel
 def all_measurements() -> Near:
-    """Every row is weighed with every measurement."""
+    """Return `Near` in which every row is compared with every measurement."""
     return Near(np.empty(0, np.int64), np.empty(0, np.int64))
 
 
 @kernel
 def _gate_reaches(rows: Rows, gate: float) -> Floats:
-    """(num_components, meas_dim) how far from its expected measurement the gate of a component reaches."""
+    """Half-width of the gate of each component along each axis, shape (num_components, meas_dim)."""
     factor = rows.innovation.factor
     num, dim = rows.innovation.predicted.shape
     out = np.empty((num, dim))
@@ -53,7 +54,7 @@ def _gate_reaches(rows: Rows, gate: float) -> Floats:
 
 @borrowing
 def _finest_axis(scan: Floats, reaches: Floats) -> int:
-    """The axis along which the scan spreads over most gates."""
+    """Return the axis along which the scan spreads over the largest number of gates."""
     best, most = 0, -1.0
     for a in range(scan.shape[1]):
         low, high, reach = math.inf, -math.inf, 0.0
@@ -68,7 +69,7 @@ def _finest_axis(scan: Floats, reaches: Floats) -> int:
 
 @inlined
 def _first_from(values: Floats, least: float) -> int:
-    """Place of the first of increasing values that is not below `least`."""
+    """Return the place of the first of increasing values that is not below `least`."""
     low, high = 0, values.shape[0]
     while low < high:
         middle = (low + high) // 2
@@ -81,7 +82,7 @@ def _first_from(values: Floats, least: float) -> int:
 
 @inlined
 def _may_be_gated(rows: Rows, row: int, measurement: Floats, angular: Bools, reaches: Floats) -> bool:
-    """Whether a measurement is within the gate of some component of the row along every axis."""
+    """Return True if a measurement is within the gate of some component of the row along every axis."""
     for c in range(rows.offsets[row], rows.offsets[row + 1]):
         inside = True
         for a in range(measurement.shape[0]):
@@ -108,7 +109,7 @@ def _sort(values: Ints, first: int, last: int) -> None:
 
 @inlined
 def _ends(rows: Rows, row: int, axis: int, angular: Bools, reaches: Floats) -> tuple[float, float]:
-    """Between which values on the axis the gates of a row lie; of an angle all where they may go round."""
+    """Return the interval of the gates of a row on the axis; for an angle that may wrap around, everything."""
     low, high = math.inf, -math.inf
     for c in range(rows.offsets[row], rows.offsets[row + 1]):
         low = min(low, rows.innovation.predicted[c, axis] - reaches[c, axis])
@@ -120,7 +121,7 @@ def _ends(rows: Rows, row: int, axis: int, angular: Bools, reaches: Floats) -> t
 
 @kernel
 def _increasing(scan: Floats, axis: int) -> tuple[Ints, Floats]:
-    """The measurements in increasing order along an axis, and their values there."""
+    """Return the measurements in increasing order along an axis, and their values there."""
     values = np.empty(len(scan))
     for j in range(len(scan)):
         values[j] = -scan[j, axis]
@@ -132,7 +133,7 @@ def _increasing(scan: Floats, axis: int) -> tuple[Ints, Floats]:
 
 @kernel
 def near_measurements(rows: Rows, scan: Floats, angular: Bools, gate: float) -> Near:
-    """The measurements that may be in the gates of each row: all that are, and few others."""
+    """Return the measurements that may be in the gates of each row: all that are, and few others."""
     num, num_rows = len(scan), len(rows.log_absent)
     reaches = _gate_reaches(rows, gate)
     axis = _finest_axis(scan, reaches)

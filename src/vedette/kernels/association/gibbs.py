@@ -1,7 +1,7 @@
 """Joint choices drawn by a Gibbs sampler (Vo, Vo, Hoang 2017, Algorithm 1), an alternative to exact ranking.
 
 Each parent's chain starts at its optimal assignment, so the heaviest choice is never missed; a sweep redraws every row
-given the others, and every distinct state is kept once. Samples are shared out by the square root of the prior weight.
+given the others, and every distinct state is kept once. Samples are divided by the square root of the prior weight.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from vedette.kernels.base.types import Floats, Ints
 
 @kernel
 def _sweep(options: Options, rows: Ints, weights: Floats, work: DualWork, rng: np.random.Generator) -> None:
-    """Redraw the option of each row given the columns of all others (`work.column_row` holds who has a column)."""
+    """Redraw the option of each row given the columns of all others (`work.column_row`: row of each column)."""
     for i in range(len(rows)):
         old = options.columns[work.row_option[i]]
-        # The row lets its measurement go before it draws: it may take it again.
+        # The row releases its measurement before the draw, and may take it again.
         if old >= 0:
             work.column_row[old] = -1
         total = 0.0
@@ -55,7 +55,7 @@ def _sweep(options: Options, rows: Ints, weights: Floats, work: DualWork, rng: n
 
 @kernel
 def _is_new(choice: Ints, num: int, children: Children, table: Ints) -> bool:
-    """Look the choice up in the hash table of this parent's children; enter it as child `num` where it is new."""
+    """Look the choice up in the hash table of this parent's children; enter it as child `num` if it is new."""
     mask = len(table) - 1
     key = 0
     for option in choice:
@@ -77,7 +77,7 @@ def _is_new(choice: Ints, num: int, children: Children, table: Ints) -> bool:
 
 @kernel
 def _relative_weights(options: Options) -> Floats:
-    """Option weights relative to the heaviest of their row, in the linear domain."""
+    """Return the linear weights of options relative to the heaviest of their row."""
     weights = np.empty(options.offsets[-1])
     for row in range(len(options.offsets) - 1):
         for option in range(options.offsets[row], options.offsets[row + 1]):
@@ -87,7 +87,7 @@ def _relative_weights(options: Options) -> Floats:
 
 @kernel
 def sample_children(options: Options, parents: Parents, num_samples: int, rng: np.random.Generator) -> Children:
-    """Distinct joint choices of all parents from about `num_samples` sweeps in all, in order of discovery."""
+    """Return distinct joint choices of all parents from about `num_samples` sweeps in total, in order of discovery."""
     shares = 0.0
     for log_weight in parents.log_weights:
         shares += math.exp(0.5 * log_weight)

@@ -1,4 +1,4 @@
-"""Rows of a scan and their options put behind others, such as first detections behind tracks."""
+"""Concatenation of rows of a scan with their options, such as first detections after tracks."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from vedette.kernels.gaussian.innovation import copy_innovation
 
 @kernel
 def joined_rows(rows: Rows, options: Options, new: Rows, new_options: Options) -> tuple[Rows, Options]:
-    """Rows and their options, followed by others of the same scan."""
+    """Return rows and their options, followed by others of the same scan."""
     num_rows, num_new = len(rows.log_absent), len(new.log_absent)
     num, num_components = rows.offsets[num_rows], rows.offsets[num_rows] + new.offsets[num_new]
     meas_dim, state_dim = rows.innovation.whitened_cross.shape[1:]
@@ -58,7 +58,7 @@ def joined_rows(rows: Rows, options: Options, new: Rows, new_options: Options) -
 
 @inlined
 def copy_entry(source: Options, entry: int, out: Options, at: int) -> None:
-    """Copy the whitened residual of an entry, and what it becomes where components of both bend."""
+    """Copy the whitened residual of an entry, and its updated moments if both have components that bend."""
     for a in range(source.whitened.shape[1]):
         out.whitened[at, a] = source.whitened[entry, a]
     if source.updated.shape[0] > 0 and out.updated.shape[0] > 0:
@@ -69,7 +69,7 @@ def copy_entry(source: Options, entry: int, out: Options, at: int) -> None:
 
 @kernel
 def _copy_rows(source: Rows, out: Rows, first: int, start: int) -> None:
-    """Write rows from row `first` and component `start` on."""
+    """Write rows, starting at row `first` and component `start`."""
     for row in range(len(source.log_absent)):
         out.labels[first + row, 0], out.labels[first + row, 1] = source.labels[row, 0], source.labels[row, 1]
         out.log_absent[first + row] = source.log_absent[row]

@@ -1,4 +1,4 @@
-"""The share of a hypothesis' joint choices that takes no measurement twice; each is summed once for all hypotheses."""
+"""Share of a hypothesis's joint choices that take no measurement twice; each sum is shared by all hypotheses."""
 
 from __future__ import annotations
 
@@ -13,39 +13,39 @@ from vedette.kernels.base.arrays import filled_ints, hashed
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints
 
-# A cluster with more contested measurements is bounded: its exact sum takes 2^measurements numbers a row.
+# A cluster with more contested measurements is only bounded: its exact sum takes 2^measurements numbers per row.
 MAX_CONTESTED = 6
 # Relative weights below this may have underflowed.
 _LEAST = 1e-250
 
 
 class TotalWork(NamedTuple):
-    """Arrays in which the joint choices of hypotheses are summed, and the shares that are known.
+    """Working arrays for the sums over joint choices of hypotheses, and the known shares.
 
-    Rows that share a measurement, directly or over others of the scan, are a component. Hypotheses mostly have the
-    same rows of a component, for which one sum is enough.
+    Rows that share a measurement, directly or through other rows of the scan, are a component. Hypotheses mostly have
+    the same rows of a component, for which one sum is enough.
     """
 
     owners: Ints  # (num_measurements,) the first place that gates each, -1: none
-    shared: Ints  # (num_measurements,) 1 where two places gate it
+    shared: Ints  # (num_measurements,) 1 if two places gate it
     bits: Ints  # (num_measurements,) number among the contested ones of a cluster, -1: none
-    leaders: Ints  # (widest,) union-find over the places of the rows that are summed
+    leaders: Ints  # (widest,) union-find over the places of the summed rows
     relative: Floats  # (most options of a row,) weights of one row, relative to its heaviest
     table: Floats  # (2^MAX_CONTESTED,) weight of each set of taken measurements
     components: Ints  # (num_rows,) component of each row of the scan
-    firsts: Ints  # (num_rows,) first place of a hypothesis that is of the component, -1: none
+    firsts: Ints  # (num_rows,) first place of a hypothesis in the component, -1: none
     others: Ints  # (widest,) next place of the same component, -1: none
     members: Ints  # (widest,) rows of one component
     slots: Ints  # hash table: number of a known share, -1: none
-    num_known: Ints  # (1,) how many shares are known
-    ends: Ints  # of each known share, where its rows end in `rows`
+    num_known: Ints  # (1,) number of known shares
+    ends: Ints  # for each known share, the end of its rows in `rows`
     rows: Ints  # of the known shares
     log_shares: Floats  # the known shares
 
 
 @kernel
 def make_total_work(options: Options, widest: int, num_rows: int) -> TotalWork:
-    """widest: most rows of one hypothesis. num_rows: of all hypotheses together."""
+    """Return working arrays. widest: largest number of rows of a hypothesis. num_rows: of all hypotheses together."""
     num, size, most = options.num_measurements, 4, 0
     for row in range(len(options.offsets) - 1):
         most = max(most, options.offsets[row + 1] - options.offsets[row])
@@ -72,7 +72,7 @@ def make_total_work(options: Options, widest: int, num_rows: int) -> TotalWork:
 
 @kernel
 def _components(options: Options) -> Ints:
-    """(num_rows,) the first of the rows that share a measurement with each, directly or not."""
+    """First of the rows that share a measurement with each row, directly or not, shape (num_rows,)."""
     leaders = np.empty(len(options.offsets) - 1, np.int64)
     lead_rows(options, leaders, np.empty(options.num_measurements, np.int64))
     for row in range(len(leaders)):
@@ -82,7 +82,7 @@ def _components(options: Options) -> Ints:
 
 @borrowing
 def _link(options: Options, rows: Ints, work: TotalWork) -> bool:
-    """Lead the places that share a measurement, directly or not, to the first of them; false where none does."""
+    """Assign places that share a measurement, directly or not, to the first of them; False if there are none."""
     found = False
     for i in range(len(rows)):
         work.leaders[i] = i
@@ -101,7 +101,7 @@ def _link(options: Options, rows: Ints, work: TotalWork) -> bool:
 
 @borrowing
 def _unlink(options: Options, rows: Ints, work: TotalWork) -> None:
-    """Forget the measurements of the rows."""
+    """Reset the measurements of the rows."""
     for row in rows:
         for option in range(options.offsets[row], options.offsets[row + 1]):
             column = options.columns[option]
@@ -111,7 +111,7 @@ def _unlink(options: Options, rows: Ints, work: TotalWork) -> None:
 
 @inlined
 def _number_contested(options: Options, rows: Ints, leader: int, work: TotalWork) -> int:
-    """Number the contested measurements of a cluster; how many there are."""
+    """Number the contested measurements of a cluster; return how many there are."""
     num = 0
     for i in range(leader, len(rows)):
         if root_of(work.leaders, i) != leader:
@@ -126,14 +126,14 @@ def _number_contested(options: Options, rows: Ints, leader: int, work: TotalWork
 
 @borrowing
 def _take_row(options: Options, row: int, work: TotalWork, size: int) -> None:
-    """One row's step of the sum over sets of taken measurements; weights relative to the row's heaviest option."""
+    """Step of one row in the sum over sets of taken measurements; weights relative to the row's heaviest option."""
     start, stop, table, free = options.offsets[row], options.offsets[row + 1], work.table, 0.0
     for option in range(start, stop):
         column, weight = options.columns[option], math.exp(options.log_weights[option] - options.log_weights[start])
         work.relative[option - start] = weight
         if column < 0 or work.bits[column] < 0:
             free += weight
-    # From the largest set down, as each set is made of smaller ones that must still hold the sums without this row.
+    # From the largest set down, as each set uses smaller ones that must still hold the sums without this row.
     for mask in range(size - 1, -1, -1):
         weight = free * table[mask]
         for option in range(start, stop):
@@ -146,7 +146,7 @@ def _take_row(options: Options, row: int, work: TotalWork, size: int) -> None:
 
 @borrowing
 def _log_cluster_share(options: Options, rows: Ints, leader: int, log_totals: Floats, work: TotalWork) -> float:
-    """As `log_contested_share` of the rows led by `leader`; 0 where too much is contested."""
+    """Return `log_contested_share` of the rows led by `leader`; 0 if there are too many contested measurements."""
     size = 1 << min(_number_contested(options, rows, leader, work), MAX_CONTESTED + 1)
     log_bound, scale, is_exact = 0.0, 0.0, size <= len(work.table)
     if is_exact:
@@ -168,7 +168,7 @@ def _log_cluster_share(options: Options, rows: Ints, leader: int, log_totals: Fl
 
 @borrowing
 def _log_component_share(options: Options, rows: Ints, log_totals: Floats, work: TotalWork) -> float:
-    """As `log_contested_share` of some rows, cluster by cluster."""
+    """Return `log_contested_share` of some rows, cluster by cluster."""
     log_share = 0.0
     if _link(options, rows, work):
         for i in range(len(rows)):
@@ -180,7 +180,7 @@ def _log_component_share(options: Options, rows: Ints, log_totals: Floats, work:
 
 @inlined
 def _is_share_of(work: TotalWork, known: int, num: int) -> bool:
-    """Whether a known share belongs to the first `num` rows of `work.members`."""
+    """Return True if a known share belongs to the first `num` rows of `work.members`."""
     start = work.ends[known - 1] if known > 0 else 0
     same = work.ends[known] - start == num
     for i in range(num):
@@ -209,12 +209,12 @@ def _log_known_share(options: Options, num: int, log_totals: Floats, work: Total
 
 @borrowing
 def log_contested_share(options: Options, rows: Ints, log_totals: Floats, work: TotalWork) -> float:
-    """Log of the share of a hypothesis' joint choices that take no measurement twice, by weight.
+    """Log of the share, by weight, of a hypothesis's joint choices that take no measurement twice.
 
-    At least that share where a cluster has more than `MAX_CONTESTED` contested measurements. log_totals: of each row.
+    An upper bound of it if a cluster has more than `MAX_CONTESTED` contested measurements. log_totals: of each row.
     """
     log_share = 0.0
-    # From behind, so that the places of a component come to stand in order.
+    # In reverse, so that the places of a component are in order.
     for i in range(len(rows) - 1, -1, -1):
         component = work.components[rows[i]]
         work.others[i], work.firsts[component] = work.firsts[component], i

@@ -1,12 +1,12 @@
-"""Which name each target of a hypothesis goes by, once it does not matter any more which of several targets is which.
+"""Resolution of ambiguous labels: a single label for each target if hypotheses disagree only on labels.
 
-Hypotheses may differ in nothing but names: {a here, b there} or {b here, a there}; {a here} or {b here}, as one target
-was born then or then. A density's marginals by label put either label half here and half there, or take neither for
-probable. As a set of targets without names the density says one thing alone, and any names may be given to it that no
-two targets of one hypothesis share (Svensson, Svensson, Guerriero, Willett 2011, for fixed numbers of targets). Here
-the heaviest hypothesis of a factor keeps its names; of each other, heaviest first, every target takes the name of the
-one that it is likeliest to be, by the assignment of the least sum of squared distances; one that is far from all of
-them opens a place of its own.
+Hypotheses may differ only in labels: {a here, b there} or {b here, a there}; {a here} or {b here}, if one target
+was born at one of two steps. The marginals of the labels then put either label half at each position, or make neither
+probable. The unlabelled set of targets is the same in all of them, and any labels may be given to it that no two
+targets of one hypothesis share (Svensson, Svensson, Guerriero, Willett 2011, for fixed numbers of targets). Here
+the heaviest hypothesis of a factor keeps its labels. In the others, heaviest first, every target takes the label of the
+target that it most likely is, by the assignment of the least sum of squared distances; a target that is far from all of
+them opens a new place.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ from vedette.kernels.gaussian.distances import pair_distances
 from vedette.kernels.gaussian.mixtures import descending_order
 from vedette.kernels.gaussian.pooling import Moments, moments_of
 
-# Where two places suit a target equally well, it stays with its own name.
+# If two places fit a target equally well, it keeps its own label.
 _STAY = 1e-6
 
 
 class _Places(NamedTuple):
-    """The places of one factor's targets: those opened so far, each by a track of a heavier hypothesis."""
+    """The places of one factor's targets opened so far, each by a track of a heavier hypothesis."""
 
-    names: Ints  # (num_labels,) label of each place, -1 where it is not open
-    place_of: Ints  # (num_labels,) place that bears each label, -1 for none
+    names: Ints  # (num_labels,) label of each place, -1 if it is not open
+    place_of: Ints  # (num_labels,) place with each label, -1 for none
     squares: Floats  # (num_tracks, num_labels) squared distance of each track from the track that opened a place
-    nearest: Ints  # (num_tracks,) the nearest open place, -1 before there is one
+    nearest: Ints  # (num_tracks,) the nearest open place, -1 if none is open
 
 
 class _Choice(NamedTuple):
-    """The assignment of one hypothesis's targets to places, and room to solve it in."""
+    """The assignment of one hypothesis's targets to places, and working arrays of its solver."""
 
     options: Options
     rows: Ints  # (num_labels,) 0, 1, 2, ...
@@ -63,7 +63,7 @@ def _make_choice(num: int) -> _Choice:
 
 @borrowing
 def _obvious(hyp_tracks: Ints, labels: Ints, places: _Places, most: float, out: Ints) -> bool:
-    """Whether every target is nearest to a place of its own, and near it; `out` then has the places."""
+    """Return True if each target is nearest to, and near, a different place; `out` then has the places."""
     for i in range(len(hyp_tracks)):
         track = hyp_tracks[i]
         place = places.nearest[track]
@@ -81,7 +81,10 @@ def _obvious(hyp_tracks: Ints, labels: Ints, places: _Places, most: float, out: 
 
 @borrowing
 def _assign(hyp_tracks: Ints, labels: Ints, places: _Places, most: float, choice: _Choice) -> None:
-    """Write the places of the least sum of squared distances; a place that is not open is `most` from everyone."""
+    """Write the places of the least sum of squared distances.
+
+    A place that is not open is at `most` from every target.
+    """
     num, options = len(places.names), choice.options
     for i in range(len(hyp_tracks)):
         track = hyp_tracks[i]
@@ -106,7 +109,7 @@ def _assign(hyp_tracks: Ints, labels: Ints, places: _Places, most: float, choice
 
 @kernel
 def _open_places(hyp_tracks: Ints, labels: Ints, places: _Places, moments: Moments, out: Ints) -> None:
-    """Open the new places in `out`: under the target's own label, if no place bears it, else under a free one."""
+    """Open the new places in `out`, with the target's own label if it is free, otherwise with a free one."""
     means, covs = moments.means, moments.covs
     for turn in range(2):
         for i in range(len(hyp_tracks)):
@@ -131,9 +134,10 @@ def _open_places(hyp_tracks: Ints, labels: Ints, places: _Places, moments: Momen
 def _name_factor(
     glmb: Glmb, first: int, last: int, low: int, high: int, label_of: Ints, distance: float, names: Ints
 ) -> None:
-    """Write into `names` what the targets of hypotheses `first` to `last`, over tracks `low` to `high`, go by.
+    """Write the resolved labels of the targets of hypotheses `first` to `last`, over tracks `low` to `high`.
 
-    label_of: (num_tracks,) number of each track's label. names: (num_entries,) number of the label given.
+    label_of: (num_tracks,) number of each track's label. names: (num_entries,) receives the number of the resolved
+    label.
     """
     numbers, labels, num = np.empty(high - low, np.int64), filled_ints(high - low, 0), 0
     for entry in range(glmb.hyp_offsets[first], glmb.hyp_offsets[last]):
@@ -164,10 +168,10 @@ def _name_factor(
 
 @kernel
 def settled_names(glmb: Glmb, factor_offsets: Ints, track_offsets: Ints, label_of: Ints, distance: float) -> Ints:
-    """(num_entries,) number of the label that each entry of `glmb.hyp_tracks` goes by, factor by factor.
+    """Number of the resolved label of each entry of `glmb.hyp_tracks`, factor by factor, shape (num_entries,).
 
-    label_of: (num_tracks,) number of each track's own label. distance: of a target from all places that are open, in
-    standard deviations of the difference of both, beyond which it opens one of its own.
+    label_of: (num_tracks,) number of each track's own label. distance: from all open places, in standard deviations of
+    the difference, beyond which a target opens a new place.
     """
     names = np.empty(len(glmb.hyp_tracks), np.int64)
     for entry in range(len(names)):

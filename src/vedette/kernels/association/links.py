@@ -1,13 +1,13 @@
-"""Which independent factors take a scan together.
+"""Links between independent factors that are updated jointly at a scan.
 
-Two factors that may both take a measurement j exclude each other there. Taken as independent, with probabilities a of
-taking it, they are wrong by an L1 error in proportion to
+Two factors that may both take a measurement j exclude each other there. Treated as independent, with probabilities a of
+taking it, they have an L1 error in proportion to
 
     the sum over pairs of factors of a_s(j) a_t(j).
 
-For each measurement the weakest claims are cut while this sum over the pairs that are cut stays within a bound; all
-others are linked. What the factors of different groups still claim of one measurement is left to
-`vedette.kernels.association.contention`.
+For each measurement the weakest associations are cut while this sum over the pairs that are cut stays within a bound;
+all others are linked. `vedette.kernels.association.contention` handles measurements that factors of different groups
+may still take.
 """
 
 from __future__ import annotations
@@ -26,27 +26,27 @@ from vedette.kernels.gaussian.mixtures import descending_order
 
 
 class MeasurementProbabilities(NamedTuple):
-    """How probable it is that a factor takes a measurement, of every measurement that one of its labels may take."""
+    """Probability that a factor takes a measurement, for every measurement that one of its labels may take."""
 
     offsets: Ints  # (num_factors + 1,) into the others
     measurements: Ints  # of each factor
-    strengths: Floats  # the most that one of its labels takes it with
+    strengths: Floats  # largest probability over its labels
 
 
 class Contention(NamedTuple):
-    """The two strongest claims to each measurement."""
+    """The two strongest factors at each measurement."""
 
-    first: Floats  # (num_measurements,) the strongest claim, 0 for none
+    first: Floats  # (num_measurements,) largest probability, 0 for none
     second: Floats  # (num_measurements,) the next one, of another factor
     owner: Ints  # (num_measurements,) factor of the strongest, -1 for none
 
 
 class Links(NamedTuple):
-    """Pairs of factors that take a scan together."""
+    """Pairs of factors that are updated jointly."""
 
     ends: Ints  # (num_links,) a factor
-    others: Ints  # (num_links,) the factor with the strongest claim to the measurement
-    strengths: Floats  # (num_links,) product of the two claims
+    others: Ints  # (num_links,) the factor of the largest probability at the measurement
+    strengths: Floats  # (num_links,) product of the two probabilities
 
 
 @borrowing
@@ -69,7 +69,10 @@ def _others_claim(contest: Contention, factor: int, measurement: int) -> float:
 
 @kernel
 def _measurement_probabilities(options: Options, alone: Alternatives, row_offsets: Ints) -> MeasurementProbabilities:
-    """What labels claim by themselves. row_offsets: (num_factors + 1,) rows of each factor."""
+    """Return the probabilities of the labels without competition.
+
+    row_offsets: (num_factors + 1,) rows of each factor.
+    """
     num_factors, num, label = len(row_offsets) - 1, len(alone.weights), 0
     offsets, measurements, strengths = np.zeros(num_factors + 1, np.int64), np.empty(num, np.int64), np.empty(num)
     place, filled = filled_ints(options.num_measurements, -1), 0
@@ -98,9 +101,9 @@ def _strengthen(
     place: Ints,
     claims: MeasurementProbabilities,
 ) -> None:
-    """Raise each claim to what it is if a label's other contested measurements go to others.
+    """Raise each probability to its value if all other contested measurements of a label go to other factors.
 
-    least: a measurement is contested where another factor claims it with more. place: (num_measurements,) to work in.
+    least: a measurement is contested if another factor takes it with more. place: (num_measurements,) working array.
     """
     label = 0
     for factor in range(len(row_offsets) - 1):
@@ -120,9 +123,9 @@ def _strengthen(
 
 @kernel
 def _links(claims: MeasurementProbabilities, contest: Contention, max_cut: float) -> Links:
-    """The pairs of factors to be linked: at each measurement those whose claims are not cut, with the strongest.
+    """Return the pairs of factors to link: at each measurement, those that are not cut with the strongest one.
 
-    A claim is cut, the weakest first, while the products of the pairs that are cut sum to `max_cut` at most.
+    Associations are cut, the weakest first, while the products of the pairs that are cut sum to at most `max_cut`.
     """
     num, filled = len(claims.strengths), 0
     factor_of, products = np.empty(num, np.int64), np.empty(num)
@@ -167,11 +170,12 @@ def _join(links: Links, order: Ints, sizes: Ints, most: int, leaders: Ints) -> N
 def linked_factors(
     options: Options, alone: Alternatives, row_offsets: Ints, sizes: Ints, max_cut: float, most: int
 ) -> Ints:
-    """(num_factors,) the first factor of the group that each is taken with.
+    """First factor of the group that each factor belongs to, shape (num_factors,).
 
     alone: of the same options. row_offsets: (num_factors + 1,) rows of each. sizes: (num_factors,) labels of each,
-    overwritten. max_cut: at each measurement, the sum over pairs of the product of their claims up to which claims are
-    cut. most: labels of a group; links are made from the strongest on, and left out where they would join more.
+    overwritten. max_cut: at each measurement, bound on the sum over pairs of the products of the cut probabilities.
+    most: largest number of labels of a group; links are made from the strongest on, and left out if they would exceed
+    it.
     """
     num_factors, num = len(row_offsets) - 1, options.num_measurements
     leaders, claims = counted_ints(num_factors), _measurement_probabilities(options, alone, row_offsets)

@@ -1,9 +1,9 @@
-"""Marginal probability of every option of every row, by clusters of rows that contend for the same measurements.
+"""Marginal probability of every option of every row, by clusters of rows that compete for the same measurements.
 
-This is what an LMB asks of a scan; who else may give it is an `Association`. Within a cluster the sum over all joint
+An LMB filter needs these marginals; an `Association` is another source of them. Within a cluster the sum over all joint
 choices is exact: a forward-backward pass over the rows whose state is the set of measurements already taken. A cluster
-too large for that is summed over its heaviest joint choices, in exact order; what it leaves out is bounded, and no row
-is certain for want of a choice (`vedette.kernels.association.truncation_bound`).
+too large for that is summed over its heaviest joint choices, in exact order; the rest is bounded, and no row becomes
+certain because a choice was left out (`vedette.kernels.association.truncation_bound`).
 """
 
 from __future__ import annotations
@@ -36,28 +36,28 @@ MAX_EXACT_MEASUREMENTS = 12
 
 
 class MarginalSums(NamedTuple):
-    """What the marginals of a scan were taken of."""
+    """Sums over joint choices from which the marginals of a scan were computed."""
 
-    log_total: float  # log total weight of all joint choices that were summed; -inf where none is possible
+    log_total: float  # log total weight of all summed joint choices; -inf if none is possible
     num_ranked: int  # clusters summed over their heaviest choices only
     log_kept: float  # log of the least share of all weight that is in the sum; 0 without such clusters, NaN: unknown
 
 
 @typed_by_fields
 class Association(NamedTuple):
-    """Who else gives the marginals, in place of the sums over clusters."""
+    """Another source of the marginals, in place of the sums over clusters."""
 
     marginals: Any  # see `vedette.models.model_function`, kind `association_marginals`
     params: Floats
 
 
-# Of the probabilities of a row, from 1: what rounding may leave.
+# Allowed deviation of the sum of a row's probabilities from 1.
 SUM_TOLERANCE = 1e-6
 
 
 @inlined
 def _told(options: Options, association: Association, out: Floats) -> MarginalSums:
-    """The marginals that `association` gives, once they are known to be distributions."""
+    """Return the marginals of `association`, after a check that they are distributions."""
     offsets, num = options.offsets, options.offsets[-1]
     columns, log_weights = options.columns[:num], options.log_weights[:num]
     log_total = association.marginals(offsets, columns, log_weights, association.params, out[:num])
@@ -88,9 +88,10 @@ def _single_row(options: Options, row: int, out: Floats) -> float:
 
 @borrowing
 def _transfer(options: Options, row: int, bit_of: Ints, source: Floats, target: Floats, forward: bool) -> None:
-    """One row's step of the pass over sets of taken measurements; weights relative to the row's heaviest option.
+    """Step of one row in the pass over sets of taken measurements; weights relative to the row's heaviest option.
 
-    source, target: forward of the sets of what rows before it gate, and with what it gates; backward the other way.
+    source, target: in the forward pass the sets over the measurements gated before the row, and with those it gates; in
+    the backward pass the other way round.
     """
     for mask in range(len(target)):
         target[mask] = 0.0
@@ -111,9 +112,9 @@ def _transfer(options: Options, row: int, bit_of: Ints, source: Floats, target: 
 def _exact_cluster(
     options: Options, rows: Ints, bit_of: Ints, gated_before: Ints, tables: Floats, out: Floats
 ) -> float:
-    """Marginals of a cluster by forward-backward; returns its log total weight, -inf if that underflows.
+    """Compute marginals of a cluster by forward-backward; return its log total weight, -inf if that underflows.
 
-    Before a row, only measurements that rows before it gate can be taken, the first `gated_before` ones.
+    Before a row, only measurements gated by rows before it can be taken, the first `gated_before` ones.
     """
     num, size = len(rows), 1 << gated_before[len(rows)]
     backwards = (num + 1) * size
@@ -126,7 +127,7 @@ def _exact_cluster(
         scale += options.log_weights[options.offsets[rows[i]]]
         before, after, at = 1 << gated_before[i], 1 << gated_before[i + 1], i * size
         _transfer(options, rows[i], bit_of, tables[at : at + before], tables[at + size : at + size + after], True)
-    # Backwards: weight of all that later rows can do once a set of measurements is taken.
+    # Backwards: total weight of the later rows once a set of measurements is taken.
     for i in range(num - 1, -1, -1):
         before, after, at = 1 << gated_before[i], 1 << gated_before[i + 1], backwards + i * size
         _transfer(options, rows[i], bit_of, tables[at + size : at + size + after], tables[at : at + before], False)
@@ -153,8 +154,10 @@ def _exact_cluster(
 def _ranked_cluster(
     options: Options, rows: Ints, caps: SearchCaps, work: MarginalWork, out: Floats
 ) -> tuple[float, float, bool]:
-    """Marginals of a cluster over its heaviest joint choices; the log of their total weight, the log of the least share
-    of all weight that this is, and whether there was room.
+    """Compute marginals of a cluster over its heaviest joint choices.
+
+    Returns the log of their total weight, the log of a lower bound on their share of all weight, and False if there was
+    not enough room.
     """
     work.single[1] = len(rows)
     parents, children = Parents(work.single, rows, work.no_weight), work.children
@@ -177,7 +180,7 @@ def _ranked_cluster(
         for option in range(options.offsets[row], options.offsets[row + 1]):
             out[option] = math.log(out[option] / total) if out[option] > 0.0 else -math.inf
     log_total = peak + math.log(total)
-    # No choice left out is heavier than the best that waits, or than the gap at which the search stops.
+    # No choice left out is heavier than the best waiting one, or than the gap at which the search stops.
     log_next = peak - caps.max_log_gap
     if work.search.sizes[HEAP] > 0:
         log_next = max(log_next, -work.search.heap_bounds[0])
@@ -188,7 +191,7 @@ def _ranked_cluster(
 
 @borrowing
 def _open_exact(options: Options, rows: Ints, log_total: float, work: MarginalWork, out: Floats) -> bool:
-    """As `open_sides` where the exact sum has lost a side below the smallest number; false where there is no room."""
+    """Apply `open_sides` if the exact sum has lost a side to underflow; return False if there is not enough room."""
     if not has_closed_side(options, rows, out):
         return True
     work.single[1] = len(rows)
@@ -202,9 +205,9 @@ def _open_exact(options: Options, rows: Ints, log_total: float, work: MarginalWo
 def fill_marginals(
     options: Options, caps: SearchCaps, association: Association | None, work: MarginalWork, out: Floats
 ) -> tuple[MarginalSums, bool]:
-    """Write the log marginal probability of each option into `out`; false where `work` must be grown for that.
+    """Write the log marginal probability of each option into `out`; return False if `work` must be grown for that.
 
-    Where clusters were ranked, 1 less the share of all weight that is in the sum bounds the error of each marginal.
+    If clusters were ranked, 1 minus the retained share of all weight bounds the error of each marginal.
     Inlined because `work` is a large bundle, of which the usual small clusters need little.
     """
     if association is not None:
@@ -224,7 +227,7 @@ def fill_marginals(
             log_total += _single_row(options, leader, out)
             continue
         total, rows = -math.inf, work.members[:count]
-        # 2^measurements states a row: beyond a dozen, ranking is cheaper.
+        # 2^measurements states per row: beyond a dozen, ranking is cheaper.
         if num_bits <= MAX_EXACT_MEASUREMENTS:
             work.needed[0] = 2 * (count + 1) << num_bits
             if work.needed[0] > len(work.tables):
@@ -246,7 +249,7 @@ def fill_marginals(
 def option_marginals(
     options: Options, caps: SearchCaps, association: Association | None
 ) -> tuple[Floats, MarginalSums]:
-    """As `fill_marginals`, into arrays made for it."""
+    """Return the result of `fill_marginals` in new arrays."""
     marginals = np.empty(options.offsets[-1])
     work = make_marginal_work(len(options.offsets) - 1, options.num_measurements)
     while True:

@@ -1,4 +1,4 @@
-"""What may happen to each row of a scan: absent, missed, or detected as one of the gated measurements.
+"""Options of each row of a scan: absent, missed, or detected as one of the gated measurements.
 
 This is the part of the joint prediction and update that all filters share (Vo, Vo, Hoang 2017, eq. 25-27 and 33-35).
 """
@@ -23,7 +23,7 @@ from vedette.kernels.gaussian.relinearisation import Pair, PairWork, make_pair_w
 
 
 class Sight(NamedTuple):
-    """The sensor of a scan and its pose, and arrays in which components that bend are updated."""
+    """The sensor of a scan and its pose, and working arrays for updates of components that bend."""
 
     sensor: Sensor
     pose: Floats  # (pose_dim,)
@@ -32,7 +32,7 @@ class Sight(NamedTuple):
 
 @kernel
 def make_options(num_rows: int, num_components: int, num_measurements: int, state_dim: int, meas_dim: int) -> Options:
-    """Room for every option that there can be."""
+    """Return arrays for every possible option."""
     most_options, most_entries = num_rows * (num_measurements + 2), num_components * (num_measurements + 1)
     updated = np.empty((most_entries, state_dim + 1, state_dim))
     return make_room(num_rows, most_options, most_entries, num_measurements, meas_dim, updated)
@@ -42,7 +42,7 @@ def make_options(num_rows: int, num_components: int, num_measurements: int, stat
 def make_room(
     num_rows: int, most_options: int, most_entries: int, num_measurements: int, meas_dim: int, updated: Floats
 ) -> Options:
-    """Room for so many options and entries. updated: as of `Options`."""
+    """Return arrays for this number of options and entries. updated: as in `Options`."""
     return Options(
         np.zeros(num_rows + 1, np.int64),
         np.empty(most_options, np.int64),
@@ -57,7 +57,7 @@ def make_room(
 
 @kernel
 def _room_for(rows: Rows, near: Near, num_measurements: int, meas_dim: int) -> Options:
-    """Room for the options of rows with the measurements near them."""
+    """Return arrays for the options of rows with the measurements near them."""
     num, most_entries = len(rows.log_absent), 0
     for row in range(num):
         most_entries += (rows.offsets[row + 1] - rows.offsets[row]) * (near.offsets[row + 1] - near.offsets[row] + 1)
@@ -67,14 +67,17 @@ def _room_for(rows: Rows, near: Near, num_measurements: int, meas_dim: int) -> O
 
 @kernel
 def room_for_updated(rows: Rows, num_entries: int) -> Floats:
-    """(num_entries, state_dim + 1, state_dim), or (0, ...) where no component bends or is at the edge of the view."""
+    """Array (num_entries, state_dim + 1, state_dim).
+
+    (0, ...) if no component bends or is at the edge of the field of view.
+    """
     dim, kinds = rows.components.means.shape[1], rows.innovation
     return np.empty((num_entries if kinds.bends.any() or kinds.at_edge.any() else 0, dim + 1, dim))
 
 
 @inlined
 def view_options(options: Options, num_rows: int, num_measurements: int) -> Options:
-    """Room for the options of fewer rows and measurements."""
+    """Return arrays for the options of fewer rows and measurements."""
     return Options(
         options.offsets[: num_rows + 1],
         options.columns,
@@ -89,7 +92,7 @@ def view_options(options: Options, num_rows: int, num_measurements: int) -> Opti
 
 @inlined
 def log_clutter_at(sensor: Sensor, measurement: Floats, pose: Floats) -> float:
-    """Log clutter intensity at a measurement, -inf where clutter is impossible."""
+    """Return the log clutter intensity at a measurement, -inf if clutter is impossible."""
     level = sensor.log_clutter_intensity(measurement, pose, sensor.clutter_params)
     if math.isnan(level) or level == math.inf:
         raise ModelError("clutter model: log intensity is not a number below infinity")
@@ -98,11 +101,14 @@ def log_clutter_at(sensor: Sensor, measurement: Floats, pose: Floats) -> float:
 
 @borrowing
 def _log_clutter(sensor: Sensor, scan: Floats, pose: Floats, floor: float, out: Floats) -> tuple[float, int]:
-    """Log clutter intensity at each measurement, raised to `floor`; returns their sum and how often that was needed."""
+    """Write the log clutter intensity at each measurement, raised to `floor`.
+
+    Return their sum and the number raised.
+    """
     total, num_raised = 0.0, 0
     for j in range(len(scan)):
         level = log_clutter_at(sensor, scan[j], pose)
-        # Where the model says that clutter is impossible, no hypothesis could leave the measurement unexplained.
+        # With zero clutter intensity, no hypothesis could leave the measurement unexplained.
         if level < floor:
             level = floor
             num_raised += 1
@@ -113,7 +119,7 @@ def _log_clutter(sensor: Sensor, scan: Floats, pose: Floats, floor: float, out: 
 
 @inlined
 def sort_row(start: int, stop: int, columns: Ints, log_weights: Floats, entries: Ints) -> None:
-    """Order the options of a row, heaviest first."""
+    """Sort the options of a row, heaviest first."""
     for i in range(start + 1, stop):
         column, weight, entry = columns[i], log_weights[i], entries[i]
         slot = i
@@ -131,9 +137,9 @@ def sort_row(start: int, stop: int, columns: Ints, log_weights: Floats, entries:
 def weigh_detection(
     rows: Rows, c: int, measurement: Floats, log_clutter: float, sight: Sight, gate: float, entry: int, out: Options
 ) -> float:
-    """Log weight of component `c` detected as a measurement, relative to clutter; -inf outside the gate.
+    """Return the log weight of component `c` detected as a measurement, relative to clutter; -inf outside the gate.
 
-    Its whitened residual, and what becomes of it where it bends, are written at `entry`.
+    Writes its whitened residual, and its updated moments if it bends, at `entry`.
     """
     innovation = rows.innovation
     distance = whiten(innovation, c, measurement, sight.sensor.angular, gate, out.whitened[entry])
@@ -155,7 +161,7 @@ def weigh_detection(
 
 @inlined
 def _detected_there(rows: Rows, c: int, sight: Sight, whitened: Floats, updated: Floats) -> float:
-    """Mean P_D of a component after a measurement. Its Gaussian is in `updated` if it bends, else written there."""
+    """Return the mean P_D of a component after a measurement. Its Gaussian is in `updated`, or is written there."""
     if not rows.innovation.bends[c]:
         write_posterior(rows.innovation, c, whitened, rows.components.means[c], updated)
     return detection_probability(sight.sensor, sight.pose, updated[0], updated[1:], sight.work.scratch.points[0])
@@ -165,7 +171,10 @@ def _detected_there(rows: Rows, c: int, sight: Sight, whitened: Floats, updated:
 def _detection_option(
     rows: Rows, row: int, measurement: Floats, log_clutter: float, sight: Sight, gate: float, entry: int, out: Options
 ) -> float:
-    """Write the component entries of row `row` detected as a measurement; its log weight, -inf outside the gate."""
+    """Write the component entries of row `row` detected as a measurement.
+
+    Return its log weight, -inf outside the gate.
+    """
     peak, first = -math.inf, rows.offsets[row]
     count = rows.offsets[row + 1] - first
     for i in range(count):
@@ -189,7 +198,7 @@ def _total_from_peak(values: Floats, start: int, count: int, peak: float) -> flo
 def _fill_options(
     rows: Rows, near: Near, scan: Floats, log_clutter: Floats, sight: Sight, gate: float, out: Options
 ) -> None:
-    """Options of every row, heaviest first; options of weight zero are left out."""
+    """Write the options of every row, heaviest first; options of weight zero are left out."""
     filled, entry, every = 0, 0, len(near.offsets) == 0
     out.offsets[0] = 0
     components = rows.components
@@ -218,7 +227,7 @@ def _fill_options(
         for at in range(begin, end):
             j = at if every else near.measurements[at]
             weight = _detection_option(rows, row, scan[j], log_clutter[j], sight, gate, entry, out)
-            # Outside the gate nothing is kept: the next option writes over the entries.
+            # Outside the gate nothing is kept: the next option overwrites the entries.
             if weight > -math.inf:
                 out.columns[filled], out.log_weights[filled], out.entries[filled] = j, weight, entry
                 filled += 1
@@ -239,11 +248,11 @@ def weigh_options(
     work: PairWork,
     out: Options,
 ) -> tuple[float, int]:
-    """Write the options of every row, their weights relative to clutter, heaviest first.
+    """Write the options of every row, with weights relative to clutter, heaviest first.
 
-    near: the measurements that are looked at. log_clutter: (>= num_measurements,) the log clutter intensity at each
-    measurement is written there. work: to update components that bend in. Returns the sum of the log clutter
-    intensities, and how many of them were raised to the floor.
+    near: the measurements to compare with. log_clutter: (>= num_measurements,) receives the log clutter intensity at
+    each measurement. work: for updates of components that bend. Returns the sum of the log clutter intensities, and how
+    many of them were raised to the floor.
     """
     total, num_raised = _log_clutter(sensor, scan.measurements, scan.pose, caps.log_clutter_floor, log_clutter)
     _fill_options(rows, near, scan.measurements, log_clutter, Sight(sensor, scan.pose, work), caps.gate, out)
@@ -252,7 +261,7 @@ def weigh_options(
 
 @kernel
 def weighed_options(rows: Rows, scan: ScanInput, sensor: Sensor, caps: Truncation) -> tuple[Options, float, int]:
-    """As `weigh_options`, into arrays made for it."""
+    """Return the result of `weigh_options` in new arrays."""
     return weighed_options_at(rows, scan, sensor, caps, np.empty(len(scan.measurements)))
 
 
@@ -260,7 +269,7 @@ def weighed_options(rows: Rows, scan: ScanInput, sensor: Sensor, caps: Truncatio
 def weighed_options_at(
     rows: Rows, scan: ScanInput, sensor: Sensor, caps: Truncation, log_clutter: Floats
 ) -> tuple[Options, float, int]:
-    """As `weighed_options`; log_clutter: (num_measurements,) written as of `weigh_options`."""
+    """Return the result of `weighed_options`; log_clutter: (num_measurements,) written as in `weigh_options`."""
     num, near = len(scan.measurements), near_measurements(rows, scan.measurements, sensor.angular, caps.gate)
     options = _room_for(rows, near, num, len(sensor.angular))
     work = make_pair_work(rows.components.means.shape[1], len(sensor.angular))

@@ -1,7 +1,7 @@
-"""The rows of a scan: tracks predicted to its time, with what each of them expects to be measured as.
+"""The rows of a scan: tracks predicted to its time, with the expected measurement of each.
 
-Survivors stand before birth sites. That a track may be gone, or a site empty, is in its row's weights, so that one pass
-over the rows predicts and updates together (Vo, Vo, Hoang 2017, section III-C).
+Survivors precede birth sites. The weights of a row include death of the track, or absence of a birth, so that one pass
+over the rows predicts and updates jointly (Vo, Vo, Hoang 2017, section III-C).
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ class Rows(NamedTuple):
 
     labels: Ints  # (num_rows, 2)
     offsets: Ints  # (num_rows + 1,) into the components
-    log_absent: Floats  # (num_rows,) log probability of not being there
-    components: Mixture  # predicted; log weights of the mixture times the probability of being there
+    log_absent: Floats  # (num_rows,) log probability of absence
+    components: Mixture  # predicted; log weights of the mixture times the probability of presence
     innovation: Innovation
 
 
@@ -49,7 +49,7 @@ def make_rows(num_rows: int, num_components: int, state_dim: int, meas_dim: int)
 
 @inlined
 def view_rows(rows: Rows, num: int) -> Rows:
-    """Room for `num` rows of one component each."""
+    """Return arrays for `num` rows of one component each."""
     innovation = rows.innovation
     return Rows(
         rows.labels[:num],
@@ -81,7 +81,7 @@ def fill_survivors(tracks: Tracks, motion: Motion, dt: float, rows: Rows, scratc
             survival = motion.prob_survival(mean, dt, motion.survival_params)
             if not 0.0 <= survival <= 1.0:
                 raise ModelError("survival model: probability is not in [0, 1]")
-            # 1 - <p, P_S>: who is in this mixture has died. What survives keeps its weight in the mixture.
+            # 1 - <p, P_S>: probability of death. The surviving part keeps its weight in the mixture.
             absent += math.exp(components.log_weights[c]) * (1.0 - survival)
             copy_component(components, c, out, c)
             out.log_weights[c] += log_or_minus_inf(survival)
@@ -99,7 +99,7 @@ def fill_births(birth: Lmb, first_row: int, rows: Rows) -> None:
     for i in range(len(sites.labels)):
         row = first_row + i
         rows.labels[row, 0], rows.labels[row, 1] = sites.labels[i, 0], sites.labels[i, 1]
-        # log (1 - r) and log r of the logit, exact near 0 and 1.
+        # log (1 - r) and log r from the logit, exact near 0 and 1.
         rows.log_absent[row] = -log_add(0.0, birth.existence_logit[i])
         log_existence = -log_add(0.0, -birth.existence_logit[i])
         rows.offsets[row + 1] = shift + sites.offsets[i + 1]
@@ -110,7 +110,7 @@ def fill_births(birth: Lmb, first_row: int, rows: Rows) -> None:
 
 @borrowing
 def expect_rows(sensor: Sensor, pose: Floats, rows: Rows, scratch: Scratch) -> None:
-    """Write what every component of the rows expects of a scan taken from `pose`."""
+    """Write the expected measurement of every component of the rows for a scan taken from `pose`."""
     components = rows.components
     for c in range(len(components.log_weights)):
         expect(sensor, pose, components.means[c], components.covs[c], c, rows.innovation, scratch)
@@ -118,7 +118,7 @@ def expect_rows(sensor: Sensor, pose: Floats, rows: Rows, scratch: Scratch) -> N
 
 @inlined
 def predict_rows(tracks: Tracks, scan: ScanInput, motion: Motion, sensor: Sensor, rows: Rows, scratch: Scratch) -> None:
-    """Write the rows of a scan, as many as `rows` has room for; the measurements are not looked at."""
+    """Write the rows of a scan, up to the size of `rows`, without using the measurements."""
     fill_survivors(tracks, motion, scan.dt, rows, scratch)
     fill_births(scan.birth, len(tracks.labels), rows)
     expect_rows(sensor, scan.pose, rows, scratch)
@@ -126,20 +126,20 @@ def predict_rows(tracks: Tracks, scan: ScanInput, motion: Motion, sensor: Sensor
 
 @inlined
 def leave_unseen(rows: Rows) -> None:
-    """Make the scan of the rows one that sees nothing: with no measurements, to update is then to predict."""
+    """Set detection of the rows to zero: without measurements, an update is then a prediction."""
     rows.innovation.prob_detection[:] = 0.0
     rows.innovation.at_edge[:] = False
 
 
 @kernel
 def rows_of_scan(tracks: Tracks, scan: ScanInput, motion: Motion | None, sensor: Sensor) -> Rows:
-    """As `predict_rows`, into arrays made for it. motion: None where the tracks are of the scan's own time."""
+    """Return the result of `predict_rows` in new arrays. motion: None if the tracks are at the time of the scan."""
     sites, state_dim, meas_dim = scan.birth.tracks, tracks.components.means.shape[1], len(sensor.angular)
     if motion is None:
         standing = standing_rows(tracks, meas_dim)
         expect_rows(sensor, scan.pose, standing, make_scratch(state_dim, meas_dim))
         return standing
-    # Every component has its innovation here once, whatever number of hypotheses hold its track.
+    # Every component has its innovation here once, for any number of hypotheses with its track.
     num_rows = len(tracks.labels) + len(sites.labels)
     rows = make_rows(
         num_rows, len(tracks.components.log_weights) + len(sites.components.log_weights), state_dim, meas_dim
@@ -150,7 +150,7 @@ def rows_of_scan(tracks: Tracks, scan: ScanInput, motion: Motion | None, sensor:
 
 @kernel
 def standing_rows(tracks: Tracks, meas_dim: int) -> Rows:
-    """The tracks as they are, without births, deaths or motion; each is surely there. `expect_rows` is left to do."""
+    """Return the tracks unchanged as rows: no births, deaths or motion, each surely present; without `expect_rows`."""
     num, state_dim = tracks.components.means.shape
     rows = make_rows(len(tracks.labels), num, state_dim, meas_dim)
     for i in range(len(tracks.labels)):
@@ -162,7 +162,7 @@ def standing_rows(tracks: Tracks, meas_dim: int) -> Rows:
 
 @kernel
 def taken_rows(rows: Rows, members: Ints) -> Rows:
-    """Some of the rows, in the order given."""
+    """Return some of the rows, in the order given."""
     num_components = 0
     for row in members:
         num_components += rows.offsets[row + 1] - rows.offsets[row]

@@ -1,4 +1,4 @@
-"""Hypotheses of several independent factors taken together: their products, heaviest first."""
+"""Products of the hypotheses of several independent factors, heaviest first."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from vedette.kernels.gaussian.mixtures import descending_order
 
 @borrowing
 def _merge_rows(rows: Ints, first: int, middle: int, last: int) -> None:
-    """Put two runs of increasing rows, one after the other, into one."""
+    """Merge two adjacent runs of increasing rows into one."""
     for i in range(middle, last):
         row, slot = rows[i], i
         while slot > first and rows[slot - 1] > row:
@@ -24,10 +24,11 @@ def _merge_rows(rows: Ints, first: int, middle: int, last: int) -> None:
 
 @kernel
 def product_of(first: Parents, second: Parents, max_hypotheses: int) -> Parents:
-    """The products of the hypotheses of two factors, heaviest first. Both have theirs so, and rows in increasing order.
+    """Return the products of the hypotheses of two factors, heaviest first.
 
-    A pair of which `max_hypotheses` others are surely heavier is left out, but never one with the heaviest hypothesis
-    of the other factor: a hypothesis that a factor has kept for the sake of one track is not lost before the scan.
+    Both factors must have their hypotheses heaviest first, and rows in increasing order. A pair of which
+    `max_hypotheses` others are surely heavier is left out, but never one with the heaviest hypothesis of the other
+    factor: a hypothesis that a factor has kept for the sake of one track is not lost before the scan.
     """
     room = max(len(first.log_weights), len(second.log_weights))
     lefts, rights, log_weights, num = np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room), 0

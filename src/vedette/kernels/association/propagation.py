@@ -1,12 +1,12 @@
-"""Association marginals by loopy belief propagation (Williams and Lau 2014), exact where who contends makes no loop.
+"""Association marginals by loopy belief propagation (Williams and Lau 2014), exact on graphs without loops.
 
-Rows and measurements send each other messages along the detections that are possible. With the weight w_ij of row i
-detected as measurement j, and w_i0 of all that it may be but detected,
+Rows and measurements exchange messages along the possible detections. With the weight w_ij of row i detected as
+measurement j, and w_i0 of all its options without detection,
 
     nu_ij = w_ij / (w_i0 + sum over j' but j of w_ij' mu_ij'),    mu_ij = 1 / (1 + sum over i' but i of nu_i'j),
 
-until mu stands still; then P(i is j) is proportional to w_ij mu_ij, and P(i is not detected) to w_i0. Each sweep costs
-as much as there are options, however many rows contend; the iteration always comes to rest, at one place.
+until mu converges; then P(i is j) is proportional to w_ij mu_ij, and P(i is not detected) to w_i0. The cost of a sweep
+is the number of options, however many rows compete; the iteration always converges, to a unique fixed point.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from vedette.kernels.base.types import Floats, Ints
 
 @inlined
 def _sum_of_others(own: float, largest: float, rest: float, is_largest: bool) -> float:
-    """The sum of non-negative terms but one, from the largest and the sum of the rest; any of them may be infinite."""
+    """Sum of non-negative terms except one, from the largest and the sum of the rest; any of them may be infinite."""
     if is_largest:
         return rest
-    # Taken off before the largest is added: a small sum is not lost under a large term that is not in it.
+    # Subtracted before the largest is added: a small sum is not lost next to a large term outside it.
     return largest if own == math.inf else max(rest - own, 0.0) + largest
 
 
@@ -32,7 +32,7 @@ def _sum_of_others(own: float, largest: float, rest: float, is_largest: bool) ->
 def _send_to_measurements(
     offsets: Ints, columns: Ints, weights: Floats, free: Floats, to_row: Floats, to_column: Floats
 ) -> None:
-    """Write nu of every detection, into `to_column`."""
+    """Write nu of every detection into `to_column`."""
     for row in range(len(offsets) - 1):
         largest, rest, heaviest = 0.0, 0.0, -1
         for option in range(offsets[row], offsets[row + 1]):
@@ -68,7 +68,7 @@ def _add_up(columns: Ints, to_column: Floats, largest: Floats, rest: Floats, hea
 def _send_to_rows(
     columns: Ints, to_column: Floats, largest: Floats, rest: Floats, heaviest: Ints, to_row: Floats
 ) -> float:
-    """Write mu of every detection, into `to_row`; returns the largest relative change."""
+    """Write mu of every detection into `to_row`; return the largest relative change."""
     change = 0.0
     for option in range(len(columns)):
         column = columns[option]
@@ -85,7 +85,7 @@ def _send_to_rows(
 def _conclude(
     offsets: Ints, columns: Ints, log_weights: Floats, weights: Floats, free: Floats, to_row: Floats, out: Floats
 ) -> float:
-    """Write the log marginals; returns the rows' part of the log total weight, -inf where a row can be nothing."""
+    """Write the log marginals; return the rows' part of the log total weight, -inf if a row has no option."""
     log_total = 0.0
     for row in range(len(offsets) - 1):
         start, stop = offsets[row], offsets[row + 1]
@@ -107,9 +107,9 @@ def _conclude(
 def propagate_beliefs(
     offsets: Ints, columns: Ints, log_weights: Floats, max_sweeps: int, tolerance: float, out: Floats
 ) -> float:
-    """Write the log marginal of every option; returns the log total weight in Bethe's approximation, -inf of none.
+    """Write the log marginal of every option; return the log total weight in Bethe's approximation, -inf if impossible.
 
-    Options as of `vedette.kernels.association.assignment.Options`. Stops after `max_sweeps`, or when no mu changes by
+    Options as in `vedette.kernels.association.assignment.Options`. Stops after `max_sweeps`, or when no mu changes by
     more than `tolerance` of itself.
 
     Z = prod over rows of (w_i0 + sum of w_ij mu_ij) times prod over measurements of (1 + sum of nu_ij), over the

@@ -1,9 +1,9 @@
 """The heaviest joint choices over all prior hypotheses at once, in exact order.
 
 Truncating a delta-GLMB to its heaviest hypotheses minimises the L1 error (Vo, Vo, Phung 2014, Prop. 5). Instead of
-ranking inside each prior hypothesis with a number of children fixed beforehand (Murty), one best-first search runs over
-all of them: its bound is the optimal assignment's dual solution, so it is exact from the first node, and rows whose
-second choice is far off stay near the root, so that one more hypothesis costs a few nodes. How it works, step by step:
+ranking within each prior hypothesis with a number of children fixed in advance (Murty), one best-first search runs over
+all of them. Its bound is the dual solution of the optimal assignment, so it is exact from the first node, and rows
+whose second choice is far off stay near the root, so that one more hypothesis costs a few nodes. Step by step:
 docs/devdocs/ranked-search.md.
 """
 
@@ -40,14 +40,14 @@ from vedette.kernels.association.search_start import open_free, open_solved, sta
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Ints
 
-# Nodes that a search visits for each child that it finds, with some to spare (12.8 were measured over 86 rows), and
-# how many children are thought of at most when room for them is made.
+# Nodes that a search visits for each child that it finds, with a margin (12.8 were measured over 86 rows), and
+# the largest number of children for which room is made in advance.
 _NODES_A_CHILD = 16
 _MOST_CHILDREN = 2048
 
 
 class Ranking(NamedTuple):
-    """Work arrays of a ranking and the children that it found."""
+    """Working arrays of a ranking and the children that it found."""
 
     search: Search
     children: Children
@@ -55,7 +55,7 @@ class Ranking(NamedTuple):
 
 @inlined
 def _next_free(search: Search, columns: Ints, choice: int, last: int, stamp: int) -> int:
-    """The first choice from `choice` on, before `last`, whose column is free; -1 for none."""
+    """Return the first choice from `choice` on, before `last`, whose column is free; -1 for none."""
     while choice < last:
         column = columns[search.options[choice]]
         if column < 0 or search.taken[column] != stamp:
@@ -73,7 +73,7 @@ def _take(search: Search, columns: Ints, choice: int, stamp: int) -> None:
 
 @inlined
 def _unused_penalty(search: Search, parent: int, stamp: int) -> float:
-    """The -v of the contended columns that no row of the full choice has taken."""
+    """Return the sum of -v over the contended columns that no row of the full choice has taken."""
     total = 0.0
     for i in range(search.penalty_starts[parent], search.penalty_ends[parent]):
         if search.taken[search.penalty_columns[i]] != stamp:
@@ -83,14 +83,14 @@ def _unused_penalty(search: Search, parent: int, stamp: int) -> float:
 
 @inlined
 def _descend(search: Search, node: int, num_rows: int, columns: Ints, limit: float) -> int:
-    """Visit `node` and dive along first choices while nothing waiting is better. A full choice's node, or -1.
+    """Visit `node` and dive along first choices while no waiting node is better; return a full choice's node, or -1.
 
     A node's bound is its parent hypothesis's optimum plus the extra costs of the choices settled so far. It is a lower
-    bound of all that is below it, since extra costs and penalties are never negative; it is met by a full choice that
-    goes on with choices of cost 0 and leaves no contended column unused, and of the root by the optimum itself.
+    bound for all its descendants, since extra costs and penalties are never negative; it is attained by a full choice
+    that continues with choices of cost 0 and leaves no contended column unused, and for the root by the optimum itself.
     """
     parent = search.parents[node]
-    # A full choice comes off the heap: its bound is its cost, and nothing that waits is cheaper.
+    # A full choice from the heap: its bound is its cost, and no waiting node is cheaper.
     if search.depths[node] == num_rows:
         return node
     first_position = search.starts[parent]
@@ -105,8 +105,8 @@ def _descend(search: Search, node: int, num_rows: int, columns: Ints, limit: flo
     while True:
         depth, bound = search.depths[node], search.bounds[node]
         if depth >= 0:
-            # A node stands for its choice and all dearer ones at its position. On its visit the next of them that is
-            # free is split off to wait: each joint choice is then under one node alone, and none is made before needed.
+            # A node represents its choice and all costlier ones at its position. On its visit the next free one of them
+            # is split off to wait: each joint choice is then under one node only, and none is made before it is needed.
             choice, previous = search.choices[node], search.previous[node]
             sibling = _next_free(search, columns, choice + 1, search.lasts[first_position + depth], stamp)
             if sibling >= 0 and search.bounds[previous] + search.costs[sibling] <= limit:
@@ -125,7 +125,7 @@ def _descend(search: Search, node: int, num_rows: int, columns: Ints, limit: flo
         if bound > limit:
             return -1
         node = new_node(search, bound, parent, depth + 1, next_choice, node)
-        # Going on without the heap is the same as being pushed and popped at once.
+        # Continuing without the heap is the same as a push followed by a pop.
         if search.sizes[HEAP] > 0 and search.heap_bounds[0] < bound:
             push(search, node)
             return -1
@@ -145,10 +145,10 @@ def _write_choice(search: Search, node: int, out: Ints, start: int) -> None:
 
 @borrowing
 def run_search(options: Options, parents: Parents, caps: SearchCaps, search: Search, children: Children) -> bool:
-    """Append children in descending order of weight, at most `max_hypotheses` in all and none more than `max_log_gap`
-    under the first.
+    """Append children in descending order of weight; False if search or children must be grown to continue.
 
-    False where search or children must be grown; called again with the grown ones it goes on where it stopped.
+    At most `max_hypotheses` in total, none more than `max_log_gap` below the first. Called again with the grown arrays,
+    the search continues where it stopped.
     """
     sizes, filled = search.sizes, children.filled
     while sizes[HEAP] > 0 and filled[0] < caps.max_hypotheses and sizes[NODES] < caps.max_nodes:
@@ -161,8 +161,8 @@ def run_search(options: Options, parents: Parents, caps: SearchCaps, search: Sea
         node = pop(search)
         parent = search.parents[node]
         rows = parents.rows[parents.offsets[parent] : parents.offsets[parent + 1]]
-        # A parent's first bound lets rows share columns. Only when it comes to the top is its assignment solved, and
-        # not even then where the rows' best options do not collide, for then they are the optimum.
+        # A parent's first bound lets rows share columns. Its assignment is solved only when it reaches the top, and
+        # not even then if the rows' best options do not collide, as they are then the optimum.
         if search.starts[parent] < 0 and not open_free(parent, rows, options, search):
             optimum = solve_assignment(options, rows, search.work) - parents.log_weights[parent]
             if optimum == math.inf:
@@ -181,7 +181,7 @@ def run_search(options: Options, parents: Parents, caps: SearchCaps, search: Sea
 
 @borrowing
 def _most_children(options: Options, parents: Parents) -> int:
-    """How many joint choices there are, collisions included, or `_MOST_CHILDREN` where there are more."""
+    """Return the number of joint choices, collisions included, up to `_MOST_CHILDREN`."""
     total = 0
     for parent in range(len(parents.log_weights)):
         count = 1
@@ -194,11 +194,12 @@ def _most_children(options: Options, parents: Parents) -> int:
 
 @kernel
 def rank_children(options: Options, parents: Parents, caps: SearchCaps) -> tuple[Children, bool]:
-    """The heaviest joint choices of all parents in descending order, in arrays made for them; the flag tells that the
-    search stopped at `max_nodes` before it had found all within the other caps.
+    """Return the heaviest joint choices of all parents in descending order, in new arrays.
+
+    Also returns True if the search stopped at `max_nodes` before it had found all within the other caps.
     """
     num, widest = min(caps.max_hypotheses, _most_children(options, parents)), widest_parent(parents)
-    # Made as large as they are likely to become: growing them took a third of the search.
+    # Made as large as they are likely to become: growing them took a third of the search time.
     search = make_search(_NODES_A_CHILD * num + len(parents.log_weights) + 2 * widest + 4)
     ranking, cut = ranked(options, parents, caps, Ranking(search, make_children(num, num * widest)))
     return ranking.children, cut
@@ -206,7 +207,7 @@ def rank_children(options: Options, parents: Parents, caps: SearchCaps) -> tuple
 
 @kernel
 def ranked(options: Options, parents: Parents, caps: SearchCaps, ranking: Ranking) -> tuple[Ranking, bool]:
-    """`rank_children` in the arrays of an earlier ranking, which grow if needed."""
+    """Apply `rank_children` in the arrays of an earlier ranking, which grow if needed."""
     search, children = ranking.search, ranking.children
     while not start_search(options, parents, search, children):
         search = grown_search(search)
@@ -221,8 +222,8 @@ def add_missing_groups(
 ) -> bool:
     """Append the best child of each group of parents that has none yet, whatever its weight.
 
-    groups: (num_parents,) number of each one's group. seen: (num_groups,) to work in. False where children must be
-    grown to go on; what is already there is not appended again.
+    groups: (num_parents,) group of each parent. seen: (num_groups,) working array. Returns False if children must be
+    grown to continue; existing children are not appended again.
     """
     for group in range(len(seen)):
         seen[group] = 0
@@ -243,7 +244,7 @@ def add_missing_groups(
         rows = parents.rows[parents.offsets[best_parent] : parents.offsets[best_parent + 1]]
         if is_full(children, len(rows)):
             return False
-        # Solved again: the assignments in between have left others' options in the work.
+        # Solved again: other assignments have overwritten the working arrays since.
         solve_assignment(options, rows, work)
         start = append_child(children, best_parent, len(rows), -best)
         for i in range(len(rows)):

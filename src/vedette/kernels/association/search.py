@@ -11,33 +11,33 @@ from vedette.kernels.base.arrays import grown_floats, grown_ints
 from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import Floats, Ints
 
-# Places in `Search.sizes`: what the search must hold (MEMBERS: rows of all parents together, WIDEST: of the widest),
-# then how much of each store is filled.
+# Indices of `Search.sizes`: the sizes of the problem (MEMBERS: rows of all parents together, WIDEST: of the widest),
+# then the filled part of each store.
 PARENTS, MEMBERS, ROWS, OPTIONS, COLUMNS, WIDEST = range(6)
 NODES, HEAP, POSITIONS, CHOICES, PENALTIES, STAMP = range(6, 12)
 _NUM_SIZES = 12
 
 
 class SearchCaps(NamedTuple):
-    """Where a search for the heaviest joint choices stops."""
+    """Stopping criteria of a search for the heaviest joint choices."""
 
     max_hypotheses: int  # joint choices found
     max_log_gap: float  # log weight below the best
-    max_nodes: int  # nodes visited, a guard against scenes of hopeless ambiguity
+    max_nodes: int  # nodes visited, a safeguard for scenes of extreme ambiguity
 
 
 class Search(NamedTuple):
     """Stores of a search.
 
-    An opened parent has one position a row, in the order in which the search settles them. Choices at a position are
-    options, cheapest first, and what they cost more than the row's part in the optimum. Where the rows' best options do
-    not collide they are the rows' own, the same for all parents; a parent in whose optimum rows give way to each other
-    has its own choices (reduced costs), and a penalty for each contended column that is left unused.
+    An opened parent has one position per row, in the order in which the search settles them. Choices at a position are
+    options, cheapest first, with their extra cost over the row's part in the optimum. If the rows' best options do not
+    collide, these are the rows' own choices, the same for all parents; a parent in whose optimum some rows do not get
+    their best option has its own choices (reduced costs), and a penalty for each contended column that is left unused.
 
-    A node settles the positions up to `depth` of a parent, this one by its choice, those before as in `previous`.
+    A node settles the positions of a parent up to `depth`, this one by its choice, those before as in `previous`.
     """
 
-    sizes: Ints  # (12,) what the search must hold, and how far the stores are filled
+    sizes: Ints  # (12,) sizes of the problem, and filled part of the stores
     starts: Ints  # (num_parents,) first position of a parent, -1: not opened
     penalty_starts: Ints  # (num_parents,)
     penalty_ends: Ints  # (num_parents,)
@@ -45,11 +45,11 @@ class Search(NamedTuple):
     firsts: Ints  # first choice at each position
     lasts: Ints  # one past its last choice
     options: Ints  # option of each choice
-    costs: Floats  # what it costs more than the optimum
+    costs: Floats  # its extra cost over the optimum
     penalty_columns: Ints  # contended columns of each opened parent
     penalty_costs: Floats  # -v > 0 of each
     bounds: Floats  # least cost of all joint choices under a node
-    parents: Ints  # whose joint choice a node begins
+    parents: Ints  # parent of the joint choice that a node begins
     depths: Ints  # last position settled, -1: none
     choices: Ints  # made at that position
     previous: Ints  # node of the positions before
@@ -61,7 +61,10 @@ class Search(NamedTuple):
 
 @kernel
 def make_search(num_nodes: int) -> Search:
-    """Room for so many nodes; for the rest of a problem it is made by `grown_search` once the problem is known."""
+    """Return a search with room for this number of nodes.
+
+    `grown_search` makes room for the rest once the problem is known.
+    """
     ints, floats = np.empty(0, np.int64), np.empty(0)
     return Search(
         np.zeros(_NUM_SIZES, np.int64),
@@ -89,7 +92,7 @@ def make_search(num_nodes: int) -> Search:
 
 @kernel
 def grown_search(search: Search) -> Search:
-    """The same search with room for its problem, and for at least one more visit of a node."""
+    """Return the same search with room for its problem, and for at least one more visit of a node."""
     sizes = search.sizes
     positions, choices = sizes[MEMBERS] + sizes[WIDEST], sizes[CHOICES] + sizes[OPTIONS]
     penalties, nodes = sizes[PENALTIES] + sizes[COLUMNS], sizes[NODES] + sizes[PARENTS] + 2 * sizes[WIDEST] + 256
@@ -122,7 +125,7 @@ def grown_search(search: Search) -> Search:
 
 @inlined
 def has_room(search: Search) -> bool:
-    """Whether one more parent can be opened and one more node visited."""
+    """Return True if one more parent can be opened and one more node visited."""
     sizes = search.sizes
     return (
         sizes[NODES] + 2 * sizes[WIDEST] + 4 <= len(search.bounds)
@@ -145,11 +148,11 @@ def new_node(search: Search, bound: float, parent: int, depth: int, choice: int,
 
 @inlined
 def push(search: Search, node: int) -> None:
-    """Let a node wait in the heap."""
+    """Add a node to the heap."""
     bounds, nodes, bound = search.heap_bounds, search.heap_nodes, search.bounds[node]
     slot = search.sizes[HEAP]
     search.sizes[HEAP] = slot + 1
-    # An equal bound does not overtake.
+    # Nodes of equal bound stay in order.
     while slot > 0:
         above = (slot - 1) // 2
         if bounds[above] <= bound:
@@ -161,7 +164,7 @@ def push(search: Search, node: int) -> None:
 
 @inlined
 def pop(search: Search) -> int:
-    """The waiting node of least bound, which waits no longer."""
+    """Remove and return the waiting node of least bound."""
     bounds, nodes = search.heap_bounds, search.heap_nodes
     top = nodes[0]
     size = search.sizes[HEAP] - 1

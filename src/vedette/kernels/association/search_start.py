@@ -1,4 +1,4 @@
-"""Start of a ranking search, and the layout of a prior hypothesis when it is first visited."""
+"""Start of a ranking search, and preparation of a prior hypothesis at its first visit."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from vedette.kernels.base.types import Floats, Ints
 
 @borrowing
 def size_search(options: Options, parents: Parents, search: Search) -> bool:
-    """Note the size of the problem; false where the search must be grown to hold it."""
+    """Store the size of the problem; return False if the search must be grown to hold it."""
     sizes, num_columns = search.sizes, options.num_measurements
     for k in range(len(sizes)):
         sizes[k] = 0
@@ -48,8 +48,9 @@ def size_search(options: Options, parents: Parents, search: Search) -> bool:
 
 @borrowing
 def start_search(options: Options, parents: Parents, search: Search, children: Children) -> bool:
-    """Nothing found and nothing opened; every parent waits with the bound that ignores collisions. False where the
-    search must be grown for the problem.
+    """Reset the search: every parent waits with the bound that ignores collisions.
+
+    False if the search must be grown.
     """
     if not size_search(options, parents, search):
         return False
@@ -75,7 +76,7 @@ def start_search(options: Options, parents: Parents, search: Search, children: C
 
 @inlined
 def _insert_position(search: Search, first: int, count: int, row: int, gap: float, gaps: Floats) -> None:
-    """Place a row among the `count` positions from `first` on, those with the larger gap before it."""
+    """Insert a row among the `count` positions from `first` on, after those of a larger gap."""
     gaps[row] = gap
     slot = first + count
     while slot > first and gaps[search.position_rows[slot - 1]] < gap:
@@ -86,7 +87,7 @@ def _insert_position(search: Search, first: int, count: int, row: int, gap: floa
 
 @inlined
 def open_free(parent: int, rows: Ints, options: Options, search: Search) -> bool:
-    """Lay out a parent whose rows' best options do not collide; false where they do."""
+    """Prepare a parent whose rows' best options do not collide; return False if they do."""
     first_position, gaps = search.sizes[POSITIONS], search.work.row_gap
     search.sizes[STAMP] += 1
     stamp = search.sizes[STAMP]
@@ -94,12 +95,12 @@ def open_free(parent: int, rows: Ints, options: Options, search: Search) -> bool
         first, last = options.offsets[rows[i]], options.offsets[rows[i] + 1]
         column = options.columns[first]
         if column >= 0:
-            # Nothing has been kept: positions are counted only once the parent is laid out.
+            # Nothing needs to be undone: positions are counted only at the end.
             if search.taken[column] == stamp:
                 return False
             search.taken[column] = stamp
         gap = search.costs[first + 1] if first + 1 < last else math.inf
-        # Rows that hardly waver are settled first: near the root then nothing branches.
+        # Rows with a clear best option are settled first, so that nothing branches near the root.
         _insert_position(search, first_position, i, i, gap, gaps)
     for position in range(first_position, first_position + len(rows)):
         row = rows[search.position_rows[position]]
@@ -119,10 +120,11 @@ def _reduced_cost(options: Options, option: int, row: int, work: DualWork) -> fl
 
 @inlined
 def open_solved(parent: int, rows: Ints, options: Options, search: Search) -> None:
-    """Lay out a parent whose assignment problem has just been solved: rows with the firmest best option first.
+    """Prepare a parent whose assignment problem has just been solved: rows with the clearest best option first.
 
-    By the duals u, v of the optimum, any joint choice costs the optimum, plus the reduced costs c - u - v >= 0 of its
-    options, plus -v of every column that it leaves unused: the sum of the u and of all v is the optimum's own cost.
+    By the duals u, v of the optimum, the cost of any joint choice is the optimum, plus the reduced costs c - u - v >= 0
+    of its options, plus -v of every column that it leaves unused: the sum of the u and of all v is the cost of the
+    optimum.
     """
     work, first_position = search.work, search.sizes[POSITIONS]
     for i in range(len(rows)):
@@ -136,7 +138,7 @@ def open_solved(parent: int, rows: Ints, options: Options, search: Search) -> No
         i = search.position_rows[position]
         search.firsts[position] = start = filled
         for option in range(options.offsets[rows[i]], options.offsets[rows[i] + 1]):
-            # The optimum's own option stands first: rounding must not put an equal one before it.
+            # The optimum's own option is first: rounding must not put an equal one before it.
             cost = 0.0 if option == work.row_option[i] else max(_reduced_cost(options, option, i, work), 0.0)
             slot = filled
             while slot > start and (search.costs[slot - 1] > cost or option == work.row_option[i]):
@@ -150,7 +152,7 @@ def open_solved(parent: int, rows: Ints, options: Options, search: Search) -> No
     penalties = search.sizes[PENALTIES]
     search.starts[parent], search.penalty_starts[parent] = first_position, penalties
     for column in range(search.sizes[COLUMNS]):
-        # Only columns that rows contend for have a price.
+        # Only contended columns have a price.
         if work.column_dual[column] < 0.0:
             search.penalty_columns[penalties] = column
             search.penalty_costs[penalties] = -work.column_dual[column]

@@ -1,4 +1,4 @@
-"""How much all joint choices of a scan weigh, those that were not found included."""
+"""Total weight of all joint choices of a scan, including those that were not found."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import Bools, Floats
 from vedette.kernels.gaussian.linalg import log_sum
 
-# Logs of weights that a double holds beside others.
+# Largest log of a weight that can be summed with others in double precision.
 _MOST_LOG = 600.0
-# Relative weight that rounding leaves of nothing, and between the logs of equal weights.
+# Rounding error of relative weights, and of the logs of equal weights.
 ROUNDING = 1e-12
 
 
 @kernel
 def log_row_totals(options: Options) -> Floats:
-    """(num_rows,) log total weight of each row's options."""
+    """Log total weight of each row's options, shape (num_rows,)."""
     totals = np.empty(len(options.offsets) - 1)
     for row in range(len(totals)):
         totals[row] = log_sum(options.log_weights[options.offsets[row] : options.offsets[row + 1]])
@@ -33,7 +33,7 @@ def log_row_totals(options: Options) -> Floats:
 def log_total_bound(log_totals: Floats, parents: Parents) -> float:
     """Log total weight of all joint choices if rows could share measurements: an upper bound on the true total.
 
-    log_totals: of the rows, as of `log_row_totals`.
+    log_totals: of the rows, as in `log_row_totals`.
     """
     bounds = np.empty(len(parents.log_weights))
     for parent in range(len(bounds)):
@@ -45,9 +45,9 @@ def log_total_bound(log_totals: Floats, parents: Parents) -> float:
 
 @inlined
 def log_heaviest_left(children: Children, caps: SearchCaps, cut: bool) -> float:
-    """Log of a weight that no joint choice left out by the ranking exceeds, -inf where there are none.
+    """Log of an upper bound on the weight of any joint choice that the ranking left out, -inf if there are none.
 
-    children: as ranked, heaviest first. cut: whether ranking stopped at its bound on nodes.
+    children: as ranked, heaviest first. cut: True if ranking stopped at its bound on nodes.
     """
     num = children.filled[0]
     if num == 0:
@@ -60,17 +60,17 @@ def log_heaviest_left(children: Children, caps: SearchCaps, cut: bool) -> float:
 def log_weight_bound(
     options: Options, parents: Parents, children: Children, log_totals: Floats, log_next: float, log_bound: float
 ) -> float:
-    """Log of an upper bound on the weight of all joint choices, those that were found included.
+    """Log of an upper bound on the weight of all joint choices, including those that were found.
 
-    Equal to that weight where no cluster of a parent has more than `MAX_CONTESTED` contested measurements, and where
+    It is equal to that weight if no cluster of a parent has more than `MAX_CONTESTED` contested measurements, and if
     the search has left nothing out.
 
     Args:
         options, parents: of the scan.
         children: those that were found, each once.
-        log_totals: of the rows, as of `log_row_totals`.
+        log_totals: of the rows, as in `log_row_totals`.
         log_next: no choice left out is heavier than this; -inf: none is left out; inf: not known.
-        log_bound: as of `log_total_bound`, of all parents, those that were cut before included.
+        log_bound: as in `log_total_bound`, for all parents, including those that were cut before.
     """
     num, best = children.filled[0], -math.inf
     for child in range(num):
@@ -85,7 +85,7 @@ def log_weight_bound(
     most, few = _left_at_most(options, parents, found, log_totals, best, log_next)
     before = math.exp(log_bound - best) - np.sum(most)
     left = before if before > ROUNDING * np.sum(most) else 0.0
-    # What could be left at most is not worth an exact sum where it is so little.
+    # Where the remainder is negligible, an exact sum is not needed.
     worth = few > ROUNDING * in_all / len(found)
     if np.any(worth):
         widest, num_rows = _sizes(parents, worth)
@@ -104,7 +104,7 @@ def log_weight_bound(
 
 @kernel
 def _sizes(parents: Parents, worth: Bools) -> tuple[int, int]:
-    """Rows of the widest parent that is worth a sum, and of all of them."""
+    """Return the number of rows of the widest parent that needs a sum, and of all of them."""
     widest, num_rows = 0, 0
     for parent in range(len(worth)):
         if worth[parent]:
@@ -117,7 +117,7 @@ def _sizes(parents: Parents, worth: Bools) -> tuple[int, int]:
 def _left_at_most(
     options: Options, parents: Parents, found: Floats, log_totals: Floats, best: float, log_next: float
 ) -> tuple[Floats, Floats]:
-    """For each parent a bound on its weight, and one on that of its joint choices that were not found.
+    """For each parent a bound on its weight, and one on the weight of its joint choices that were not found.
 
     Both relative to exp(best), as is `found`, the weight of those that were found.
     """

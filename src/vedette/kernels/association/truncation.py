@@ -1,4 +1,4 @@
-"""Which of the joint choices of a scan are kept as hypotheses."""
+"""Selection of the joint choices of a scan that are kept as hypotheses."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from vedette.kernels.gaussian.mixtures import descending_order
 
 
 class Truncation(NamedTuple):
-    """What of a scan is kept."""
+    """Limits on the hypotheses of a scan."""
 
-    search: SearchCaps  # how many hypotheses, and how light
-    gate: float  # squared Mahalanobis distance beyond which a track was not seen as a measurement
+    search: SearchCaps  # number and least weight of hypotheses
+    gate: float  # squared Mahalanobis distance beyond which a track cannot take a measurement
     log_clutter_floor: float  # least log clutter intensity
-    max_track_gap: float  # log weight below the best to which a hypothesis is kept as a track's only one; 0: none is
+    max_track_gap: float  # log weight gap within which the only hypothesis of a track is kept; 0: none is
 
 
 @borrowing
 def _same_tracks(first: int, second: int, children: Children, columns: Ints) -> bool:
-    """Whether two children are the same hypothesis: the same updated tracks, whoever else died."""
+    """Return True if two children are the same hypothesis: the same updated tracks, whatever other tracks died."""
     i, j = children.offsets[first], children.offsets[second]
     end_i, end_j = children.offsets[first + 1], children.offsets[second + 1]
     while True:
@@ -75,7 +75,7 @@ def merge_equal(children: Children, columns: Ints) -> Ints:
 
 @kernel
 def heaviest_first(children: Children, firsts: Ints) -> Ints:
-    """The children `firsts` by descending weight, ties by order of discovery."""
+    """Return the children `firsts` by descending weight, ties by order of discovery."""
     log_weights = np.empty(len(firsts))
     for i in range(len(firsts)):
         log_weights[i] = children.log_weights[firsts[i]]
@@ -87,7 +87,10 @@ def heaviest_first(children: Children, firsts: Ints) -> Ints:
 
 @kernel
 def keep_heaviest(children: Children, order: Ints, needed: Ints, caps: SearchCaps) -> Ints:
-    """The children to keep of those in `order`, heaviest first: those needed; of the others, by number and gap."""
+    """Return the children to keep of those in `order`, heaviest first: those needed.
+
+    Of the others, by number and gap.
+    """
     others = caps.max_hypotheses
     for child in order:
         others -= needed[child]
@@ -95,7 +98,7 @@ def keep_heaviest(children: Children, order: Ints, needed: Ints, caps: SearchCap
     num_kept = 0
     for child in order:
         wanted = needed[child] == 1
-        # The needed ones have their places already, taken from the same number.
+        # The needed ones are counted already, in the same total.
         gap = children.log_weights[order[0]] - children.log_weights[child]
         if not wanted and others > 0 and gap <= caps.max_log_gap:
             wanted = True

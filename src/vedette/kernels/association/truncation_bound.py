@@ -1,4 +1,4 @@
-"""What a sum over the heaviest joint choices of a cluster leaves out: a bound on it, and what it must not rule out."""
+"""Weight that a sum over the heaviest joint choices of a cluster leaves out: its bound, and safe marginals."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from vedette.kernels.base.compile import borrowing, inlined
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.linalg import log_add, log_sum
 
-# Log weight of an option that is to be taken only where there is no other.
+# Log weight of an option that is taken only if there is no other.
 _FORBIDDEN = -1e200
-_LIKELIEST = 6  # options of a row that are looked at for those that another row wants
+_LIKELIEST = 6  # options of a row that are compared with those of another row
 _ROUNDING = 1e-12
 
 
@@ -28,10 +28,10 @@ def _share_contested(options: Options, row: int, other: int, log_total: float, l
 
 @borrowing
 def _log_uncontested(options: Options, rows: Ints, work: DualWork) -> float:
-    """Upper bound on the log share of the joint choices, if rows could share measurements, in which none do.
+    """Upper bound on the log share of the joint choices without a shared measurement, if rows could share them.
 
-    Rows are paired, each with the one that it contends with most of those without a partner; choices in which no pair
-    shares a measurement are no fewer than those in which nobody does, and pairs are independent of one another.
+    Each row is paired with the unpaired row with which it competes most. The choices in which no pair shares a
+    measurement include all those in which no two rows do, and pairs are independent of one another.
     """
     log_totals, taken, log_share = work.row_dual, work.row_option, 0.0
     for i in range(len(rows)):
@@ -46,7 +46,7 @@ def _log_uncontested(options: Options, rows: Ints, work: DualWork) -> float:
                     most, partner = contested, j
         if partner >= 0:
             taken[partner] = 1
-            log_share += math.log1p(-min(most, 1.0 - _ROUNDING))  # rounding must leave something of everything
+            log_share += math.log1p(-min(most, 1.0 - _ROUNDING))  # never all, despite rounding
     return log_share
 
 
@@ -54,8 +54,9 @@ def _log_uncontested(options: Options, rows: Ints, work: DualWork) -> float:
 def log_left_out_bound(options: Options, rows: Ints, log_summed: float, log_next: float, work: DualWork) -> float:
     """Upper bound on the log of the total weight of the joint choices that were not summed.
 
-    The lesser of two: all joint choices if none but pairs of rows were kept from sharing measurements, less those
-    summed; and the number of joint choices times exp(`log_next`), which none of those left out exceeds.
+    It is the lesser of two bounds: the weight of all joint choices in which only pairs of rows may not share
+    measurements, minus the weight summed; and the number of joint choices times exp(`log_next`), the largest weight of
+    any left out.
     """
     log_all, log_count = _log_uncontested(options, rows, work), 0.0
     for row in rows:
@@ -64,13 +65,13 @@ def log_left_out_bound(options: Options, rows: Ints, log_summed: float, log_next
         log_count += math.log(stop - start)
     if log_all <= log_summed:
         return -math.inf
-    # log (exp(all) - exp(summed)), written so that it does not cancel.
+    # log (exp(all) - exp(summed)), without cancellation.
     return min(log_all + math.log(-math.expm1(log_summed - log_all)), log_count + log_next)
 
 
 @inlined
 def _sides(options: Options, row: int, marginals: Floats) -> tuple[int, float, float]:
-    """The option of being absent (-1: there is none), its log marginal, and the greatest of the other options."""
+    """Return the option of absence (-1: there is none), its log marginal, and the largest of the other options."""
     option_absent, absent, present = -1, -math.inf, -math.inf
     for option in range(options.offsets[row], options.offsets[row + 1]):
         if options.columns[option] == ABSENT:
@@ -82,7 +83,7 @@ def _sides(options: Options, row: int, marginals: Floats) -> tuple[int, float, f
 
 @borrowing
 def has_closed_side(options: Options, rows: Ints, marginals: Floats) -> bool:
-    """Whether some row that may be absent and may be present is only ever one of them."""
+    """Return True if some row that may be absent or present has probability zero of one of them."""
     for row in rows:
         option_absent, absent, present = _sides(options, row, marginals)
         both_possible = option_absent >= 0 and options.offsets[row + 1] - options.offsets[row] > 1
@@ -93,9 +94,9 @@ def has_closed_side(options: Options, rows: Ints, marginals: Floats) -> bool:
 
 @borrowing
 def _heaviest_absent(options: Options, rows: Ints, at: int, option_absent: int, work: DualWork) -> float:
-    """Log weight of the heaviest joint choice in which row `rows[at]` is absent."""
+    """Return the log weight of the heaviest joint choice in which row `rows[at]` is absent."""
     last = len(rows) - 1
-    # Order does not matter to an assignment: the row is moved to the end and left out.
+    # The order of rows does not affect an assignment: the row is moved to the end and left out.
     rows[at], rows[last] = rows[last], rows[at]
     cost = solve_assignment(options, rows[:last], work)
     rows[at], rows[last] = rows[last], rows[at]
@@ -104,9 +105,9 @@ def _heaviest_absent(options: Options, rows: Ints, at: int, option_absent: int, 
 
 @borrowing
 def _heaviest_present(options: Options, rows: Ints, at: int, option_absent: int, work: DualWork) -> tuple[int, float]:
-    """The option of row `rows[at]` in the heaviest joint choice in which it is present, and that choice's log weight.
+    """Return the option of row `rows[at]` in the heaviest joint choice with it present, and that choice's log weight.
 
-    Being absent is moved to the end of the row meanwhile, at a weight that nothing possible has.
+    Absence is temporarily moved to the end of the row, with a weight below every possible one.
     """
     columns, log_weights, last = options.columns, options.log_weights, options.offsets[rows[at] + 1] - 1
     log_absent = log_weights[option_absent]
@@ -124,11 +125,12 @@ def _heaviest_present(options: Options, rows: Ints, at: int, option_absent: int,
 
 @borrowing
 def open_sides(options: Options, rows: Ints, log_summed: float, work: DualWork, marginals: Floats) -> None:
-    """Let no row be surely there, or surely not, because every choice that was summed has it so.
+    """Ensure that no row is certainly present, or certainly absent, only because all summed choices agree on it.
 
-    Where none has it absent (or none has it present), the heaviest choice that does, found by one assignment, is added
-    to this row's marginals. It is at most what was left out, so that marginals stay within the share left out of the
-    true ones, and a row's other options keep their proportions. A side that no choice at all has stays impossible.
+    If none has it absent (or none has it present), the heaviest choice that does, found by one assignment, is added to
+    this row's marginals. Its weight is at most what was left out, so that marginals stay within the share left out of
+    the true ones, and a row's other options keep their proportions. A side without any possible choice stays
+    impossible.
     """
     for at in range(len(rows)):
         start, stop = options.offsets[rows[at]], options.offsets[rows[at] + 1]
