@@ -1,1 +1,1 @@
-"""Label sets, conversions between labelled densities, inner products, generalized covariance intersection."""
+"""Kernels of labelled densities: label sets, conversions, integrals, fusion and factorisation."""

@@ -1,4 +1,4 @@
-"""LMBs of the targets that may have been born: from measurements, and within a time."""
+"""LMBs of births: from measurements, and within a period."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from vedette.kernels.gaussian.components import make_components, stacked_mixture
 
 
 class BirthsOfMeasurements(NamedTuple):
-    """How targets may begin at measurements."""
+    """Parameters of births at measurements."""
 
     std: Floats  # (state_dim,) standard deviations of each target
-    expected: float  # number of targets in all
+    expected: float  # expected total number of targets
     max_existence: float  # largest existence probability
-    step: int  # with `first`, the label of the first target; the second number of the others goes on from there
+    step: int  # with `first`, the label of the first target; the index of the others continues from there
     first: int
 
 
 @kernel
 def births_of_measurements(positions: Floats, unexplained: Floats, begin: BirthsOfMeasurements) -> Lmb:
-    """One target at rest for each measured position, in their order.
+    """Return an LMB of one target at rest for each measured position, in their order.
 
     Args:
         positions: (num, 2) m; (num, 3) with heights, in states [px, py, vx, vy, pz, ...].
-        unexplained: (num,) probabilities that no track explains the measurement, in proportion to which the expected
-            number is shared.
-        begin: the rest.
+        unexplained: (num,) probabilities that no track explains the measurement; the expected number of births is
+            divided in proportion to them.
+        begin: the other parameters.
     """
     num, dim = len(unexplained), len(begin.std)
     total = unexplained.sum()
@@ -46,14 +46,14 @@ def births_of_measurements(positions: Floats, unexplained: Floats, begin: Births
         if positions.shape[1] > 2 and dim > HEIGHT:
             out.means[i, HEIGHT] = positions[i, 2]
         existence = min(begin.max_existence, begin.expected * unexplained[i] / total)
-        # A share may be too small for a number.
+        # A share may underflow to 0.
         logits[i] = math.log(existence) - math.log1p(-existence) if existence > 0.0 else -math.inf
     return Lmb(Tracks(labels, offsets, out), logits)
 
 
 @kernel
 def births_within(first: Lmb, second: Lmb, share: float) -> Lmb:
-    """The targets of two LMBs, of which each is born in a share of the time: 1 - r' = (1 - r)^share; 1: unchanged."""
+    """Return the targets of two LMBs, each born within a share of the time: 1 - r' = (1 - r)^share; 1: unchanged."""
     num, components = len(first.existence_logit), first.tracks.offsets[-1]
     labels = np.concatenate((first.tracks.labels, second.tracks.labels))
     offsets = np.concatenate((first.tracks.offsets, second.tracks.offsets[1:]))

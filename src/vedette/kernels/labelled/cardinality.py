@@ -1,4 +1,4 @@
-"""Distribution of the number of targets of independent densities together."""
+"""Distribution of the total number of targets of independent densities."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import numpy as np
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Ints
 
-# Probabilities below are 0: far below what sums to one can show, and numbers smaller yet are slow.
+# Smaller probabilities become 0: they are negligible in any sum, and subnormal numbers are slow.
 _LEAST = 1e-280
 
 
 @kernel
 def convolved(probabilities: Floats, offsets: Ints) -> Floats:
-    """Distribution of the sum of independent numbers.
+    """Return the distribution of the sum of independent numbers.
 
     Number `i` is n with probability `probabilities[offsets[i] + n]`, n from 0 up to the run's end.
     Probabilities below 1e-280 become 0.
@@ -21,7 +21,7 @@ def convolved(probabilities: Floats, offsets: Ints) -> Floats:
     num = len(offsets) - 1
     found, last = np.zeros(offsets[num] - num + 1), np.zeros(offsets[num] - num + 1)
     found[0] = 1.0
-    # Places outside `low:high` hold zeros.
+    # Entries outside `low:high` are zero.
     low, high = 0, 1
     for i in range(num):
         width = offsets[i + 1] - offsets[i]

@@ -1,4 +1,4 @@
-"""Many GLMBs as LMBs at once."""
+"""Conversion of many GLMBs to LMBs at once."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class LmbCases(NamedTuple):
 
 @kernel
 def _held_sets(set_offsets: Ints, cases: SensorCases, case: int) -> tuple[Ints, Ints, Floats]:
-    """Offsets, members and log weights of the label sets that a case has not lost."""
+    """Return the offsets, members and log weights of the label sets that a case holds."""
     num = 0
     for at in range(len(set_offsets) - 1):
         num += cases.held[case, at]
@@ -47,10 +47,10 @@ def _held_sets(set_offsets: Ints, cases: SensorCases, case: int) -> tuple[Ints, 
 def glmb_cases_to_lmb(
     members: Ints, set_offsets: Ints, cases: SensorCases, labels: Ints, first: int, last: int, out: LmbCases
 ) -> None:
-    """Cases `first:last` of marginalised GLMBs as LMBs by moments, as `glmb_to_lmb` makes each.
+    """Convert cases `first:last` of marginalised GLMBs to LMBs by moments, each as `glmb_to_lmb` does.
 
     members: (num_members, 2) label of each member of each label set. labels: (num_labels, 2) all of them in increasing
-    order; one that a case has lost with all its sets gets logit -inf there, and no Gaussian.
+    order; a label without any set in a case gets logit -inf there, and no Gaussian.
     """
     num = len(members)
     offsets, components = np.arange(num + 1), make_components(num, cases.means.shape[2])

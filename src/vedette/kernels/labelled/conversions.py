@@ -19,7 +19,7 @@ from vedette.kernels.labelled.subsets import smallest_sums
 
 @kernel
 def _set_weights(glmb: Glmb, group_of: Ints, num_sets: int) -> tuple[Floats, Floats]:
-    """(num_sets,) log weight of each label set, and (num_hyps,) linear weights relative to the heaviest of the set."""
+    """Log weight of each label set, (num_sets,), and linear weights relative to the set's heaviest, (num_hyps,)."""
     peaks, sums = np.full(num_sets, -math.inf), np.zeros(num_sets)
     relative = np.zeros(len(group_of))
     for h in range(len(group_of)):
@@ -36,11 +36,11 @@ def _set_weights(glmb: Glmb, group_of: Ints, num_sets: int) -> tuple[Floats, Flo
 
 @kernel
 def marginalise(glmb: Glmb, caps: MixtureCaps) -> Glmb:
-    """Marginalised GLMB: one hypothesis a label set, over all association histories (paper eq. 10).
+    """Return the marginalised GLMB: one hypothesis per label set, over all association histories (paper eq. 10).
 
     Each track of a label set is the mixture of that label's tracks in the set's hypotheses, weighted by them, and
     reduced under the caps; with `max_components` 1 it is one Gaussian of the mixture's moments. Each (label set, label)
-    has its own entry in the track table, in the order of the hypotheses. Hypotheses come out by descending weight,
+    has its own entry in the track table, in the order of the hypotheses. Hypotheses are in order of descending weight,
     equal weights in the order of their first occurrence; a label set of weight zero is kept.
     """
     group_of, first = group_by_label_set(glmb)
@@ -49,7 +49,7 @@ def marginalise(glmb: Glmb, caps: MixtureCaps) -> Glmb:
 
 @kernel
 def marginalise_sets(glmb: Glmb, group_of: Ints, first: Ints, caps: MixtureCaps) -> tuple[Glmb, Ints]:
-    """As `marginalise`, of hypotheses whose label sets have these numbers; and the number of each that comes out.
+    """Marginalise hypotheses with given numbers of label sets; also return the set of each resulting hypothesis.
 
     group_of: (num_hyps,) number of each hypothesis's label set. first: (num_sets,) the first hypothesis of each set.
     """
@@ -84,7 +84,7 @@ def marginalise_sets(glmb: Glmb, group_of: Ints, first: Ints, caps: MixtureCaps)
 
 @kernel
 def _log_sum_where(log_weights: Floats, mark: Ints, low: int, high: int, value: int, equal: bool) -> float:
-    """log-sum-exp over the places of `low:high` whose mark is `value`, or over those where it is not."""
+    """Return the log-sum-exp over the places of `low:high` with mark `value`, or over the other places."""
     peak, total = -math.inf, 0.0
     for h in range(low, high):
         if (mark[h] == value) == equal:
@@ -99,11 +99,11 @@ def _log_sum_where(log_weights: Floats, mark: Ints, low: int, high: int, value: 
 
 @kernel
 def glmb_to_lmb(glmb: Glmb, caps: MixtureCaps) -> Lmb:
-    """LMB of the same existence probabilities and, up to the reduction of mixtures, the same track densities.
+    """Return the LMB of the same existence probabilities and, up to mixture reduction, the same track densities.
 
     Reuter, Vo, Vo and Dietmayer 2014, "The labeled multi-Bernoulli filter", eq. 43-45. The logit of existence is the
-    difference of the log weights with and without the label, so that nothing is lost near existence 1. A label all of
-    whose hypotheses have weight zero keeps logit -inf and the plain mean of its tracks.
+    difference of the log weights with and without the label, so that no precision is lost near existence 1. A label
+    whose hypotheses all have weight zero keeps logit -inf and the plain mean of its tracks.
     """
     labels, num_entries = increasing_labels(glmb), len(glmb.hyp_tracks)
     num_labels, label_of = len(labels), np.empty(num_entries, np.int64)
@@ -116,10 +116,10 @@ def glmb_to_lmb(glmb: Glmb, caps: MixtureCaps) -> Lmb:
 
 @kernel
 def factors_to_lmb(glmb: Glmb, labels: Ints, label_of: Ints, firsts: Ints, ends: Ints, caps: MixtureCaps) -> Lmb:
-    """As `glmb_to_lmb`, of densities over disjoint labels, whose hypotheses come one density's after another's.
+    """Apply `glmb_to_lmb` to densities over disjoint labels, with concatenated hypotheses.
 
     labels: (num_labels, 2) that occur in them, increasing. label_of: place of the label of each entry of `hyp_tracks`.
-    firsts, ends: (num_labels,) the hypotheses of the density that has the label.
+    firsts, ends: (num_labels,) range of the hypotheses of the density with the label.
     """
     num_labels, num_entries, log_weights = len(labels), len(glmb.hyp_tracks), glmb.hyp_log_weights
     hyp_of = np.empty(num_entries, np.int64)
@@ -139,7 +139,7 @@ def factors_to_lmb(glmb: Glmb, labels: Ints, label_of: Ints, firsts: Ints, ends:
         for m in range(low, high):
             relative = 0.0 if log_with == -math.inf else math.exp(log_weights[hyp_of[entries[m]]] - log_with)
             end = add_to_pool(glmb.hyp_tracks[entries[m]], relative, slot_of, pool, weights, end)
-        # Only what was touched is reset: a loop over all tracks a label would be quadratic.
+        # Resets only the used entries: a loop over all tracks for each label would be quadratic.
         for p in range(pool_offsets[i], end):
             slot_of[pool[p]] = -1
         pool_offsets[i + 1] = end
@@ -149,7 +149,7 @@ def factors_to_lmb(glmb: Glmb, labels: Ints, label_of: Ints, firsts: Ints, ends:
 
 @kernel
 def _normalise_kept(log_weights: Floats, complete: bool) -> float:
-    """Normalise the log weights of the hypotheses kept; the weight of those left out, 0 if all are there."""
+    """Normalise the log weights of the kept hypotheses; return the weight left out, 0 if the list is complete."""
     log_kept = log_sum(log_weights)
     for h in range(len(log_weights)):
         log_weights[h] -= log_kept
@@ -158,11 +158,11 @@ def _normalise_kept(log_weights: Floats, complete: bool) -> float:
 
 @kernel
 def factored_to_glmb(density: FactoredGlmb, label_of: Ints, num_labels: int, max_hypotheses: int) -> tuple[Glmb, float]:
-    """GLMB of the `max_hypotheses` heaviest products of one hypothesis of each factor, and the weight left out.
+    """Return the GLMB of the `max_hypotheses` heaviest products of one hypothesis of each factor, and the weight left out.
 
     The GLMB shares the track table; its weights are normalised. Products of weight zero are never listed, so with a
-    large `max_hypotheses` all the others are there and the weight left out is zero. Equal weights come in the order in
-    which the search finds them, which is the same every time. label_of: (num_tracks,) place of the label of each track
+    large `max_hypotheses` all the others are listed and the weight left out is zero. Equal weights are in the order in
+    which the search finds them, which is deterministic. label_of: (num_tracks,) place of the label of each track
     among all labels, `num_labels`.
     """
     num, sorted_hyps = len(density.factor_offsets) - 1, np.empty(len(density.hyp_log_weights), np.int64)

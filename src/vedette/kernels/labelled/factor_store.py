@@ -1,4 +1,4 @@
-"""A factored density while it is written, factor by factor."""
+"""Store in which a factored density is written factor by factor."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from vedette.kernels.gaussian.mixtures import descending_order
 from vedette.kernels.labelled.groups import group_log_sums
 from vedette.kernels.labelled.splitting import Choices, group_choices
 
-# Places in `FactorStore.filled`.
+# Indices of `FactorStore.filled`.
 _TRACKS, _COMPONENTS, _HYPS, _ENTRIES, _FACTORS = range(5)
 
 
 class FactorStore(NamedTuple):
-    """Factors so far, and room for more."""
+    """The factors written so far, and room for more."""
 
     filled: Ints  # (5,) numbers of tracks, components, hypotheses, entries of `hyp_tracks`, and factors
-    labels: Ints  # flat, two numbers a track
+    labels: Ints  # flat, two numbers per track
     offsets: Ints
     components: Mixture
     track_offsets: Ints
@@ -35,7 +35,7 @@ class FactorStore(NamedTuple):
 
 @kernel
 def make_store(num_tracks: int, num_components: int, state_dim: int) -> FactorStore:
-    """Nothing yet; room for so many tracks, each a factor."""
+    """Return an empty store with room for this number of tracks, each its own factor."""
     return FactorStore(
         np.zeros(5, np.int64),
         np.empty(2 * num_tracks, np.int64),
@@ -51,7 +51,7 @@ def make_store(num_tracks: int, num_components: int, state_dim: int) -> FactorSt
 
 @kernel
 def with_room(store: FactorStore, factors: int, tracks: int, components: int, hyps: int, entries: int) -> FactorStore:
-    """The same factors with room for more: so many factors, tracks, components, hypotheses and entries in all."""
+    """Return the same factors with room for further factors, tracks, components, hypotheses and entries."""
     filled = store.filled
     return FactorStore(
         filled,
@@ -68,7 +68,7 @@ def with_room(store: FactorStore, factors: int, tracks: int, components: int, hy
 
 @inlined
 def has_room_for_single(store: FactorStore, components: int) -> bool:
-    """Whether a factor of one label and `components` components fits."""
+    """Return True if a factor of one label and `components` components fits."""
     filled = store.filled
     return (
         2 * filled[_TRACKS] + 2 <= len(store.labels)
@@ -84,7 +84,7 @@ def has_room_for_single(store: FactorStore, components: int) -> bool:
 
 @inlined
 def next_component(store: FactorStore) -> int:
-    """Where the components of the next track are to be written."""
+    """Return the position for the components of the next track."""
     return int(store.filled[_COMPONENTS])
 
 
@@ -107,7 +107,7 @@ def _close_factor(store: FactorStore) -> None:
 
 @inlined
 def append_single(store: FactorStore, step: int, index: int, end: int, logit: float) -> None:
-    """Enter a factor of one label, absent or there; its components are written already, up to `end`."""
+    """Append a factor of one label, absent or present; its components are already written, up to `end`."""
     filled = store.filled
     hyp, entry = filled[_HYPS], filled[_ENTRIES]
     store.hyp_log_weights[hyp], store.hyp_log_weights[hyp + 1] = -log_add(0.0, logit), -log_add(0.0, -logit)
@@ -120,7 +120,7 @@ def append_single(store: FactorStore, step: int, index: int, end: int, logit: fl
 
 @kernel
 def append_part(store: FactorStore, glmb: Glmb, choices: Choices, part_of: Ints, part: int) -> None:
-    """Enter the marginal over the labels of a part, heaviest hypothesis first. The store must have room."""
+    """Append the marginal over the labels of a part, heaviest hypothesis first. The store must have room."""
     groups = np.empty(len(glmb.hyp_log_weights), np.int64)
     firsts = group_choices(choices.symbols, part_of, part, groups)
     log_weights = group_log_sums(glmb.hyp_log_weights, groups, len(firsts))
@@ -151,7 +151,7 @@ def _append_track(store: FactorStore, tracks: Tracks, track: int) -> None:
 
 @kernel
 def stored(store: FactorStore) -> FactoredGlmb:
-    """The factors as a density, without the room that is left."""
+    """Return the factors as a density, without the unused room."""
     filled = store.filled
     num = filled[_TRACKS]
     tracks = Tracks(

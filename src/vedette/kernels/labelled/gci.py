@@ -1,7 +1,7 @@
-"""Generalized covariance intersection of track densities: weighted geometric means of Gaussian mixtures.
+"""Generalised covariance intersection of track densities: weighted geometric means of Gaussian mixtures.
 
 The fused density of one label is proportional to f = prod_i GM_i^(w_i) over the sensors i that know the label. A
-power of a mixture is not a mixture; its component-wise stand-in, q = prod_i sum_c (a_ic N_ic)^(w_i) >= f, is one with
+power of a mixture is not a mixture; its component-wise substitute, q = prod_i sum_c (a_ic N_ic)^(w_i) >= f, is one with
 a Gaussian for every combination of components. With cubature points, each Gaussian N_c of q is given the mass and the
 moments that f = q (f / q) has under it, where 0 < f / q <= 1.
 """
@@ -28,9 +28,9 @@ class Powers(NamedTuple):
 
     rows: Floats  # (num_components, row_size) information rows of N^w about `reference`
     log_weights: Floats  # (num_components,) w log a of each
-    starts: Ints  # (num_sensors + 1,) where the components of each sensor start
-    weights: Floats  # (num_sensors,) the powers w; 0 where a label is unknown
-    reference: Floats  # (state_dim,) near the densities, so that little cancels
+    starts: Ints  # (num_sensors + 1,) start of the components of each sensor
+    weights: Floats  # (num_sensors,) the powers w; 0 if the label is unknown
+    reference: Floats  # (state_dim,) near the densities, to limit cancellation
     row: Floats  # (row_size,) of a product
     factor: Floats  # (state_dim, state_dim)
     matrix: Floats  # (state_dim, state_dim)
@@ -66,7 +66,7 @@ def _load(chosen: Ints, item: int, fusion_weights: Floats, tracks: Tracks, power
         powers.weights[s] = 0.0
         if track < 0:
             continue
-        # Sensors that do not know the label have no say in its density: the others' weights sum to one.
+        # Sensors that do not know the label do not affect its density: the others' weights sum to one.
         weight = fusion_weights[item, s] / total
         powers.weights[s] = weight
         for c in range(tracks.offsets[track], tracks.offsets[track + 1]):
@@ -84,7 +84,7 @@ def _load(chosen: Ints, item: int, fusion_weights: Floats, tracks: Tracks, power
 
 @kernel
 def _multiply(powers: Powers, low: int, high: int, out: Mixture) -> None:
-    """One Gaussian for every combination of one component a sensor: its log mass and its moments."""
+    """Write one Gaussian for every combination of one component per sensor: its log mass and its moments."""
     dim, row = len(powers.reference), powers.row
     for combination in range(low, high):
         rest, total = combination - low, 0.0
@@ -95,7 +95,7 @@ def _multiply(powers: Powers, low: int, high: int, out: Mixture) -> None:
             if num == 0:
                 continue
             component = powers.starts[s] + rest % num
-            # The digits of the combination's number, in bases of the sensors' numbers of components.
+            # The digits of the combination's number, with the sensors' numbers of components as bases.
             rest //= num
             total += powers.log_weights[component]
             for k in range(len(row)):
@@ -108,7 +108,7 @@ def _multiply(powers: Powers, low: int, high: int, out: Mixture) -> None:
 
 @kernel
 def _log_ratio(powers: Powers) -> float:
-    """log (f / q) at reference + `powers.offset`."""
+    """Return log (f / q) at reference + `powers.offset`."""
     ratio = 0.0
     for s in range(len(powers.weights)):
         weight, log_power, log_sum_of_powers = powers.weights[s], -math.inf, -math.inf
@@ -124,7 +124,7 @@ def _log_ratio(powers: Powers) -> float:
 
 @kernel
 def _correct(powers: Powers, points: Floats, point_weights: Floats, mean: Floats, cov: Floats) -> float:
-    """Give a Gaussian of q the moments of f / q times it, by cubature; returns the log of the mass it keeps."""
+    """Give a Gaussian of q the moments of f / q times it, by cubature; return the log of the retained mass."""
     dim, num = len(mean), len(points)
     offset, images, masses, total = powers.offset, np.empty((num, dim)), np.empty(num), 0.0
     if not cholesky(cov, powers.factor):
@@ -135,7 +135,7 @@ def _correct(powers: Powers, points: Floats, point_weights: Floats, mean: Floats
             for j in range(i + 1):
                 images[p, i] += powers.factor[i, j] * points[p, j]
             offset[i] = mean[i] - powers.reference[i] + images[p, i]
-        # f / q is at most 1, so that no point can dominate however far out it is.
+        # f / q is at most 1, so that no distant point can dominate.
         masses[p] = point_weights[p] * math.exp(_log_ratio(powers))
         total += masses[p]
     for i in range(dim):
@@ -154,7 +154,7 @@ def _correct(powers: Powers, points: Floats, point_weights: Floats, mean: Floats
 
 @kernel
 def _count_combinations(chosen: Ints, tracks: Tracks) -> tuple[Ints, int]:
-    """Offsets of the combinations of components of each label, and the most components of a label."""
+    """Return the offsets of the combinations of components of each label, and the most components of a label."""
     num, num_sensors = chosen.shape
     offsets, most = np.zeros(num + 1, np.int64), 0
     for item in range(num):
@@ -173,16 +173,16 @@ def _count_combinations(chosen: Ints, tracks: Tracks) -> tuple[Ints, int]:
 def fuse_tracks(
     chosen: Ints, fusion_weights: Floats, tracks: Tracks, points: Floats, point_weights: Floats
 ) -> tuple[Ints, Mixture, Floats]:
-    """Fused density of each label, and the log of the integral of prod_i p_i^(w_i) (paper eqs. 11 and 12).
+    """Return the fused density of each label, and the log of the integral of prod_i p_i^(w_i) (paper eqs. 11 and 12).
 
-    chosen: (num, S) track of each sensor, -1 where it does not know the label: its factor is left out and the other
-    sensors' weights are scaled to sum to one. fusion_weights: (num, S) positive where known. points: (num_points, dim),
+    chosen: (num, S) track of each sensor, -1 if it does not know the label: its factor is left out and the other
+    sensors' weights are scaled to sum to one. fusion_weights: (num, S) positive if known. points: (num_points, dim),
     point_weights: (num_points,) a cubature rule for the standard normal without negative weights; with no points the
     fused mixture is the component-wise power. A fused mixture has a component for every combination of the sensors'
     components.
 
     Returns offsets (num + 1,) and components of the fused tracks, and log_overlaps (num,). Raises FloatingPointError
-    where a covariance is not positive definite, NumericalError where a fused one is not.
+    if a covariance is not positive definite, NumericalError if a fused one is not.
     """
     num, dim = len(chosen), tracks.components.means.shape[1]
     offsets, most = _count_combinations(chosen, tracks)
@@ -201,18 +201,18 @@ def fuse_tracks(
 
 
 class PowerRule(NamedTuple):
-    """How a power of a mixture is taken."""
+    """How the power of a mixture is computed."""
 
-    caps: MixtureCaps  # of the mixtures that are fused, and of those that come of it
-    points: Floats  # (num_points, state_dim) cubature points of a standard normal; none: the stand-in itself
+    caps: MixtureCaps  # of the mixtures before and after fusion
+    points: Floats  # (num_points, state_dim) cubature points of a standard normal; none: the component-wise power
     point_weights: Floats  # (num_points,)
 
 
 @kernel
 def fused_tracks(labels: Ints, chosen: Ints, weights: Floats, tracks: Tracks, rule: PowerRule) -> tuple[Tracks, Floats]:
-    """As `fuse_tracks`: the fused tracks with their mixtures reduced, and log_overlaps. labels: (num, 2)."""
+    """Return the tracks of `fuse_tracks` with reduced mixtures, and log_overlaps. labels: (num, 2)."""
     offsets, components, log_overlaps = fuse_tracks(chosen, weights, tracks, rule.points, rule.point_weights)
     if len(rule.points) > 0:
-        for item in range(len(log_overlaps)):  # Hoelder: the integral is at most 1, which cubature may overshoot
+        for item in range(len(log_overlaps)):  # Hoelder: the integral is at most 1; cubature may exceed it
             log_overlaps[item] = min(log_overlaps[item], 0.0)
     return reduced_tracks(Tracks(labels, offsets, components), rule.caps), log_overlaps

@@ -14,27 +14,27 @@ from vedette.kernels.labelled.cardinality import convolved
 
 
 class FactorSizes(NamedTuple):
-    """What each factor of a product offers for each number of its targets, from 0 up."""
+    """For each number of targets of each factor, from 0 up: its probability and heaviest hypothesis."""
 
     offsets: Ints  # (num_factors + 1,) places of the factor's numbers
     probabilities: Floats  # of the number, linear
     best: Floats  # log weight of the heaviest hypothesis of the number, -inf if there is none
-    hyps: Ints  # that hypothesis, the first of several
+    hyps: Ints  # that hypothesis, the first on a tie
 
 
 class Shares(NamedTuple):
-    """How the factors share out a total number of targets at the largest sum of log weights."""
+    """Division of a total number of targets among the factors at the largest sum of log weights."""
 
-    singles: Ints  # factors of at most one target: first those that gain most by it, then by label
+    singles: Ints  # factors of at most one target, by decreasing gain from it, then by label
     of_singles: Floats  # largest sum of these with 0, 1, ... targets
     several: Ints  # factors of more than one target
     of_several: Floats  # largest sum of these with 0, 1, ... targets
-    taken: Ints  # (num_several, len(of_several)) targets in that factor where the factors up to it have 0, 1, ...
+    taken: Ints  # (num_several, len(of_several)) targets in that factor if the factors up to it have 0, 1, ...
 
 
 @kernel
 def factor_sizes(density: FactoredGlmb) -> FactorSizes:
-    """The numbers of targets of each factor, from 0 to those of its largest hypothesis."""
+    """Return the possible numbers of targets of each factor, from 0 to the size of its largest hypothesis."""
     num = len(density.factor_offsets) - 1
     offsets, ends = np.zeros(num + 1, np.int64), density.hyp_offsets
     for f in range(num):
@@ -56,7 +56,7 @@ def factor_sizes(density: FactoredGlmb) -> FactorSizes:
 
 @kernel
 def shares(density: FactoredGlmb, sizes: FactorSizes) -> Shares:
-    """The largest sums for every total number, separately for factors of one target and for larger ones."""
+    """Return the largest sums for every total number, separately for factors of one target and for larger ones."""
     offsets, best = sizes.offsets, sizes.best
     width = offsets[1:] - offsets[:-1]
     singles, several = np.flatnonzero(width == 2), np.flatnonzero(width > 2)
@@ -70,7 +70,7 @@ def shares(density: FactoredGlmb, sizes: FactorSizes) -> Shares:
     order = order[np.argsort(steps[order], kind="mergesort")]
     singles = singles[order[np.argsort(gains[order], kind="mergesort")]]
     of_singles = np.zeros(len(singles) + 1)
-    # Of the first n the sum with the target, of the rest the sum without.
+    # The first n factors have their target, the others do not.
     for i in range(len(singles)):
         of_singles[i + 1] = of_singles[i] + best[offsets[singles[i]] + 1]
     without = 0.0
@@ -95,7 +95,7 @@ def _of_several(sizes: FactorSizes, several: Ints) -> tuple[Floats, Ints]:
         width = sizes.offsets[several[s] + 1] - first
         last[:end] = sums[:end]
         sums[: end + width - 1] = -math.inf
-        # The most for this factor first: of equal sums, earlier factors have the fewest targets.
+        # Largest number for this factor first: on a tie, earlier factors have the fewest targets.
         for k in range(width - 1, -1, -1):
             for n in range(end):
                 weight = last[n] + sizes.best[first + k]
@@ -107,9 +107,9 @@ def _of_several(sizes: FactorSizes, several: Ints) -> tuple[Floats, Ints]:
 
 @kernel
 def heaviest_tracks(density: FactoredGlmb, sizes: FactorSizes, shared: Shares, number: int) -> Ints:
-    """(number,) tracks of the heaviest product with this number of targets, in label order.
+    """Tracks of the heaviest product with this number of targets, in label order, shape (number,).
 
-    number: of positive probability. Of equal weights: the fewest targets in earlier factors; the earlier hypothesis;
+    number: of positive probability. On a tie: the fewest targets in earlier factors; the earlier hypothesis;
     among factors of at most one target, those of smaller labels.
     """
     singles, several = shared.singles, shared.several
@@ -141,9 +141,9 @@ def _add_tracks(density: FactoredGlmb, hyp: int, tracks: Ints, filled: int) -> i
 
 @kernel
 def chosen_labels(density: FactoredGlmb, chosen: Ints) -> tuple[Ints, Floats]:
-    """Which tracks have the label of a chosen one, and how probably these labels exist.
+    """Return the tracks that have the label of a chosen one, and the existence probabilities of these labels.
 
-    Returns (num_tracks,) place among the chosen, or -1, and (num_chosen,) existence probabilities.
+    That is (num_tracks,) place among the chosen, or -1, and (num_chosen,) existence probabilities.
     """
     labels, ends = density.tracks.labels, density.hyp_offsets
     places, existence = filled_ints(len(labels), -1), np.zeros(len(chosen))
@@ -163,7 +163,7 @@ def chosen_labels(density: FactoredGlmb, chosen: Ints) -> tuple[Ints, Floats]:
 
 @kernel
 def map_tracks(density: FactoredGlmb) -> tuple[Ints, Floats]:
-    """Tracks of the heaviest product with the most probable number of targets, and existence of their labels."""
+    """Return the tracks of the heaviest product with the most probable number of targets, and label existence."""
     sizes = factor_sizes(density)
     number = int(np.argmax(convolved(sizes.probabilities, sizes.offsets)))
     chosen = heaviest_tracks(density, sizes, shares(density, sizes), number)

@@ -1,9 +1,8 @@
-"""Logs of inner products, zeta(a, b) = integral of K^|X| a(X) b(X) dX, of labelled densities with Gaussian-mixture
-tracks.
+"""Logs of inner products, zeta(a, b) = integral of K^|X| a(X) b(X) dX, of labelled densities.
 
-Two densities come stacked in one bundle, the first `split` hypotheses (LMB: tracks) being a's. All is in the log
-domain: inner products of 4-D tracks in SI units are 1e-6 and less, and enter to the power of the number of targets.
-`log_unit_volume` is log K, K the unit of hyper-volume of the paper's eq. 5.
+The tracks are Gaussian mixtures. Two densities are stacked in one bundle, the first `split` hypotheses (LMB: tracks)
+being a's. Everything is in the log domain: inner products of 4-D tracks in SI units are 1e-6 and less, and enter to the
+power of the number of targets. `log_unit_volume` is log K, K the unit of hyper-volume of the paper's eq. 5.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from vedette.kernels.labelled.labels import group_by_label_set
 
 @kernel
 def _log_gaussians(tracks: Tracks, a: int, b: int, offset: Floats, factor: Floats) -> float:
-    """log of the integral of the product of components `a` and `b`: N(m_a; m_b, P_a + P_b)."""
+    """Return the log of the integral of the product of components `a` and `b`: N(m_a; m_b, P_a + P_b)."""
     n, means, covs = len(offset), tracks.components.means, tracks.components.covs
     for i in range(n):
         offset[i] = means[a, i] - means[b, i]
@@ -37,7 +36,7 @@ def _log_gaussians(tracks: Tracks, a: int, b: int, offset: Floats, factor: Float
 
 @kernel
 def log_tracks(tracks: Tracks, a: int, b: int) -> float:
-    """log <p, q> of the mixtures of tracks `a` and `b`; NaN where a covariance is not positive definite."""
+    """Return log <p, q> of the mixtures of tracks `a` and `b`; NaN if a covariance is not positive definite."""
     n, log_weights = tracks.components.means.shape[1], tracks.components.log_weights
     offset, factor, total = np.empty(n), np.empty((n, n)), -math.inf
     for i in range(tracks.offsets[a], tracks.offsets[a + 1]):
@@ -50,8 +49,7 @@ def log_tracks(tracks: Tracks, a: int, b: int) -> float:
 
 @kernel
 def _label_blocks(tracks: Tracks) -> tuple[Ints, Ints, int]:
-    """Places for one number a pair of tracks of one label: that of (i, j) is start[i] + place[j], i's row in its
-    block.
+    """Return places for one number per pair of tracks of one label: (i, j) has start[i] + place[j], in the row of i.
 
     Returns start, place, and the number of places.
     """
@@ -70,7 +68,10 @@ def _label_blocks(tracks: Tracks) -> tuple[Ints, Ints, int]:
 
 @kernel
 def _log_pair(glmb: Glmb, h: int, g: int, log_unit_volume: float, start: Ints, place: Ints, pairs: Floats) -> float:
-    """log of the product over the labels of two hypotheses of K <p, q>; each pair of tracks is computed once."""
+    """Return the log of the product over the labels of two hypotheses of K <p, q>.
+
+    Computes each pair of tracks once.
+    """
     total, shift = 0.0, glmb.hyp_offsets[g] - glmb.hyp_offsets[h]
     for e in range(glmb.hyp_offsets[h], glmb.hyp_offsets[h + 1]):
         i, j = glmb.hyp_tracks[e], glmb.hyp_tracks[e + shift]
@@ -85,7 +86,7 @@ def _log_pair(glmb: Glmb, h: int, g: int, log_unit_volume: float, start: Ints, p
 
 @kernel
 def log_glmbs(glmb: Glmb, split: int, log_unit_volume: float, common: bool, self_terms: bool) -> Floats:
-    """log zeta of GLMBs a and b: all pairs of hypotheses that share a label set (paper eq. 9).
+    """Return log zeta of GLMBs a and b: the sum over all pairs of hypotheses that share a label set (paper eq. 9).
 
     glmb: hypotheses of a, then from `split` on those of b, over one track table. common: only the label sets that
     both have. Returns log zeta(a, b), zeta(a, a), zeta(b, b), the last two -inf unless `self_terms`.
@@ -113,7 +114,7 @@ def log_glmbs(glmb: Glmb, split: int, log_unit_volume: float, common: bool, self
                 if weight > peaks[term]:
                     sums[term] *= math.exp(peaks[term] - weight)
                     peaks[term] = weight
-                # (h, g) stands for (g, h) too, where both are of one density.
+                # (h, g) also represents (g, h) if both are of one density.
                 sums[term] += (2.0 if term > 0 and g != h else 1.0) * math.exp(weight - peaks[term])
             g = following[g]
     for term in range(3):
@@ -124,7 +125,7 @@ def log_glmbs(glmb: Glmb, split: int, log_unit_volume: float, common: bool, self
 
 @kernel
 def log_probabilities(logit: float) -> tuple[float, float]:
-    """log r and log (1 - r) of a logit; exact at +-inf."""
+    """Return log r and log (1 - r) of a logit; exact at +-inf."""
     if logit >= 0.0:
         tail = math.log1p(math.exp(-logit))
         return -tail, -logit - tail
@@ -149,7 +150,7 @@ def _precedes(labels: Ints, i: int, j: int) -> bool:
 
 @kernel
 def log_lmbs(tracks: Tracks, logits: Floats, split: int, log_unit_volume: float, common: bool) -> Floats:
-    """log zeta(a, b), zeta(a, a), zeta(b, b) of LMBs: sums over labels of Bernoulli terms.
+    """Return log zeta(a, b), zeta(a, a), zeta(b, b) of LMBs: sums over labels of Bernoulli terms.
 
     tracks, logits: a's in increasing label order, then from `split` on b's. A label that only one of them has exists
     in the other with probability 0. common: only the labels that both have.

@@ -1,4 +1,4 @@
-"""Labels and label sets of a GLMB: grouping hypotheses, ordering labels."""
+"""Labels and label sets of a GLMB: grouping of hypotheses, ordering of labels."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def _same_labels(glmb: Glmb, a: int, b: int) -> bool:
 
 @kernel
 def group_by_label_set(glmb: Glmb) -> tuple[Ints, Ints]:
-    """Label sets of a GLMB, numbered by first occurrence.
+    """Number the label sets of a GLMB by first occurrence.
 
     Returns (num_hyps,) the number of each hypothesis's label set, and (num_sets,) the first hypothesis of each set.
     """
@@ -57,7 +57,7 @@ def group_by_label_set(glmb: Glmb) -> tuple[Ints, Ints]:
 
 @kernel
 def label_place(unique: Ints, count: int, step: int, index: int) -> int:
-    """Place of the label (step, index) among the first `count` of `unique`, which are in increasing order."""
+    """Return the place of the label (step, index) among the first `count` of `unique`, which are increasing."""
     low, high = 0, count
     while low < high:
         middle = (low + high) // 2
@@ -70,7 +70,7 @@ def label_place(unique: Ints, count: int, step: int, index: int) -> int:
 
 @kernel
 def increasing_labels(glmb: Glmb) -> Ints:
-    """Labels that occur in the hypotheses, once each, in increasing order."""
+    """Return the labels that occur in the hypotheses, once each, in increasing order."""
     labels, count = glmb.tracks.labels, 0
     unique, seen = np.empty((len(labels), 2), np.int64), np.zeros(len(labels), np.int64)
     for track in glmb.hyp_tracks:

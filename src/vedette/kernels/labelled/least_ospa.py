@@ -1,7 +1,7 @@
-"""The targets of a product of GLMBs whose expected OSPA is least where a target is either in place or not.
+"""The targets of a product of GLMBs of least expected OSPA, if a target is either in place or not.
 
-With n estimated targets of which M are in place, and N true ones, OSPA^p is then c^p (1 - M / max(n, N)). Estimated are
-those of the heaviest hypothesis of n targets, for the n that makes the mean of M / max(n, N) largest.
+With n estimated targets of which M are in place, and N true ones, OSPA^p is then c^p (1 - M / max(n, N)). The estimate
+is the heaviest hypothesis of n targets, for the n with the largest mean of M / max(n, N).
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ from vedette.kernels.gaussian.mixtures import heaviest_of_runs
 from vedette.kernels.labelled.cardinality import convolved
 from vedette.kernels.labelled.heaviest import FactorSizes, chosen_labels, factor_sizes, heaviest_tracks, shares
 
-# Squared Mahalanobis distance up to which two tracks are in one place: three standard deviations of the difference.
+# Squared Mahalanobis distance up to which two tracks share a place: three standard deviations of the difference.
 _IN_PLACE = 9.0
-# Tracks below, and places that are free with less, do not move the choice.
+# Less probable tracks, and places that are free with less probability, do not affect the choice.
 _LEAST = 1e-3
-# Numbers of targets below are left out of the sums.
+# Less probable numbers of targets are left out of the sums.
 _LEAST_NUMBER = 1e-15
 
 
 @kernel
 def least_ospa_tracks(density: FactoredGlmb) -> tuple[Ints, Floats]:
-    """The tracks of the estimated targets in label order, and the existence probabilities of their labels.
+    """Return the tracks of the estimated targets in label order, and the existence probabilities of their labels.
 
     All numbers of targets are tried from the most probable one outwards, except those whose bound, the mean of
-    min(n, N) / max(n, N), is no larger than the best mean. Of equal means the smaller number.
+    min(n, N) / max(n, N), is no larger than the best mean. On a tie the smaller number is chosen.
     """
     sizes = factor_sizes(density)
     shared, numbers = shares(density, sizes), convolved(sizes.probabilities, sizes.offsets)
@@ -53,7 +53,7 @@ def least_ospa_tracks(density: FactoredGlmb) -> tuple[Ints, Floats]:
 
 @kernel
 def _bound(numbers: Floats, number: int) -> float:
-    """Mean of min(n, N) / max(n, N), 1 where both are 0."""
+    """Return the mean of min(n, N) / max(n, N), 1 if both are 0."""
     bound = numbers[0] if number == 0 else 0.0
     for n in range(1, len(numbers)):
         bound += numbers[n] * min(n, number) / max(n, number)
@@ -62,7 +62,7 @@ def _bound(numbers: Floats, number: int) -> float:
 
 @kernel
 def _track_existence(density: FactoredGlmb) -> Floats:
-    """(num_tracks,) probability of each track over the hypotheses of its factor."""
+    """Probability of each track over the hypotheses of its factor, shape (num_tracks,)."""
     existence, ends = np.zeros(len(density.tracks.labels)), density.hyp_offsets
     for h in range(len(density.hyp_log_weights)):
         weight = math.exp(density.hyp_log_weights[h])
@@ -73,9 +73,9 @@ def _track_existence(density: FactoredGlmb) -> Floats:
 
 @kernel
 def _mean_share(density: FactoredGlmb, sizes: FactorSizes, chosen: Ints, existence: Floats) -> tuple[float, Floats]:
-    """Mean of M / max(n, N), 1 where both are 0, and the existence probability of each chosen label.
+    """Return the mean of M / max(n, N), 1 if both are 0, and the existence probability of each chosen label.
 
-    One pass over the factors adds up, for each number of targets so far, its probability and the mean of M with it.
+    One pass over the factors sums, for each number of targets so far, its probability and the mean of M with it.
     """
     worth, own = _worths(density, chosen, existence)
     offsets, ends, num = sizes.offsets, density.hyp_offsets, len(sizes.offsets) - 1
@@ -116,10 +116,11 @@ def _mean_share(density: FactoredGlmb, sizes: FactorSizes, chosen: Ints, existen
 
 @kernel
 def _worths(density: FactoredGlmb, chosen: Ints, existence: Floats) -> tuple[Floats, Floats]:
-    """How much of an estimated target in place each track is, and the existence probability of each chosen label.
+    """Return the fraction of an estimated target in place for each track, and the existence of each chosen label.
 
-    A track of a chosen label is one; a track of another label that is where a chosen one is, is one as far as that
-    place is free: those of a place together at most 1 less the label's existence. Surest labels come first.
+    A track of a chosen label counts 1. A track of another label at the position of a chosen one counts as far as that
+    place is free: those of a place together at most 1 minus the label's existence. Labels of largest existence come
+    first.
     """
     places, own = chosen_labels(density, chosen)
     worth = np.where(places >= 0, 1.0, 0.0)

@@ -1,14 +1,14 @@
 """Parallel update of tracks: p+ prod_s (p_s / p+)^(v_s), from posteriors p_s of one common Gaussian prediction p+.
 
-Everything is done in the coordinates u = C^-1 (x - m+) in which the prediction N(m+, C C') is the standard normal.
+All computations use the coordinates u = C^-1 (x - m+) in which the prediction N(m+, C C') is the standard normal.
 There a posterior N(m_s, P_s) has information I + A_s, A_s = C' (P_s^-1 - P+^-1) C, and mean z_s = C^-1 (m_s - m+), and
 
     log (p_s / p+)(u) = ln|I + A_s| / 2 - u'A_s u / 2 + eta_s'u - eta_s'z_s / 2,    eta_s = (I + A_s) z_s.
 
-A posterior that is the prediction has A_s = 0 and z_s = 0 to the last bit, since L^-1 L and L^-1 0 come out exact.
+A posterior that is the prediction has A_s = 0 and z_s = 0 to the last bit, since L^-1 L and L^-1 0 are exact.
 
-A posterior that is a mixture says a sum of such terms, one a component. The product is then a mixture of one component
-for each choice of a component at every sensor, of which the likeliest are followed.
+A posterior that is a mixture contributes a sum of such terms, one per component. The product is then a mixture of one
+component for each choice of a component at every sensor, of which the likeliest are followed.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from vedette.kernels.gaussian.eigen import clip_negative
 from vedette.kernels.gaussian.linalg import cholesky, log_det_from_factor, log_sum, solve_lower, solve_upper
 from vedette.kernels.gaussian.mixtures import descending_order, moment_match, require_gaussians
 
-# Choices lighter than this share of the likeliest are not followed.
+# Choices lighter than this share of the likeliest are dropped.
 _LOG_LEAST = math.log(1e-6)
 
 
@@ -32,7 +32,7 @@ class _Work(NamedTuple):
     """Working arrays of one label."""
 
     root: Floats  # (dim, dim) C
-    factor: Floats  # (dim, dim) of what is factored just now
+    factor: Floats  # (dim, dim) of the current factorisation
     whitened: Floats  # (dim, dim) L_s^-1 C
     rotated: Floats  # (dim, dim)
     vectors: Floats  # (dim, dim)
@@ -62,7 +62,10 @@ def _make_factors(room: int, dim: int) -> _GaussianFactors:
 
 @borrowing
 def _gain(cov: Floats, work: _Work, gain: Floats) -> bool:
-    """A_s (-> gain) of a component of this covariance, negative eigenvalues clipped at 0; whether it is definite."""
+    """Write A_s (-> gain) of a component of this covariance, negative eigenvalues clipped at 0.
+
+    True if it is definite.
+    """
     n = len(cov)
     if not cholesky(cov, work.factor):
         return False
@@ -87,7 +90,10 @@ def _gain(cov: Floats, work: _Work, gain: Floats) -> bool:
 def _factor_of_posterior(
     item: int, mean: Floats, cov: Floats, predicted: Floats, work: _Work, factors: _GaussianFactors
 ) -> bool:
-    """What a posterior's component says, and its normaliser, in place `item`; whether it is a Gaussian."""
+    """Write the factor of a posterior's component, and its normaliser, in place `item`.
+
+    Return True if it is a Gaussian.
+    """
     n, gain, pull = len(mean), factors.gains[item], factors.pulls[item]
     if not _gain(cov, work, gain):
         return False
@@ -111,7 +117,7 @@ def _factor_of_posterior(
 def _multiply(
     first: _GaussianFactors, a: int, second: _GaussianFactors, b: int, power: float, out: _GaussianFactors, item: int
 ) -> None:
-    """The product of one factor and the power of another, in place `item`."""
+    """Write the product of one factor and the power of another in place `item`."""
     n = first.pulls.shape[1]
     for i in range(n):
         out.pulls[item, i] = first.pulls[a, i] + power * second.pulls[b, i]
@@ -132,7 +138,10 @@ def _copy(factors: _GaussianFactors, source: int, out: _GaussianFactors, item: i
 
 @borrowing
 def _weigh(item: int, factors: _GaussianFactors, work: _Work) -> tuple[bool, float]:
-    """Factor of I + A (-> work) and F^-1 eta (-> work.offset); whether it is definite, and the log of the integral."""
+    """Compute the factor of I + A (-> work) and F^-1 eta (-> work.offset).
+
+    Return True if definite, and the log integral.
+    """
     n = factors.pulls.shape[1]
     for i in range(n):
         for j in range(n):
@@ -150,7 +159,7 @@ def _weigh(item: int, factors: _GaussianFactors, work: _Work) -> tuple[bool, flo
 def _solve(
     item: int, predicted: Floats, factors: _GaussianFactors, work: _Work, mean: Floats, cov: Floats
 ) -> tuple[bool, float]:
-    """m+ + C (I + A)^-1 eta and C (I + A)^-1 C'; whether that is definite, and the log of the integral."""
+    """Write m+ + C (I + A)^-1 eta and C (I + A)^-1 C'; return True if that is definite, and the log of the integral."""
     n = len(mean)
     positive, log_integral = _weigh(item, factors, work)
     if not positive:
@@ -178,7 +187,10 @@ def _solve(
 
 @kernel
 def _likeliest(num: int, factors: _GaussianFactors, work: _Work, most: int, out: _GaussianFactors) -> int:
-    """The likeliest `most` of the first `num` choices (-> out), which take the weight of the others; their number."""
+    """Copy the likeliest `most` of the first `num` choices (-> out), with the weight of the others.
+
+    Return their number.
+    """
     weights = np.empty(num)
     for c in range(num):
         positive, weights[c] = _weigh(c, factors, work)
@@ -201,10 +213,11 @@ def update_in_parallel(
     """Fused mean, covariance and log of the integral of p+ prod_s (p_s / p+)^(v_s) of each label.
 
     means: (num, dim), covs: (num, dim, dim) of the prediction. chosen: (num, S) the sensors' posteriors in `own`, -1
-    for one that has nothing to say. weights: (S,) the exponents v_s, non-negative; of mixtures 1. max_choices: of a
-    component at each sensor, followed at most. A label of which nobody says anything keeps its prediction as it is.
+    for a sensor without information. weights: (S,) the exponents v_s, non-negative; for mixtures 1. max_choices:
+    largest number of choices of one component per sensor that are followed. A label without information from any sensor
+    keeps its prediction unchanged.
 
-    Raises FloatingPointError where a covariance is not positive definite, NumericalError where a fused one is not.
+    Raises FloatingPointError if a covariance is not positive definite, NumericalError if a fused one is not.
     """
     num, dim, largest = len(means), means.shape[1], 1
     for track in range(len(own.labels)):
@@ -241,7 +254,7 @@ def update_in_parallel(
 
 @kernel
 def _merge(count: int, choices: _GaussianFactors, predicted: Floats, work: _Work, mean: Floats, cov: Floats) -> float:
-    """Mean and covariance of the mixture of the choices, and the log of its integral."""
+    """Write the mean and covariance of the mixture of the choices; return the log of its integral."""
     n = len(predicted)
     log_weights, means, covs = np.empty(count), np.empty((count, n)), np.empty((count, n, n))
     for c in range(count):
@@ -254,7 +267,7 @@ def _merge(count: int, choices: _GaussianFactors, predicted: Floats, work: _Work
 
 @borrowing
 def _is_nothing(factors: _GaussianFactors) -> bool:
-    """Whether the first factor is 1: nothing was added to the prediction."""
+    """Return True if the first factor is 1, so that the prediction is unchanged."""
     n = factors.pulls.shape[1]
     for i in range(n):
         if factors.pulls[0, i] != 0.0:

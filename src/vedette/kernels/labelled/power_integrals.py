@@ -1,13 +1,13 @@
-"""Power integrals of labelled densities: the one primitive behind all rewards of a planner.
+"""Power integrals of labelled densities, from which all rewards of a planner are computed.
 
-Of a prediction p and the product g = prod_s pi_s^(w_s) of chosen cases of some sensors, each a product of factors with
-a weighted list of label sets (a GLMB is one factor, an LMB one a label, with the sets {} and {l}),
+For a prediction p and the product g = prod_s pi_s^(w_s) of chosen cases of some sensors, each a product of factors with
+a weighted list of label sets (a GLMB is one factor, an LMB one per label, with the sets {} and {l}),
 
     Z(a, b) = log of the set integral of K^((a + b - 1) |X|) p(X)^a g(X)^b
             = sum over factors of logsumexp over the factor's label sets L of
               a w_p(L) + b sum_s w_s log weight_s(L) + (a + b - 1) |L| log K + sum over l in L of log integral p^a g^b,
 
-where the last p and g are of one label. Every case is laid out once on the label sets of the prediction, its log
+where the last p and g are of one label. Every case is prepared once on the label sets of the prediction, its log
 weights and information rows scaled by its sensor's power; a product is then a sum of rows. Single Gaussians only; the
 rows of one label share one reference.
 """
@@ -31,7 +31,7 @@ from vedette.kernels.gaussian.mixtures import match_components
 _SAME_POWER = 1e-12
 _LARGEST_PRODUCT = 1e200
 
-# A term so much below another is lost beside it, whatever the number of label sets.
+# A term this far below another one is negligible next to it, whatever the number of label sets.
 _LOST = 60.0
 
 
@@ -39,19 +39,19 @@ class SensorCases(NamedTuple):
     """One sensor's densities on its own label sets; a member is a (label set, label)."""
 
     log_weights: Floats  # (num_cases, num_sets)
-    held: Bools  # (num_cases, num_sets) false where the case has lost the set
+    held: Bools  # (num_cases, num_sets) False if the case has lost the set
     means: Floats  # (num_cases, num_members, state_dim)
     covs: Floats  # (num_cases, num_members, state_dim, state_dim)
 
 
 class Places(NamedTuple):
-    """Where a sensor's members stand among those of a layout."""
+    """Places of a sensor's members among those of the target label sets."""
 
-    members: Ints  # (num_members,) the sensor's own member, -1 where it lacks the label set
+    members: Ints  # (num_members,) the sensor's own member, -1 if it lacks the label set
     version_offsets: Ints  # (num_members + 1,) into versions
     versions: Ints  # the sensor's members of the same label
     own_sets: Ints  # (num_own_members,) label set of each of the sensor's members
-    references: Floats  # (num_members, state_dim) about which the rows are taken
+    references: Floats  # (num_members, state_dim) reference points of the rows
 
 
 class Laid(NamedTuple):
@@ -59,26 +59,26 @@ class Laid(NamedTuple):
 
     factor_offsets: Ints  # (num_factors + 1,) into the label sets
     set_offsets: Ints  # (num_sets + 1,) into the members
-    log_weights: Floats  # (num_cases, num_sets) w times the log weight, or that of a stand-in
-    held: Bools  # (num_cases, num_sets) false where a stand-in is put
+    log_weights: Floats  # (num_cases, num_sets) w times the log weight, or that of a substitute
+    held: Bools  # (num_cases, num_sets) False if a substitute is used
     all_held: bool  # whether every label set is held by some case of any choice
-    rows: Floats  # (num_cases, num_members, row_size) of p^w; zeros where the case does not know the label
+    rows: Floats  # (num_cases, num_members, row_size) of p^w; zeros if the case does not know the label
 
 
 class Terms(NamedTuple):
-    """What exponents and prediction contribute, whatever is chosen: pairs (0, b), then (a, b), then (a, 0)."""
+    """Contribution of exponents and prediction, the same for all choices: pairs (0, b), then (a, b), then (a, 0)."""
 
     powers: Floats  # (num_changing,) b of each pair (0, b), then of each (a, b)
     own_powers: Floats  # (num_crossed,) a of each pair (a, b)
     log_weights: Floats  # (num_changing, num_sets) the part of a term that is the same for all cases
     rows: Floats  # (num_crossed, num_members, row_size) a times the prediction's rows
     own: Floats  # (num_own, num_sets) whole terms of pairs (a, 0)
-    own_totals: Floats  # (num_own,) their Z where no label set is left out
+    own_totals: Floats  # (num_own,) their Z if no label set is left out
     dim: int  # of a target's state
 
 
 class Work(NamedTuple):
-    """Working arrays of one product with all samples side by side, in the last axis."""
+    """Working arrays of one product, with all samples in the last axis."""
 
     product: Floats  # (row_size, num_samples)
     joint: Floats  # (row_size, num_samples)
@@ -88,7 +88,7 @@ class Work(NamedTuple):
     crossed: Floats  # (num_crossed, num_samples) log integrals of p^a g^b over the labels of a set
     peaks: Floats  # (num_changing, num_samples) largest term among the label sets of a factor
     sums: Floats  # (num_changing, num_samples) of the terms' exponentials, relative to it
-    products: Floats  # (num_changing, num_samples) of such sums over factors, of which one logarithm is taken for all
+    products: Floats  # (num_changing, num_samples) of such sums over factors, so that one logarithm is enough
     any_held: Bools  # (num_samples,) whether some label set of the factor is held
     is_whole: Bools  # (num_samples,) whether no label set was left out so far
 
@@ -112,10 +112,10 @@ def _make_work(size: int, num_changing: int, num_crossed: int, num_samples: int)
 
 @kernel
 def write_rows(cases: SensorCases, places: Places, power: float, first: int, last: int, rows: Floats) -> None:
-    """Information rows of cases `first:last`, scaled by the sensor's power.
+    """Write the information rows of cases `first:last`, scaled by the sensor's power.
 
-    Where a case lacks a label set, the row is of the Gaussian of the label's mean and covariance over the sets that it
-    has; zeros where it knows the label in none.
+    If a case lacks a label set, the row is of the Gaussian of the label's mean and covariance over the sets that it
+    has; zeros if it has the label in none.
     """
     dim, most = cases.means.shape[2], 1
     for m in range(len(places.members)):
@@ -155,7 +155,9 @@ def _fill(value: float, out: Floats) -> None:
 
 @inlined
 def _multiply(laid: Laid, chosen: Ints, member: int, product: Floats) -> None:
-    """Rows of the products of the chosen cases' powers; where some do not know the label, the others' sum to one.
+    """Write the rows of the products of the chosen cases' powers.
+
+    If some lack the label, the others' powers sum to one.
 
     chosen: each sensor's case with the first sample; the other samples' follow it.
     """
@@ -180,7 +182,10 @@ def _multiply(laid: Laid, chosen: Ints, member: int, product: Floats) -> None:
 
 @inlined
 def _add_log_integrals(rows: Floats, dim: int, from_quotient: bool, integrals: Integrals, out: Floats) -> None:
-    """out (num_samples,) += log integrals of rows, which are used up. from_quotient: where none, it is infinite."""
+    """Add log integrals of rows, which are overwritten, to out (num_samples,).
+
+    from_quotient: the integral is infinite if it does not exist.
+    """
     integrate_rows(rows, dim, integrals)
     factors, exponents = integrals.factors, integrals.exponents
     logs(factors, integrals.bits, integrals.more_bits)
@@ -192,7 +197,7 @@ def _add_log_integrals(rows: Floats, dim: int, from_quotient: bool, integrals: I
 
 @inlined
 def _integrate(laid: Laid, chosen: Ints, at: int, terms: Terms, work: Work) -> None:
-    """Over the labels of a set: the overlaps, the quadratics and the crossed ones."""
+    """Integrate over the labels of a set: the overlaps, the quadratics and the crossed integrals."""
     product, joint, num_crossed = work.product, work.joint, terms.own_powers.shape[0]
     size, num_samples = product.shape
     num_alone = terms.powers.shape[0] - num_crossed
@@ -232,7 +237,7 @@ def _add_terms(at: int, sample: int, weight: float, terms: Terms, work: Work) ->
         else:
             term += work.crossed[e - num_alone, sample]
         if math.isnan(term) and (math.isinf(weight) or math.isinf(given)):
-            term = -math.inf  # both densities are zero, or one is whose power is positive
+            term = -math.inf  # both densities are zero, or one with a positive power is
         peak = work.peaks[e, sample]
         if term > peak:
             work.sums[e, sample] = 1.0 + (work.sums[e, sample] * math.exp(peak - term) if term < peak + _LOST else 0.0)
@@ -245,7 +250,7 @@ def _add_terms(at: int, sample: int, weight: float, terms: Terms, work: Work) ->
 
 @inlined
 def _add_factor(work: Work, out: Floats) -> None:
-    """Add the logs of a factor's sums to the totals, but for what stays in `work.products`."""
+    """Add the logs of a factor's sums to the totals, except for the part that stays in `work.products`."""
     for sample in range(out.shape[0]):
         if not work.any_held[sample]:
             continue
@@ -268,7 +273,7 @@ def _is_held(laid: Laid, chosen: Ints, sample: int, at: int) -> bool:
 
 @inlined
 def _power_integrals(laid: Laid, chosen: Ints, terms: Terms, work: Work, out: Floats) -> None:
-    """Z (num_samples, num_pairs) of one product. A label set that no case holds is left out, also of Z(a, 0)."""
+    """Write Z (num_samples, num_pairs) of one product. A label set that no case holds is left out, also of Z(a, 0)."""
     num, num_samples = work.sums.shape
     _fill(0.0, out)
     _fill(1.0, work.products)
@@ -301,7 +306,7 @@ def _power_integrals(laid: Laid, chosen: Ints, terms: Terms, work: Work, out: Fl
 
 @borrowing
 def _own_of_held(laid: Laid, chosen: Ints, sample: int, own: Floats) -> float:
-    """Z(a, 0) over the label sets that some chosen case holds."""
+    """Return Z(a, 0) over the label sets that some chosen case holds."""
     total = 0.0
     for factor in range(laid.factor_offsets.shape[0] - 1):
         factor_sum, any_held = -math.inf, False
@@ -315,10 +320,10 @@ def _own_of_held(laid: Laid, chosen: Ints, sample: int, own: Floats) -> float:
 
 @kernel
 def power_table(laid: Laid, first_cases: Ints, actions: Ints, terms: Terms, first: int, last: int, out: Floats) -> None:
-    """Z (num_joint, num_samples, num_pairs) of joint actions `first:last`, the pairs in the order of `terms`.
+    """Write Z (num_joint, num_samples, num_pairs) of joint actions `first:last`, the pairs in the order of `terms`.
 
     actions: (num_joint, num_sensors) one action of each sensor; with a sample it is the sensor's case
-    `first_cases + action * num_samples + sample`. NaN where a precision of positive powers is not positive definite.
+    `first_cases + action * num_samples + sample`. NaN if a precision of positive powers is not positive definite.
     """
     num_sensors, num_samples, size = len(first_cases), out.shape[1], laid.rows.shape[2]
     chosen = np.empty(num_sensors, np.int64)

@@ -1,8 +1,8 @@
-"""Labels that are only the improbable other name of a target take the name that it is known by.
+"""Removal of alternative labels: an improbable second label of a target is replaced by its established label.
 
 One target may have been first detected as the label (1, 0) or, had that been clutter, as (2, 0). No later scan can
-tell, so such a pair would stay for good. As a set of states without labels the density does not change when hypotheses
-that hold the second label and not the first give its track the first label.
+distinguish the two, so such a pair would remain forever. As a density of unlabelled states nothing changes if
+hypotheses that hold the second label and not the first give its track the first label.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from vedette.kernels.gaussian.linalg import normalise_logs
 from vedette.kernels.gaussian.mixtures import descending_order
 from vedette.kernels.labelled.splitting import Choices, choices_of, existences_of
 
-# A label is another's name where it exists beside that one in less than this share of its own probability, and the
-# other exists with at least this.
+# A label is an alternative of another one if both exist together with at most this share of its own probability, and
+# the other one exists with at least this probability.
 _BESIDE, _KNOWN = 0.1, 0.5
 
 
 @borrowing
 def _known_name(choices: Choices, existences: Floats, label: int) -> int:
-    """The most probable label that another one stands in for, -1 for none."""
+    """Return the most probable label that another one is an alternative of, -1 for none."""
     best = -1
     for known in range(len(existences)):
         if known == label or existences[known] < _KNOWN or (best >= 0 and existences[known] <= existences[best]):
@@ -38,7 +38,7 @@ def _known_name(choices: Choices, existences: Floats, label: int) -> int:
 
 @borrowing
 def _rename(choices: Choices, existences: Floats, label: int, known: int, labels: Ints) -> None:
-    """Give the tracks of a label to another. Hypotheses that hold both lose their weight.
+    """Give the tracks of a label to another one. Hypotheses that hold both lose their weight.
 
     labels: (num_tracks, 2) of the tracks; written.
     """
@@ -57,10 +57,11 @@ def _rename(choices: Choices, existences: Floats, label: int, known: int, labels
 
 @kernel
 def with_known_names(glmb: Glmb, choices: Choices, max_error: float) -> tuple[Glmb, Choices, float]:
-    """The GLMB in which improbable other names of targets are given up, its choices, and the L1 change of the density.
+    """Return the GLMB without improbable alternative labels, its choices, and the L1 change of the density.
 
-    choices: of the GLMB, heaviest first; written. max_error: of the labelled density, twice the existence of the labels
-    that are given up; the least probable ones first. Tracks that no hypothesis holds any more stay in the table.
+    choices: of the GLMB, heaviest first; written. max_error: bound on the L1 error of the labelled density, twice the
+    existence of the removed labels; the least probable ones are removed first. Tracks without a hypothesis stay in the
+    table.
     """
     num_labels, spent = len(choices.labels), 0.0
     if num_labels < 2:
@@ -84,7 +85,7 @@ def with_known_names(glmb: Glmb, choices: Choices, max_error: float) -> tuple[Gl
 
 @kernel
 def _with_weight(tracks: Tracks, choices: Choices, log_weights: Floats) -> Glmb:
-    """The hypotheses that still have a weight, normalised."""
+    """Return the hypotheses that still have a weight, normalised."""
     num, num_labels = choices.symbols.shape
     offsets, members, filled = np.zeros(num + 1, np.int64), np.empty(num * num_labels, np.int64), 0
     kept, num_kept = np.empty(num), 0

@@ -1,4 +1,4 @@
-"""Marginalised GLMBs of several sensors, or products of them group by group, on the union of their label sets."""
+"""Alignment of marginalised GLMBs of several sensors, or products of them, on the union of their label sets."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from vedette.kernels.labelled.stacking import joined_tracks
 
 
 class Sets(NamedTuple):
-    """The label sets of all sensors, each once a sensor, of positive weight."""
+    """The label sets of all sensors, each once per sensor, of positive weight."""
 
-    hyps: Glmb  # sensor after sensor, of each its groups one after the other
+    hyps: Glmb  # by sensor, then by group
     sensor_of: Ints  # (num_hyps,) increasing
     group_of: Ints  # (num_hyps,)
 
@@ -31,16 +31,16 @@ class Aligned(NamedTuple):
     labels: Ints  # (num_members, 2)
     label_of: Ints  # (num_members,) number of the label, of `num_labels`
     num_labels: int
-    chosen: Ints  # (num_members, num_sensors) place in `tracks`, -1 where the sensor does not know the label
+    chosen: Ints  # (num_members, num_sensors) place in `tracks`, -1 if the sensor does not know the label
     tracks: Tracks
     log_weights: Floats  # (num_sets, num_sensors) of the set, or a floor
     held: Bools  # (num_sets, num_sensors) whether it is the sensor's own
-    num_missing_labels: Ints  # (num_sensors,) labels that the sensor does not know
+    num_missing_labels: Ints  # (num_sensors,) number of labels that the sensor does not know
 
 
 @kernel
 def label_existence(aligned: Aligned, log_weights: Floats) -> Floats:
-    """(num_labels,) existence of each label under (num_sets,) weights of the sets."""
+    """Existence of each label under (num_sets,) weights of the sets, shape (num_labels,)."""
     out = np.zeros(aligned.num_labels)
     for k in range(len(log_weights)):
         for member in range(aligned.offsets[k], aligned.offsets[k + 1]):
@@ -50,7 +50,7 @@ def label_existence(aligned: Aligned, log_weights: Floats) -> Floats:
 
 @kernel
 def _numbered(sets: Sets, num_groups: int) -> tuple[Ints, Ints]:
-    """The number of each hypothesis's label set, and the first of each. Each group has an empty set of its own."""
+    """Return the number of each hypothesis's label set, and the first of each. Each group has its own empty set."""
     set_of, first = group_by_label_set(sets.hyps)
     of_set, of_empty = np.full(len(first), -1, np.int64), np.full(num_groups, -1, np.int64)
     numbers, firsts, num = np.empty(len(set_of), np.int64), np.empty(len(set_of), np.int64), 0
@@ -70,7 +70,7 @@ def _numbered(sets: Sets, num_groups: int) -> tuple[Ints, Ints]:
 
 @kernel
 def _marginal_labels(sets: Sets, sensor: int, num_groups: int, caps: MixtureCaps) -> Lmb:
-    """One sensor's labels, with their marginal densities over the sets that it has."""
+    """Return one sensor's labels, with their marginal densities over its sets."""
     low, high = np.searchsorted(sets.sensor_of, sensor), np.searchsorted(sets.sensor_of, sensor + 1)
     start, end = sets.hyps.hyp_offsets[low], sets.hyps.hyp_offsets[high]
     offsets, members = sets.hyps.hyp_offsets[low : high + 1] - start, sets.hyps.hyp_tracks[start:end]
@@ -98,9 +98,11 @@ def _marginal_labels(sets: Sets, sensor: int, num_groups: int, caps: MixtureCaps
 def _stand_in(
     marginal: Lmb, first_track: int, sensor: int, lacking: Bools, labels: Ints, label_of: Ints, chosen: Ints, seen: Ints
 ) -> int:
-    """Choose the sensor's marginal densities in members of sets that it lacks; the number of labels it does not know.
+    """Use the sensor's marginal densities in members of sets that it lacks.
 
-    seen: (num_labels,) that may be written into, below `sensor` + 1 everywhere.
+    Return the number of labels it does not know.
+
+    seen: (num_labels,) working array, below `sensor` + 1 everywhere.
     """
     known, unknown = marginal.tracks.labels, 0
     for member in range(len(label_of)):
@@ -120,9 +122,9 @@ def _stand_in(
 def _own_weights(
     sets: Sets, numbers: Ints, firsts: Ints, num_sensors: int, num_groups: int, floor: float
 ) -> tuple[Ints, Floats]:
-    """(num_sets, num_sensors) hypothesis of each, or -1, and its log weight; there the least of the floor and its own.
+    """Hypothesis of each set, or -1, and its log weight, or the floor, both of shape (num_sets, num_sensors).
 
-    The least is over the sets of a group.
+    The floor is the least of `floor` and the sensor's own log weights in the group.
     """
     num_sets, hyp_of = len(firsts), np.full((len(firsts), num_sensors), -1, np.int64)
     floors = np.full((num_groups, num_sensors), floor)
@@ -140,10 +142,10 @@ def _own_weights(
 
 @kernel
 def aligned_sets(sets: Sets, num_sensors: int, num_groups: int, floor: float, caps: MixtureCaps) -> Aligned:
-    """The sets side by side.
+    """Return the label sets of all sensors, aligned.
 
-    Where a sensor lacks a set, its weight is the least of `floor` and the weights that it has in the group, and the
-    density of each label its marginal density over the sets that it has, reduced by the caps.
+    If a sensor lacks a set, its weight is the least of `floor` and the weights that it has in the group, and the
+    density of each label its marginal density over the sensor's sets, reduced by the caps.
     """
     hyps, (numbers, firsts) = sets.hyps, _numbered(sets, num_groups)
     hyp_of, log_weights = _own_weights(sets, numbers, firsts, num_sensors, num_groups, floor)

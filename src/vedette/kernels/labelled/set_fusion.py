@@ -20,12 +20,12 @@ from vedette.kernels.labelled.labels import group_by_label_set
 from vedette.kernels.labelled.set_alignment import Aligned, Sets, aligned_sets, label_existence
 from vedette.kernels.labelled.stacking import taken_tracks
 
-# Existence from which a sensor is sure of a label, and below which the fusion has lost it.
+# Existence from which a label counts as sure at a sensor, and below which it counts as lost in the fusion.
 SURE, LOST = 0.9, 0.5
 
 
 class SetRule(NamedTuple):
-    """How sets are fused; see `CmDeltaGlmb`."""
+    """Parameters of the fusion of label sets; see `CmDeltaGlmb`."""
 
     weights: Floats  # (num_sensors,) positive
     missing_log_weight: float
@@ -34,7 +34,7 @@ class SetRule(NamedTuple):
 
 
 class SetReport(NamedTuple):
-    """What a fusion had to repair and what it threw away; see `FusionInfo`."""
+    """Repairs and truncations of a fusion; see `FusionInfo`."""
 
     missing_sets: Ints  # (num_sensors,)
     missing_labels: Ints  # (num_sensors,)
@@ -42,19 +42,19 @@ class SetReport(NamedTuple):
     num_lost_labels: int
     empty_intersection: bool  # of some group
     log_normaliser: float
-    log_kept: float  # of the product over groups of the shares of the kept sets
+    log_kept: float  # log of the product over groups of the kept share of the weight
 
 
 @kernel
 def fuse_glmbs(stack: Glmb, sensor_of: Ints, rule: SetRule) -> tuple[Glmb, SetReport]:
-    """The fusion of GLMBs, delta or marginalised. stack: of all sensors; sensor_of: (num_hyps,), increasing."""
+    """Fuse GLMBs, delta or marginalised. stack: of all sensors; sensor_of: (num_hyps,), increasing."""
     density, report = fuse_sets(_marginalised(stack, sensor_of, len(rule.weights), rule.power.caps), 1, rule)
     return Glmb(density.tracks, density.hyp_offsets, density.hyp_tracks, density.hyp_log_weights), report
 
 
 @kernel
 def _marginalised(stack: Glmb, sensor_of: Ints, num_sensors: int, caps: MixtureCaps) -> Sets:
-    """The label sets of each sensor that have a positive weight, sensor by sensor, heaviest first."""
+    """Return the label sets of each sensor of positive weight, sensor by sensor, heaviest first."""
     set_of, first = group_by_label_set(stack)
     number = np.full((len(first), num_sensors), -1, np.int64)
     own_set, own_first, num = np.empty(len(set_of), np.int64), np.empty(len(set_of), np.int64), 0
@@ -86,7 +86,7 @@ def _marginalised(stack: Glmb, sensor_of: Ints, num_sensors: int, caps: MixtureC
 
 @kernel
 def fuse_sets(sets: Sets, num_groups: int, rule: SetRule) -> tuple[FactoredGlmb, SetReport]:
-    """The fusion of marginalised GLMBs, a factor a group. No set has weight 0, no sensor's factor spans two groups."""
+    """Fuse marginalised GLMBs, one factor per group. No set may have weight 0, no sensor's factor may cross groups."""
     num_sensors = len(rule.weights)
     aligned = aligned_sets(sets, num_sensors, num_groups, rule.missing_log_weight, rule.power.caps)
     weights = np.ones((len(aligned.labels), 1)) * rule.weights
@@ -128,7 +128,7 @@ def _report(aligned: Aligned, log_weights: Floats, log_normalisers: Floats, log_
 
 @kernel
 def _log_set_weights(aligned: Aligned, weights: Floats, log_overlaps: Floats) -> Floats:
-    """(num_sets,) log of the product of the powers, integrated."""
+    """Log of the integral of the product of the powers, shape (num_sets,)."""
     out = np.zeros(len(aligned.groups))
     for k in range(len(out)):
         overlaps = 0.0
@@ -142,7 +142,7 @@ def _log_set_weights(aligned: Aligned, weights: Floats, log_overlaps: Floats) ->
 
 @kernel
 def _num_lost(aligned: Aligned, log_own: Floats, log_fused: Floats) -> int:
-    """Labels of which a sensor is sure and which the fused density has lost."""
+    """Return the number of labels that a sensor is sure of and the fused density has lost."""
     fused, sure, lost = label_existence(aligned, log_fused), np.zeros(aligned.num_labels, np.bool_), 0
     for s in range(log_own.shape[1]):
         sure |= label_existence(aligned, log_own[:, s].copy()) >= SURE
@@ -158,7 +158,7 @@ class _Taken(NamedTuple):
     hyp_offsets: Ints
     hyp_log_weights: Floats  # normalised in each group
     factor_offsets: Ints
-    log_kept: float  # of the product over groups of the share of their weight
+    log_kept: float  # log of the product over groups of the share of their weight
 
 
 @kernel
@@ -175,7 +175,7 @@ def _heaviest(aligned: Aligned, log_weights: Floats, num_groups: int, most: int)
                 raise NumericalError(
                     "fusion: expected a label set of positive weight; the sensors' densities share no place"
                 )
-            # From the heaviest on: logs of -1e12 keep their differences.
+            # Relative to the heaviest: logs of -1e12 keep their differences.
             relative[k], is_kept[k] = log_weights[k] - peak, 1 if rank - starts[group] < most else 0
             if is_kept[k] == 1:
                 kept[num] = k

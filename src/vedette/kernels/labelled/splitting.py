@@ -1,11 +1,11 @@
-"""Splitting a GLMB into independent factors, at a stated L1 error.
+"""Splitting a GLMB into independent factors within a given L1 error.
 
-Of the hypotheses of a GLMB, each a choice of one symbol a label (a track, or absence) with weight w, the product of the
+The hypotheses of a GLMB are choices of one symbol per label (a track, or absence) with weight w. The product of the
 marginals of some parts of the labels has the weights pi = prod over parts of w_part. It differs from the GLMB by
 
     sum over choices |w - pi| = sum over hypotheses |w - pi| + 1 - sum over hypotheses pi,
 
-as the choices that are no hypothesis have w = 0, and all pi sum to 1. That bounds the L1 distance of the densities.
+as the choices that are not hypotheses have w = 0, and all pi sum to 1. That bounds the L1 distance of the densities.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ from vedette.kernels.base.types import Floats, Glmb, Ints
 from vedette.kernels.gaussian.mixtures import descending_order
 from vedette.kernels.labelled.labels import increasing_labels, label_place
 
-# Rounding leaves a product this far from what it is equal to.
+# Rounding error of a product that is exact.
 _EQUAL = 1e-11
 
 
 class Choices(NamedTuple):
-    """The hypotheses of a GLMB as choices of one symbol a label."""
+    """The hypotheses of a GLMB as choices of one symbol per label."""
 
     labels: Ints  # (num_labels, 2) increasing
-    symbols: Ints  # (num_hyps, num_labels) the label's track, -1 where it is absent
+    symbols: Ints  # (num_hyps, num_labels) the label's track, -1 if absent
     weights: Floats  # (num_hyps,) linear
 
 
 @kernel
 def choices_of(glmb: Glmb) -> Choices:
-    """The hypotheses of a normalised GLMB."""
+    """Return the hypotheses of a normalised GLMB as choices."""
     labels = increasing_labels(glmb)
     num, num_labels = len(glmb.hyp_log_weights), len(labels)
     symbols, weights = np.empty((num, num_labels), np.int64), np.empty(num)
@@ -52,7 +52,10 @@ def choices_of(glmb: Glmb) -> Choices:
 
 @kernel
 def group_choices(symbols: Ints, part_of: Ints, part: int, groups: Ints) -> Ints:
-    """Number the choices of the labels of a part by first occurrence: (num_hyps,) into `groups`; the first of each."""
+    """Number the choices of the labels of a part by first occurrence, (num_hyps,) into `groups`.
+
+    Return the first of each.
+    """
     num, size = len(symbols), 4
     while size < 2 * num:
         size *= 2
@@ -82,20 +85,20 @@ def _same_choice(symbols: Ints, a: int, b: int, part_of: Ints, part: int) -> boo
 
 
 class _Parts(NamedTuple):
-    """Parts of the labels, each known by its first label; rows of other labels are out of date."""
+    """Parts of the labels, each identified by its first label; rows of other labels are not current."""
 
     groups: Ints  # (num_labels, num_hyps) number of each hypothesis's choice among those of the part
     sums: Floats  # (num_labels, num_hyps) weight of each of the part's choices
     counts: Ints  # (num_labels,) choices of the part
-    part_of: Ints  # (num_labels,) first label of the part that each is in
+    part_of: Ints  # (num_labels,) first label of the part of each
     sizes: Ints  # (num_labels,) labels of the part
-    table: Ints  # to number pairs of choices in, of a power of two of places, all -1
-    keys: Ints  # as long
+    table: Ints  # hash table for pairs of choices, its size a power of two, all -1
+    keys: Ints  # of the same size
 
 
 @kernel
 def _alone(choices: Choices) -> _Parts:
-    """Every label a part."""
+    """Return every label as its own part."""
     num_hyps, num = choices.symbols.shape
     size = 4
     while size < 2 * num_hyps:
@@ -129,7 +132,7 @@ def _alone(choices: Choices) -> _Parts:
 
 @borrowing
 def _pair_choices(parts: _Parts, a: int, b: int, weights: Floats, groups: Ints, sums: Floats) -> int:
-    """Number the choices of two parts together, and sum their weights; how many there are.
+    """Number the joint choices of two parts, and sum their weights; return their number.
 
     groups, sums: (num_hyps,) written; the rows of either part may be given.
     """
@@ -155,7 +158,7 @@ def _pair_choices(parts: _Parts, a: int, b: int, weights: Floats, groups: Ints, 
 
 @borrowing
 def _dependence(parts: _Parts, a: int, b: int, weights: Floats, groups: Ints, sums: Floats, seen: Ints) -> float:
-    """L1 distance of two parts' joint choices from those of independent ones. groups, sums, seen: to work in."""
+    """L1 distance of two parts' joint choices from those of independent ones. groups, sums, seen: working arrays."""
     for group in range(_pair_choices(parts, a, b, weights, groups, sums)):
         seen[group] = 0
     error, left = 0.0, 1.0
@@ -184,9 +187,9 @@ def _product_error(parts: _Parts, weights: Floats) -> float:
 
 @borrowing
 def _join(parts: _Parts, a: int, b: int, weights: Floats) -> None:
-    """Make two parts one."""
+    """Merge two parts."""
     first, last = min(a, b), max(a, b)
-    # The rows of the first are read up to each hypothesis before they are written there.
+    # The rows of the first are read up to each hypothesis before they are overwritten.
     parts.counts[first] = _pair_choices(parts, first, last, weights, parts.groups[first], parts.sums[first])
     for k in range(len(parts.part_of)):
         if parts.part_of[k] == last:
@@ -196,7 +199,7 @@ def _join(parts: _Parts, a: int, b: int, weights: Floats) -> None:
 
 @kernel
 def _by_dependence(parts: _Parts, weights: Floats) -> tuple[Ints, Ints]:
-    """Every two labels, those that depend on each other most first."""
+    """Return all pairs of labels, the most dependent ones first."""
     num, num_hyps, filled = len(parts.part_of), len(weights), 0
     most = num * (num - 1) // 2
     firsts, seconds, errors = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most)
@@ -212,7 +215,7 @@ def _by_dependence(parts: _Parts, weights: Floats) -> tuple[Ints, Ints]:
 
 @kernel
 def existences_of(choices: Choices) -> Floats:
-    """(num_labels,) existence probability of each label."""
+    """Existence probability of each label, shape (num_labels,)."""
     existences = np.zeros(len(choices.labels))
     for h in range(len(choices.weights)):
         for k in range(len(existences)):
@@ -223,11 +226,11 @@ def existences_of(choices: Choices) -> Floats:
 
 @kernel
 def independent_parts(choices: Choices, max_error: float, max_labels: int, min_existence: float) -> tuple[Ints, float]:
-    """(num_labels,) the first label of the part that each is in, and the L1 error of their product.
+    """First label of the part of each label, shape (num_labels,), and the L1 error of the product of the parts.
 
-    choices: no two hypotheses are the same. The parts are as small as an error of at most `max_error` allows, labels
-    that depend on each other most joined first, but none is made larger than `max_labels`, and labels less probable
-    than `min_existence` stay alone, whatever the error then is.
+    choices: no two hypotheses are the same. The parts are as small as an error of at most `max_error` allows. The most
+    dependent labels are joined first, but no part becomes larger than `max_labels`, and labels less probable than
+    `min_existence` stay alone, whatever the resulting error.
     """
     weights, parts = choices.weights, _alone(choices)
     part_of, sizes, num_parts = parts.part_of, parts.sizes, len(choices.labels)

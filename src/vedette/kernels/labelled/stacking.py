@@ -1,4 +1,4 @@
-"""Several bundles as one, so that one kernel call sees them all, and tracks taken out of one."""
+"""Concatenation of bundles, so that one kernel call processes them all, and extraction of tracks."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from vedette.kernels.gaussian.components import copy_components, joined_componen
 
 
 def join_offsets(offsets: Sequence[Ints]) -> Ints:
-    """Offsets of the concatenation of ragged arrays, each with offsets from 0 on."""
+    """Return the offsets of the concatenation of ragged arrays, each with offsets from 0 on."""
     joined, end = [np.zeros(1, np.int64)], 0
     for item in offsets:
         joined.append(item[1:] + end)
@@ -21,13 +21,13 @@ def join_offsets(offsets: Sequence[Ints]) -> Ints:
 
 
 def stack_tracks(tables: Sequence[Tracks]) -> Tracks:
-    """One track table of all the tracks, in the order given."""
+    """Return one track table of all the tracks, in the order given."""
     labels, offsets, components = zip(*tables, strict=True)
     return Tracks(np.concatenate(labels), join_offsets(offsets), joined_components(components))
 
 
 def stack_glmbs(glmbs: Sequence[Glmb]) -> Glmb:
-    """One bundle of all the hypotheses over one track table, in the order given; the weights stay as they are."""
+    """Return one bundle of all the hypotheses over one track table, in the order given, with unchanged weights."""
     tracks, offsets, members, log_weights = zip(*glmbs, strict=True)
     starts = np.cumsum([0, *(len(table.labels) for table in tracks[:-1])])
     shifted = np.concatenate(members) + np.repeat(starts, [*map(len, members)])
@@ -36,7 +36,7 @@ def stack_glmbs(glmbs: Sequence[Glmb]) -> Glmb:
 
 @kernel
 def joined_tracks(first: Tracks, second: Tracks) -> Tracks:
-    """The tracks of both, in their order."""
+    """Return the tracks of both, in their order."""
     offsets = np.concatenate((first.offsets, second.offsets[1:] + first.offsets[-1]))
     labels = np.concatenate((first.labels, second.labels))
     return Tracks(labels, offsets, stacked_mixtures(first.components, second.components))
@@ -44,7 +44,7 @@ def joined_tracks(first: Tracks, second: Tracks) -> Tracks:
 
 @kernel
 def taken_tracks(tracks: Tracks, places: Ints) -> Tracks:
-    """The tracks at `places`, in that order."""
+    """Return the tracks at `places`, in that order."""
     num, given = len(places), tracks.components
     labels, offsets = np.empty((num, 2), np.int64), np.zeros(num + 1, np.int64)
     for i in range(num):

@@ -1,4 +1,4 @@
-"""Choices of one cost of each of several lists in order of their sum, by best-first search."""
+"""Choices of one cost from each of several lists in order of their sum, by best-first search."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from vedette.kernels.gaussian.mixtures import descending_order
 
 @kernel
 def _sift_up(heap: Ints, sums: Floats, size: int) -> None:
-    """Restore the heap (smallest sum first, then the smallest node) after an entry was put at its end."""
+    """Restore the heap (smallest sum first, then the smallest node) after an entry was added at its end."""
     place = size - 1
     while place > 0:
         above = (place - 1) // 2
@@ -26,7 +26,7 @@ def _sift_up(heap: Ints, sums: Floats, size: int) -> None:
 
 @kernel
 def _sift_down(heap: Ints, sums: Floats, size: int) -> None:
-    """Restore the heap after an entry was put at its top."""
+    """Restore the heap after an entry was replaced at its top."""
     place = 0
     while 2 * place + 1 < size:
         below = 2 * place + 1
@@ -43,11 +43,11 @@ def _sift_down(heap: Ints, sums: Floats, size: int) -> None:
 
 @kernel
 def smallest_sums(costs: Floats, offsets: Ints, max_sums: int) -> tuple[Ints, Ints, Ints, Ints, bool]:
-    """The `max_sums` smallest sums of one cost of each of several lists, the smallest first.
+    """Return the `max_sums` smallest sums of one cost from each of several lists, the smallest first.
 
     costs, offsets: list `i` is `costs[offsets[i]:offsets[i + 1]]`, from 0 up; an infinite cost is never taken. Returns
     chains of nodes: choice `k` takes place `places[node]` of list `lists[node]` for node = order[k], previous[node],
-    previous[previous[node]], ... down to node 0, and the first of every other list; and whether all choices of finite
+    previous[previous[node]], ... down to node 0, and the first of every other list; and True if all choices of finite
     costs are listed.
     """
     num_lists = len(offsets) - 1
@@ -58,7 +58,7 @@ def smallest_sums(costs: Floats, offsets: Ints, max_sums: int) -> tuple[Ints, In
             size += 1
         sizes[i] = size
         dearer[i] = costs[offsets[i] + 1] if size > 1 else math.inf
-        # A product beyond this is more than anyone lists.
+        # Larger products are never listed.
         total = min(total * min(size, 1 << 31), 1 << 31)
     by_cost = descending_order(-dearer)
     num = 0
@@ -81,8 +81,8 @@ def smallest_sums(costs: Floats, offsets: Ints, max_sums: int) -> tuple[Ints, In
         size -= 1
         heap[0] = heap[size]
         _sift_down(heap, sums, size)
-        # Each other choice is reached once: by a step in the next dearer list besides that in the dearest so far, or
-        # instead of it where that is its first; or by one more step in the dearest.
+        # Each other choice is reached once: by a step in the next costlier list in addition to that in the last one so
+        # far, or in its place if that is its first; or by one more step in the last one.
         for way in range(3):
             rank = ranks[node] + (1 if way < 2 else 0)
             if rank == num or (way == 1 and places[node] > 1):

@@ -1,7 +1,7 @@
-"""Versions of a track that have come to say the same are made one, and with them the hypotheses that differ in no more.
+"""Merging of nearly equal versions of a track, and of the hypotheses that then no longer differ.
 
-Hypotheses that explain a scan differently give a label different tracks; as more is measured, these draw together, and
-what told them apart is forgotten. Kept apart they would multiply from scan to scan.
+Hypotheses that explain a scan differently give a label different tracks. With more measurements these converge, and
+their different origin becomes irrelevant. Without merging they would multiply from scan to scan.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ from vedette.kernels.labelled.splitting import Choices, choices_of, group_choice
 
 
 class _Pairs(NamedTuple):
-    """For each version a heavier one of its label that it may be made one with, and what that costs."""
+    """For each version, a heavier one of its label that it may be merged with, and the cost."""
 
-    costs: Floats  # (num_tracks,) inf where there is none within reach
+    costs: Floats  # (num_tracks,) inf if there is none within the distance
     heavier: Ints  # (num_tracks,)
 
 
 @kernel
 def _likeliest_heavier(versions: Ints, weights: Floats, moments: Moments) -> Ints:
-    """(num_versions,) place of the heavier version that each is probably made one with at the least cost, -1 for none.
+    """Place of the heavier version with probably the least merging cost, -1 for none, shape (num_versions,).
 
-    By diagonals alone: for near Gaussians the squared L1 distance grows as sum d^2 / P + (log P - log Q)^2 / 2.
+    Uses only diagonals: for near Gaussians the squared L1 distance grows as sum d^2 / P + (log P - log Q)^2 / 2.
     """
     num, dim = len(versions), moments.means.shape[1]
     means, inverses, logs = np.empty((num, dim)), np.empty((num, dim)), np.empty((num, dim))
@@ -50,7 +50,7 @@ def _likeliest_heavier(versions: Ints, weights: Floats, moments: Moments) -> Int
             for a in range(dim):
                 offset, ratio = means[k, a] - means[i, a], logs[k, a] - logs[i, a]
                 gap += offset * offset * inverses[i, a] + 0.5 * ratio * ratio
-            # Of the weights v <= w only w / (v + w) differs from one heavier version to the next.
+            # For weights v <= w only w / (v + w) differs between heavier versions.
             share = weights[versions[i]] / (weights[versions[i]] + weight) if weight > 0.0 else 1.0
             if share * share * gap < least:
                 least, found[k] = share * share * gap, i
@@ -61,9 +61,9 @@ def _likeliest_heavier(versions: Ints, weights: Floats, moments: Moments) -> Int
 def _find_pairs(versions: Ints, weights: Floats, moments: Moments, distance: float, pairs: _Pairs) -> None:
     """Find the pairs of one label. versions: heaviest first.
 
-    Two versions of weights v and w that are made their mixture change the density by 2 v w / (v + w) times the L1
-    distance between them, at most: as much if which of them it is says all about the other labels, not at all if it
-    says nothing.
+    Merging two versions of weights v and w into their mixture changes the density by at most 2 v w / (v + w) times the
+    L1 distance between them: by that much if the version determines the other labels, and not at all if it is
+    independent of them.
     """
     dim, places = moments.means.shape[1], _likeliest_heavier(versions, weights, moments)
     factor, offset = np.empty((dim, dim)), np.empty(dim)
@@ -89,9 +89,9 @@ def _find_pairs(versions: Ints, weights: Floats, moments: Moments, distance: flo
 
 @kernel
 def _leaders(glmb: Glmb, choices: Choices, weights: Floats, distance: float, max_error: float) -> tuple[Ints, int]:
-    """(num_tracks,) the version that each stands for, and how many there are.
+    """Version that represents each track, shape (num_tracks,), and the number of such versions.
 
-    Cheapest pairs first, while their costs sum to `max_error` at most.
+    Cheapest pairs are merged first, while their costs sum to at most `max_error`.
     """
     moments, versions, labels = (
         moments_of(glmb.tracks, 0, len(weights)),
@@ -122,10 +122,10 @@ def _leaders(glmb: Glmb, choices: Choices, weights: Floats, distance: float, max
 
 @kernel
 def _pooling_error(glmb: Glmb, merged: Tracks, leader: Ints, number: Ints, weights: Floats) -> float:
-    """Bound on the L1 change of a density each of whose tracks is put in the place of its versions.
+    """Bound on the L1 change of a density in which each merged track replaces its versions.
 
-    A track for another, label by label, changes no more than the weight of the hypotheses that hold it times the
-    distance of the two mixtures, and this no more than the mean distance of their components.
+    Replacing a track by another, label by label, changes the density by at most the weight of the hypotheses that hold
+    it times the distance of the two mixtures, which is at most the mean distance of their components.
     """
     tracks, error, own, pooled = glmb.tracks, 0.0, glmb.tracks.components, merged.components
     dim = pooled.means.shape[1]
@@ -146,14 +146,14 @@ def _pooling_error(glmb: Glmb, merged: Tracks, leader: Ints, number: Ints, weigh
 
 @kernel
 def merge_versions(glmb: Glmb, choices: Choices, caps: MixtureCaps, max_error: float) -> tuple[Glmb, Choices, float]:
-    """The GLMB with versions of a label made one track, its choices, and a bound on the L1 change of the density.
+    """Return the GLMB with merged versions of labels, its choices, and a bound on the L1 change of the density.
 
-    choices: of the GLMB as it is given.
+    choices: of the given GLMB.
 
-    Only versions within `caps.merge_distance` of a heavier one, under its covariance, and those first by which the
-    density changes least, while all together change it by `max_error` at most before mixtures are reduced. A merged
-    track is the mixture of its versions, each weighed by all hypotheses that hold it, and reduced; hypotheses that are
-    then equal are one. Heaviest first.
+    Only versions within `caps.merge_distance` of a heavier one, under its covariance, are merged, those of the least
+    change of the density first, while all changes sum to at most `max_error` before mixtures are reduced. A merged
+    track is the mixture of its versions, each weighted by all hypotheses that hold it, and reduced; hypotheses that are
+    then equal are merged. The result is heaviest first.
     """
     if not (caps.merge_distance > 0.0 and max_error > 0.0):
         return glmb, choices, 0.0
@@ -191,7 +191,7 @@ def merge_versions(glmb: Glmb, choices: Choices, caps: MixtureCaps, max_error: f
 def _merged_tracks(
     tracks: Tracks, leader: Ints, num_leaders: int, weights: Floats, caps: MixtureCaps
 ) -> tuple[Ints, Tracks]:
-    """(num_tracks,) the number of each leader's merged track, and these."""
+    """Number of each leader's merged track, shape (num_tracks,), and these tracks."""
     num, filled = len(leader), 0
     number, labels = filled_ints(num, -1), np.empty((num_leaders, 2), np.int64)
     for first in range(num):

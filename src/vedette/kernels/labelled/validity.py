@@ -14,13 +14,13 @@ from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Glmb, Ints, Lmb, Tracks
 from vedette.kernels.gaussian.linalg import cholesky, log_sum
 
-_TOLERANCE = 0.5e-9  # of the log of sums that are to be 1, and of symmetry, relative to the largest variance
+_TOLERANCE = 0.5e-9  # of the log of sums that must be 1, and of symmetry, relative to the largest variance
 _LEAST_PIVOT = 1e-7  # of a Cholesky factor, relative to the standard deviation
 
 
 @kernel
 def _cuts(offsets: Ints, count: int, total: int, least: int) -> bool:
-    """Whether offsets cut `total` entries into `count` runs of at least `least`."""
+    """Return True if offsets divide `total` entries into `count` runs of at least `least`."""
     if len(offsets) != count + 1 or offsets[0] != 0 or offsets[count] != total:
         return False
     shortest = total
@@ -64,7 +64,7 @@ def _is_gaussian(mean: Floats, cov: Floats, factor: Floats) -> bool:
 
 @kernel
 def _are_mixtures(tracks: Tracks) -> bool:
-    """Whether every track is a density."""
+    """Return True if every track is a density."""
     log_weights, means, covs = tracks.components
     num, (num_components, dim) = len(tracks.labels), means.shape
     if tracks.labels.shape[1] != 2 or dim == 0 or len(log_weights) != num_components:
@@ -83,7 +83,7 @@ def _are_mixtures(tracks: Tracks) -> bool:
 
 @kernel
 def is_valid_lmb(density: Lmb) -> bool:
-    """Whether tracks are densities of labels in order, and existence is a probability."""
+    """Return True if tracks are densities of labels in order, and existence is a probability."""
     labels, logits = density.tracks.labels, density.existence_logit
     if not _are_mixtures(density.tracks) or len(logits) != len(labels):
         return False
@@ -95,7 +95,7 @@ def is_valid_lmb(density: Lmb) -> bool:
 
 @kernel
 def is_valid_glmb(density: Glmb) -> bool:
-    """Whether tracks are densities, and hypotheses of weights that sum to 1 hold tracks of labels in order."""
+    """Return True if tracks are densities, and hypotheses are normalised and hold tracks of labels in order."""
     offsets, members, num_hyps = density.hyp_offsets, density.hyp_tracks, len(density.hyp_log_weights)
     if not _are_mixtures(density.tracks) or num_hyps == 0 or not _cuts(offsets, num_hyps, len(members), 0):
         return False
