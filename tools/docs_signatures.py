@@ -24,7 +24,7 @@ TAKEN_BY = {
     "prob_detection": "models.DetectionModel.function",
     "mean_prob_detection": "models.DetectionModel.mean_function",
     "log_clutter_intensity": "models.ClutterModel.log_intensity",
-    "association_marginals": "filters.Marginals.function",
+    "association_marginals": "filters.CustomMarginals.function",
     "label_reward": "control.LabelReward.function",
 }
 

@@ -238,7 +238,7 @@ REFUSED: list[tuple[Any, Any, str]] = [
         {"kind": "central"},
         "kind: expected ranked, as one filter takes the scans of all sensors",
     ),
-    ({"assignment": NOT_OURS}, None, "function: expected own_association.py:no_marginals to give a Marginals"),
+    ({"assignment": NOT_OURS}, None, "function: expected own_association.py:no_marginals to give a CustomMarginals"),
 ]
 
 

@@ -158,7 +158,7 @@ def _normalise_kept(log_weights: Floats, complete: bool) -> float:
 
 @kernel
 def factored_to_glmb(density: FactoredGlmb, label_of: Ints, num_labels: int, max_hypotheses: int) -> tuple[Glmb, float]:
-    """Return the GLMB of the `max_hypotheses` heaviest products of one hypothesis of each factor, and the weight left out.
+    """Return the GLMB of the `max_hypotheses` heaviest products of one hypothesis per factor, and the weight left out.
 
     The GLMB shares the track table; its weights are normalised. Products of weight zero are never listed, so with a
     large `max_hypotheses` all the others are listed and the weight left out is zero. Equal weights are in the order in

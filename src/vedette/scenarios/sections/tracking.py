@@ -27,7 +27,7 @@ if TYPE_CHECKING:  # with the filters comes the compiler, which a check does wit
 if TYPE_CHECKING:
     Assignment = Part
 else:
-    Assignment = one_of("assignment", "filters", "vedette.filters:Marginals, for an lmb")
+    Assignment = one_of("assignment", "filters", "vedette.filters:CustomMarginals, for an lmb")
 
 
 @derived("vedette.filters.limits:Limits")
