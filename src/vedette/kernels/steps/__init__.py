@@ -1,1 +1,1 @@
-"""One scan of each filter."""
+"""One scan of each filter: prediction, update and reduction."""

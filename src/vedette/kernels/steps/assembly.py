@@ -1,4 +1,4 @@
-"""From the kept joint choices of a scan to the posterior: updated tracks, each held once, and hypotheses over them."""
+"""Posterior from the kept joint choices of a scan: updated tracks, each stored once, and hypotheses over them."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from vedette.kernels.gaussian.relinearisation import copy_updated
 
 
 class Naming(NamedTuple):
-    """Which tracks a posterior has, numbered by first use: one for each option that one of its hypotheses takes."""
+    """Tracks of a posterior, numbered by first use: one for each option that one of its hypotheses takes."""
 
-    track_of: Ints  # (num_options,) number of the track that an option makes, -1 where none is made
+    track_of: Ints  # (num_options,) number of the track that an option makes, -1 for none
     options: Ints  # (num_options,) option of each track
     rows: Ints  # (num_options,) row of each track
 
@@ -33,7 +33,7 @@ def make_naming(num_options: int) -> Naming:
 
 @inlined
 def write_updated(row: int, option: int, rows: Rows, options: Options, start: int, out: Mixture) -> int:
-    """Write the updated components of a row under one of its options from `start` on; returns the end.
+    """Write the updated components of a row under one of its options from `start` on; return the end.
 
     Their log weights sum to the option's own; components outside the gate are left out.
     """
@@ -41,7 +41,7 @@ def write_updated(row: int, option: int, rows: Rows, options: Options, start: in
     detected, predicted = options.columns[option] != MISSED, rows.components
     for i in range(rows.offsets[row + 1] - first):
         c, weight = first + i, options.component_log_weights[entry + i]
-        # A component outside the gate cannot have made this measurement.
+        # A component outside the gate cannot have caused this measurement.
         if weight == -math.inf:
             continue
         copy_component(predicted, c, out, start)
@@ -59,9 +59,10 @@ def write_updated(row: int, option: int, rows: Rows, options: Options, start: in
 def name_tracks(
     children: Children, kept: Ints, parents: Parents, options: Options, naming: Naming, out: Parents
 ) -> tuple[int, int, float]:
-    """Write the hypotheses of the `kept` children, normalised, as the next scan's parents: over the tracks of `naming`.
+    """Write the hypotheses of the `kept` children, normalised, over the tracks of `naming`.
 
-    Returns the numbers of tracks and of entries of `out.rows`, and the log of the sum of the children's weights.
+    They are the parents of the next scan. Returns the numbers of tracks and of entries of `out.rows`, and the log of
+    the sum of the children's weights.
     """
     for option in range(options.offsets[len(options.offsets) - 1]):
         naming.track_of[option] = -1
@@ -75,7 +76,7 @@ def name_tracks(
             option = children.options[start + i]
             if options.columns[option] == ABSENT:
                 continue
-            # An option stands for a row as well, so that it names the updated track whatever hypothesis takes it.
+            # An option also determines the row, so it identifies the updated track in every hypothesis.
             if naming.track_of[option] < 0:
                 naming.track_of[option] = num_tracks
                 naming.options[num_tracks], naming.rows[num_tracks] = option, parents.rows[first_row + i]
@@ -88,7 +89,7 @@ def name_tracks(
 
 @borrowing
 def update_tracks(naming: Naming, num_tracks: int, rows: Rows, options: Options, out: Tracks) -> int:
-    """Write the tracks that have been named, their mixtures normalised; returns the number of components."""
+    """Write the named tracks with normalised mixtures; return the number of components."""
     filled, components = 0, out.components
     out.offsets[0] = 0
     for i in range(num_tracks):
@@ -108,7 +109,7 @@ def update_tracks(naming: Naming, num_tracks: int, rows: Rows, options: Options,
 def assemble(
     children: Children, kept: Ints, parents: Parents, rows: Rows, options: Options
 ) -> tuple[Glmb, float, Naming]:
-    """The posterior of the kept children, normalised, the log of their unnormalised sum, and what its tracks are of."""
+    """Return the normalised posterior of the kept children, the log of their unnormalised sum, and its naming."""
     naming = make_naming(options.offsets[-1])
     hyps = Parents(np.empty(len(kept) + 1, np.int64), np.empty(children.filled[1], np.int64), np.empty(len(kept)))
     num, filled, log_total = name_tracks(children, kept, parents, options, naming, hyps)

@@ -1,4 +1,4 @@
-"""Which measurements the tracks explain, so that the others may be new targets."""
+"""Probability that existing tracks explain each measurement, so that births can use the others."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from vedette.kernels.steps.lmb import weigh_by_existence
 
 @kernel
 def prob_explained(belief: Lmb, scan: ScanInput, sensor: Sensor, truncation: Truncation) -> Floats:
-    """(num_measurements,) probability that each is of a track, if tracks did not contend for it:
+    """Probability that each measurement is of a track, without competition between tracks, shape (num_measurements,).
 
     sum over labels of r <p, p_D g(z | .)> / (kappa(z) + the same sum).
     """
@@ -48,9 +48,9 @@ def births_unexplained(
     least_unexplained: float,
     begin: BirthsOfMeasurements,
 ) -> Lmb:
-    """Who may be born where one sensor measured what no track explains surely, from the least explained on.
+    """Return births at the measurements of one sensor that tracks do not surely explain, least explained first.
 
-    places: (num_measurements, 2) where each was taken, m.
+    places: (num_measurements, 2) position of each, m.
     """
     unexplained = 1.0 - prob_explained(belief, scan, sensor, truncation)
     order = descending_order(unexplained)

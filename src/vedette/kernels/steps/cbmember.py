@@ -1,6 +1,6 @@
 """The cardinality-balanced multi-Bernoulli filter: one step of Gaussian-mixture Bernoullis (Vo, Vo, Cantoni 2009).
 
-Bernoullis are held as an LMB without meaning in its labels; they are the rows of a scan as those of an LMB are.
+Bernoullis are stored as an LMB with meaningless labels; they are the rows of a scan as those of an LMB are.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from vedette.kernels.steps.lmb import Reduction, append_reduced, labels_to_keep,
 
 
 class CbMemberReport(NamedTuple):
-    """What a step had to change and what it left out."""
+    """Changes and truncations of a step."""
 
     num_raised: int  # measurements whose clutter intensity was raised to the floor
     dropped_existence: float  # summed existence of dropped Bernoullis
@@ -36,9 +36,9 @@ class Choices(NamedTuple):
     """The options of a scan by measurement."""
 
     rows: Ints  # (num_options,) row of each option
-    missed: Ints  # (num_rows,) option of a missed detection, -1 where there is none
+    missed: Ints  # (num_rows,) option of a missed detection, -1 if there is none
     offsets: Ints  # (num_measurements + 1,) into detections
-    detections: Ints  # the options that are detections as each measurement
+    detections: Ints  # the detection options of each measurement
 
 
 @kernel
@@ -56,7 +56,7 @@ def list_choices(options: Options, num_measurements: int) -> Choices:
 
 @kernel
 def existence_logits(rows: Rows, options: Options, choices: Choices) -> Floats:
-    """Existence logit of every legacy Bernoulli, one a row, and then of one a measurement; -inf where there is none.
+    """Existence logit of every legacy Bernoulli, one per row, and then of one per measurement; -inf if there is none.
 
     With a = 1 - r, m = r <p, 1 - pD> and o_z = r <p, pD g_z> / kappa(z) of each row, 1 - r <p, pD> is a + m, and
     legacy odds are m / a, those of a measurement (sum of o a / (a + m)^2) / (1 + sum of o m / (a + m)^2): the paper's
@@ -86,7 +86,7 @@ def existence_logits(rows: Rows, options: Options, choices: Choices) -> Floats:
 
 @kernel
 def _possible(logits: Floats) -> Ints:
-    """Which Bernoullis have any existence."""
+    """Return the Bernoullis of positive existence."""
     found, num = np.empty(len(logits), np.int64), 0
     for i in range(len(logits)):
         if logits[i] > -math.inf:
@@ -97,7 +97,7 @@ def _possible(logits: Floats) -> Ints:
 
 @kernel
 def _most_components(sources: Ints, rows: Rows, choices: Choices) -> tuple[int, int]:
-    """Components of the widest of the kept Bernoullis and of all together, before reduction."""
+    """Return the components of the widest of the kept Bernoullis and of all together, before reduction."""
     num_rows, widest, total = len(rows.log_absent), 0, 0
     for source in sources:
         width = 0
@@ -114,8 +114,9 @@ def _most_components(sources: Ints, rows: Rows, choices: Choices) -> tuple[int, 
 
 @kernel
 def posterior_mixtures(sources: Ints, rows: Rows, options: Options, choices: Choices, caps: MixtureCaps) -> Tracks:
-    """The reduced mixture of each kept Bernoulli: of the missed row, or of all rows that explain its
-    measurement, weighed by the odds of their existence.
+    """Return the reduced mixture of each kept Bernoulli.
+
+    That is the mixture of a missed row, or of all rows that explain a measurement, weighted by their existence odds.
     """
     num_rows, dim = len(rows.log_absent), rows.components.means.shape[1]
     widest, total = _most_components(sources, rows, choices)
@@ -133,7 +134,7 @@ def posterior_mixtures(sources: Ints, rows: Rows, options: Options, choices: Cho
                 row = choices.rows[option]
                 end = write_updated(row, option, rows, options, width, wide)
                 for c in range(width, end):
-                    # r / (1 - r): the odds of a row are its weight over that of being absent.
+                    # r / (1 - r): the odds of a row are its weight over that of its absence.
                     wide.log_weights[c] -= rows.log_absent[row]
                 width = end
         filled = append_reduced(wide, width, caps, work, out, filled)
@@ -143,7 +144,7 @@ def posterior_mixtures(sources: Ints, rows: Rows, options: Options, choices: Cho
 
 @kernel
 def _bounded(existence_logit: Floats, most: float) -> tuple[Floats, float]:
-    """Existence of at most a logit, and the expected number of targets that this takes away."""
+    """Return existence logits bounded by `most`, and the expected number of targets removed by this."""
     bounded, lost = existence_logit.copy(), 0.0
     for i in range(len(bounded)):
         if bounded[i] > most:
@@ -162,7 +163,7 @@ def step_cb_member(
     reduction: Reduction,
     max_existence_logit: float,
 ) -> tuple[Lmb, CbMemberReport]:
-    """One scan. max_existence_logit: prior existences are taken as at most this."""
+    """Predict and update with one scan. max_existence_logit: upper bound on the prior existences."""
     rows = rows_of_scan(prior.tracks, scan, motion, sensor)
     existence_logit, lost = _bounded(prior.existence_logit, max_existence_logit)
     weigh_by_existence(existence_logit, rows)

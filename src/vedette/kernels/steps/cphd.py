@@ -1,8 +1,8 @@
 """The Gaussian-mixture CPHD filter: one step of an iid cluster's cardinality and intensity (Vo, Vo, Cantoni 2007).
 
-Everything about numbers is a polynomial with coefficients that are not negative, held as their logs: a generating
-function of a cardinality distribution, or one whose coefficients are the elementary symmetric functions of the scan's
-likelihood ratios. Sums of such terms neither cancel nor, as logs, overflow.
+All cardinality computations use polynomials with non-negative coefficients, stored as logs: a generating function of a
+cardinality distribution, or one whose coefficients are the elementary symmetric functions of the scan's likelihood
+ratios. Sums of such terms neither cancel nor, as logs, overflow.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from vedette.kernels.steps.phd import IntensityReport, corrected_intensity, pred
 
 @inlined
 def times_linear(log_coefficients: Floats, degree: int, log_constant: float, log_slope: float) -> None:
-    """Multiply the polynomial of the first `degree` + 1 coefficients by (constant + slope z), in its place.
+    """Multiply the polynomial of the first `degree` + 1 coefficients by (constant + slope z), in place.
 
-    `log_coefficients` has room for one more; what stands there is written over.
+    `log_coefficients` must have room for one more coefficient, which is overwritten.
     """
     log_coefficients[degree + 1] = log_coefficients[degree] + log_slope
     for j in range(degree, 0, -1):
@@ -36,15 +36,15 @@ def times_linear(log_coefficients: Floats, degree: int, log_constant: float, log
 
 @kernel
 def predict_cardinality(log_cardinality: Floats, log_lived: float, log_died: float, birth_logit: Floats) -> Floats:
-    """Log probabilities of 0, 1, ... targets after each lived on or died alike, and each site gave birth or not.
+    """Log probabilities of 0, 1, ... targets after survival, the same for each target, and births at each site.
 
     log_lived, log_died: log of the mean probabilities of a target, which sum to one. birth_logit: (num_sites,) of the
-    existence of each birth. The sums over binomials of Vo, Vo, Cantoni 2007 are taken by Horner's rule.
+    existence of each birth. The sums over binomials of Vo, Vo, Cantoni 2007 are computed by Horner's rule.
     """
     highest = len(log_cardinality) - 1
     predicted = np.full(highest + len(birth_logit) + 1, -math.inf)
     predicted[0] = log_cardinality[highest]
-    # Horner: ((rho_n (d + s z) + rho_(n-1)) (d + s z) + ...), d died and s lived on.
+    # Horner: ((rho_n (d + s z) + rho_(n-1)) (d + s z) + ...), d death and s survival.
     for count in range(highest - 1, -1, -1):
         times_linear(predicted, highest - 1 - count, log_died, log_lived)
         predicted[0] = log_add(predicted[0], log_cardinality[count])
@@ -56,7 +56,7 @@ def predict_cardinality(log_cardinality: Floats, log_lived: float, log_died: flo
 
 @kernel
 def symmetric_functions(log_ratios: Floats) -> Floats:
-    """(num + 1, num + 1) log elementary symmetric functions: entry [k, j] of order j of the first k ratios."""
+    """Log elementary symmetric functions, (num + 1, num + 1): entry [k, j] of order j of the first k ratios."""
     num = len(log_ratios)
     table = np.full((num + 1, num + 1), -math.inf)
     table[0, 0] = 0.0
@@ -69,7 +69,7 @@ def symmetric_functions(log_ratios: Floats) -> Floats:
 
 @kernel
 def _log_factorials(num: int) -> Floats:
-    """Of 0 to `num` - 1."""
+    """Return the log factorials of 0 to `num` - 1."""
     logs = np.zeros(num)
     for n in range(1, num):
         logs[n] = logs[n - 1] + math.log(n)
@@ -78,9 +78,10 @@ def _log_factorials(num: int) -> Floats:
 
 @kernel
 def cardinality_derivatives(log_cardinality: Floats, log_missed: float, most: int) -> Floats:
-    """(most + 1,) log of the derivatives of order 0, 1, ... of the generating function at exp(log_missed).
+    """Log of the derivatives of order 0, 1, ... of the generating function at exp(log_missed), shape (most + 1,).
 
-    The one of order j is the expected number of ways to choose j detected targets in order while the others are missed.
+    The derivative of order j is the expected number of ways to choose j detected targets in order while the others are
+    missed.
     """
     num = len(log_cardinality)
     log_factorials = _log_factorials(num)
@@ -113,11 +114,11 @@ def correct_cardinality(log_cardinality: Floats, log_missed: float, log_symmetri
 
 @kernel
 def measurement_slopes(table: Floats, log_ratios: Floats, derivatives: Floats) -> Floats:
-    """Log of the derivative of sum over j of e_j(ratios) derivatives[j] by each ratio.
+    """Log of the derivative of sum over j of e_j(ratios) derivatives[j] with respect to each ratio.
 
-    That is the sum over j of e_j(all other ratios) derivatives[j + 1], which weighs a detection in the corrected
-    intensity. Taken by one sweep backwards through `table` (see `symmetric_functions`), all of them together cost no
-    more than the functions themselves.
+    That is the sum over j of e_j(all other ratios) derivatives[j + 1], the weight of a detection in the corrected
+    intensity. All of them are computed by one backward sweep through `table` (see `symmetric_functions`), at the cost
+    of the functions themselves.
     """
     num = len(log_ratios)
     adjoint, slopes, terms = derivatives[: num + 1].copy(), np.empty(num), np.empty(num)
@@ -132,7 +133,7 @@ def measurement_slopes(table: Floats, log_ratios: Floats, derivatives: Floats) -
 
 @borrowing
 def _log_products_sum(log_symmetric: Floats, derivatives: Floats, shift: int) -> float:
-    """log of the sum over j of e_j derivatives[j + shift]."""
+    """Return the log of the sum over j of e_j derivatives[j + shift]."""
     total = -math.inf
     for j in range(len(log_symmetric)):
         total = log_add(total, log_symmetric[j] + derivatives[j + shift])
@@ -141,9 +142,9 @@ def _log_products_sum(log_symmetric: Floats, derivatives: Floats, shift: int) ->
 
 @kernel
 def trim_cardinality(log_cardinality: Floats, max_log_gap: float) -> tuple[Floats, float]:
-    """The distribution without the large numbers less probable than the most probable by `max_log_gap`, normalised.
+    """Return the normalised distribution without large numbers that are `max_log_gap` less probable than the mode.
 
-    Also the log of the share that stays.
+    Also returns the log of the retained share.
     """
     total, peak = log_sum(log_cardinality), -math.inf
     for n in range(len(log_cardinality)):
@@ -166,7 +167,7 @@ def _log_mean(log_cardinality: Floats) -> float:
 
 @kernel
 def _predict(log_cardinality: Floats, prior: Mixture, birth: Lmb, rows_log_weights: Floats, log_died: float) -> Floats:
-    """Predicted cardinality; the row's weights, survivors weighed as of one target, are scaled to sum to one."""
+    """Return the predicted cardinality; scale the row's weights, with survivors of one target, to sum to one."""
     num = len(prior.log_weights)
     predicted = predict_cardinality(log_cardinality, log_sum(rows_log_weights[:num]), log_died, birth.existence_logit)
     log_prior_mean = _log_mean(log_cardinality)
@@ -181,7 +182,7 @@ def _predict(log_cardinality: Floats, prior: Mixture, birth: Lmb, rows_log_weigh
 
 @kernel
 def _normalised(mixture: Mixture) -> Mixture:
-    """The mixture with weights that sum to one; none where there is no weight."""
+    """Return the mixture with weights that sum to one, or without components if there is no weight."""
     if normalise_logs(mixture.log_weights) == -math.inf:
         return components_between(mixture, 0, 0)
     return mixture
@@ -189,7 +190,7 @@ def _normalised(mixture: Mixture) -> Mixture:
 
 @kernel
 def _detections(columns: Ints) -> Ints:
-    """The options that are detections."""
+    """Return the options that are detections."""
     found, num = np.empty(len(columns), np.int64), 0
     for option in range(len(columns)):
         if columns[option] != MISSED:
@@ -208,10 +209,10 @@ def step_cphd(
     truncation: Truncation,
     caps: MixtureCaps,
 ) -> tuple[Floats, Mixture, IntensityReport]:
-    """One scan (Vo, Vo and Cantoni 2007). As clutter is Poisson, its rate falls out of the paper's ratios.
+    """Predict and update with one scan (Vo, Vo and Cantoni 2007). With Poisson clutter, its rate cancels in the ratios.
 
-    prior: the density of one target, weights that sum to one. Where no number of targets can have given the scan, the
-    log total of the report is -inf and the prior comes back.
+    prior: the density of one target, weights that sum to one. If no number of targets explains the scan, the log total
+    of the report is -inf and the prior is returned.
     """
     rows, log_died = predict_intensity(prior, scan, motion, sensor)
     predicted = _predict(log_cardinality, prior, scan.birth, rows.components.log_weights, log_died)
@@ -230,7 +231,7 @@ def step_cphd(
     log_total = _log_products_sum(log_symmetric, derivatives, 0)
     if log_total == -math.inf:
         return log_cardinality, prior, IntensityReport(log_total, log_clutter, num_raised, 0.0)
-    # Vo, Vo, Cantoni 2007: a miss weighs <Upsilon1, rho> / <Upsilon0, rho>, each detection its own such ratio.
+    # Vo, Vo, Cantoni 2007: weight of a miss <Upsilon1, rho> / <Upsilon0, rho>, of each detection its own such ratio.
     log_factors = np.full(num_options, _log_products_sum(log_symmetric, derivatives, 1) - log_total)
     slopes = measurement_slopes(table, log_ratios, derivatives)
     for k in range(len(detections)):

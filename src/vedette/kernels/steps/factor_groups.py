@@ -1,4 +1,4 @@
-"""The factors of a belief that a scan links, as one small GLMB of their own: rows, options and prior hypotheses."""
+"""Groups of linked factors of a belief as small GLMBs: rows, options and prior hypotheses."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from vedette.kernels.gaussian.mixtures import descending_order
 
 
 class Factors(NamedTuple):
-    """The factors of a scan: those of the prior, then every label that may begin as one of its own."""
+    """The factors of a scan: those of the prior, then every possible new label as its own factor."""
 
     prior: FactoredGlmb
     row_offsets: Ints  # (num_factors + 1,) rows of each
@@ -27,7 +27,7 @@ class Factors(NamedTuple):
 
 
 class Group(NamedTuple):
-    """Factors that a scan is taken by together. Rows are in label order, and columns numbered within the group."""
+    """Factors that are updated jointly. Rows are in label order, and columns are numbered within the group."""
 
     rows: Rows
     options: Options
@@ -38,13 +38,16 @@ class Group(NamedTuple):
 
 @inlined
 def is_single(factors: Factors, factor: int) -> bool:
-    """Whether the factor is one row: one track that is there or not."""
+    """Return True if the factor is one row: one track that is present or absent."""
     return bool(factors.row_offsets[factor + 1] - factors.row_offsets[factor] == 1)
 
 
 @kernel
 def factors_of(prior: FactoredGlmb, num_births: int) -> Factors:
-    """The factors of a scan, with their rows in the order of `rows_of_scan`, then candidates. num_births: of both."""
+    """Return the factors of a scan, with their rows in the order of `rows_of_scan`, then candidates.
+
+    num_births: number of birth sites and candidates.
+    """
     num_prior = len(prior.factor_offsets) - 1
     row_offsets, num_labels = np.zeros(num_prior + num_births + 1, np.int64), np.empty(num_prior + num_births, np.int64)
     for factor in range(num_prior):
@@ -71,7 +74,7 @@ def _count_labels(labels: Ints, first: int, last: int) -> int:
 
 @borrowing
 def weigh_singles(prior: FactoredGlmb, rows: Rows) -> None:
-    """Make the rows of single tracks, predicted as if certain, uncertain by the hypotheses of their factors."""
+    """Apply the existence of single tracks, predicted as certain, from the hypotheses of their factors."""
     for factor in range(len(prior.factor_offsets) - 1):
         if prior.track_offsets[factor + 1] - prior.track_offsets[factor] != 1:
             continue
@@ -82,7 +85,7 @@ def weigh_singles(prior: FactoredGlmb, rows: Rows) -> None:
             else:
                 log_absent = log_add(log_absent, prior.hyp_log_weights[h])
         row = prior.track_offsets[factor]
-        # Absent: never there, or there and died.
+        # Absent: never present, or died.
         rows.log_absent[row] = log_add(log_absent, log_present + rows.log_absent[row])
         for c in range(rows.offsets[row], rows.offsets[row + 1]):
             rows.components.log_weights[c] += log_present
@@ -90,7 +93,7 @@ def weigh_singles(prior: FactoredGlmb, rows: Rows) -> None:
 
 @kernel
 def presence_of_rows(prior: FactoredGlmb, num_rows: int) -> Floats:
-    """(num_rows,) probability of each row in its factor; 1 of a single row, whose options say whether it is there."""
+    """Probability of each row in its factor, shape (num_rows,); 1 for a single row, whose options include absence."""
     presence = np.ones(num_rows)
     for factor in range(len(prior.factor_offsets) - 1):
         first, last = prior.track_offsets[factor], prior.track_offsets[factor + 1]
@@ -107,7 +110,7 @@ def presence_of_rows(prior: FactoredGlmb, num_rows: int) -> Floats:
 
 @kernel
 def groups_of_rows(factors: Factors, leaders: Ints) -> Ints:
-    """(num_rows,) the group of each row. leaders: (num_factors,) of each factor."""
+    """Group of each row, shape (num_rows,). leaders: (num_factors,) of each factor."""
     group_of = np.empty(factors.row_offsets[len(leaders)], np.int64)
     for factor in range(len(leaders)):
         for row in range(factors.row_offsets[factor], factors.row_offsets[factor + 1]):
@@ -117,7 +120,7 @@ def groups_of_rows(factors: Factors, leaders: Ints) -> Ints:
 
 @kernel
 def _members(factors: Factors, group: Ints, labels: Ints) -> Ints:
-    """The rows of a group's factors in label order, versions of a track in the order of the rows."""
+    """Return the rows of a group's factors in label order, versions of a track in the order of the rows."""
     num = 0
     for factor in group:
         num += factors.row_offsets[factor + 1] - factors.row_offsets[factor]
@@ -138,9 +141,9 @@ def _members(factors: Factors, group: Ints, labels: Ints) -> Ints:
 
 @kernel
 def _taken_options(options: Options, members: Ints, columns: Ints) -> tuple[Options, Ints]:
-    """The options of some rows, with columns of their own, and which measurement each column is.
+    """Return the options of some rows, with columns renumbered, and the measurement of each column.
 
-    columns: (num_measurements,) all -1, and so again afterwards. Component entries stay those of all rows.
+    columns: (num_measurements,) all -1, before and after. Component entries stay those of all rows.
     """
     num = 0
     for row in members:
@@ -167,9 +170,12 @@ def _taken_options(options: Options, members: Ints, columns: Ints) -> tuple[Opti
 
 @kernel
 def _parents_of(factors: Factors, factor: int, place: Ints) -> Parents:
-    """The hypotheses of one factor over the rows of its group, heaviest first. place: of each row in the group."""
+    """Return the hypotheses of one factor over the rows of its group, heaviest first.
+
+    place: of each row in the group.
+    """
     if is_single(factors, factor):
-        # Whether the track is there is in its row's weights: both hypotheses are one.
+        # Absence is in the row's weights: both hypotheses become one.
         rows = np.empty(1, np.int64)
         rows[0] = place[factors.row_offsets[factor]]
         offsets = np.zeros(2, np.int64)
@@ -194,9 +200,9 @@ def _parents_of(factors: Factors, factor: int, place: Ints) -> Parents:
 def gathered_group(
     factors: Factors, members_of: Ints, rows: Rows, options: Options, max_hypotheses: int, place: Ints, columns: Ints
 ) -> Group:
-    """The factors `members_of` as a problem of their own.
+    """Return the factors `members_of` as a separate problem.
 
-    place: (num_rows,) to work in. columns: (num_measurements,) all -1, and so again afterwards.
+    place: (num_rows,) working array. columns: (num_measurements,) all -1, before and after.
     """
     members = _members(factors, members_of, rows.labels)
     for i in range(len(members)):

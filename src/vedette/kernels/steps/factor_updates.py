@@ -1,4 +1,4 @@
-"""What becomes of the factors of one group at a scan: their update, and the parts into which it falls."""
+"""Update of the factors of one group at a scan, and its split into independent parts."""
 
 from __future__ import annotations
 
@@ -30,36 +30,36 @@ from vedette.kernels.steps.factor_groups import Group
 from vedette.kernels.steps.glmb import Associated, kept_children
 from vedette.kernels.steps.lmb import Reduction, append_reduced, write_mixture
 
-# Places in the sums of a scan; what each is says `FactoredReport`.
+# Indices of the sums of a scan; see `FactoredReport`.
 TOTAL, KEPT, TWICE, SPLIT, DROPPED, CUT, FULL, REDUCED = range(8)
 _NUM_SUMS = 8
 
-# A component of a label alone is dropped where it holds less of an existing target than this times the least share.
+# A component of a label that is alone is dropped if its expected number of targets is below this times the least share.
 _WORTH = 10.0
 
-# Dropped labels return to the undetected targets if they exist with at least a tenth of the least existence: fainter
-# ones would add a component for every recent false measurement.
+# Dropped labels return to the undetected targets if their existence is at least a tenth of the least existence: less
+# probable ones would add a component for every recent false measurement.
 _LOG_RETURNED = math.log(10.0)
 
-# A posterior is condensed where the hypotheses behind this share of the most that a group may have weigh more than
-# that: the next scan has many times as many, and of those cut off most hold more targets than those kept. The L1 error
-# up to which versions of labels are made one then grows by a factor, until it is above `Factoring.max_merging`. Where
-# that is not enough, the posterior is split up to that error.
+# A posterior is condensed if the hypotheses beyond the share _KEPT_APART of the longest list weigh more than
+# _MOST_BEHIND: the next scan has many times as many, and most of those cut off hold more targets than those kept. The
+# L1 error up to which versions of labels are merged then grows by _GROWTH, until it is above `Factoring.max_merging`.
+# If that is not enough, the posterior is split up to that error.
 _KEPT_APART, _MOST_BEHIND, _GROWTH = 0.25, 0.05, 3.0
 
 
 class Factoring(NamedTuple):
-    """When factors are taken together, and when they are split."""
+    """Criteria for joint updates of factors, and for splits."""
 
     max_error: float  # L1 error of one group's split
-    max_cut: float  # sum over pairs of factors, at each measurement, of the products of claims that are cut
+    max_cut: float  # sum over pairs of factors, at each measurement, of the products of cut probabilities
     max_labels: int  # of a factor, after a scan
-    max_together: int  # labels of the factors that take a scan together
-    max_merging: float  # L1 error up to which a posterior with too many hypotheses is condensed and split; 0: it is cut
+    max_together: int  # labels of the factors that are updated jointly
+    max_merging: float  # L1 error up to which a posterior with too many hypotheses is condensed and split; 0: cut
 
 
 class Work(NamedTuple):
-    """Arrays of a scan to work in."""
+    """Working arrays of a scan."""
 
     marginals: Floats  # (num_options,) log probability of each option
     wide: Mixture  # of one row over all its options
@@ -67,9 +67,9 @@ class Work(NamedTuple):
     columns: Ints  # (num_measurements,) -1 between groups
     claimed: Floats  # (num_measurements,) expected number of groups that take each
     sums: Floats  # (_NUM_SUMS,)
-    reducing: ReductionWork  # for as many components as `wide` has
-    faint: Mixture  # one Gaussian of each label that is dropped, weighed by its existence
-    num_faint: Ints  # (1,) how many there are
+    reducing: ReductionWork  # for the number of components of `wide`
+    faint: Mixture  # one Gaussian of each dropped label, weighted by its existence
+    num_faint: Ints  # (1,) their number
 
 
 @kernel
@@ -93,7 +93,7 @@ def make_work(rows: Rows, options: Options) -> Work:
 
 @kernel
 def found_faint(work: Work) -> Mixture:
-    """The labels that were dropped, as an intensity."""
+    """Return the dropped labels as an intensity."""
     return components_between(work.faint, 0, work.num_faint[0])
 
 
@@ -108,7 +108,7 @@ def _append_mixture(
     reducing: ReductionWork,
     work: Work,
 ) -> None:
-    """Enter a label as a factor unless it is too improbable. The store must have room. reducing: work arrays."""
+    """Append a label as a factor unless it is too improbable. The store must have room. reducing: working arrays."""
     existence = 1.0 / (1.0 + math.exp(-logit))
     start, caps = next_component(store), reduction.mixture
     if logit < reduction.min_existence_logit:
@@ -120,7 +120,7 @@ def _append_mixture(
             faint.log_weights[k] = math.log(existence)
             work.num_faint[0] += 1
         return
-    # Of a label that hardly exists few components are worth their time.
+    # An improbable label keeps few components, to save time.
     log_least = min(0.0, caps.log_min_weight + math.log(_WORTH / existence))
     caps = MixtureCaps(log_least, caps.merge_distance, caps.max_components)
     end = append_reduced(wide, width, caps, reducing, store.components, start)
@@ -130,7 +130,7 @@ def _append_mixture(
 
 @borrowing
 def update_alone(row: int, rows: Rows, options: Options, reduction: Reduction, store: FactorStore, work: Work) -> None:
-    """Enter the exact update of a single track whose measurements no group shares. The store must have room."""
+    """Append the exact update of a single track whose measurements no group shares. The store must have room."""
     start, stop, marginals = options.offsets[row], options.offsets[row + 1], work.marginals
     log_total, absent, present = log_sum(options.log_weights[start:stop]), -math.inf, -math.inf
     work.sums[TOTAL] += log_total
@@ -153,7 +153,7 @@ def update_alone(row: int, rows: Rows, options: Options, reduction: Reduction, s
 
 @borrowing
 def _claim_jointly(group: Group, children: Children, kept: Ints, log_total: float, work: Work) -> None:
-    """Enter the probabilities with which the group takes measurements, after the pairs with earlier groups."""
+    """Add the probabilities with which the group takes measurements, after the pairs with earlier groups."""
     columns = group.options.columns
     for child in kept:
         weight = math.exp(children.log_weights[child] - log_total)
@@ -171,20 +171,20 @@ def _claim_jointly(group: Group, children: Children, kept: Ints, log_total: floa
 
 @kernel
 def make_ranking() -> Ranking:
-    """Empty work arrays, which the groups of a scan share."""
+    """Return empty working arrays, which the groups of a scan share."""
     return Ranking(make_search(0), make_children(0, 0))
 
 
 @kernel
 def update_group(group: Group, truncation: Truncation, ranking: Ranking, work: Work) -> tuple[Glmb, Ranking]:
-    """The posterior of a group, empty with a log total of -inf where no joint choice was found; and its ranking."""
+    """Return the posterior of a group, empty with a log total of -inf if no joint choice was found, and its ranking."""
     found, sums = Associated(group.rows, group.options, group.parents, 0.0, 0), work.sums
     ranking, cut = ranked(group.options, group.parents, truncation.search, ranking)
     children = ranking.children
     log_next = log_heaviest_left(children, truncation.search, cut)
     log_totals = log_row_totals(group.options)
     log_bound = log_weight_bound(group.options, group.parents, children, log_totals, log_next, group.log_bound)
-    # A search that ran dry has left nothing out.
+    # An exhausted search has left nothing out.
     is_covered = children.filled[0] < truncation.search.max_hypotheses and not cut
     children, kept = kept_children(found, children, truncation, is_covered)
     posterior, log_total, _ = assemble(children, kept, group.parents, group.rows, group.options)
@@ -202,7 +202,7 @@ def update_group(group: Group, truncation: Truncation, ranking: Ranking, work: W
 def _append_label(
     store: FactorStore, glmb: Glmb, choices: Choices, label: int, reduction: Reduction, work: Work
 ) -> None:
-    """Enter the marginal of one label, the mixture of its versions. The store must have room."""
+    """Append the marginal of one label, the mixture of its versions. The store must have room."""
     tracks, absent = glmb.tracks, -math.inf
     log_versions = np.empty(len(tracks.labels))
     for track in range(len(log_versions)):
@@ -229,15 +229,15 @@ def _append_label(
 
 @kernel
 def _is_crowded(choices: Choices, most: int) -> bool:
-    """Whether a list of at most `most` hypotheses is too short for the next scan."""
+    """Return True if a list of at most `most` hypotheses is too short for the next scan."""
     return bool(choices.weights[int(_KEPT_APART * most) :].sum() > _MOST_BEHIND)
 
 
 @kernel
 def _merged(glmb: Glmb, reduction: Reduction, factoring: Factoring, most: int) -> tuple[Glmb, Choices, float]:
-    """The posterior with names and versions of targets made one, its choices, and a bound on its L1 change.
+    """Return the posterior with merged labels and versions of targets, its choices, and a bound on its L1 change.
 
-    most: hypotheses that a group may have.
+    most: largest number of hypotheses of a group.
     """
     caps, choices, renaming_error, max_error = reduction.mixture, choices_of(glmb), 0.0, factoring.max_error
     if reduction.min_existence_logit > -math.inf:  # a prediction keeps all labels
@@ -255,7 +255,7 @@ def _merged(glmb: Glmb, reduction: Reduction, factoring: Factoring, most: int) -
 def append_parts(
     store: FactorStore, glmb: Glmb, factoring: Factoring, reduction: Reduction, most: int, work: Work
 ) -> FactorStore:
-    """Split the posterior of a group and enter its parts. most: hypotheses that the group may have."""
+    """Split the posterior of a group and append its parts. most: largest number of hypotheses of the group."""
     glmb, choices, merging_error = _merged(glmb, reduction, factoring, most)
     max_error = factoring.max_error
     if 0.0 < max_error < factoring.max_merging and _is_crowded(choices, most):

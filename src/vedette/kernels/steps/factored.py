@@ -1,8 +1,8 @@
-"""Joint prediction and update of a factored density: every group of linked factors as a small delta-GLMB of its own.
+"""Joint prediction and update of a factored density: every group of linked factors as a small delta-GLMB.
 
-The factors whose claims to measurements meet (`vedette.kernels.association.links`) are multiplied out and take the scan
-together, by the kernels of the delta-GLMB; those that nobody contends with are updated alone, a single track as that of
-an LMB. Then each group falls into the smallest parts that are independent within a stated L1 error
+Factors that may take the same measurements (`vedette.kernels.association.links`) are multiplied out and updated
+jointly, by the kernels of the delta-GLMB; factors without competition are updated alone, a single track as in an LMB.
+Then each group splits into the smallest parts that are independent within a given L1 error
 (`vedette.kernels.labelled.splitting`), and a part of one label becomes one track again, the mixture of its versions.
 """
 
@@ -67,19 +67,19 @@ from vedette.kernels.steps.undetected import (
 
 
 class FactoredReport(NamedTuple):
-    """What a step found and what it left out."""
+    """Sums and truncations of a step."""
 
     log_total: float  # log of the sum of the kept weights, relative to all measurements being clutter; -inf: none
     log_kept: float  # log of the least share of all weight, within groups, that is kept
     log_clutter: float  # sum of the log clutter intensities of the scan
     num_raised: int  # measurements whose clutter intensity was raised to the floor
     cut: bool  # a ranking stopped at its bound on nodes
-    full: bool  # a group has as many hypotheses as it may
+    full: bool  # a group has the largest allowed number of hypotheses
     taken_twice: float  # upper bound on the probability that factors of two groups take one measurement
     split_error: float  # summed L1 error of the splits
-    reduction_error: float  # summed L1 bound of what merging versions and reducing mixtures changed
+    reduction_error: float  # summed L1 bound of the changes by merged versions and reduced mixtures
     dropped_existence: float  # summed existence of dropped labels
-    left_out: float  # expected number of targets among first detections that are no candidates
+    left_out: float  # expected number of targets among first detections that are not candidates
     most_labels: int  # of a group
 
 
@@ -95,10 +95,11 @@ def step_factored(
     reduction: Reduction,
     factoring: Factoring,
 ) -> tuple[FactoredGlmb, Mixture, Left, FactoredReport]:
-    """One scan: weigh, link, update and split; and the intensity of who stays undetected, and the cells.
+    """Weigh, link, update and split at one scan.
 
-    undetected, arrivals: before the scan, and since then. motion: None of a scan of the prior's own time, which has no
-    births.
+    Also return the intensity of targets that stay undetected, and the cells.
+
+    undetected: before the scan. arrivals: since then. motion: None for a scan at the time of the prior, without births.
     """
     if motion is not None:
         undetected = predicted_undetected(undetected, motion, scan.dt, arrivals)

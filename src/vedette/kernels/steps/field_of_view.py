@@ -1,7 +1,7 @@
-"""Which tracks a scan says anything of, so that one sensor's scan costs what is near it, not what there is.
+"""Tracks that a scan can affect, so that the cost of a scan depends on the tracks near it, not on their total number.
 
-A track out of view, which is missed as it had to be, stays as it was: of 1 - p_D nothing is left to write in a double,
-and of p_D g(z | x) / kappa(z) nothing beside 1 whatever was measured.
+A track outside the field of view, which is certain to be missed, stays unchanged: 1 - p_D is 1 in double precision,
+and p_D g(z | x) / kappa(z) is negligible next to 1 for every measurement.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from vedette.kernels.gaussian.linalg import LOG_2PI, cholesky, log_det_from_fact
 from vedette.kernels.gaussian.reduction import MixtureCaps, reduce_mixture
 from vedette.kernels.gaussian.scratch import Scratch, make_scratch
 
-_NOTHING = 2.0**-54  # beside 1
+_NOTHING = 2.0**-54  # negligible next to 1
 
 
 @kernel
 def _least_log_clutter(scan: ScanInput, sensor: Sensor, floor: float) -> float:
-    """Where clutter is thinnest among the measurements; inf where there are none."""
+    """Return the least log clutter intensity at the measurements; inf if there are none."""
     least = math.inf
     for j in range(len(scan.measurements)):
         least = min(least, max(log_clutter_at(sensor, scan.measurements[j], scan.pose), floor))
@@ -36,7 +36,10 @@ def _least_log_clutter(scan: ScanInput, sensor: Sensor, floor: float) -> float:
 def _says_something(
     tracks: Tracks, c: int, scan: ScanInput, sensor: Sensor, least_log_clutter: float, scratch: Scratch
 ) -> bool:
-    """Whether the scan may change a component: no measurement is likelier of it than at the peak of the noise alone."""
+    """Return True if the scan may change a component.
+
+    The bound on the likelihood of a measurement is the peak of the measurement noise alone.
+    """
     mean, noise = tracks.components.means[c], scratch.measurement_noise
     chance = detection_probability(sensor, scan.pose, mean, tracks.components.covs[c], scratch.points[0])
     if chance == 0.0 or chance > _NOTHING:
@@ -52,7 +55,7 @@ def _says_something(
 
 @kernel
 def in_view(tracks: Tracks, scan: ScanInput, sensor: Sensor, truncation: Truncation) -> Bools:
-    """(num_tracks,) whether the scan may say anything of each track."""
+    """Mask of the tracks that the scan may change, shape (num_tracks,)."""
     marks = np.zeros(len(tracks.labels), np.bool_)
     scratch = make_scratch(tracks.components.means.shape[1], len(sensor.angular))
     least_log_clutter = _least_log_clutter(scan, sensor, truncation.log_clutter_floor)
@@ -66,7 +69,7 @@ def in_view(tracks: Tracks, scan: ScanInput, sensor: Sensor, truncation: Truncat
 
 @kernel
 def marked(lmb: Lmb, marks: Bools) -> Lmb:
-    """The LMB of the marked tracks."""
+    """Return the LMB of the marked tracks."""
     num, num_components = 0, 0
     for i in range(len(marks)):
         if marks[i]:
@@ -92,7 +95,7 @@ def _copy(source: Tracks, i: int, out: Tracks, num: int) -> None:
 
 @kernel
 def _copy_reduced(source: Tracks, i: int, caps: MixtureCaps, out: Tracks, num: int) -> bool:
-    """As `_copy`, reduced; whether that left all components, so that there is nothing more to reduce."""
+    """Apply `_copy` with reduction; return True if all components were kept, so that nothing remains to be reduced."""
     _copy(source, i, out, num)
     first, end = out.offsets[num], out.offsets[num + 1]
     if end - first == 1:
@@ -106,10 +109,10 @@ def _copy_reduced(source: Tracks, i: int, caps: MixtureCaps, out: Tracks, num: i
 
 @kernel
 def put_back(prior: Lmb, marks: Bools, updated: Lmb, caps: MixtureCaps, settled: Bools) -> tuple[Lmb, Bools]:
-    """The prior with its marked tracks as in `updated`, or gone where they are not in it; in label order.
+    """Return the prior with its marked tracks as in `updated`, or dropped if they are not in it; in label order.
 
-    Mixtures of the others are reduced as by an update that changes nothing, which may merge what the last one made,
-    but for the `settled` ones, of which it is known that it does not. Also returns which are settled now.
+    Mixtures of the other tracks are reduced as by an update without effect, which may merge results of the last one.
+    The `settled` tracks, whose reduction has no effect, are skipped. Also returns the tracks that are settled now.
     """
     most, dim = len(marks), prior.tracks.components.means.shape[1]
     room = make_components(len(prior.tracks.components.log_weights) + len(updated.tracks.components.log_weights), dim)

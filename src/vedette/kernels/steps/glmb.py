@@ -3,12 +3,12 @@
 A child is a prior hypothesis with one option for each of its rows: a survivor or birth site is absent, missed or
 detected. Its weight is the prior one's times those of the options,
 
-    w+ = w  prod over rows of  P(absent)                                       where it is absent,
-                               P(there) <p+, 1 - p_D>                          where it is missed,
-                               P(there) <p+, p_D g(z | .)> / kappa(z)          where it is detected as z,
+    w+ = w  prod over rows of  P(absent)                                       if it is absent,
+                               P(present) <p+, 1 - p_D>                        if it is missed,
+                               P(present) <p+, p_D g(z | .)> / kappa(z)        if it is detected as z,
 
-relative to the weight of all measurements being clutter. A planner runs the same kernels in a workspace that it keeps
-(`vedette.kernels.planning.pseudo_glmb`); what a filter adds is births, and which children it keeps.
+relative to the weight of all measurements being clutter. A planner runs the same kernels in its own workspace
+(`vedette.kernels.planning.pseudo_glmb`); a filter adds births, and the choice of the children to keep.
 """
 
 from __future__ import annotations
@@ -46,19 +46,19 @@ from vedette.kernels.steps.assembly import Naming, assemble
 
 
 class StepReport(NamedTuple):
-    """What a step found and what it left out."""
+    """Sums and truncations of a step."""
 
     log_total: float  # log of the sum of the kept weights, relative to all measurements being clutter
     log_kept: float  # log of the least share that this is of the sum of all weights
     log_clutter: float  # sum of the log clutter intensities of the scan
     num_raised: int  # measurements whose clutter intensity was raised to the floor
     cut: bool  # the ranking stopped at its bound on nodes
-    full: bool  # there are as many hypotheses as there may be
+    full: bool  # the number of hypotheses is at its limit
     sources: Ints  # (num_tracks, 2) prior track of each track, -1: born; its measurement, -1: missed
 
 
 class Associated(NamedTuple):
-    """The rows of a scan, what may happen to each, and the prior hypotheses over them."""
+    """The rows of a scan, the options of each, and the prior hypotheses over them."""
 
     rows: Rows
     options: Options
@@ -69,7 +69,7 @@ class Associated(NamedTuple):
 
 @kernel
 def parents_with_births(prior: Glmb, num_births: int) -> Parents:
-    """The prior's hypotheses, each with all birth sites: every one of them may have given birth under each."""
+    """Return the prior's hypotheses, each with all birth sites, as any of them may give birth in each hypothesis."""
     num_hyps, num_tracks = len(prior.hyp_log_weights), len(prior.tracks.labels)
     offsets = np.zeros(num_hyps + 1, np.int64)
     rows = np.empty(len(prior.hyp_tracks) + num_hyps * num_births, np.int64)
@@ -89,7 +89,7 @@ def parents_with_births(prior: Glmb, num_births: int) -> Parents:
 def _associate(
     prior: Glmb, scan: ScanInput, motion: Motion | None, sensor: Sensor, truncation: Truncation
 ) -> Associated:
-    """Weigh what may happen to each row: the tracks of the prior, then birth sites."""
+    """Weigh the options of each row: the tracks of the prior, then birth sites."""
     rows = rows_of_scan(prior.tracks, scan, motion, sensor)
     options, log_clutter, num_raised = weighed_options(rows, scan, sensor, truncation)
     parents = parents_with_births(prior, len(rows.labels) - len(prior.tracks.labels))
@@ -100,9 +100,9 @@ def _associate(
 def kept_children(
     found: Associated, children: Children, truncation: Truncation, is_covered: bool
 ) -> tuple[Children, Ints]:
-    """The children, each hypothesis once, with the best of every association; and those to keep, heaviest first.
+    """Return the children, each hypothesis once, with the best of every association; and those to keep, heaviest first.
 
-    is_covered: nothing that `max_track_gap` would keep has been left out.
+    is_covered: True if nothing that `max_track_gap` would keep has been left out.
     """
     rows, options, parents, caps = found.rows, found.options, found.parents, truncation.search
     covering = truncation.max_track_gap > 0.0 and not is_covered
@@ -110,7 +110,7 @@ def kept_children(
     if covering:
         associations = associations_of_options(rows.labels, options)
         children = add_uncovered(options, associations, parents, children, truncation.max_track_gap)
-    # Two parents that differ in tracks which are now absent have the same child: it is one hypothesis.
+    # Two parents that differ only in tracks that are now absent have the same child: it is one hypothesis.
     order = heaviest_first(children, merge_equal(children, options.columns))
     needed = filled_ints(children.filled[0], 0)
     if covering:
@@ -122,11 +122,14 @@ def kept_children(
 
 @kernel
 def _sources(naming: Naming, num_tracks: int, num_prior: int, columns: Ints) -> Ints:
-    """The prior track, of so many, and the measurement of each track, as in `StepReport`. columns: of the options."""
+    """Return the prior track, among `num_prior`, and the measurement of each track, as in `StepReport`.
+
+    columns: of the options.
+    """
     sources = np.empty((num_tracks, 2), np.int64)
     for i in range(num_tracks):
         row = naming.rows[i]
-        sources[i, 0] = row if row < num_prior else -1  # birth sites stand after the tracks
+        sources[i, 0] = row if row < num_prior else -1  # birth sites follow the tracks
         sources[i, 1] = columns[naming.options[i]]  # MISSED is -1
     return sources
 
@@ -143,7 +146,7 @@ def _conclude(
 ) -> tuple[Glmb, StepReport]:
     """Truncate and assemble.
 
-    num_prior: tracks of the prior. log_next: as of `log_weight_bound`. is_covered: as of `kept_children`.
+    num_prior: number of tracks of the prior. log_next: see `log_weight_bound`. is_covered: see `kept_children`.
     """
     log_totals = log_row_totals(found.options)
     log_bound = log_total_bound(log_totals, found.parents)
@@ -161,13 +164,13 @@ def _conclude(
 def step_ranked(
     prior: Glmb, scan: ScanInput, motion: Motion | None, sensor: Sensor, truncation: Truncation
 ) -> tuple[Glmb, StepReport]:
-    """One scan with the exactly ranked hypotheses.
+    """Predict and update with one scan, with exactly ranked hypotheses.
 
-    motion: None of a scan of the prior's own time, which has no births.
+    motion: None for a scan at the time of the prior, which has no births.
     """
     found = _associate(prior, scan, motion, sensor, truncation)
     children, cut = rank_children(found.options, found.parents, truncation.search)
-    # A search that ran dry has left nothing out.
+    # An exhausted search has left nothing out.
     is_covered = children.filled[0] < truncation.search.max_hypotheses and not cut
     log_next = log_heaviest_left(children, truncation.search, cut)
     return _conclude(len(prior.tracks.labels), found, children, truncation, cut, is_covered, log_next)
@@ -183,7 +186,7 @@ def step_gibbs(
     num_samples: int,
     rng: np.random.Generator,
 ) -> tuple[Glmb, StepReport]:
-    """One scan with hypotheses found by Gibbs sampling."""
+    """Predict and update with one scan, with hypotheses found by Gibbs sampling."""
     found = _associate(prior, scan, motion, sensor, truncation)
     children = sample_children(found.options, found.parents, num_samples, rng)
     return _conclude(len(prior.tracks.labels), found, children, truncation, False, False, math.inf)

@@ -1,11 +1,11 @@
 """Joint prediction and update of an LMB density (Reuter, Vo, Vo, Dietmayer 2014), with exact association marginals.
 
-The update of an LMB is a GLMB; it is taken back to the LMB of the same existence probabilities and track moments. Both
-are sums over the options of a row weighed by their marginal probabilities, so that the GLMB itself is never listed:
+The update of an LMB is a GLMB; it is projected to the LMB of the same existence probabilities and track moments. Both
+are sums over the options of a row weighted by their marginal probabilities, so that the GLMB itself is never listed:
 
     r+ = sum over the options but absence of P(option),   p+ = sum of P(option) p(x | option) / r+.
 
-A planner runs the same kernels in a workspace that it keeps (`vedette.kernels.planning.pseudo_lmb`).
+A planner runs the same kernels in its own workspace (`vedette.kernels.planning.pseudo_lmb`).
 """
 
 from __future__ import annotations
@@ -31,29 +31,29 @@ from vedette.kernels.steps.matching import make_mixture, match_rows
 
 
 class Reduction(NamedTuple):
-    """How track mixtures and the label set are kept small."""
+    """Limits on track mixtures and on the label set."""
 
     mixture: MixtureCaps  # of each track
     min_existence_logit: float  # labels less probable than this are dropped
-    max_labels: int  # how many of the others stay
+    max_labels: int  # largest number of the others
 
 
 class LmbReport(NamedTuple):
-    """What a step found and what it left out."""
+    """Sums and truncations of a step."""
 
     sums: MarginalSums  # its total is relative to all measurements being clutter
     log_clutter: float  # sum of the log clutter intensities of the scan
     num_raised: int  # measurements whose clutter intensity was raised to the floor
     dropped_existence: float  # summed existence of dropped labels
-    cut: bool  # whether a track had more options than a cap has left
+    cut: bool  # whether a track had more options than a cap allows
 
 
 @inlined
 def _log_presence(logit: float) -> tuple[float, float]:
-    """log existence and log (1 - existence)."""
+    """Return log existence and log (1 - existence)."""
     if logit >= 0.0:
         log_existence = -math.log1p(math.exp(-logit))
-        # Whichever of the two is near 0 is taken by log1p, and the other from the difference.
+        # The one of the two near 0 is computed by log1p, and the other one from the difference.
         return log_existence, log_existence - logit
     log_absence = -math.log1p(math.exp(logit))
     return log_absence + logit, log_absence
@@ -61,10 +61,10 @@ def _log_presence(logit: float) -> tuple[float, float]:
 
 @borrowing
 def weigh_by_existence(existence_logit: Floats, rows: Rows) -> None:
-    """Make the first rows, predicted as if certain, uncertain by the prior existence of their tracks."""
+    """Apply the prior existence of the tracks to the first rows, which were predicted as certain."""
     for i in range(len(existence_logit)):
         log_existence, log_absence = _log_presence(existence_logit[i])
-        # Absent: never there, or there and died.
+        # Absent: never present, or died.
         rows.log_absent[i] = log_add(log_absence, log_existence + rows.log_absent[i])
         for c in range(rows.offsets[i], rows.offsets[i + 1]):
             rows.components.log_weights[c] += log_existence
@@ -72,12 +72,12 @@ def weigh_by_existence(existence_logit: Floats, rows: Rows) -> None:
 
 @borrowing
 def fill_existence(options: Options, marginals: Floats, logits: Floats) -> None:
-    """Posterior existence logit of every row."""
+    """Write the posterior existence logit of every row."""
     for row in range(len(options.offsets) - 1):
         present, absent = -math.inf, -math.inf
         for option in range(options.offsets[row], options.offsets[row + 1]):
             if options.columns[option] == ABSENT:
-                # The logit from both sides, never 1 - r: existence near 1 keeps its digits.
+                # The logit uses both sides, never 1 - r: no loss of precision for existence near 1.
                 absent = marginals[option]
             else:
                 present = log_add(present, marginals[option])
@@ -86,7 +86,7 @@ def fill_existence(options: Options, marginals: Floats, logits: Floats) -> None:
 
 @kernel
 def labels_to_keep(logits: Floats, reduction: Reduction) -> tuple[Ints, float]:
-    """Rows to keep, in label order, and the expected number of targets lost with the others."""
+    """Return the rows to keep, in label order, and the expected number of targets lost with the others."""
     marks = np.zeros(len(logits), np.int64)
     kept, dropped = 0, 0.0
     for row in descending_order(logits):
@@ -106,7 +106,7 @@ def labels_to_keep(logits: Floats, reduction: Reduction) -> tuple[Ints, float]:
 
 @kernel
 def _most_components(kept: Ints, rows: Rows, options: Options) -> tuple[int, int]:
-    """Components of the widest row and of all kept rows together, before reduction."""
+    """Return the components of the widest row and of all kept rows together, before reduction."""
     widest, total = 0, 0
     for row in kept:
         width = (rows.offsets[row + 1] - rows.offsets[row]) * max(1, options.offsets[row + 1] - options.offsets[row])
@@ -117,7 +117,7 @@ def _most_components(kept: Ints, rows: Rows, options: Options) -> tuple[int, int
 
 @kernel
 def _matched_tracks(kept: Ints, rows: Rows, options: Options, marginals: Floats) -> Tracks:
-    """One Gaussian for each kept row."""
+    """Return one Gaussian for each kept row."""
     num, dim = len(kept), rows.components.means.shape[1]
     widest, _ = _most_components(kept, rows, options)
     labels, offsets = np.empty((num, 2), np.int64), np.zeros(num + 1, np.int64)
@@ -132,7 +132,10 @@ def _matched_tracks(kept: Ints, rows: Rows, options: Options, marginals: Floats)
 
 @borrowing
 def write_mixture(row: int, rows: Rows, options: Options, marginals: Floats, wide: Mixture) -> int:
-    """Write a row's components over all its options but absence, weighed by their log probabilities; their number."""
+    """Write a row's components over all its options except absence, weighted by their probabilities.
+
+    Return their number.
+    """
     width = 0
     for option in range(options.offsets[row], options.offsets[row + 1]):
         if options.columns[option] == ABSENT or marginals[option] == -math.inf:
@@ -142,7 +145,7 @@ def write_mixture(row: int, rows: Rows, options: Options, marginals: Floats, wid
             wide.log_weights[c] += marginals[option] - options.log_weights[option]
         width = end
     if width == 0:
-        # Existence 0: any density will do, as long as it is one.
+        # Existence 0: any valid density can be used.
         for c in range(rows.offsets[row], rows.offsets[row + 1]):
             copy_component(rows.components, c, wide, width)
             wide.log_weights[width] = 0.0
@@ -152,7 +155,7 @@ def write_mixture(row: int, rows: Rows, options: Options, marginals: Floats, wid
 
 @kernel
 def _reduced_tracks(kept: Ints, rows: Rows, options: Options, marginals: Floats, caps: MixtureCaps) -> Tracks:
-    """Each kept row's mixture over its options, reduced."""
+    """Return each kept row's mixture over its options, reduced."""
     dim = rows.components.means.shape[1]
     widest, total = _most_components(kept, rows, options)
     labels, offsets = np.empty((len(kept), 2), np.int64), np.zeros(len(kept) + 1, np.int64)
@@ -169,9 +172,9 @@ def _reduced_tracks(kept: Ints, rows: Rows, options: Options, marginals: Floats,
 
 @borrowing
 def append_reduced(wide: Mixture, width: int, caps: MixtureCaps, work: ReductionWork, out: Mixture, filled: int) -> int:
-    """Append the first `width` components, reduced and their weights normalised to one; returns the new end."""
+    """Append the first `width` components, reduced and with weights normalised to one; return the new end."""
     if width == 1 and wide.log_weights[0] > -math.inf:
-        # Of one there is nothing to reduce: most births, which nothing was measured of.
+        # A single component needs no reduction: most births, which have no measurements.
         copy_component(wide, 0, out, filled)
         out.log_weights[filled] = 0.0
         return filled + 1
@@ -190,9 +193,9 @@ def step_lmb(
     reduction: Reduction,
     association: Association | None,
 ) -> tuple[Lmb, LmbReport]:
-    """One scan.
+    """Predict and update with one scan.
 
-    motion: None of a scan of the prior's own time, which has no births. association: None for the sums over clusters.
+    motion: None for a scan at the time of the prior, which has no births. association: None for the sums over clusters.
     """
     rows = rows_of_scan(prior.tracks, scan, motion, sensor)
     weigh_by_existence(prior.existence_logit, rows)

@@ -1,4 +1,4 @@
-"""The one Gaussian of the moments of a row's mixture over what may have happened to it."""
+"""Moment matching: one Gaussian of the moments of a row's mixture over its options."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.innovation import update_mean
 
-# Where the covariance of a component of the mixture is: of the rows, of their innovation, of the options' entries.
+# Source of the covariance of a mixture component: the rows, their innovation, or the entries of the options.
 PREDICTED = 0
 UPDATED = 1
 RELINEARISED = 2
 
 
 class MixtureRoom(NamedTuple):
-    """Room for the components of one row's mixture, an entry for each option and component."""
+    """Working arrays for the components of one row's mixture, an entry for each option and component."""
 
     weights: Floats  # (num_entries,) linear, relative to the likeliest option
     means: Floats  # (num_entries, state_dim), then their deviations from the mean of the mixture
@@ -29,13 +29,13 @@ class MixtureRoom(NamedTuple):
 
 @kernel
 def make_mixture(num_entries: int, state_dim: int) -> MixtureRoom:
-    """Room for so many components."""
+    """Return arrays for this number of components."""
     return MixtureRoom(np.empty(num_entries), np.empty((num_entries, state_dim)), np.empty(num_entries, np.int64))
 
 
 @inlined
 def _gather(row: int, rows: Rows, options: Options, marginals: Floats, out: MixtureRoom) -> int:
-    """Write weights and updated means of the components that can be there; returns their number."""
+    """Write weights and updated means of the components that may be present; return their number."""
     first, last, count, peak = rows.offsets[row], rows.offsets[row + 1], 0, -math.inf
     for option in range(options.offsets[row], options.offsets[row + 1]):
         if options.columns[option] != ABSENT:
@@ -50,7 +50,7 @@ def _gather(row: int, rows: Rows, options: Options, marginals: Floats, out: Mixt
             log_weight = options.component_log_weights[at] - options.log_weights[option]
             if log_weight == -math.inf:
                 continue
-            # The option's marginal, shared out over its components; a single Gaussian needs no exponential.
+            # The option's marginal, divided among its components; a single Gaussian needs no exponential.
             out.weights[count] = scale if log_weight == 0.0 else scale * math.exp(log_weight)
             if rows.innovation.bends[c] if detected else rows.innovation.at_edge[c]:
                 out.sources[count] = 3 * at + RELINEARISED
@@ -69,7 +69,7 @@ def _gather(row: int, rows: Rows, options: Options, marginals: Floats, out: Mixt
 
 @inlined
 def _gather_predicted(row: int, rows: Rows, out: MixtureRoom) -> int:
-    """Write the components as they were predicted, all of one weight; returns their number."""
+    """Write the components as predicted, all with the same weight; return their number."""
     first, last = rows.offsets[row], rows.offsets[row + 1]
     for c in range(first, last):
         out.weights[c - first], out.sources[c - first] = 1.0, 3 * c + PREDICTED
@@ -82,7 +82,7 @@ def _gather_predicted(row: int, rows: Rows, out: MixtureRoom) -> int:
 def _moments(
     count: int, rows: Rows, options: Options, mixture: MixtureRoom, out_mean: Floats, out_cov: Floats, n: int
 ) -> None:
-    """Mean and covariance of the first `count` components; their means are left as deviations from the mean."""
+    """Write the mean and covariance of the first `count` components; their means become deviations from the mean."""
     weights, means, sources = mixture.weights, mixture.means, mixture.sources
     total = 0.0
     for k in range(count):
@@ -96,7 +96,7 @@ def _moments(
             means[k, i] -= out_mean[i]
         for j in range(i + 1):
             out_cov[i, j] = 0.0
-    # All detections of a component that does not bend have one posterior covariance: only means were gathered.
+    # All detections of a component that does not bend share one posterior covariance: only means were gathered.
     for k in range(count):
         c, share = sources[k] // 3, weights[k] / total
         if sources[k] % 3 == RELINEARISED:
@@ -120,16 +120,16 @@ def _moments(
 def match_rows(
     chosen: Ints, rows: Rows, options: Options, marginals: Floats, mixture: MixtureRoom, means: Floats, covs: Floats
 ) -> None:
-    """Mean and covariance of the mixture of each chosen row, where it is there, over its options and components.
+    """Write the mean and covariance of the mixture of each chosen row, given presence, over its options and components.
 
-    marginals: log probability of each option. mixture: to work in. means, covs: (len(chosen), ...) the result. A row
-    that cannot be there has its predicted moments.
+    marginals: log probability of each option. mixture: working arrays. means, covs: (len(chosen), ...) the result. A
+    row that cannot be present keeps its predicted moments.
     """
     for k in range(len(chosen)):
         count = _gather(chosen[k], rows, options, marginals, mixture)
         if count == 0:
             count = _gather_predicted(chosen[k], rows, mixture)
-        # A constant size is unrolled by the compiler.
+        # The compiler unrolls loops of constant size.
         if means.shape[1] == 4:
             _moments(count, rows, options, mixture, means[k], covs[k], 4)
         else:

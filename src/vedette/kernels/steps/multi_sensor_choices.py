@@ -1,4 +1,4 @@
-"""Tracks that contend for measurements of several sensors: clusters of them, and what each may take as sets of bits."""
+"""Tracks that compete for measurements of several sensors: their clusters, and their choices as bit sets."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ _BITS = 31  # bits of a mask in one word, so that words hash without overflow
 
 
 class Choices(NamedTuple):
-    """What each track may choose. Choices of track `t` are `offsets[t]:offsets[t + 1]`, and being absent.
+    """Choices of each track: `offsets[t]:offsets[t + 1]` for track `t`, and absence.
 
-    columns: (num_choices, num_sensors) measurements taken, counted through all sensors; negative: none.
+    columns: (num_choices, num_sensors) measurements taken, numbered over all sensors; negative: none.
     log_weights: (num_choices,). log_absent: (num_tracks,).
     """
 
@@ -29,11 +29,11 @@ class Choices(NamedTuple):
 
 
 class Classes(NamedTuple):
-    """Choices of the tracks of a cluster, those that take the same contested measurements together.
+    """Choices of the tracks of a cluster, grouped by the contested measurements that they take.
 
     offsets: (num_members + 1,) classes of each member, of which the first takes nothing.
     masks: (num_classes, num_words).
-    log_weights: (num_classes,). alive: (num_members, num_words) measurements for which a later member may ask.
+    log_weights: (num_classes,). alive: (num_members, num_words) measurements that a later member may take.
     """
 
     offsets: Ints
@@ -51,8 +51,10 @@ def _root(leaders: Ints, track: int) -> int:
 
 @kernel
 def find_clusters(choices: Choices, num_columns: int) -> tuple[Ints, Ints]:
-    """leaders: (num_tracks,) a track of the same cluster, not after the track itself; the first leads itself.
-    contested: (num_columns,) 1 where more than one track may take the measurement.
+    """Return the leader of each track's cluster, and the contested measurements.
+
+    leaders: (num_tracks,) a track of the same cluster, not after the track itself; the first one is its own leader.
+    contested: (num_columns,) 1 if more than one track may take the measurement.
     """
     num_tracks = len(choices.log_absent)
     leaders, owners, contested = (
@@ -87,7 +89,7 @@ def members_of(leaders: Ints, leader: int) -> Ints:
 
 @kernel
 def _number_contested(choices: Choices, members: Ints, contested: Ints) -> tuple[Ints, int]:
-    """(num_columns,) number of each contested measurement of the cluster, else -1, and how many there are."""
+    """Number of each contested measurement of the cluster, else -1, shape (num_columns,), and how many there are."""
     bit_of, num_bits = filled_ints(len(contested), -1), 0
     for track in members:
         for choice in range(choices.offsets[track], choices.offsets[track + 1]):
@@ -101,7 +103,10 @@ def _number_contested(choices: Choices, members: Ints, contested: Ints) -> tuple
 
 @kernel
 def _order_members(choices: Choices, members: Ints, bit_of: Ints, num_bits: int) -> None:
-    """Put next, again and again, the member that leaves the fewest measurements open: asked for before and after it."""
+    """Sort members greedily: next is the one that leaves the fewest measurements open.
+
+    An open measurement may be taken both by earlier and by later members.
+    """
     num = len(members)
     wants, asked, is_open = (
         np.zeros((num, num_bits), np.int64),
@@ -157,7 +162,10 @@ def same_mask(first: Ints, second: Ints) -> bool:
 
 @kernel
 def make_classes(choices: Choices, members: Ints, contested: Ints, class_of: Ints) -> Classes:
-    """Classes of the members, which are put in order. class_of: (num_choices,) to be written for their choices."""
+    """Return the classes of the members, which are sorted.
+
+    class_of: (num_choices,) receives the class of their choices.
+    """
     bit_of, num_bits = _number_contested(choices, members, contested)
     _order_members(choices, members, bit_of, num_bits)
     num_words, most = max(1, (num_bits + _BITS - 1) // _BITS), len(members)

@@ -1,8 +1,8 @@
-"""What may have happened to each track at several sensors at once: a miss or a gated measurement at every one of them.
+"""Combinations of the options of each track at several sensors: a miss or a gated measurement at every one of them.
 
-Combinations of a track grow sensor by sensor: each gated measurement, and the miss, makes one of its own, in which the
-components are updated by it. With linear Gaussian models the order of the sensors does not matter: weights and moments
-are those of all measurements together.
+Combinations of a track grow sensor by sensor: each gated measurement, and the miss, gives a new one, in which it
+updates the components. With linear Gaussian models the order of the sensors does not matter: weights and moments are
+those of all measurements together.
 """
 
 from __future__ import annotations
@@ -38,27 +38,27 @@ from vedette.kernels.steps.lmb import weigh_by_existence
 class Combinations(NamedTuple):
     """Combinations of every track over the sensors so far.
 
-    The log weights of a row's components are those of the track's presence, of its mixture, and of the likelihoods of
-    what it took relative to clutter.
+    The log weights of a row's components combine the track's presence, its mixture, and the likelihoods of its
+    measurements relative to clutter.
     """
 
-    rows: Rows  # one a combination: the label of its track, and its updated components; none is absent
-    tracks: Ints  # (num,) number of the track that each is of, increasing
-    columns: Ints  # (num, num_sensors) measurement of each sensor, counted through all sensors, or MISSED
-    log_absent: Floats  # (num_tracks,) log probability that a track is not there
+    rows: Rows  # one per combination: the label of its track, and its updated components; none is absent
+    tracks: Ints  # (num,) number of the track of each, increasing
+    columns: Ints  # (num, num_sensors) measurement of each sensor, numbered over all sensors, or MISSED
+    log_absent: Floats  # (num_tracks,) log probability that a track is absent
 
 
 class SensorReport(NamedTuple):
-    """What a sensor's scan added and what was left out of it."""
+    """Sums and truncations of one sensor's scan."""
 
     log_clutter: float  # sum of the log clutter intensities of the scan
     num_raised: int  # measurements whose clutter intensity was raised to the floor
-    log_kept: float  # log of the share of the combinations' weight that the cap has left, as weighed at this sensor
+    log_kept: float  # log of the share of the combinations' weight, at this sensor, that the cap retains
 
 
 @kernel
 def _one_each(prior: Lmb, rows: Rows, num_sensors: int) -> Combinations:
-    """A combination for each of the rows, of which the first are the prior's tracks, as if they were certain."""
+    """Return a combination for each of the rows, of which the first are the prior's tracks, predicted as certain."""
     weigh_by_existence(prior.existence_logit, rows)
     num = len(rows.log_absent)
     log_absent, tracks, columns = (
@@ -73,7 +73,7 @@ def _one_each(prior: Lmb, rows: Rows, num_sensors: int) -> Combinations:
 
 @kernel
 def predict_combinations(prior: Lmb, scan: ScanInput, num_sensors: int, motion: Motion) -> Combinations:
-    """One combination a predicted track or birth site, before the first sensor; measurements are not looked at."""
+    """Return one combination per predicted track or birth site, before the first sensor, without using measurements."""
     birth = scan.birth
     num_tracks, num_births = len(prior.tracks.labels), len(birth.tracks.labels)
     num, dim = num_tracks + num_births, prior.tracks.components.means.shape[1]
@@ -85,13 +85,16 @@ def predict_combinations(prior: Lmb, scan: ScanInput, num_sensors: int, motion: 
 
 @kernel
 def standing_combinations(prior: Lmb, num_sensors: int) -> Combinations:
-    """One combination a track, as it is at the time of the scans, without births, deaths or motion."""
+    """Return one combination per track, at the time of the scans, without births, deaths or motion."""
     return _one_each(prior, standing_rows(prior.tracks, 0), num_sensors)
 
 
 @kernel
 def _options_to_keep(combinations: Combinations, options: Options, most: int) -> tuple[Ints, float]:
-    """(num_options,) 1 for the `most` heaviest options of each track, and the log of the share of weight they are."""
+    """Mark the `most` heaviest options of each track, (num_options,).
+
+    Also return the log of their share of the weight.
+    """
     marks, log_kept = filled_ints(options.offsets[-1], 1), 0.0
     first, num = 0, len(combinations.tracks)
     while first < num:
@@ -113,7 +116,7 @@ def _options_to_keep(combinations: Combinations, options: Options, most: int) ->
 
 @kernel
 def _taken(combinations: Combinations, rows: Rows, options: Options, kept: Ints, at: int, shift: int) -> Combinations:
-    """The combinations that follow from the kept options at sensor `at`, its measurements counted from `shift`."""
+    """Return the combinations that follow from the kept options at sensor `at`, measurements counted from `shift`."""
     num, num_components = 0, 0
     for i in range(len(combinations.tracks)):
         for option in range(options.offsets[i], options.offsets[i + 1]):
@@ -150,7 +153,7 @@ def _taken(combinations: Combinations, rows: Rows, options: Options, kept: Ints,
 def extend_combinations(
     combinations: Combinations, at: int, shift: int, scan: ScanInput, sensor: Sensor, truncation: Truncation
 ) -> tuple[Combinations, SensorReport]:
-    """The combinations after the scan of sensor `at`, whose measurements are counted from `shift` on."""
+    """Return the combinations after the scan of sensor `at`, whose measurements are counted from `shift` on."""
     given, meas_dim = combinations.rows, len(sensor.angular)
     rows = Rows(
         given.labels,

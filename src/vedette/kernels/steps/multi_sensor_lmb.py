@@ -1,4 +1,4 @@
-"""From the combinations of all tracks at all sensors to the LMB of the exact posterior's existences and densities."""
+"""LMB of the exact posterior's existences and densities, from the combinations of all tracks at all sensors."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from vedette.kernels.steps.multi_sensor_choices import Choices
 from vedette.kernels.steps.multi_sensor_combinations import Combinations, extend_combinations
 from vedette.kernels.steps.multi_sensor_marginals import StateCaps, choice_marginals
 
-_LEAST_LOGIT = -1e300  # of an existence that is not 0
+_LEAST_LOGIT = -1e300  # of a positive existence
 
 
 @kernel
 def _likely_choices(combinations: Combinations, log_least_odds: float) -> tuple[Choices, Ints, float]:
-    """The choices of every track, without those that take measurements and are surely less probable than that.
+    """Return the choices of every track, without measured ones that are surely less probable than a bound.
 
-    A joint choice that holds a combination of weight w exists for every one in which the track takes no measurement, of
-    weight v, instead; so its probability is at most w / (v + w). Also returns which combination each choice is, and the
-    log of the share of weight that is left at least.
+    For each joint choice with a combination of weight w, there is one with a combination of weight v in which the track
+    takes no measurement; so the probability of the former is at most w / (v + w). Also returns the combination of each
+    choice, and the log of a lower bound on the retained share of weight.
     """
     rows, num_tracks, num = combinations.rows, len(combinations.log_absent), len(combinations.tracks)
     log_weights, log_free, log_kept = np.empty(num), combinations.log_absent.copy(), 0.0
@@ -56,7 +56,7 @@ def _likely_choices(combinations: Combinations, log_least_odds: float) -> tuple[
 
 @kernel
 def _logits(choices: Choices, marginals: Floats, absent: Floats) -> Floats:
-    """Log odds of each track's existence; -inf where it cannot be there."""
+    """Return the log odds of each track's existence; -inf if it cannot exist."""
     logits = np.empty(len(absent))
     for track in range(len(absent)):
         present = -math.inf
@@ -68,7 +68,7 @@ def _logits(choices: Choices, marginals: Floats, absent: Floats) -> Floats:
 
 @kernel
 def _widths(chosen: Ints, rows: Rows, choices: Choices, sources: Ints) -> tuple[int, int]:
-    """Components of the chosen track that has most, and of all chosen tracks."""
+    """Return the largest number of components of a chosen track, and the number of all chosen tracks together."""
     widest, total = 0, 0
     for track in chosen:
         width = 0
@@ -82,7 +82,7 @@ def _widths(chosen: Ints, rows: Rows, choices: Choices, sources: Ints) -> tuple[
 def _reduced_tracks(
     chosen: Ints, rows: Rows, choices: Choices, sources: Ints, marginals: Floats, caps: MixtureCaps
 ) -> Tracks:
-    """Each chosen track's mixture over its combinations, reduced."""
+    """Return each chosen track's mixture over its combinations, reduced."""
     components = rows.components
     dim = components.means.shape[1]
     widest, total = _widths(chosen, rows, choices, sources)
@@ -109,9 +109,9 @@ def _reduced_tracks(
 def lmb_of_combinations(
     combinations: Combinations, num_columns: int, truncation: Truncation, reduction: Reduction
 ) -> tuple[Lmb, LmbReport]:
-    """Associate, marginalise and reduce once the combinations are there; clutter is left to those who made them.
+    """Associate, marginalise and reduce the combinations; the caller accounts for clutter.
 
-    num_columns: measurements of all sensors. A track that cannot be there has no density, and is always dropped.
+    num_columns: number of measurements of all sensors. A track that cannot exist has no density, and is always dropped.
     """
     reduction = Reduction(reduction.mixture, max(reduction.min_existence_logit, _LEAST_LOGIT), reduction.max_labels)
     choices, sources, log_kept = _likely_choices(combinations, reduction.min_existence_logit)
@@ -133,7 +133,7 @@ def lmb_of_combinations(
 def update_lmb(
     combinations: Combinations, scan: ScanInput, sensor: Sensor, truncation: Truncation, reduction: Reduction
 ) -> tuple[Lmb, LmbReport]:
-    """The LMB after one sensor's scan of the time that `combinations`, before it, are of."""
+    """Return the LMB after one sensor's scan; `combinations` are those before the scan, at its time."""
     taken, seen = extend_combinations(combinations, 0, 0, scan, sensor, truncation)
     posterior, report = lmb_of_combinations(taken, len(scan.measurements), truncation, reduction)
     sums = MarginalSums(report.sums.log_total, report.sums.num_ranked, report.sums.log_kept + seen.log_kept)

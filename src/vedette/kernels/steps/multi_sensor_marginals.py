@@ -1,9 +1,9 @@
-"""Marginal probability of every combination of every track, where tracks contend for the measurements of all sensors.
+"""Marginal probability of every combination of every track, if tracks compete for the measurements of all sensors.
 
 Within a cluster of tracks that share a measurement of any sensor, directly or not, the sum over all joint choices runs
-forward and backward over the tracks; its state is the set of contested measurements that earlier tracks have taken and
-later ones may still ask for. Only sets that occur are held, and the tracks come in an order that keeps few measurements
-open at a time. All is in logs, so that nothing vanishes.
+forward and backward over the tracks. Its state is the set of contested measurements that earlier tracks have taken and
+later ones may still take. Only sets that occur are stored, and the tracks are ordered to keep few measurements open at
+a time. Everything is in logs, so that nothing underflows.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from vedette.kernels.steps.multi_sensor_choices import (
     same_mask,
 )
 
-_NUM_PARTS = 32  # kept states that are tried in the place of one that is not
+_NUM_PARTS = 32  # number of kept states that are tried as replacement of a dropped one
 
 
 class StateCaps(NamedTuple):
-    """How many sets of taken measurements are followed at a time, and to which log weight under the heaviest."""
+    """Largest number of sets of taken measurements that are followed, and their log weight gap below the heaviest."""
 
     max_states: int
     max_log_gap: float
@@ -40,8 +40,8 @@ class StateCaps(NamedTuple):
 class States(NamedTuple):
     """Sets of contested measurements that have been taken.
 
-    masks: (num_states, num_words). log_weights: (num_states,) of all that led there. log_lent: (num_states, 2) of that
-    which led to sets that are not followed but taken for this one: in the sum, and in the bound on what is amiss in it.
+    masks: (num_states, num_words). log_weights: (num_states,) total weight of the paths to each. log_lent: (num_states,
+    2) weight of the dropped sets that a state replaces: in the sum, and in the bound on the error of the sum.
     """
 
     masks: Ints
@@ -51,7 +51,7 @@ class States(NamedTuple):
 
 @inlined
 def _slot(table: Ints, masks: Ints, mask: Ints) -> int:
-    """Where in the hash table `mask` stands, or the free place for it."""
+    """Return the slot of `mask` in the hash table, or the free slot for it."""
     key = 0
     for word in range(len(mask)):
         key = hashed(key, mask[word])
@@ -63,8 +63,9 @@ def _slot(table: Ints, masks: Ints, mask: Ints) -> int:
 
 @kernel
 def _advance(classes: Classes, member: int, states: States) -> tuple[States, Ints]:
-    """The states after a member has chosen, and which of them follows from each state and class, -1 for none, in two
-    columns as `States.log_lent`.
+    """Return the states after a member's choice, and the state that follows from each state and class, -1 for none.
+
+    The latter has two columns as `States.log_lent`.
     """
     first, num_classes = classes.offsets[member], classes.offsets[member + 1] - classes.offsets[member]
     most, num_words = len(states.masks) * num_classes, states.masks.shape[1]
@@ -94,7 +95,7 @@ def _advance(classes: Classes, member: int, states: States) -> tuple[States, Int
 
 @inlined
 def _part_of(masks: Ints, num: int, mask: Ints) -> int:
-    """The first of `num` sets that is part of `mask`; -1: none."""
+    """Return the first of `num` sets that is a subset of `mask`; -1: none."""
     for place in range(num):
         is_part = True
         for word in range(len(mask)):
@@ -106,11 +107,11 @@ def _part_of(masks: Ints, num: int, mask: Ints) -> int:
 
 @kernel
 def _keep_heaviest(states: States, targets: Ints, caps: StateCaps) -> States:
-    """The heaviest states, to which `targets` are led.
+    """Return the heaviest states, with `targets` redirected to them.
 
-    Another is taken for the heaviest of the first few that is part of it. Where there is none, it is taken for the
-    heaviest of all in the sum, so that no choice is ruled out for want of a state; and for the empty set in the bound,
-    since the less is taken, the more choices are left to the later members.
+    A dropped state is replaced by the heaviest of the first few that is a subset of it. If there is none, the sum uses
+    the heaviest of all, so that no choice is ruled out for lack of a state, and the bound uses the empty set, since
+    fewer taken measurements leave more choices to the later members.
     """
     order, num_words = descending_order(states.log_weights), states.masks.shape[1]
     heaviest, most = states.log_weights[order[0]], 0
@@ -143,7 +144,7 @@ def _keep_heaviest(states: States, targets: Ints, caps: StateCaps) -> States:
 
 @kernel
 def _backward(classes: Classes, starts: Ints, forward: States, targets: Ints, out: Floats) -> float:
-    """Log of the sum of all joint choices that hold each class; returns the log of the most that is amiss in them."""
+    """Write the log of the sum of all joint choices that hold each class; return the log of a bound on their error."""
     amiss, amiss_at_most, last = -math.inf, -math.inf, len(targets)
     after = np.zeros((1, 2))
     for member in range(len(starts) - 2, -1, -1):
@@ -170,7 +171,7 @@ def _backward(classes: Classes, starts: Ints, forward: States, targets: Ints, ou
 
 @kernel
 def _append(forward: States, filled: int, states: States) -> States:
-    """`forward` with the states of one more member from `filled` on; their masks are not needed any more."""
+    """Return `forward` with the states of one more member from `filled` on; their masks are no longer needed."""
     num = len(states.log_weights)
     log_weights, log_lent = forward.log_weights, forward.log_lent
     if filled + num > len(log_weights):
@@ -183,7 +184,10 @@ def _append(forward: States, filled: int, states: States) -> States:
 
 @kernel
 def _sum_cluster(classes: Classes, caps: StateCaps, out: Floats) -> tuple[float, float]:
-    """Log of the sum of all joint choices that hold each class; returns the log of all, and the most that is amiss."""
+    """Write the log of the sum of all joint choices that hold each class.
+
+    Return the log of the total and of the error.
+    """
     num_members = len(classes.offsets) - 1
     starts, num_targets = np.zeros(num_members + 1, np.int64), 0
     states = States(np.zeros((1, classes.masks.shape[1]), np.int64), np.zeros(1), np.full((1, 2), -math.inf))
@@ -221,11 +225,11 @@ def _single_track(choices: Choices, track: int, out: Floats, out_absent: Floats)
 def choice_marginals(
     choices: Choices, num_columns: int, caps: StateCaps, out: Floats, out_absent: Floats
 ) -> tuple[float, int, float]:
-    """Log marginal probability of each choice in `out`, and of each track's absence in `out_absent`.
+    """Write the log marginal probability of each choice to `out`, and of each track's absence to `out_absent`.
 
     Returns the log total weight of all joint choices (-inf: none is possible), the number of clusters in which not all
-    sets of taken measurements were followed, and the log of the least share of all weight that is where it should be (0
-    without such clusters): 1 less that share bounds the error of each marginal.
+    sets of taken measurements were followed, and the log of a lower bound on the share of weight that is correctly
+    assigned (0 without such clusters): 1 minus that share bounds the error of each marginal.
     """
     log_total, num_inexact, log_kept = 0.0, 0, 0.0
     leaders, contested = find_clusters(choices, num_columns)
@@ -250,7 +254,7 @@ def choice_marginals(
             log_kept += math.log1p(-math.exp(log_amiss - log_joint)) if log_amiss < log_joint else -math.inf
         for i in range(len(members)):
             none, track = classes.offsets[i], members[i]
-            # A class's share among all choices, times a choice's among those of its class.
+            # A class's share of all choices, times a choice's share of its class.
             out_absent[track] = choices.log_absent[track]
             if out_absent[track] > -math.inf:
                 out_absent[track] += sums[none] - log_joint - classes.log_weights[none]

@@ -1,7 +1,7 @@
-"""The Gaussian-mixture PHD filter (Vo and Ma 2006), and what the CPHD filter shares with it.
+"""The Gaussian-mixture PHD filter (Vo and Ma 2006), and the parts that it shares with the CPHD filter.
 
-An intensity is predicted and seen as the one row of a scan: its components are the surviving ones followed by the birth
-sites; its options are to be missed or detected as one of the gated measurements, and never to be absent.
+An intensity is predicted and updated as the single row of a scan: its components are the surviving ones followed by the
+birth sites; its options are a miss or a detection as one of the gated measurements, and never absence.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from vedette.kernels.steps.assembly import write_updated
 
 
 class IntensityReport(NamedTuple):
-    """What a step found and what it left out."""
+    """Sums and truncations of a step."""
 
     log_total: float  # log density of the scan relative to clutter alone
     log_clutter: float  # sum of the log clutter intensities of the scan
     num_raised: int  # measurements whose clutter intensity was raised to the floor
-    log_kept: float  # log of the share of the cardinality distribution that trimming left, 0 where there is none
+    log_kept: float  # log of the share of the cardinality distribution that trimming retains, 0 without trimming
 
 
 @kernel
 def predict_intensity(prior: Mixture, scan: ScanInput, motion: Motion | None, sensor: Sensor) -> tuple[Rows, float]:
-    """The predicted intensity as one row, survivors before births, and the log of the weight that died.
+    """Return the predicted intensity as one row, survivors before births, and the log of the weight that died.
 
     The births carry the intensity of the multi-Bernoulli birth: the sum of existence times density over the sites.
     """
@@ -54,7 +54,7 @@ def predict_intensity(prior: Mixture, scan: ScanInput, motion: Motion | None, se
 
 @kernel
 def corrected_intensity(rows: Rows, options: Options, log_factors: Floats, caps: MixtureCaps) -> Mixture:
-    """The components of every option times the option's factor, reduced; their total weight is kept.
+    """Return the components of every option times the option's factor, reduced; their total weight is preserved.
 
     log_factors: (>= num_options,) log of the factor of each option.
     """
@@ -81,7 +81,10 @@ def corrected_intensity(rows: Rows, options: Options, log_factors: Floats, caps:
 def step_phd(
     prior: Mixture, scan: ScanInput, motion: Motion | None, sensor: Sensor, truncation: Truncation, caps: MixtureCaps
 ) -> tuple[Mixture, IntensityReport]:
-    """One scan (Vo and Ma 2006, Propositions 1 and 2): a measurement shares one unit between targets and clutter."""
+    """Predict and update with one scan (Vo and Ma 2006, Propositions 1 and 2).
+
+    Each measurement distributes one unit among targets and clutter.
+    """
     rows, _ = predict_intensity(prior, scan, motion, sensor)
     options, log_clutter, num_raised = weighed_options(rows, scan, sensor, truncation)
     num_options = options.offsets[1]

@@ -1,4 +1,4 @@
-"""Targets not yet found between scans and in one: who lives on, moves and appears, and whom a sensor misses.
+"""Prediction and update of undetected targets: survival, motion and births, and missed detections.
 
 They are a Poisson intensity of Gaussians, and tables of expected numbers in the cells of a grid.
 """
@@ -16,7 +16,7 @@ from vedette.kernels.base.types import HEIGHT, Floats, Mixture, Motion, Sensor
 from vedette.kernels.gaussian.components import make_components
 from vedette.kernels.gaussian.intensities import predicted_intensity
 
-# Standard deviations of a birth's position that stand for "anywhere" about a measurement: wide beside the noise.
+# Standard deviations of a birth's position that represent "anywhere" about a measurement: wide relative to the noise.
 WIDE = 3.0
 
 
@@ -29,46 +29,46 @@ class Cells(NamedTuple):
     middles: Floats  # (num_cells, state_dim) targets at rest in the middle of each
     states: Floats  # (num_cells, num_nodes, state_dim) the same at the nodes of each
     node_weights: Floats  # (num_nodes,) that sum to 1
-    entering: Floats  # (num_cells,) of targets that appear, how they are shared out; of any sum
+    entering: Floats  # (num_cells,) relative rates of targets that appear; of any sum
 
 
 class Arrivals(NamedTuple):
-    """What changes the undetected targets between two scans, beside motion and survival of the states."""
+    """Changes of the undetected targets between two scans, in addition to motion and survival of the states."""
 
-    born: Mixture  # intensity of those that appear at sites
+    born: Mixture  # intensity of births at sites
     max_components: int  # of the intensity
-    survival: float  # probability of living on in a cell; negative: as the motion says in its middle
-    across: Floats  # shares of a cell that end up 0, 1, ... columns to one side
+    survival: float  # survival probability in a cell; negative: that of the motion at its middle
+    across: Floats  # shares of a cell that move 0, 1, ... columns to one side
     along: Floats  # the same of rows
     numbers: Floats  # (num_tables,) of targets that appear in the cells of each table
 
 
 class Undetected(NamedTuple):
-    """The undetected targets, and the name of the first of those that a scan detects.
+    """The undetected targets, and the label of the first of those that a scan detects.
 
-    Those in the cells are, about each measurement, one Gaussian that is wide beside the noise.
+    Targets in the cells are represented, about each measurement, by one Gaussian that is wide relative to the noise.
     """
 
     intensity: Mixture
     tables: Floats  # (num_tables, num_cells) expected numbers; the first is of the targets, others move as they do
     cells: Cells
-    places: Floats  # (num_measurements, 2 or 3) position and height of each; none: no first detections in cells
+    places: Floats  # (num_measurements, 2 or 3) position of each; empty: no first detections of targets in cells
     std: Floats  # (state_dim,) of a target that appears in a cell, about its place and at rest
     step: int  # of the labels
     first_index: int  # of the label of the scan's first measurement
-    birth_rate: float  # 1/s, where it is learnt and the second table is of it
+    birth_rate: float  # 1/s, if it is learnt and the second table is of it
 
 
 @inlined
 def mean_detection(sensor: Sensor, pose: Floats, states: Floats, node_weights: Floats) -> float:
-    """Sum of weight * P_D over the (num_nodes, state_dim) states of a cell."""
+    """Return the sum of weight * P_D over the (num_nodes, state_dim) states of a cell."""
     total = 0.0
     for i in range(states.shape[0]):
         detection = sensor.prob_detection(states[i], pose, sensor.detection_params)
         if not 0.0 <= detection <= 1.0:
             raise ModelError("detection model: probability is not in [0, 1]")
         total += node_weights[i] * detection
-    return min(total, 1.0)  # weights sum to 1 but for rounding
+    return min(total, 1.0)  # weights sum to 1 up to rounding
 
 
 @borrowing
@@ -81,7 +81,7 @@ def _take_out(sensor: Sensor, pose: Floats, states: Floats, node_weights: Floats
 
 @kernel
 def take_out_detected(sensor: Sensor, pose: Floats, states: Floats, node_weights: Floats, tables: Floats) -> Floats:
-    """(num_tables, num_cells) tables times the mean over each cell of 1 - P_D.
+    """Tables times the mean over each cell of 1 - P_D, shape (num_tables, num_cells).
 
     states: (num_cells, num_nodes, state_dim) of targets at the nodes of each cell; node_weights: (num_nodes,), sum 1.
     """
@@ -92,7 +92,7 @@ def take_out_detected(sensor: Sensor, pose: Floats, states: Floats, node_weights
 
 @kernel
 def survival_probabilities(motion: Motion, dt: float, states: Floats) -> Floats:
-    """(num,) probability of living through `dt` seconds at each of (num, state_dim) states."""
+    """Probability of survival over `dt` seconds at each of (num, state_dim) states, shape (num,)."""
     out = np.empty(len(states))
     for i in range(len(states)):
         out[i] = motion.prob_survival(states[i], dt, motion.survival_params)
@@ -103,7 +103,7 @@ def survival_probabilities(motion: Motion, dt: float, states: Floats) -> Floats:
 
 @borrowing
 def _spread(row: Floats, shares: Floats, out: Floats) -> None:
-    """Share each number of a row out among those on both sides of it (-> out); what leaves the row is lost."""
+    """Distribute each number of a row to its neighbours on both sides (-> out); what leaves the row is lost."""
     for i in range(len(row)):
         out[i] = row[i] * shares[0]
         for offset in range(1, len(shares)):
@@ -115,7 +115,7 @@ def _spread(row: Floats, shares: Floats, out: Floats) -> None:
 
 @kernel
 def moved_in_cells(expected: Floats, across: Floats, along: Floats) -> Floats:
-    """(num_rows, num_columns) expected numbers after a step. across, along: shares as of `Arrivals`."""
+    """Expected numbers after a step, shape (num_rows, num_columns). across, along: shares as in `Arrivals`."""
     num_rows, num_columns = expected.shape
     between, moved = np.empty((num_rows, num_columns)), np.empty((num_rows, num_columns))
     column, spread = np.empty(num_rows), np.empty(num_rows)
@@ -147,7 +147,7 @@ def _predicted_tables(tables: Floats, cells: Cells, motion: Motion, dt: float, a
 
 @kernel
 def predicted_undetected(before: Undetected, motion: Motion, dt: float, arrivals: Arrivals) -> Undetected:
-    """The undetected targets `dt` seconds later."""
+    """Return the undetected targets `dt` seconds later."""
     most = arrivals.max_components
     return Undetected(
         predicted_intensity(before.intensity, motion, dt, arrivals.born, most),
@@ -163,7 +163,7 @@ def predicted_undetected(before: Undetected, motion: Motion, dt: float, arrivals
 
 @borrowing
 def _density_at(place: Floats, cells: Cells, table: Floats) -> float:
-    """Targets per square metre; 0 outside of the region."""
+    """Return targets per square metre; 0 outside of the region."""
     column = np.floor((place[0] - cells.corner[0]) / cells.size[0])
     row = np.floor((place[1] - cells.corner[1]) / cells.size[1])
     if not (0 <= column < cells.num_columns and 0 <= row < len(table) // cells.num_columns):
@@ -173,7 +173,7 @@ def _density_at(place: Floats, cells: Cells, table: Floats) -> float:
 
 @kernel
 def intensity_at_places(undetected: Undetected) -> Mixture:
-    """(num_measurements,) Gaussians of the targets in the cells about each measurement; none without tables."""
+    """Gaussians (num_measurements,) of the targets in the cells about each measurement; none without tables."""
     num, dim = len(undetected.places) if len(undetected.tables) > 0 else 0, len(undetected.std)
     out, std = make_components(num, dim), undetected.std.copy()
     std[:2] *= WIDE
@@ -191,16 +191,16 @@ def intensity_at_places(undetected: Undetected) -> Mixture:
 
 
 class Left(NamedTuple):
-    """What a scan leaves of the targets in the cells."""
+    """Targets in the cells after a scan."""
 
     tables: Floats  # (num_tables, num_cells)
-    changes: Floats  # (num_tables,) of their sums; the first is the log probability that it detected none of them
-    born_shares: Floats  # (num_measurements,) where a second table is of a birth rate: see `_share_born`
+    changes: Floats  # (num_tables,) of their sums; the first is the log probability of no detection
+    born_shares: Floats  # (num_measurements,) if a second table is of a birth rate: see `_share_born`
 
 
 @kernel
 def left_in_cells(undetected: Undetected, sensor: Sensor, pose: Floats) -> Left:
-    """The tables after a scan. undetected: at its time."""
+    """Return the tables after a scan. undetected: at its time."""
     tables, cells = undetected.tables, undetected.cells
     shares = np.empty(len(undetected.places) if len(tables) > 1 else 0)
     for j in range(len(shares)):
@@ -213,10 +213,10 @@ def left_in_cells(undetected: Undetected, sensor: Sensor, pose: Floats) -> Left:
 
 @borrowing
 def _share_born(undetected: Undetected, place: Floats) -> float:
-    """Of the intensity at a measurement, the share of targets born after the first scan.
+    """Share of the intensity at a measurement that comes from targets born after the first scan.
 
-    Others were there at first, come from birth sites, or had a label before. Noise is taken as half of the standard
-    deviation of a birth.
+    The others existed initially, come from birth sites, or had a label before. The noise is taken as half of the
+    standard deviation of a birth.
     """
     intensity, std, elsewhere = undetected.intensity, undetected.std, 0.0
     for c in range(len(intensity.log_weights)):
