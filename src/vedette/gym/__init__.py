@@ -1,6 +1,6 @@
 """Scenarios as environments for reinforcement learning, and policies as planners.
 
-Importing this registers the environment `vedette/Scenario-v0` with Gymnasium, whose argument is a `scenario`.
+Importing this package registers the environment `vedette/Scenario-v0` with Gymnasium; its argument is a `scenario`.
 """
 
 from vedette.internal.extras import require_packages
@@ -15,7 +15,7 @@ from vedette.gym.parallel import ScenarioParallelEnv
 from vedette.gym.policies import PolicyPlanner, policy_planner
 from vedette.gym.single import ScenarioEnv
 
-if "vedette/Scenario-v0" not in gymnasium.registry:  # which a module that is loaded again would tell of
+if "vedette/Scenario-v0" not in gymnasium.registry:  # a second registration would warn
     gymnasium.register("vedette/Scenario-v0", "vedette.gym.single:ScenarioEnv")
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""Runs of scenarios from decision to decision, which is what all environments are made of."""
+"""Episodes: scenario runs that advance from one decision to the next (used by all environments)."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ Scenarios: TypeAlias = AnyScenario | Sequence[AnyScenario] | Callable[[np.random
 Reward: TypeAlias = Callable[[Sequence[Moment], Truth], float]
 AnyReward: TypeAlias = Literal["ospa", "expected_loss"] | Reward
 RENDER_MODES = ["rgb_array", "human"]
-# These grow with every scan, or are -inf where nothing fits: of a stretch of time their mean says little.
+# These grow with every scan, or are -inf if nothing fits, so their mean over a period is not informative.
 _NOT_AVERAGED = ("log_likelihood", "fusion_log_normaliser")
 
 
 class BuiltScenario:
-    """A scenario with what its episodes share."""
+    """A scenario with the objects that its episodes share."""
 
     def __init__(self, scenario: AnyScenario, num_labels: int) -> None:
         self.scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
@@ -53,7 +53,7 @@ class BuiltScenario:
 
     @property
     def layout(self) -> Layout:
-        """Of its observations and actions."""
+        """Layout of its observations and actions."""
         return Layout.of(self.encoder.decision_context(self.experiment.tracker.initial(), self.experiment.poses))
 
 
@@ -62,11 +62,11 @@ class Layout(NamedTuple):
 
     shapes: dict[str, tuple[int, ...]]
     num_actions: tuple[int, ...]
-    deciding: tuple[int, ...]  # places of these sensors
+    deciding: tuple[int, ...]  # indices of these sensors
 
     @classmethod
     def of(cls, context: DecisionContext) -> Layout:
-        """Of a decision."""
+        """Return the layout of a decision."""
         options, shown = context.options, context.observation
         deciding = deciding_sensors(options)
         sizes = tuple(len(options[s].actions) for s in deciding)
@@ -77,11 +77,11 @@ class Episodes:
     """Runs of one or several scenarios, one after the other, each from decision to decision.
 
     Attributes:
-        built: the scenario of the present run.
+        built: the scenario of the current run.
         layout: of all observations and actions.
-        render_mode: how pictures are shown.
-        world, context: the present run, and the decision at hand.
-        num_moved: actions of the last decision that constraints have moved.
+        render_mode: how frames are shown.
+        world, context: the current run, and the pending decision.
+        num_moved: number of actions of the last decision that constraints changed.
     """
 
     def __init__(self, scenario: Scenarios, reward: AnyReward, num_labels: int, render_mode: str | None) -> None:
@@ -100,9 +100,11 @@ class Episodes:
         self.layout = self.built.layout
 
     def start(self, seed: int | None, run: int | None) -> None:
-        """Turn to a run: that of a seed and number; by default run 0 of a seed, and the next of the seed before.
+        """Start a run: that of a seed and number.
 
-        Where none was ever given a seed is drawn.
+        By default run 0 of a given seed, or the next run of the previous seed.
+
+        If no seed was ever given, one is drawn.
         """
         first = seed is not None or self._seed is None
         if seed is None:
@@ -118,7 +120,7 @@ class Episodes:
         self._advance()
 
     def decide(self, actions: ArrayLike) -> None:
-        """Send the sensors where a policy says, and go on to the next decision, or to the end."""
+        """Apply the actions of a policy, and advance to the next decision, or to the end."""
         if self._seed is None or self.is_over:
             raise InputError(
                 f"step: expected a reset first, as {'there is no run' if self._seed is None else 'the run is over'}"
@@ -144,11 +146,11 @@ class Episodes:
 
     @property
     def is_over(self) -> bool:
-        """Whether the last scan is done."""
+        """True if the last scan is done."""
         return self.world.is_over
 
     def reward(self) -> float:
-        """Of the scans since the last decision."""
+        """Return the reward of the scans since the last decision."""
         moments, cutoff = self._moments, self.built.scenario.model.ospa.cutoff
         truth = self.world.truth.between(moments[0].step - 1, moments[-1].step)
         if callable(self._reward):
@@ -162,7 +164,7 @@ class Episodes:
         return -float(np.mean([expected_loss(moment.state.fused, cutoff) for moment in moments]))
 
     def info(self) -> dict[str, Any]:
-        """What is known without the truth: where the run is, and the health of its filters since the last decision."""
+        """Return the position in the run and the filters' health since the last decision, without the truth."""
         first, last = self._moments[0].step - 1, self._moments[-1].step
         told: dict[str, Any] = {"seed": self._seed, "run": self._run, "step": last, "time": self._moments[-1].time}
         told |= {"num_moved": self.num_moved}
@@ -172,12 +174,15 @@ class Episodes:
         return told
 
     def record(self) -> RunRecord:
-        """What the run has brought so far, as `vedette.evaluation.run_scenario` gives it of a planner."""
+        """Return the record of the run so far, as `vedette.evaluation.run_scenario` returns it for a planner."""
         num = len(self._journal.estimates)
         return self._journal.record(self.built.score(self.world.truth.first(num), self._journal.estimates))
 
     def render(self) -> NDArray[np.uint8] | None:
-        """(height, width, 3) picture of the last scan, as a frame of `vedette video`; or in a window, and None."""
+        """Return a picture (height, width, 3) of the last scan, a frame of `vedette video`.
+
+        Or show it in a window, and return None.
+        """
         if self.render_mode is None:
             return None
         from vedette.evaluation.figures import scan_image
@@ -196,7 +201,7 @@ class Episodes:
             self._window = None
 
     def _drawn(self, seed: int, run: int) -> BuiltScenario:
-        """The scenario of a run, built."""
+        """Return the scenario of a run, built."""
         found = self._draw(run_stream(seed, run, SCENES))
         return found if isinstance(found, BuiltScenario) else BuiltScenario(found, self._num_labels)
 
@@ -204,7 +209,7 @@ class Episodes:
 def _scenario_sampler(
     scenario: AnyScenario | Sequence[AnyScenario], num_labels: int
 ) -> Callable[[np.random.Generator], BuiltScenario]:
-    """What draws one of several scenarios, each built once."""
+    """Return a function that draws one of several scenarios, each built once."""
     given = [scenario] if isinstance(scenario, str | Path | Scenario) else list(scenario)
     if not given:
         raise reject("scenario", "at least one scenario", "none")
@@ -213,16 +218,16 @@ def _scenario_sampler(
 
 
 def policy_plan(name: str, context: DecisionContext, chosen: tuple[int, ...]) -> Plan:
-    """The plan of a policy."""
+    """Return the plan of a policy."""
     notes = context.mask.notes if context.mask is not None else ()
     return Plan(name, tuple(own.actions for own in context.options), chosen, (), {}, notes)
 
 
 def expected_loss(belief: Any, cutoff: float) -> float:
-    """Error to be expected of the targets that a belief holds: sum over labels of r min(sqrt(tr P), c), m.
+    """Return the expected error of the targets in a belief: sum over labels of r min(sqrt(tr P), c), m.
 
-    r is the existence of a label, P the covariance of its position, c the cutoff. It knows nothing of targets that the
-    belief does not hold. Raises `InputError` for a belief without labels.
+    r is the existence of a label, P the covariance of its position, c the cutoff. Targets that the belief does not hold
+    are not included. Raises `InputError` for a belief without labels.
     """
     if not isinstance(belief, LabelledDensity):
         raise reject("reward", "ospa or a function, as the belief has no labels", "expected_loss")

@@ -1,4 +1,4 @@
-"""What a policy is shown before a decision: beliefs, sensors and their actions as arrays of fixed size."""
+"""Observations of a policy before a decision: beliefs, sensors and their actions as arrays of fixed size."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ Observation: TypeAlias = dict[str, NDArray[Any]]
 
 
 class DecisionContext(NamedTuple):
-    """A decision that is to be made.
+    """A pending decision.
 
-    state, poses: what is believed, and (num_sensors, 3 or more) where the sensors are. options: of each sensor what it
-    may do. mask: what constraints allow; None where there are none. observation: what a policy is shown of all that.
+    state, poses: the belief, and (num_sensors, 3 or more) poses of the sensors. options: possible actions of each
+    sensor. mask: actions that constraints allow; None without constraints. observation: what the policy receives.
     """
 
     state: State
@@ -39,17 +39,17 @@ class DecisionContext(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ObservationEncoder:
-    """What shows decisions to a policy, and takes its answers; environments and planners have the same.
+    """Converts decisions into observations and answers of a policy into actions, for environments and planners alike.
 
     Attributes:
-        sensors: all of them; those that have more than one action are decided about.
-        settings: the horizon, over which courses are told apart.
-        constraints: what the sensors must not do.
-        timetable: when they scan and decide.
-        num_labels: targets that are shown, those that most probably exist.
+        sensors: all sensors; those with more than one action are decided about.
+        settings: the horizon, over which courses are distinguished.
+        constraints: constraints on the sensors.
+        timetable: times of scans and decisions.
+        num_labels: number of targets in an observation, the most probable ones.
 
     Raises:
-        InputError: `num_labels` that is no number of at least 1.
+        InputError: `num_labels` that is not a number of at least 1.
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -63,24 +63,24 @@ class ObservationEncoder:
 
     @classmethod
     def of(cls, parts: Mapping[str, Any], num_labels: int = 10) -> ObservationEncoder:
-        """Of what a planner of a scenario is made of (`vedette.scenarios.build.build_parts`)."""
+        """Return the encoder for the parts of a scenario's planner (`vedette.scenarios.build.build_parts`)."""
         timetable = parts["oracle"]["timetable"]
         return cls(parts["sensors"], parts["settings"], parts["constraints"], timetable, num_labels)
 
     def decision_context(self, state: State, poses: Floats) -> DecisionContext:
-        """The decision at hand.
+        """Return the pending decision.
 
-        Raises `InputError` for poses that do not fit, or no sensor with a choice.
+        Raises `InputError` for poses that do not fit, or if no sensor has a choice.
         """
         options = options_of(self.sensors, poses, self.settings)
         mask = mask_of_decision(self.constraints, self.sensors, options, state.fused, poses, self.settings)
         return DecisionContext(state, poses, options, mask, self._observation(state, poses, options, mask))
 
     def resolve_actions(self, context: DecisionContext, actions: ArrayLike) -> tuple[tuple[int, ...], int]:
-        """The index of each sensor's action, of those that decide as a policy says, and how many were moved.
+        """Return the index of each sensor's action, as chosen by the policy, and the number that constraints changed.
 
-        A joint action that constraints forbid is moved to one near it, as that of `vedette.control.RandomPlanner` is.
-        actions: (num_deciding,) indices. Raises `InputError` for what are none.
+        A joint action that violates constraints is replaced by one near it, as in `vedette.control.RandomPlanner`.
+        actions: (num_deciding,) indices. Raises `InputError` for invalid indices.
         """
         deciding = deciding_sensors(context.options)
         given = np.atleast_1d(as_array("actions", actions, "iu", "indices of actions"))
@@ -116,14 +116,14 @@ class ObservationEncoder:
         return found
 
     def _times(self, step: int) -> NDArray[np.float32]:
-        """(2,) s to the next decision, or where there is none to the end, and to the end."""
+        """Time in s to the next decision (to the end if there is none), and to the end, shape (2,)."""
         times, last = self.timetable.times, len(self.timetable.times)
         due = next((own for own in self.timetable.decision_steps if own > step), last)
         return np.asarray(times[[due - 1, -1]] - times[step - 1], np.float32)
 
 
 def deciding_sensors(options: tuple[Options, ...]) -> tuple[int, ...]:
-    """The sensors that have more than one action; `InputError` where none has."""
+    """Return the sensors that have more than one action. Raises `InputError` if there are none."""
     found = tuple(s for s, own in enumerate(options) if len(own.actions) > 1)
     if not found:
         raise InputError("sensors: expected one with a choice of actions at least; got none")
@@ -131,10 +131,10 @@ def deciding_sensors(options: tuple[Options, ...]) -> tuple[int, ...]:
 
 
 def belief_arrays(belief: Any, step: int, num_labels: int) -> Observation:
-    """The targets that most probably exist, those first, as arrays of `num_labels` rows; rows beyond them are 0.
+    """Return the most probable targets, in descending order, as arrays of `num_labels` rows; unused rows are 0.
 
-    Mean and covariance are those of a label's marginal density; where a belief has no labels, targets are those that
-    are estimated.
+    Mean and covariance are those of a label's marginal density; for a belief without labels, the targets are the
+    estimated ones.
     """
     rows = list((belief if isinstance(belief, LabelledDensity) else best_estimate(belief, step)).targets())
     rows = [rows[i] for i in np.argsort([-row.existence for row in rows], kind="stable")[:num_labels]]

@@ -19,11 +19,13 @@ from vedette.simulation import RunRecord, World
 _BELIEF = ("existence", "means", "sqrt_covs", "mask")
 
 
-class ScenarioParallelEnv(ParallelEnv):  # type: ignore[misc]  # which has no types
-    """A scenario from decision to decision; each sensor that has a choice is an agent, and all get one reward.
+class ScenarioParallelEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is untyped
+    """A scenario from decision to decision.
 
-    Steps, rewards and the end are those of `ScenarioEnv`. An agent is called `sensor_2`, by its place in the scenario,
-    from 1. Its observation has its own row of `ends` and `action_mask`, and of `poses` its own first.
+    Each sensor that has a choice is an agent, and all agents get the same reward.
+
+    Steps, rewards and the end are those of `ScenarioEnv`. An agent is named `sensor_2`, by its position in the
+    scenario, from 1. Its observation has its own row of `ends` and `action_mask`, and its own row of `poses` first.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": RENDER_MODES, "render_fps": 2, "name": "vedette_scenario_v0"}
@@ -37,7 +39,10 @@ class ScenarioParallelEnv(ParallelEnv):  # type: ignore[misc]  # which has no ty
         belief: Literal["fused", "own"] = "fused",
         render_mode: str | None = None,
     ) -> None:
-        """As `ScenarioEnv`; belief: whether agents are shown what is believed by all together, or by their sensor."""
+        """Arguments as in `ScenarioEnv`.
+
+        belief: whether agents observe the fused belief, or that of their own sensor.
+        """
         self.episodes, self.render_mode = Episodes(scenario, reward, num_labels, render_mode), render_mode
         self._own, self._num_labels = one_of("belief", belief, ("fused", "own")) == "own", num_labels
         layout = self.episodes.layout
@@ -53,26 +58,26 @@ class ScenarioParallelEnv(ParallelEnv):  # type: ignore[misc]  # which has no ty
             self._observation_spaces[agent] = space_of(layout.shapes | own)
 
     def observation_space(self, agent: str) -> spaces.Dict:
-        """Of an agent."""
+        """Return the observation space of an agent."""
         return self._observation_spaces[agent]
 
     def action_space(self, agent: str) -> spaces.Discrete:
-        """Of an agent: the indices of its sensor's actions."""
+        """Return the action space of an agent: the indices of its sensor's actions."""
         return self._action_spaces[agent]
 
     @property
     def world(self) -> World:
-        """The present run, with its truth."""
+        """The current run, with its truth."""
         return self.episodes.world
 
     def record(self) -> RunRecord:
-        """The present run so far, as one of a campaign."""
+        """Return the record of the current run so far, as in a campaign."""
         return self.episodes.record()
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
-        """The first decision of a run; arguments as of `ScenarioEnv.reset`."""
+        """Return the first decision of a run; arguments as in `ScenarioEnv.reset`."""
         self.episodes.start(seed, (options or {}).get("run"))
         self.agents = self.possible_agents[:]
         return self._observations(), self._all(self.episodes.info)
@@ -80,7 +85,7 @@ class ScenarioParallelEnv(ParallelEnv):  # type: ignore[misc]  # which has no ty
     def step(
         self, actions: dict[str, Any]
     ) -> tuple[dict[str, Observation], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
-        """Send the sensors, each where its agent says, and go on to the next decision or the end.
+        """Apply the action of each agent to its sensor, and advance to the next decision or the end.
 
         Raises `InputError` for an agent without an action, or after the end.
         """
@@ -110,7 +115,7 @@ class ScenarioParallelEnv(ParallelEnv):  # type: ignore[misc]  # which has no ty
         return {agent: told() for agent in self._sensors}
 
     def render(self) -> NDArray[np.uint8] | None:
-        """As of `ScenarioEnv.render`."""
+        """Return the result of `ScenarioEnv.render`."""
         return self.episodes.render()
 
     def close(self) -> None:

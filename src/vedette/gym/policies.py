@@ -20,12 +20,12 @@ Policy: TypeAlias = Callable[[Observation], ArrayLike]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PolicyPlanner:
-    """A planner that asks a policy, showing it what an environment shows.
+    """A planner that follows a policy, which receives the observations of an environment.
 
     Attributes:
-        policy: gives the index of an action of each sensor that decides, for an observation of `ScenarioEnv`.
-        encoder: shows the decision.
-        name: of the strategy.
+        policy: returns the index of an action of each sensor that decides, for an observation of `ScenarioEnv`.
+        encoder: makes the observation of a decision.
+        name: name of the strategy.
     """
 
     policy: Policy
@@ -33,9 +33,9 @@ class PolicyPlanner:
     name: str = "policy"
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
-        """What the policy says, moved where constraints forbid it; `rng` is not asked.
+        """Return the policy's actions, changed if constraints forbid them; `rng` is not used.
 
-        Raises `InputError` for what are no actions.
+        Raises `InputError` for invalid actions.
         """
         context = self.encoder.decision_context(state, np.asarray(poses, np.float64))
         chosen, _ = self.encoder.resolve_actions(context, self.policy(context.observation))
@@ -43,10 +43,10 @@ class PolicyPlanner:
 
 
 def policy_planner(policy: Policy, *, num_labels: int = 10) -> Callable[..., PolicyPlanner]:
-    """What makes a planner of a policy in a scenario.
+    """Return a function that makes a planner of a policy in a scenario.
 
-    In `mine.py` beside a scenario, `steer = policy_planner(policy)`; in the scenario
-    `planners: {mine: {kind: custom, function: "mine.py:steer"}}`. num_labels: as of the environment.
+    In `mine.py` next to a scenario, `steer = policy_planner(policy)`; in the scenario
+    `planners: {mine: {kind: custom, function: "mine.py:steer"}}`. num_labels: as in the environment.
     """
 
     def make(**parts: Any) -> PolicyPlanner:

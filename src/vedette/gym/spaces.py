@@ -1,4 +1,4 @@
-"""The spaces that observations lie in."""
+"""The spaces of observations."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 _FLAGS, _NOT_NEGATIVE = ("mask", "action_mask"), ("existence", "time", "undetected")
-_LARGEST = float(np.finfo(np.float32).max)  # Gymnasium's checks take bounds that are infinite for forgotten
+_LARGEST = float(np.finfo(np.float32).max)  # Gymnasium's checks treat infinite bounds as missing
 
 
 def space_of(shapes: Mapping[str, tuple[int, ...]]) -> spaces.Dict[NDArray[Any]]:
-    """Of observations with arrays of these shapes, by name."""
+    """Return the space of observations with arrays of these shapes, by name."""
     return spaces.Dict({name: _array(name, shape) for name, shape in shapes.items()})
 
 

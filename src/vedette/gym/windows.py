@@ -7,17 +7,17 @@ from numpy.typing import NDArray
 
 
 class Window:
-    """One picture after another, where there is a display."""
+    """A window for a sequence of pictures, if there is a display."""
 
     def __init__(self) -> None:
-        import matplotlib.pyplot as plt  # which looks for a display
+        import matplotlib.pyplot as plt  # needs a display
 
         self._plt = plt
         plt.ion()
         self._figure = plt.figure("Vedette", frameon=False)
 
     def show(self, image: NDArray[np.uint8]) -> None:
-        """In place of the one before."""
+        """Replace the picture."""
         self._figure.clear()
         axes = self._figure.add_axes((0.0, 0.0, 1.0, 1.0))
         axes.imshow(image)
@@ -26,5 +26,5 @@ class Window:
         self._figure.canvas.flush_events()
 
     def close(self) -> None:
-        """Take it away."""
+        """Close the window."""
         self._plt.close(self._figure)

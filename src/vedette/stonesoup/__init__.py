@@ -1,4 +1,4 @@
-"""A tracker and a sensor manager of Stone Soup's kinds on what is here; its models, scans and truth converted."""
+"""A Stone Soup tracker and sensor manager based on Vedette; converts Stone Soup models, scans and truth."""
 
 from vedette.internal.extras import require_packages
 

@@ -1,4 +1,4 @@
-"""Targets and sensors as Stone Soup has them, converted together; a tracker and a sensor manager share what results."""
+"""Conversion of Stone Soup target and sensor models into Vedette models, for the tracker and the sensor manager."""
 
 from __future__ import annotations
 
@@ -41,14 +41,14 @@ Births: TypeAlias = BirthModel | MeasurementBirth | GaussianState | Sequence[Any
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ConvertedModels:
-    """What `convert` makes of Stone Soup's models.
+    """Result of `convert`: Vedette models equal to Stone Soup models.
 
     Attributes:
-        targets: how targets move, live on and appear.
-        sensors: what each sensor sees.
-        layout: where Stone Soup's states have the components of those here.
-        sources: for each sensor, that of Stone Soup or its measurement model, by which scans know where it is.
-        names: for each sensor, what a detection's `metadata["sensor"]` calls it.
+        targets: motion, survival and birth models.
+        sensors: model of each sensor.
+        layout: order of the components in Stone Soup's states.
+        sources: for each sensor, the Stone Soup sensor or its measurement model, from which scans take its position.
+        names: for each sensor, its name in a detection's `metadata["sensor"]`.
     """
 
     targets: TargetModel
@@ -60,12 +60,12 @@ class ConvertedModels:
     def tracker(
         self, kind: Literal["lmb", "glmb"] = "lmb", *, fusion: Fusion | None = None, feedback: bool = False
     ) -> Tracker:
-        """A tracker of the library: of one sensor its filter, of several one filter of all scans, or a fusion.
+        """Return a Vedette tracker: the filter of one sensor; for several, one filter of all scans, or a fusion.
 
         Args:
-            kind: of filter.
-            fusion: of a filter at each sensor; None: one takes all scans (decision 8).
-            feedback: whether sensors take over what is fused, see `vedette.tracking.Distributed`.
+            kind: kind of filter.
+            fusion: fusion of a filter at each sensor; None: one filter takes all scans (decision 8).
+            feedback: whether sensors take over the fused belief, see `vedette.tracking.Distributed`.
         """
         one_of("kind", kind, _FILTERS)
         if fusion is None and len(self.sensors) > 1:
@@ -74,7 +74,7 @@ class ConvertedModels:
         return Distributed(own, fusion, feedback)
 
     def predicted(self, mean: Any, cov: Any, seconds: float) -> tuple[Any, Any]:
-        """Mean and covariance, in the order of this library, after some seconds, the motion linearised."""
+        """Return the mean and covariance, in Vedette's order, after some seconds, with the motion linearised."""
         motion, state = self.targets.motion, np.asarray(mean, np.float64)[np.newaxis]
         slope = np.empty((1, motion.state_dim, motion.state_dim))
         write_rows(motion.transition_jacobian, state, float(seconds), motion.transition_params, slope)  # type: ignore[arg-type]
@@ -93,23 +93,23 @@ def convert(
     expected_births: float = 0.5,
     max_existence: float = 0.03,
 ) -> ConvertedModels:
-    """Models of Stone Soup as those of this library that are equal to them.
+    """Convert models of Stone Soup into equal Vedette models.
 
     Args:
         transition_model: see `convert_motion`.
-        sensors: sensors or measurement models (see `convert_measurement`), one or more; of several by the names that
-            detections call them in their `metadata["sensor"]`, or in a list, for names "0", "1", ...
-        births: where targets appear. A `GaussianState`, as the prior of a `SimpleMeasurementInitiator`: wherever
-            something is measured that no track explains, its variances those of a birth about it. A list of
-            `WeightedGaussianState`: at these places, each with its weight as the probability of a birth at a scan. Or a
-            `BirthModel` or `MeasurementBirth` of `vedette.models`.
+        sensors: sensors or measurement models (see `convert_measurement`), one or more; several by the names in their
+            detections' `metadata["sensor"]`, or in a list, for names "0", "1", ...
+        births: where targets appear. A `GaussianState`, as the prior of a `SimpleMeasurementInitiator`: at every
+            measurement that no track explains, with its variances. A list of `WeightedGaussianState`: at these
+            positions, each with its weight as the probability of a birth at a scan. Or a `BirthModel` or
+            `MeasurementBirth` of `vedette.models`.
         clutter: see `convert_clutter`; None: the `clutter_model` of each sensor.
-        prob_detection: where a sensor looks (`convert_detection`), or a detection model.
-        prob_survival: probability of living on to the next scan.
-        expected_births, max_existence: of births from measurements, see `vedette.models.MeasurementBirth`.
+        prob_detection: probability in a sensor's field of view (`convert_detection`), or a detection model.
+        prob_survival: probability of survival to the next scan.
+        expected_births, max_existence: for births from measurements, see `vedette.models.MeasurementBirth`.
 
     Raises:
-        InputError: what has no equal here: it names the model, the field and what there is.
+        InputError: a model without an equal in Vedette; the message names the model, the field and the value.
     """
     try:
         named = dict(sensors) if isinstance(sensors, Mapping) else {str(k): own for k, own in enumerate(sensors)}

@@ -1,4 +1,4 @@
-"""A sensor manager of Stone Soup's on the planners of this library."""
+"""A Stone Soup sensor manager that uses Vedette's planners."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ _PLANNERS = {"joint": JointPlanner, "independent": IndependentPlanner}
 
 
 class StoneSoupActions:
-    """What one sensor may do until a time, as Stone Soup's action generators have it: a platform of this library.
+    """The actions of one sensor until a time, from Stone Soup's action generators, as a Vedette platform.
 
-    Poses are those of copies that take the actions, by Stone Soup's own `move` and `act`.
+    Poses are those of copies that perform the actions, by Stone Soup's own `move` and `act`.
     """
 
     columns = ("choice",)
@@ -53,15 +53,15 @@ class StoneSoupActions:
         self._courses: dict[tuple[float, ...], Floats] = {}
 
     def actions(self, pose: Floats) -> Floats:
-        """(num_actions, 1) their numbers."""
+        """Return the indices of the actions, shape (num_actions, 1)."""
         return np.arange(float(len(self.chosen)))[:, np.newaxis]
 
     def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
-        """The poses of one."""
+        """Return the poses of one action."""
         return np.asarray(self.courses(pose, action[np.newaxis], times)[0])
 
     def courses(self, pose: Floats, actions: Floats, times: Floats) -> Floats:
-        """Those of many actions at once."""
+        """Return the poses of several actions at once."""
         key = tuple(times.tolist())
         if key not in self._courses:
             self._courses[key] = np.array([self._course(each, times) for each in self.chosen])
@@ -77,18 +77,19 @@ class StoneSoupActions:
         for seconds in times.tolist():
             then = self._now + datetime.timedelta(seconds=seconds)
             for carrier in twins[:-1]:
-                carrier.move(then, noise=False)  # those that nobody steers do not go anywhere by `act`
+                carrier.move(then, noise=False)  # `act` does not move platforms without steering
             twins[-1].act(then, noise=False)
             poses.append(convert_pose(twins[-1].measurement_model))
         return np.array(poses)
 
 
 class PlanningSensorManager(SensorManager):  # type: ignore[misc] # Stone Soup is untyped
-    """Decides what sensors do next by what this library's planners expect of it, several sensors jointly.
+    """Stone Soup sensor manager that chooses the sensors' actions with Vedette's planners, several sensors jointly.
 
-    Sensors are those that `models` were converted of, on the ground or on platforms, each of which carries one. They
-    are steered by the `dwell_centre` of a rotating radar and by what moves a platform. Tracks become a labelled
-    multi-Bernoulli, each as probable as its `metadata["existence"]`; those of an earlier time are moved on.
+    The sensors are those that `models` were converted from, on the ground or on platforms, each of which carries one.
+    They are controlled by the `dwell_centre` of a rotating radar and by the movement of a platform. Tracks become a
+    labelled multi-Bernoulli, with `metadata["existence"]` as existence probability; tracks of an earlier time are
+    predicted.
     """
 
     models: Any = Property(doc="What `vedette.stonesoup.convert` made of the sensors.")
@@ -129,14 +130,15 @@ class PlanningSensorManager(SensorManager):  # type: ignore[misc] # Stone Soup i
         return_reward: bool = False,
         **kwargs: Any,
     ) -> Any:
-        """The actions until `timestamp`, as the other sensor managers return them; `plan` has what they rest on.
+        """Return the actions until `timestamp`, in the form of other sensor managers; `plan` has the plan behind them.
 
         Returns:
-            A list of one dictionary, of each sensor, and platform, its actions. With `return_reward` also an array of
-                the expected reward, of independent decisions their sum.
+            A list of one dictionary, with the actions of each sensor, and platform. With `return_reward` also an array
+                of the expected reward, for independent decisions their sum.
 
         Raises:
-            InputError: no time left, an actionable property that no sensor here knows, more than one choice wanted.
+            InputError: no time left, an actionable property that no sensor here supports, more than one choice
+                requested.
         """
         if nchoose != 1:
             raise reject("nchoose", "1, the best", nchoose)
@@ -167,7 +169,7 @@ class PlanningSensorManager(SensorManager):  # type: ignore[misc] # Stone Soup i
         return [config]
 
     def _now(self, tracks: Any) -> datetime.datetime:
-        """The latest time that is known of."""
+        """Return the latest known time."""
         times = [track.timestamp for track in tracks] + [sensor.timestamp for sensor in self.models.sources]
         known: list[datetime.datetime] = [time for time in times if time is not None]
         if not known:

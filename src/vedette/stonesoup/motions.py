@@ -1,6 +1,6 @@
-"""Stone Soup's transition models as motion models, and where its states keep what.
+"""Conversion of Stone Soup's transition models into motion models, and the layout of its states.
 
-Its noise is that of an acceleration that is white in continuous time, its coefficients are spectral densities.
+Its noise is that of an acceleration that is white in continuous time; its coefficients are spectral densities.
 """
 
 from __future__ import annotations
@@ -29,29 +29,29 @@ from vedette.models.arguments import float_array, non_negative, reject
 
 @dataclass(frozen=True, slots=True)
 class StateLayout:
-    """Where the components of a state [px, py, vx, vy, ...] of this library stand in one of Stone Soup.
+    """Positions of the components of a Vedette state [px, py, vx, vy, ...] in a Stone Soup state.
 
     Attributes:
-        order: for each component, its place in Stone Soup's state: (0, 2, 1, 3) of [x, vx, y, vy].
+        order: for each component, its index in Stone Soup's state: (0, 2, 1, 3) for [x, vx, y, vy].
     """
 
     order: tuple[int, ...]
 
     @property
     def position(self) -> tuple[int, int]:
-        """Where Stone Soup's state has the position: the `mapping` of its measurement models."""
+        """Indices of the position in Stone Soup's state: the `mapping` of its measurement models."""
         return self.order[0], self.order[1]
 
     def states(self, vectors: ArrayLike) -> Floats:
-        """(n, state_dim) states of Stone Soup's, one a row, in the order of this library."""
+        """Return Stone Soup states, one per row, in Vedette's order, shape (n, state_dim)."""
         return np.ascontiguousarray(np.asarray(vectors, np.float64)[:, self.order])
 
     def covs(self, covs: ArrayLike) -> Floats:
-        """(n, state_dim, state_dim) covariances in the order of this library."""
+        """Return covariances in Vedette's order, shape (n, state_dim, state_dim)."""
         return np.ascontiguousarray(np.asarray(covs, np.float64)[:, self.order][:, :, self.order])
 
     def inverse(self) -> StateLayout:
-        """The way back."""
+        """Return the inverse layout."""
         return StateLayout(tuple(int(place) for place in np.argsort(self.order)))
 
 
@@ -82,7 +82,10 @@ def _taylor_jacobian(state: Floats, dt: float, params: Floats, out: Floats) -> N
 
 @model_function("process_noise_cov")
 def _integrated_noise(state: Floats, dt: float, params: Floats, out: Floats) -> None:
-    """params: spectral density of the last derivative along x and y, and where there is one, of the turn rate."""
+    """Process noise.
+
+    params: spectral density of the last derivative along x and y, and of the turn rate if there is one.
+    """
     out[:, :] = 0.0
     num = state.shape[0] // 2
     for i in range(num):
@@ -121,7 +124,7 @@ def _known_turn_jacobian(state: Floats, dt: float, params: Floats, out: Floats) 
 
 
 def _of_axes(model: Any) -> tuple[MotionModel, StateLayout]:
-    """Two axes of the same number of derivatives."""
+    """Convert two axes with the same number of derivatives."""
     axes = list(model.model_list)
     kinds = (RandomWalk, ConstantVelocity, ConstantAcceleration, ConstantNthDerivative)
     if len(axes) != 2 or any(type(axis) not in kinds for axis in axes):
@@ -168,13 +171,13 @@ _MOTIONS: dict[type, Callable[[Any], tuple[MotionModel, StateLayout]]] = {
 
 
 def convert_motion(transition_model: Any) -> tuple[MotionModel, StateLayout]:
-    """A transition model of Stone Soup as a motion model, and how its states are laid out.
+    """Convert a transition model of Stone Soup into a motion model, and return the layout of its states.
 
     `CombinedLinearGaussianTransitionModel` of two `RandomWalk`, `ConstantVelocity`, `ConstantAcceleration` or
     `ConstantNthDerivative`, whose densities may differ; `ConstantTurn`; `KnownTurnRate`.
 
     Raises:
-        InputError: another model: it names it, the field and what there is.
+        InputError: another model; the message names the model, the field and the value.
     """
     if type(transition_model) not in _MOTIONS:
         wanted = f"one of {', '.join(kind.__name__ for kind in _MOTIONS)}"

@@ -1,4 +1,4 @@
-"""Detections and ground truth of Stone Soup as scans, poses and truth of this library."""
+"""Conversion of Stone Soup detections and ground truth into scans, poses and truth."""
 
 from __future__ import annotations
 
@@ -19,26 +19,27 @@ from vedette.stonesoup.sensors import convert_pose, measured_quantities, measure
 
 
 class Scans(NamedTuple):
-    """What was measured at one time, as trackers take it."""
+    """The scans of one time, as trackers take them."""
 
-    time: float  # s, from the first scan on
-    scans: tuple[Floats | None, ...]  # one a sensor: (num, meas_dim); None where it did not scan
+    time: float  # s, since the first scan
+    scans: tuple[Floats | None, ...]  # one per sensor: (num, meas_dim); None if it did not scan
     poses: Floats  # (num_sensors, 3)
-    detections: tuple[tuple[Any, ...], ...]  # one a sensor: of Stone Soup, in the order of the rows
+    detections: tuple[tuple[Any, ...], ...]  # one per sensor: of Stone Soup, in the order of the rows
 
 
 @dataclass(slots=True)
 class ScanConverter:
-    """Turns times with sets of detections into scans, one after the other.
+    """Converts times with sets of detections into scans, one after the other.
 
-    A detection is of the sensor that its `metadata["sensor"]` names; without one of the sensor that has its measurement
-    model, as it stands. Where that was, its measurement model says; of a scan of nothing the sensor itself.
+    A detection belongs to the sensor in its `metadata["sensor"]`; without one, to the sensor with its current
+    measurement model. The pose is that of the detection's measurement model; for an empty scan that of the sensor
+    itself.
 
     Attributes:
         models: of the sensors.
-        every_sensor_scans: whether all sensors scan at each time, those without detections in vain; False: only those
-            that have any, and a set of none is of nobody.
-        start: the time that is 0 s; None: the first that comes.
+        every_sensor_scans: whether all sensors scan at each time, those without detections with an empty scan; False:
+            only sensors with detections scan, and an empty set belongs to no sensor.
+        start: the time of 0 s; None: the first time.
     """
 
     models: ConvertedModels
@@ -47,10 +48,11 @@ class ScanConverter:
     _poses: dict[int, Floats] = field(default_factory=dict)
 
     def at(self, time: datetime.datetime, detections: Iterable[Any]) -> Scans:
-        """The scans of one time.
+        """Return the scans of one time.
 
         Raises:
-            InputError: names the detection and its attribute, what was expected and what came.
+            InputError: an invalid detection; the message names the detection and its attribute, what was expected and
+                the value.
         """
         if self.start is None:
             self.start = time
@@ -74,7 +76,7 @@ class ScanConverter:
         self._poses |= poses
         scans, kept = [], []
         for s, own in enumerate(rows):
-            own.sort(key=lambda row: row[0])  # a set has no order of its own
+            own.sort(key=lambda row: row[0])  # sets are unordered
             scanned = own or self.every_sensor_scans or len(rows) == 1
             values = np.array([values for values, _ in own]).reshape(len(own), models.sensors[s].meas_dim)
             scans.append(values if scanned else None)
@@ -97,7 +99,7 @@ class ScanConverter:
 
 
 def _same(model: Any, other: Any) -> bool:
-    """Whether two measurement models are of one sensor: kind, place, direction and noise."""
+    """Return True if two measurement models are of one sensor: kind, position, direction and noise."""
     if model is None or type(model) is not type(other):
         return False
     return np.array_equal(convert_pose(model), convert_pose(other)) and np.array_equal(model.covar(), other.covar())
@@ -110,19 +112,19 @@ def convert_truth(
     *,
     start: datetime.datetime | None = None,
 ) -> Truth:
-    """Ground truth paths of Stone Soup as the truth of a run: each is there at the times that it has a state of.
+    """Convert ground truth paths of Stone Soup into the truth of a run; a path exists at the times of its states.
 
     Args:
         paths: `GroundTruthPath`s, or anything that iterates over states with a `timestamp` and a `state_vector`.
         times: of the scans, increasing.
         layout: of the states.
-        start: the time that is 0 s; None: the first.
+        start: the time of 0 s; None: the first.
     """
     moments = list(times)
     start = moments[0] if start is None and moments else start
     where = {moment: k for k, moment in enumerate(moments)}
     states: list[dict[int, Any]] = [{} for _ in moments]
-    # A set has no order of its own; paths have an id.
+    # Sets are unordered; paths have an id.
     for number, path in enumerate(sorted(paths, key=lambda path: (path[0].timestamp, str(getattr(path, "id", ""))))):
         for state in path:
             if state.timestamp in where:

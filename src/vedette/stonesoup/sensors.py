@@ -1,7 +1,7 @@
-"""Stone Soup's measurement models, noise, fields of view and clutter as models of a sensor.
+"""Conversion of Stone Soup's measurement models, noise, fields of view and clutter into sensor models.
 
-Its bearings are counter-clockwise from the x axis as those here are, but from where the sensor points: what is measured
-is turned by the `rotation_offset` (`vedette.recorded.detections.elements_of`), and the pose is told by it.
+Its bearings are counter-clockwise from the x axis as in Vedette, but relative to the direction of the sensor.
+Measurements are rotated by the `rotation_offset` (`vedette.recorded.detections.elements_of`), and the pose uses it.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ from vedette.models import (
 from vedette.models.arguments import float_array, positive_definite, reject
 from vedette.stonesoup.motions import StateLayout
 
-# What each measures, by the names of `vedette.recorded.table_of_detections`; how; and as which clutter knows it.
+# Measured quantities, by the names of `vedette.recorded.table_of_detections`; the model; and its name for clutter.
 _MEASURED: dict[type, tuple[tuple[str, ...], Any, str]] = {
     LinearGaussian: (("x", "y"), position, "position"),
     CartesianToBearingRange: (("bearing", "range"), bearing_range, "bearing_range"),
@@ -51,7 +51,7 @@ _MEASURED: dict[type, tuple[tuple[str, ...], Any, str]] = {
 }
 _ROUND = (RadarBearingRange, RadarBearing)
 _ROTATING = (RadarRotatingBearingRange, RadarRotatingBearing)
-_NO_LIMIT = 1e9  # m, of a field of view without one
+_NO_LIMIT = 1e9  # m, range of an unlimited field of view
 
 
 def _entry(model: Any) -> tuple[tuple[str, ...], Any, str]:
@@ -62,22 +62,22 @@ def _entry(model: Any) -> tuple[tuple[str, ...], Any, str]:
 
 
 def measurement_model_of(sensor: Any) -> Any:
-    """The measurement model of a sensor as it stands, or the model itself."""
+    """Return the current measurement model of a sensor, or the model itself."""
     return getattr(sensor, "measurement_model", sensor)
 
 
 def measured_quantities(model: Any) -> tuple[str, ...]:
-    """What the elements of a measurement are, by the names of `vedette.recorded.table_of_detections`."""
+    """Return the quantities of a measurement, by the names of `vedette.recorded.table_of_detections`."""
     return _entry(model)[0]
 
 
 def convert_measurement(model: Any, layout: StateLayout) -> MeasurementModel:
-    """A measurement model of Stone Soup's that has an equal here, once bearings are turned by its `rotation_offset`.
+    """Convert a Stone Soup measurement model; bearings are rotated by its `rotation_offset`.
 
     `LinearGaussian` of the position, `CartesianToBearingRange` and `Cartesian2DToBearing`.
 
     Raises:
-        InputError: another model, or one of another `mapping` than the motion has the position in.
+        InputError: another model, or one whose `mapping` is not that of the position in the motion model.
     """
     made: MeasurementModel = _entry(model)[1]()
     if tuple(model.mapping) != layout.position:
@@ -87,10 +87,10 @@ def convert_measurement(model: Any, layout: StateLayout) -> MeasurementModel:
 
 
 def convert_pose(model: Any) -> Floats:
-    """[px, py, heading_rad] of the sensor that a measurement model is of; zeros of one that is nowhere.
+    """Return [px, py, heading_rad] of the sensor of a measurement model; zeros if it has no position.
 
     Raises:
-        InputError: a sensor that is turned about the x or the y axis.
+        InputError: a sensor that is rotated about the x or the y axis.
     """
     _entry(model)
     offset, rotation = getattr(model, "translation_offset", None), getattr(model, "rotation_offset", None)
@@ -110,7 +110,7 @@ def _constant_cov(state: Floats, pose: Floats, params: Floats, out: Floats) -> N
 
 
 def convert_noise(model: Any) -> NoiseModel:
-    """Its noise covariance, of independent components or not.
+    """Convert the noise covariance of a measurement model, diagonal or not.
 
     Raises:
         InputError: a matrix that is not positive definite.
@@ -125,12 +125,14 @@ def convert_noise(model: Any) -> NoiseModel:
 
 
 def convert_detection(sensor: Any, prob_detection: float) -> DetectionModel:
-    """Detection with a probability wherever a sensor looks, and nowhere else; of a measurement model, everywhere.
+    """Return detection with a probability inside a sensor's field of view, and 0 outside.
 
-    Stone Soup's radars detect all that is in their field of view; the probability says how far to trust that.
+    For a measurement model, everywhere.
+
+    Stone Soup's radars detect every target in their field of view; the probability corrects this.
 
     Raises:
-        InputError: a sensor whose field of view is none that is known here, or that looks past obstacles.
+        InputError: a sensor with an unsupported field of view, or with obstacles.
     """
     if type(sensor) in _MEASURED:
         return constant_detection(prob_detection)
@@ -147,12 +149,12 @@ def convert_detection(sensor: Any, prob_detection: float) -> DetectionModel:
 
 
 def convert_clutter(source: Any, model: Any) -> ClutterModel:
-    """Uniform clutter of a measurement model.
+    """Return uniform clutter of a measurement model.
 
     Args:
-        source: a `ClutterModel` of Stone Soup's that is uniform in x and y; a `SimpleDetectionSimulator`, of which the
-            `meas_range` and `clutter_rate` are taken; or a clutter model of this library.
-        model: of the sensor that measures it.
+        source: a Stone Soup `ClutterModel` that is uniform in x and y; a `SimpleDetectionSimulator`, whose
+            `meas_range` and `clutter_rate` are used; or a clutter model of Vedette.
+        model: measurement model of the sensor.
 
     Raises:
         InputError: another source or distribution.

@@ -1,4 +1,4 @@
-"""A tracker of Stone Soup's on the filters and fusion rules of this library."""
+"""A Stone Soup tracker that uses Vedette's filters and fusion rules."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ from vedette.stonesoup.scans import ScanConverter, Scans
 from vedette.tracking import State, TrackerInfo
 from vedette.tracking import Tracker as VedetteTracker
 
-# Squared distance in standard deviations of the noise, up to four components: one detection in 10^4 is farther.
+# Squared distance in standard deviations of the noise, up to four components: exceeded by one detection in 10^4.
 _NEAR = 23.5
 
 
 class LabelledTracker(_TrackerMixInUpdate, Tracker):  # type: ignore[misc] # Stone Soup is untyped
-    """Tracks are the labels of a random finite set filter, an LMB or a GLMB of one or several sensors.
+    """Stone Soup tracker whose tracks are the labels of an LMB or GLMB filter of one or several sensors.
 
-    A label has a track from when its target exists with more than `existence_threshold` until it does with no more than
-    `end_threshold`, with a state at every time; then it also has those from before, since it passed `end_threshold`, as
-    tracks of Stone Soup's initiators do. Its `id` is the label ("birth step.index"), when it comes back
-    "birth step.index (2)", and `metadata["existence"]` the probability. The state is a `GaussianStateUpdate`. As a
-    filter averages over associations, its hypothesis names the detection that is nearest to the updated state in
-    standard deviations of the sensor's noise, of several sensors the nearest of all; a `MissedDetection` where none is
-    near. The prediction in it is the track's last state moved on, none of a new track.
+    A label has a track from the time its existence exceeds `existence_threshold` until it no longer exceeds
+    `end_threshold`, with a state at every time; it then also has the earlier states since it exceeded `end_threshold`,
+    like tracks of Stone Soup's initiators. Its `id` is the label ("birth step.index"), if it returns "birth step.index
+    (2)", and `metadata["existence"]` the probability. The state is a `GaussianStateUpdate`. As a filter averages over
+    associations, its hypothesis names the detection that is nearest to the updated state in standard deviations of the
+    sensor's noise, over all sensors; a `MissedDetection` if none is near. The prediction in it is the predicted last
+    state of the track; a new track has none.
     """
 
     detector: Any = Property(doc="Yields times and sets of detections: a detector, reader, simulator or list.")
@@ -78,11 +78,11 @@ class LabelledTracker(_TrackerMixInUpdate, Tracker):  # type: ignore[misc] # Sto
 
     @property
     def tracks(self) -> set[Track]:
-        """Those of the targets that are there now."""
+        """Tracks of the targets that currently exist."""
         return {track for label, track in self._current.items() if label in self._confirmed}
 
     def update_tracker(self, time: datetime.datetime, detections: Any) -> tuple[datetime.datetime, set[Track]]:
-        """Take in the detections of a time; the tracks then."""
+        """Update with the detections of a time; return the time and the tracks."""
         given = self._scans.at(time, detections)
         self.state, self.info = self.tracker.step(self.state, given.scans, given.poses, given.time, rngs=self._rngs)
         before, self._current = self._current, {}
@@ -96,7 +96,7 @@ class LabelledTracker(_TrackerMixInUpdate, Tracker):  # type: ignore[misc] # Sto
             hypothesis = SingleHypothesis(self._prediction(track, time), self._nearest(mean, given, time))
             vector, spread = self._in_their_order(mean, cov)
             update = GaussianStateUpdate(vector, spread, timestamp=time, hypothesis=hypothesis)
-            if track.states and track.timestamp == time:  # scans of one time that came apart
+            if track.states and track.timestamp == time:  # scans of one time that were passed separately
                 track[-1] = update
             else:
                 track.append(update)
@@ -123,7 +123,7 @@ class LabelledTracker(_TrackerMixInUpdate, Tracker):  # type: ignore[misc] # Sto
         return GaussianStatePrediction(*self._in_their_order(*moved), timestamp=time)
 
     def _nearest(self, mean: Floats, given: Scans, time: datetime.datetime) -> Any:
-        """The detection nearest to a state, or a missed one."""
+        """Return the detection nearest to a state, or a missed one."""
         best, found = _NEAR, None
         for sensor, scan, pose, detections in zip(
             self.models.sensors, given.scans, given.poses, given.detections, strict=True
