@@ -11,7 +11,7 @@ from vedette import models
 from vedette.densities import FactoredGLMB, existence_probabilities
 from vedette.filters import FactoredGlmbFilter
 from vedette.kernels.base.types import FactoredGlmb, Glmb, Mixture, Tracks
-from vedette.kernels.labelled.renaming import with_known_names
+from vedette.kernels.labelled.established_labels import with_established_labels
 from vedette.kernels.labelled.splitting import choices_of
 
 LABELS = np.array([[1, 0], [2, 0], [2, 1]])
@@ -38,7 +38,7 @@ def listed(density: Glmb) -> dict[tuple[tuple[float, ...], ...], float]:
 
 def test_an_improbable_other_name_takes_the_known_one_and_keeps_its_track() -> None:
     before = glmb({(0,): 0.992, (1,): 0.004, (): 0.004})
-    after, choices, error = with_known_names(before, choices_of(before), 0.01)
+    after, choices, error = with_established_labels(before, choices_of(before), 0.01)
     assert listed(after) == pytest.approx({((1, 0, 0.0),): 0.992, ((1, 0, 4.0),): 0.004, (): 0.004}, rel=1e-12)
     assert choices.labels.tolist() == [[1, 0]]
     assert error == pytest.approx(0.008, rel=1e-12)
@@ -46,14 +46,14 @@ def test_an_improbable_other_name_takes_the_known_one_and_keeps_its_track() -> N
 
 def test_another_target_keeps_its_name() -> None:
     before = glmb({(0,): 0.992, (0, 1): 0.004, (): 0.004})
-    after, _, error = with_known_names(before, choices_of(before), 0.01)
+    after, _, error = with_established_labels(before, choices_of(before), 0.01)
     assert error == 0.0
     assert listed(after) == listed(before)
 
 
 def test_the_least_probable_names_go_first_and_no_more_than_the_error_allows() -> None:
     before = glmb({(0,): 0.99, (1,): 0.006, (2,): 0.004})
-    after, choices, error = with_known_names(before, choices_of(before), 0.01)
+    after, choices, error = with_established_labels(before, choices_of(before), 0.01)
     assert error == pytest.approx(0.008, rel=1e-12)
     assert choices.labels.tolist() == [[1, 0], [2, 0]]
     assert listed(after)[((1, 0, 8.0),)] == pytest.approx(0.004, rel=1e-12)
@@ -61,7 +61,7 @@ def test_the_least_probable_names_go_first_and_no_more_than_the_error_allows() -
 
 def test_hypotheses_that_hold_both_names_are_left_out() -> None:
     before = glmb({(0,): 0.99, (1,): 0.0038, (0, 1): 0.0002, (): 0.006})
-    after, _, _ = with_known_names(before, choices_of(before), 0.01)
+    after, _, _ = with_established_labels(before, choices_of(before), 0.01)
     assert listed(after) == pytest.approx(
         {((1, 0, 0.0),): 0.99 / 0.9998, ((1, 0, 4.0),): 0.0038 / 0.9998, (): 0.006 / 0.9998}, rel=1e-12
     )

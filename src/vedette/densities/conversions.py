@@ -17,7 +17,7 @@ from vedette.densities.labelled import LMB, LabelledDensity
 from vedette.densities.tracks import TrackTable, single_gaussians, take_tracks
 from vedette.errors import InputError
 from vedette.internal.probabilities import log_expit
-from vedette.kernels.association.label_resolution import settled_names
+from vedette.kernels.association.label_resolution import resolved_labels
 from vedette.kernels.base.types import Lmb
 from vedette.kernels.gaussian.pooling import reduced_tracks
 from vedette.kernels.gaussian.reduction import MixtureCaps
@@ -132,7 +132,7 @@ def reduced_lmb(density: LabelledDensity, caps: MixtureCaps, *, resolved: bool =
     all_labels, place = distinct_labels(density.tracks.labels)
     place_of_entry = place[factors.hyp_tracks]
     if resolved:
-        place_of_entry = settled_names(hypotheses, factors.factor_offsets, factors.track_offsets, place, _APART)
+        place_of_entry = resolved_labels(hypotheses, factors.factor_offsets, factors.track_offsets, place, _APART)
     used = np.bincount(place_of_entry, minlength=len(all_labels)) > 0  # the table may contain unused labels
     factor = np.empty(len(all_labels), np.int64)
     factor[place] = np.repeat(np.arange(len(factors.factor_offsets) - 1), np.diff(factors.track_offsets))

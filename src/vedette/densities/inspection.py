@@ -11,7 +11,7 @@ from vedette.errors import InputError
 from vedette.internal.text import pluralise
 from vedette.kernels.base.types import HEIGHT, Floats, Ints
 
-_MOST_TOLD = 3
+_MOST_SHOWN = 3
 _LARGE = 1e7  # m, from which on a position is shown in powers of ten
 _CORNERS, _FAINTEST = 73, 0.15
 _COLUMNS = ("x_m", "y_m", "vx_mps", "vy_mps")
@@ -51,15 +51,15 @@ class Targets(NamedTuple):
 
     def in_words(self) -> str:
         """Return the likeliest few in words: label, probability (or expected number), position and its std."""
-        first = np.argsort(-self.weights, kind="stable")[:_MOST_TOLD]
-        told = []
+        first = np.argsort(-self.weights, kind="stable")[:_MOST_SHOWN]
+        parts = []
         for target in self._at(first).each():
             with np.errstate(invalid="ignore"):
                 stds = np.sqrt(np.diagonal(target.cov))
             name = "" if target.label is None else f"{target.label[0]}.{target.label[1]}: "
-            told.append(f"{name}{target.existence:.3g} at {_place(target.mean)} ± {_place(stds)} m")
+            parts.append(f"{name}{target.existence:.3g} at {_place(target.mean)} ± {_place(stds)} m")
         more = len(self.weights) - len(first)
-        return "; ".join(told + ([f"{more} more"] if more else []))
+        return "; ".join(parts + ([f"{more} more"] if more else []))
 
     def columns(self, weight: str) -> dict[str, list[Any]]:
         """Return the columns of `MultiTarget.to_table`."""
@@ -114,5 +114,5 @@ def state_columns(means: Floats, covs: Floats, *, has_height: bool = False) -> d
 
 
 def _place(state: Floats) -> str:
-    told = [f"{x:.1f}" if abs(x) < _LARGE else f"{x:.3g}" for x in state[:2].tolist()]
-    return f"({', '.join(told)})"
+    parts = [f"{x:.1f}" if abs(x) < _LARGE else f"{x:.3g}" for x in state[:2].tolist()]
+    return f"({', '.join(parts)})"

@@ -18,7 +18,7 @@ from vedette.internal.threads import run_chunks
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.gaussian.information import row_size
 from vedette.kernels.gaussian.linalg import LOG_2PI
-from vedette.kernels.labelled.power_integrals import Laid, Places, SensorCases, Terms, power_table, write_rows
+from vedette.kernels.labelled.power_integrals import Places, PreparedCases, SensorCases, Terms, power_table, write_rows
 
 
 class SensorPower(NamedTuple):
@@ -50,7 +50,7 @@ class PowerProducts:
         state_dim: length of a target's state.
     """
 
-    laid: Laid
+    laid: PreparedCases
     log_weights: Floats
     log_dets: Floats
     rows: Floats
@@ -131,11 +131,11 @@ def precompute_products(
     chosen = np.array([i for i, place in enumerate(prediction.places) if place in known], np.int64)
     target = _restricted(prediction, chosen)
     references = target.means[0].copy()
-    parts = [_lay_out(share, target, references) for share in shares]
-    own = _lay_out(SensorPower.whole(target, np.ones((1, len(target.sets)), np.bool_)), target, references)
+    parts = [_prepare(share, target, references) for share in shares]
+    own = _prepare(SensorPower.whole(target, np.ones((1, len(target.sets)), np.bool_)), target, references)
     log_weights, held, rows = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     all_held = bool(np.any([part[1].all(axis=0) for part in parts], axis=0).all())
-    laid = Laid(target.factor_offsets, target.set_offsets, log_weights, held, all_held, rows)
+    laid = PreparedCases(target.factor_offsets, target.set_offsets, log_weights, held, all_held, rows)
     columns = np.arange(len(shares)) if sensors is None else np.array(sensors, np.int64)
     first_cases = offsets_of([share.cases.num_cases for share in shares])[:-1].copy()
     log_dets = np.linalg.slogdet(target.covs[0])[1]
@@ -162,7 +162,7 @@ def _restricted(cases: DensityBatch, chosen: Ints) -> DensityBatch:
     )
 
 
-def _lay_out(share: SensorPower, target: DensityBatch, references: Floats) -> tuple[Floats, Bools, Floats]:
+def _prepare(share: SensorPower, target: DensityBatch, references: Floats) -> tuple[Floats, Bools, Floats]:
     """Return log weights, masks of held sets, and rows of a sensor's cases on the sets of `target`."""
     cases = share.cases
     own = {place: i for i, place in enumerate(cases.places)}

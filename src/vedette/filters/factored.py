@@ -31,12 +31,12 @@ from vedette.filters.undetected import (
     after_scan,
     before_scan,
     most_components,
-    named_at,
     no_arrivals,
     no_births,
     no_undetected,
     split_births,
     with_dropped,
+    with_step,
 )
 from vedette.kernels.base.types import Bools, FactoredGlmb, Ints, Lmb
 from vedette.kernels.steps.factor_updates import Factoring
@@ -117,7 +117,7 @@ class _FactoredFilterBase(LabelledFilterBase[FactoredGLMB]):
             undetected = with_cells(undetected, targets.birth, dt, appear=appear)
             undetected = with_deaths(undetected, prior, targets.survival, dt)
         if step is not None:
-            undetected = named_at(undetected, step, self.targets.birth.num_sites)
+            undetected = with_step(undetected, step, self.targets.birth.num_sites)
         return _Before(density, undetected, arrivals, error)
 
     def _stepped(self, prior: _Before, step: SensorStep) -> tuple[_Before, FactoredReport]:

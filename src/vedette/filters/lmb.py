@@ -18,7 +18,7 @@ from vedette.filters.multi_sensor import MultiSensorFilter, SequentialUpdate
 from vedette.filters.protocols import Filter, FilterInfo
 from vedette.kernels.association.marginals import Association
 from vedette.kernels.base.types import Bools, Ints, Lmb
-from vedette.kernels.steps.field_of_view import in_view, marked, put_back
+from vedette.kernels.steps.field_of_view import in_view, marked, merge_updated
 from vedette.kernels.steps.lmb import LmbReport, step_lmb
 from vedette.kernels.steps.multi_sensor_combinations import predict_combinations, standing_combinations
 from vedette.kernels.steps.multi_sensor_lmb import update_lmb
@@ -115,12 +115,12 @@ class SequentialLmbFilter(LmbFilterBase, SequentialUpdate[LMB]):
         return step_lmb(prior, *step.inputs, step.limits.reduction(), association)
 
     def _updated_in_view(self, prior: Lmb, settled: Bools, step: SensorStep) -> tuple[Lmb, LmbReport, Bools]:
-        """Return `_stepped` of the labels that the scan may affect; settled: see `put_back`, empty if none."""
+        """Return `_stepped` of the labels that the scan may affect; settled: see `merge_updated`, empty if none."""
         scan, _, sensor, truncation = step.inputs
         marks = in_view(prior.tracks, scan, sensor, truncation)
         updated, report = self._stepped(marked(prior, marks), step)
         before = settled if len(settled) else np.zeros(len(marks), np.bool_)
-        posterior, settled = put_back(prior, marks, updated, step.limits.track_caps(), before)
+        posterior, settled = merge_updated(prior, marks, updated, step.limits.track_caps(), before)
         return posterior, report, settled
 
 

@@ -89,7 +89,7 @@ def _intensity_of(labels: Lmb) -> Mixture:
     return tracks.components._replace(log_weights=weighed)
 
 
-def named_at(undetected: UndetectedTargets, step: Any, num_sites: int) -> UndetectedTargets:
+def with_step(undetected: UndetectedTargets, step: Any, num_sites: int) -> UndetectedTargets:
     """Return the undetected targets with new labels at this step. Raises `InputError` for a step before the last."""
     number, last = step_number(step), undetected.next_label[0]
     if number < last:

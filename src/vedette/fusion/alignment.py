@@ -14,7 +14,7 @@ from vedette.densities.tracks import take_tracks
 from vedette.kernels.base.types import Floats, Ints
 
 
-def side_by_side(beliefs: Sequence[FactoredGLMB], max_products: int) -> tuple[list[FactoredGLMB], Floats]:
+def align_factors(beliefs: Sequence[FactoredGLMB], max_products: int) -> tuple[list[FactoredGLMB], Floats]:
     """Return the beliefs with one factor for each of the smallest groups of labels that no factor crosses.
 
     Factor g of each belief holds labels of group g alone; if a belief has none of them, its factor g is certain of no
@@ -36,8 +36,8 @@ def _one_a_group(belief: FactoredGLMB, groups: Ints, num_groups: int, max_produc
     ends = np.searchsorted(groups[order], np.arange(num_groups + 1))
     counts = np.diff(ends)
     single, none = np.flatnonzero(counts == 1), np.flatnonzero(counts == 0)
-    nobody = FactoredGLMB.of(GLMB.empty(belief.state_dim))
-    parts = [take_factors(belief, order[ends[single]]), take_factors(nobody, np.zeros(len(none), np.int64))]
+    empty = FactoredGLMB.of(GLMB.empty(belief.state_dim))
+    parts = [take_factors(belief, order[ends[single]]), take_factors(empty, np.zeros(len(none), np.int64))]
     several = np.flatnonzero(counts > 1)
     for group in several.tolist():
         factors = take_factors(belief, order[ends[group] : ends[group + 1]])

@@ -137,12 +137,12 @@ def all_valid(beliefs: Sequence[Any]) -> bool:
     """Return True if all beliefs are valid LMBs of one state dimension; fast, without reporting faults."""
     if not beliefs or not all(isinstance(belief, LabelledDensity) and belief.is_lmb for belief in beliefs):
         return False
-    if not all(map(_formed, beliefs)) or len({belief.state_dim for belief in beliefs}) > 1:
+    if not all(map(_has_kernel_arrays, beliefs)) or len({belief.state_dim for belief in beliefs}) > 1:
         return False
     return all(is_valid_lmb(belief.to_kernel()) for belief in beliefs)
 
 
-def _formed(belief: Any) -> bool:
+def _has_kernel_arrays(belief: Any) -> bool:
     """Return True if the arrays of an LMB have the types that kernels expect."""
     tracks, logits = belief.tracks, belief.existence_logit
     arrays = tracks.labels, tracks.offsets, tracks.log_weights, tracks.means, tracks.covs, logits

@@ -13,7 +13,7 @@ from vedette.densities import GLMB, FactoredGLMB, LabelledDensity
 from vedette.densities.batches import DensityBatch
 from vedette.densities.conversions import marginalised_factors
 from vedette.densities.products import PowerProducts, SensorPower
-from vedette.fusion.alignment import side_by_side, sort_factors
+from vedette.fusion.alignment import align_factors, sort_factors
 from vedette.fusion.base import FusionInfo, active_sensors, check_beliefs, check_kinds, check_weights, per_sensor_counts
 from vedette.fusion.powers import FusionLimits, MixturePower, check_power, numerical_errors_of_tracks, power_rule
 from vedette.fusion.precomputed import precompute_glmbs
@@ -93,7 +93,7 @@ class CmDeltaGlmb:
             fused = GLMB.from_kernel(glmb)
         else:
             factored = [marginalised_factors(FactoredGLMB.of(belief), power.caps) for belief in own]
-            sensors, log_shares = side_by_side(factored, self.limits.max_hypotheses)
+            sensors, log_shares = align_factors(factored, self.limits.max_hypotheses)
             hyps, sensor_of = _stacked(sensors)
             sets = Sets(hyps, sensor_of, np.concatenate([sensor.factor_of for sensor in sensors]))
             with numerical_errors_of_tracks():

@@ -62,11 +62,11 @@ def match_labels(
     Raises `InputError` for beliefs other than labelled densities of one state dimension, an invalid density, or a
     probability outside (0, 1).
     """
-    names = common_names(beliefs, gate_probability=gate_probability)
+    names = common_labels(beliefs, gate_probability=gate_probability)
     return [relabelled(belief, own) for belief, own in zip(beliefs, names, strict=True)]
 
 
-def common_names(
+def common_labels(
     beliefs: Sequence[LabelledDensity], *, gate_probability: float = GATE_PROBABILITY
 ) -> list[dict[Label, Label]]:
     """For each sensor, the label that `match_labels` gives to each of its labels. Raises the same errors."""
@@ -81,7 +81,7 @@ def common_names(
     found, common = owns[0], [{label: label for label in owns[0].labels}]
     for sensor in range(1, len(beliefs)):
         own = owns[sensor]
-        names = _names(own, found, _pairs(own, found, gate), sensor)
+        names = _common_labels(own, found, _pairs(own, found, gate), sensor)
         common.append(dict(zip(own.labels, names, strict=True)))
         found = _joined(found, own._replace(labels=names))
     return common
@@ -124,7 +124,7 @@ def _assign(rows: Ints, columns: Ints, costs: Floats, pairs: dict[int, int]) -> 
             pairs[int(row_names[r])] = int(column_names[c])
 
 
-def _names(own: _Targets, found: _Targets, pairs: dict[int, int], sensor: int) -> list[Label]:
+def _common_labels(own: _Targets, found: _Targets, pairs: dict[int, int], sensor: int) -> list[Label]:
     """Return the new label of each of a sensor's labels."""
     taken = set(found.labels)
     names: dict[int, Label] = {i: found.labels[place] for i, place in pairs.items()}

@@ -123,7 +123,7 @@ def grouped_sets(
             chosen[:, evidence.columns, s] = tracks
         for label in np.flatnonzero(lacking & (power > 0.0)).tolist():
             num_missing[s] += 1
-            log_weights += power * _of_dropped(members[:, label], prior, missing_existence)
+            log_weights += power * _dropped_log_ratios(members[:, label], prior, missing_existence)
     rows = np.column_stack([np.nonzero(members)[1], chosen[members]])
     distinct, place = np.unique(rows, axis=0, return_inverse=True)
     places = np.full(members.shape, -1)
@@ -166,7 +166,7 @@ class _FactorEvidence(NamedTuple):
         return cls(columns, (after - before)[part_of.ravel()], tracks[part_of.ravel()])
 
 
-def _of_dropped(member: Bools, prior: Floats, missing_existence: float) -> Floats:
+def _dropped_log_ratios(member: Bools, prior: Floats, missing_existence: float) -> Floats:
     """Log weight ratios (num_sets,) of a posterior that dropped a label: existence is at most `missing_existence`."""
     number = member.astype(np.int64)
     sums = group_log_sums(prior, number, 2)

@@ -20,7 +20,7 @@ from vedette.models import SensorModel
 from vedette.models.arguments import float_array, instance, one_a_sensor, reject, sequence
 
 # Existence at which the information of a scan is evaluated: at 1 it is infinite for a sensor that never misses.
-SURE_EXISTENCE = 0.999
+NEAR_CERTAIN_EXISTENCE = 0.999
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -120,7 +120,7 @@ def view_weights(aligned: AlignedLmbs, weights: Floats, views: FieldsOfView, act
     if unseen.any() and not all(views.scanned):
         detection = np.where(unseen, _detection(aligned, views.if_all_scanned(), active), detection)
         unseen = ~(detection > 0.0).any(axis=1, keepdims=True)
-    shares = weights * np.where(unseen, aligned.held, detection / (1.0 - SURE_EXISTENCE * detection))
+    shares = weights * np.where(unseen, aligned.held, detection / (1.0 - NEAR_CERTAIN_EXISTENCE * detection))
     return np.asarray(shares / sum_over_sensors(shares)[:, None])
 
 

@@ -166,12 +166,12 @@ class Episodes:
     def info(self) -> dict[str, Any]:
         """Return the position in the run and the filters' health since the last decision, without the truth."""
         first, last = self._moments[0].step - 1, self._moments[-1].step
-        told: dict[str, Any] = {"seed": self._seed, "run": self._run, "step": last, "time": self._moments[-1].time}
-        told |= {"num_moved": self.num_moved}
+        info: dict[str, Any] = {"seed": self._seed, "run": self._run, "step": last, "time": self._moments[-1].time}
+        info |= {"num_moved": self.num_moved}
         kept = {name: getattr(self._journal.health, name)[first:last] for name in Health.__match_args__}
         means = {name: own.mean(axis=0) for name, own in kept.items() if name not in _NOT_AVERAGED}
-        told["health"] = {name: np.asarray(own) for name, own in means.items() if np.isfinite(own).all()}
-        return told
+        info["health"] = {name: np.asarray(own) for name, own in means.items() if np.isfinite(own).all()}
+        return info
 
     def record(self) -> RunRecord:
         """Return the record of the run so far, as `vedette.evaluation.run_scenario` returns it for a planner."""

@@ -111,8 +111,8 @@ class ScenarioParallelEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is u
             found[agent] = {name: array.copy() for name, array in (shown | own).items()}
         return found
 
-    def _all(self, told: Callable[[], dict[str, Any]]) -> dict[str, dict[str, Any]]:
-        return {agent: told() for agent in self._sensors}
+    def _all(self, make: Callable[[], dict[str, Any]]) -> dict[str, dict[str, Any]]:
+        return {agent: make() for agent in self._sensors}
 
     def render(self) -> NDArray[np.uint8] | None:
         """Return the result of `ScenarioEnv.render`."""

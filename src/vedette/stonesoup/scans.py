@@ -85,16 +85,16 @@ class ScanConverter:
         return Scans(seconds, tuple(scans), np.array([self._poses[s] for s in range(len(rows))]), tuple(kept))
 
     def _sensor(self, detection: Any, place: str) -> int:
-        names, told = self.models.names, getattr(detection, "metadata", None) or {}
-        if "sensor" in told and str(told["sensor"]) in names:
-            return names.index(str(told["sensor"]))
+        names, metadata = self.models.names, getattr(detection, "metadata", None) or {}
+        if "sensor" in metadata and str(metadata["sensor"]) in names:
+            return names.index(str(metadata["sensor"]))
         if len(names) == 1:
             return 0
         model = getattr(detection, "measurement_model", None)
         alike = [s for s, source in enumerate(self.models.sources) if _same(model, measurement_model_of(source))]
         if len(alike) != 1:
             wanted = f"{', '.join(names)}, or the measurement_model of one of them"
-            raise InputError(f'{place}, metadata["sensor"]: expected one of {wanted}; got {told.get("sensor")}')
+            raise InputError(f'{place}, metadata["sensor"]: expected one of {wanted}; got {metadata.get("sensor")}')
         return alike[0]
 
 

@@ -68,8 +68,8 @@ class LabelledTracker(_TrackerMixInUpdate, Tracker):  # type: ignore[misc] # Sto
         self.info: TrackerInfo | None = None
         self._scans = ScanConverter(self.models, self.every_sensor_scans)
         if not 0.0 <= self.end_threshold <= self.existence_threshold < 1.0:
-            told = f"{self.end_threshold} and {self.existence_threshold}"
-            raise InputError(f"end_threshold: expected 0 <= end_threshold <= existence_threshold < 1; got {told}")
+            given = f"{self.end_threshold} and {self.existence_threshold}"
+            raise InputError(f"end_threshold: expected 0 <= end_threshold <= existence_threshold < 1; got {given}")
         streams = np.random.SeedSequence(self.seed).spawn(len(self.models.sensors))
         self._rngs = [np.random.default_rng(stream) for stream in streams]
         self._current: dict[tuple[int, int], Track] = {}

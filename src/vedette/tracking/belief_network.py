@@ -12,7 +12,7 @@ from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.filters import FilterInfo
 from vedette.fusion import FieldsOfView, Fusion, FusionInfo, LabelMatchedFusion, requires_common_prior
-from vedette.fusion.matching import common_names, relabelled
+from vedette.fusion.matching import common_labels, relabelled
 from vedette.fusion.rebasing import rebase, with_labels_of
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import reject
@@ -179,7 +179,7 @@ class BeliefNetwork(LocalFilters):
         base = predictions[0]
         if any(prediction is not base for prediction in predictions):
             if isinstance(self.merging, LabelMatchedFusion):
-                names = common_names(predictions, gate_probability=self.merging.gate_probability)
+                names = common_labels(predictions, gate_probability=self.merging.gate_probability)
                 predictions = list(map(relabelled, predictions, names))
                 posteriors = list(map(relabelled, posteriors, names))
             merging = with_weights(self.merging, (weights / weights.sum()).tolist())

@@ -134,7 +134,7 @@ def _weigh(options: Options, components: Ints, meetings: Meetings) -> None:
 
 
 @kernel
-def leave_to_others(options: Options, group_of: Ints, alone: Alternatives, components: Ints) -> float:
+def apply_contention(options: Options, group_of: Ints, alone: Alternatives, components: Ints) -> float:
     """Multiply the options of rows by the shares of their measurements that other groups leave.
 
     Args:

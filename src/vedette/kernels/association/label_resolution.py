@@ -131,7 +131,7 @@ def _open_places(hyp_tracks: Ints, labels: Ints, places: _Places, moments: Momen
 
 
 @kernel
-def _name_factor(
+def _resolve_factor(
     glmb: Glmb, first: int, last: int, low: int, high: int, label_of: Ints, distance: float, names: Ints
 ) -> None:
     """Write the resolved labels of the targets of hypotheses `first` to `last`, over tracks `low` to `high`.
@@ -167,7 +167,7 @@ def _name_factor(
 
 
 @kernel
-def settled_names(glmb: Glmb, factor_offsets: Ints, track_offsets: Ints, label_of: Ints, distance: float) -> Ints:
+def resolved_labels(glmb: Glmb, factor_offsets: Ints, track_offsets: Ints, label_of: Ints, distance: float) -> Ints:
     """Number of the resolved label of each entry of `glmb.hyp_tracks`, factor by factor, shape (num_entries,).
 
     label_of: (num_tracks,) number of each track's own label. distance: from all open places, in standard deviations of
@@ -179,5 +179,7 @@ def settled_names(glmb: Glmb, factor_offsets: Ints, track_offsets: Ints, label_o
     for factor in range(len(factor_offsets) - 1):
         low, high = track_offsets[factor], track_offsets[factor + 1]
         if high - low > 1:
-            _name_factor(glmb, factor_offsets[factor], factor_offsets[factor + 1], low, high, label_of, distance, names)
+            _resolve_factor(
+                glmb, factor_offsets[factor], factor_offsets[factor + 1], low, high, label_of, distance, names
+            )
     return names

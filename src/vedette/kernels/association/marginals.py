@@ -56,7 +56,7 @@ SUM_TOLERANCE = 1e-6
 
 
 @inlined
-def _told(options: Options, association: Association, out: Floats) -> MarginalSums:
+def _custom_marginals(options: Options, association: Association, out: Floats) -> MarginalSums:
     """Return the marginals of `association`, after a check that they are distributions."""
     offsets, num = options.offsets, options.offsets[-1]
     columns, log_weights = options.columns[:num], options.log_weights[:num]
@@ -211,7 +211,7 @@ def fill_marginals(
     Inlined because `work` is a large bundle, of which the usual small clusters need little.
     """
     if association is not None:
-        return _told(options, association, out), True
+        return _custom_marginals(options, association, out), True
     log_total, num_ranked, log_kept = 0.0, 0, 0.0
     if not find_clusters(options, work):
         for row in range(len(options.offsets) - 1):

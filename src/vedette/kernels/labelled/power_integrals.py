@@ -54,7 +54,7 @@ class Places(NamedTuple):
     references: Floats  # (num_members, state_dim) reference points of the rows
 
 
-class Laid(NamedTuple):
+class PreparedCases(NamedTuple):
     """Cases of all sensors on one list of factors, label sets and members; w is the power of the case's sensor."""
 
     factor_offsets: Ints  # (num_factors + 1,) into the label sets
@@ -154,7 +154,7 @@ def _fill(value: float, out: Floats) -> None:
 
 
 @inlined
-def _multiply(laid: Laid, chosen: Ints, member: int, product: Floats) -> None:
+def _multiply(laid: PreparedCases, chosen: Ints, member: int, product: Floats) -> None:
     """Write the rows of the products of the chosen cases' powers.
 
     If some lack the label, the others' powers sum to one.
@@ -196,7 +196,7 @@ def _add_log_integrals(rows: Floats, dim: int, from_quotient: bool, integrals: I
 
 
 @inlined
-def _integrate(laid: Laid, chosen: Ints, at: int, terms: Terms, work: Work) -> None:
+def _integrate(laid: PreparedCases, chosen: Ints, at: int, terms: Terms, work: Work) -> None:
     """Integrate over the labels of a set: the overlaps, the quadratics and the crossed integrals."""
     product, joint, num_crossed = work.product, work.joint, terms.own_powers.shape[0]
     size, num_samples = product.shape
@@ -264,7 +264,7 @@ def _add_factor(work: Work, out: Floats) -> None:
 
 
 @inlined
-def _is_held(laid: Laid, chosen: Ints, sample: int, at: int) -> bool:
+def _is_held(laid: PreparedCases, chosen: Ints, sample: int, at: int) -> bool:
     held = False
     for s in range(chosen.shape[0]):
         held |= laid.held[chosen[s] + sample, at]
@@ -272,7 +272,7 @@ def _is_held(laid: Laid, chosen: Ints, sample: int, at: int) -> bool:
 
 
 @inlined
-def _power_integrals(laid: Laid, chosen: Ints, terms: Terms, work: Work, out: Floats) -> None:
+def _power_integrals(laid: PreparedCases, chosen: Ints, terms: Terms, work: Work, out: Floats) -> None:
     """Write Z (num_samples, num_pairs) of one product. A label set that no case holds is left out, also of Z(a, 0)."""
     num, num_samples = work.sums.shape
     _fill(0.0, out)
@@ -305,7 +305,7 @@ def _power_integrals(laid: Laid, chosen: Ints, terms: Terms, work: Work, out: Fl
 
 
 @borrowing
-def _own_of_held(laid: Laid, chosen: Ints, sample: int, own: Floats) -> float:
+def _own_of_held(laid: PreparedCases, chosen: Ints, sample: int, own: Floats) -> float:
     """Return Z(a, 0) over the label sets that some chosen case holds."""
     total = 0.0
     for factor in range(laid.factor_offsets.shape[0] - 1):
@@ -319,7 +319,9 @@ def _own_of_held(laid: Laid, chosen: Ints, sample: int, own: Floats) -> float:
 
 
 @kernel
-def power_table(laid: Laid, first_cases: Ints, actions: Ints, terms: Terms, first: int, last: int, out: Floats) -> None:
+def power_table(
+    laid: PreparedCases, first_cases: Ints, actions: Ints, terms: Terms, first: int, last: int, out: Floats
+) -> None:
     """Write Z (num_joint, num_samples, num_pairs) of joint actions `first:last`, the pairs in the order of `terms`.
 
     actions: (num_joint, num_sensors) one action of each sensor; with a sample it is the sensor's case

@@ -197,7 +197,7 @@ def _parents_of(factors: Factors, factor: int, place: Ints) -> Parents:
 
 
 @kernel
-def gathered_group(
+def gather_group(
     factors: Factors, members_of: Ints, rows: Rows, options: Options, max_hypotheses: int, place: Ints, columns: Ints
 ) -> Group:
     """Return the factors `members_of` as a separate problem.

@@ -21,8 +21,8 @@ from vedette.kernels.gaussian.components import components_between, copy_compone
 from vedette.kernels.gaussian.distances import reduction_bound
 from vedette.kernels.gaussian.linalg import log_add, log_sum
 from vedette.kernels.gaussian.reduction import MixtureCaps, ReductionWork, make_reduction_work, reduce_into
+from vedette.kernels.labelled.established_labels import with_established_labels
 from vedette.kernels.labelled.factor_store import FactorStore, append_part, append_single, next_component, with_room
-from vedette.kernels.labelled.renaming import with_known_names
 from vedette.kernels.labelled.splitting import Choices, choices_of, independent_parts
 from vedette.kernels.labelled.track_merging import merge_versions
 from vedette.kernels.steps.assembly import assemble
@@ -241,7 +241,7 @@ def _merged(glmb: Glmb, reduction: Reduction, factoring: Factoring, most: int) -
     """
     caps, choices, renaming_error, max_error = reduction.mixture, choices_of(glmb), 0.0, factoring.max_error
     if reduction.min_existence_logit > -math.inf:  # a prediction keeps all labels
-        glmb, choices, renaming_error = with_known_names(glmb, choices, max_error)
+        glmb, choices, renaming_error = with_established_labels(glmb, choices, max_error)
     glmb, choices, total = merge_versions(glmb, choices, caps, max_error)
     total += renaming_error
     while 0.0 < max_error < factoring.max_merging and _is_crowded(choices, most):

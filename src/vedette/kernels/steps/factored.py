@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.kernels.association.alternatives import alternatives_of, log_unclaimed
-from vedette.kernels.association.contention import leave_to_others
+from vedette.kernels.association.contention import apply_contention
 from vedette.kernels.association.first_detections import (
     candidates_of,
     missed_intensity,
@@ -32,7 +32,7 @@ from vedette.kernels.gaussian.mixtures import require_gaussians
 from vedette.kernels.labelled.factor_store import has_room_for_single, make_store, stored, with_room
 from vedette.kernels.steps.factor_groups import (
     factors_of,
-    gathered_group,
+    gather_group,
     groups_of_rows,
     is_single,
     presence_of_rows,
@@ -120,7 +120,7 @@ def step_factored(
     factors = factors_of(prior, len(rows.log_absent) - len(prior.tracks.labels))
     sizes = factors.num_labels.copy()
     leaders = linked_factors(options, alone, factors.row_offsets, sizes, factoring.max_cut, factoring.max_together)
-    log_twice = leave_to_others(options, groups_of_rows(factors, leaders), alone, rows.offsets)
+    log_twice = apply_contention(options, groups_of_rows(factors, leaders), alone, rows.offsets)
     offsets, members = group_members(leaders, len(leaders))
     work, ranking, most_labels = make_work(rows, options), make_ranking(), 0
     widest = len(work.wide.log_weights)
@@ -136,7 +136,7 @@ def step_factored(
             update_alone(factors.row_offsets[leader], rows, options, reduction, store, work)
             continue
         most = truncation.search.max_hypotheses
-        group = gathered_group(factors, together, rows, options, most, work.place, work.columns)
+        group = gather_group(factors, together, rows, options, most, work.place, work.columns)
         posterior, ranking = update_group(group, truncation, ranking, work)
         if len(posterior.hyp_log_weights) > 0:
             store = append_parts(store, posterior, factoring, reduction, most, work)

@@ -33,7 +33,7 @@ def _least_log_clutter(scan: ScanInput, sensor: Sensor, floor: float) -> float:
 
 
 @inlined
-def _says_something(
+def _may_change(
     tracks: Tracks, c: int, scan: ScanInput, sensor: Sensor, least_log_clutter: float, scratch: Scratch
 ) -> bool:
     """Return True if the scan may change a component.
@@ -61,7 +61,7 @@ def in_view(tracks: Tracks, scan: ScanInput, sensor: Sensor, truncation: Truncat
     least_log_clutter = _least_log_clutter(scan, sensor, truncation.log_clutter_floor)
     for i in range(len(marks)):
         for c in range(tracks.offsets[i], tracks.offsets[i + 1]):
-            if _says_something(tracks, c, scan, sensor, least_log_clutter, scratch):
+            if _may_change(tracks, c, scan, sensor, least_log_clutter, scratch):
                 marks[i] = True
                 break
     return marks
@@ -108,7 +108,7 @@ def _copy_reduced(source: Tracks, i: int, caps: MixtureCaps, out: Tracks, num: i
 
 
 @kernel
-def put_back(prior: Lmb, marks: Bools, updated: Lmb, caps: MixtureCaps, settled: Bools) -> tuple[Lmb, Bools]:
+def merge_updated(prior: Lmb, marks: Bools, updated: Lmb, caps: MixtureCaps, settled: Bools) -> tuple[Lmb, Bools]:
     """Return the prior with its marked tracks as in `updated`, or dropped if they are not in it; in label order.
 
     Mixtures of the other tracks are reduced as by an update without effect, which may merge results of the last one.

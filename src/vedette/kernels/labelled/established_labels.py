@@ -21,7 +21,7 @@ _BESIDE, _KNOWN = 0.1, 0.5
 
 
 @borrowing
-def _known_name(choices: Choices, existences: Floats, label: int) -> int:
+def _established_label(choices: Choices, existences: Floats, label: int) -> int:
     """Return the most probable label that another one is an alternative of, -1 for none."""
     best = -1
     for known in range(len(existences)):
@@ -56,7 +56,7 @@ def _rename(choices: Choices, existences: Floats, label: int, known: int, labels
 
 
 @kernel
-def with_known_names(glmb: Glmb, choices: Choices, max_error: float) -> tuple[Glmb, Choices, float]:
+def with_established_labels(glmb: Glmb, choices: Choices, max_error: float) -> tuple[Glmb, Choices, float]:
     """Return the GLMB without improbable alternative labels, its choices, and the L1 change of the density.
 
     choices: of the GLMB, heaviest first; written. max_error: bound on the L1 error of the labelled density, twice the
@@ -71,7 +71,7 @@ def with_known_names(glmb: Glmb, choices: Choices, max_error: float) -> tuple[Gl
         error = 2.0 * existences[label]
         if spent + error > max_error:
             break
-        known = _known_name(choices, existences, label)
+        known = _established_label(choices, existences, label)
         if known >= 0:
             _rename(choices, existences, label, known, labels)
             spent += error
