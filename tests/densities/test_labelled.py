@@ -22,7 +22,7 @@ from vedette.densities import (
     track_moments,
 )
 from vedette.densities.conversions import with_single_gaussians
-from vedette.densities.label_sets import possible
+from vedette.densities.label_sets import without_zero_weights
 from vedette.densities.tracks import place_labels
 
 ANY = st.one_of(glmbs(), lmbs(), factoreds(3))
@@ -93,15 +93,15 @@ def test_single_gaussians_have_the_same_sets_and_every_one_once(density: Any) ->
 def test_what_is_impossible_goes(kind: type[GLMB] | type[FactoredGLMB]) -> None:
     lmb = LMB.from_bernoullis([[1, 0], [1, 1]], [0.5, 1.0], np.zeros((2, 2)), np.tile(np.eye(2), (2, 1, 1)))
     product = FactoredGLMB.of(lmb)
-    assert possible(lmb) is lmb
+    assert without_zero_weights(lmb) is lmb
     assert product.num_hyps == 4
     hyps: list[list[int]] = [[0, 1], [0], [1]]
     density: Any = product if kind is FactoredGLMB else GLMB.from_hypotheses(lmb.tracks, hyps, [0.5, 0.0, 0.5])
-    fewer = possible(density)
+    fewer = without_zero_weights(density)
     fewer.validate()
     assert fewer.num_hyps == density.num_hyps - 1
     _close(_sets(fewer), _sets(lmb))
-    assert possible(fewer) is fewer
+    assert without_zero_weights(fewer) is fewer
 
 
 def test_labels_of_tables_are_placed() -> None:

@@ -7,7 +7,7 @@ from typing import NamedTuple, TypeVar
 from vedette.densities import LMB, LabelledDensity, track_moments
 from vedette.densities.containers import for_kernel, unchecked
 from vedette.densities.conversions import with_single_gaussians
-from vedette.densities.label_sets import possible
+from vedette.densities.label_sets import without_zero_weights
 from vedette.densities.tracks import gaussian_tracks, single_gaussians
 from vedette.filters.inputs import model_errors
 from vedette.kernels.base.types import Lmb
@@ -44,7 +44,7 @@ def predicted(fused: _Labelled, motion: MotionModel, num_steps: int, period: flo
     Tracks are first collapsed to one Gaussian each (GLMBs are marginalised), as in the pseudo-updates. Label sets of
     weight zero are left out of a GLMB.
     """
-    single = possible(with_single_gaussians(fused))
+    single = without_zero_weights(with_single_gaussians(fused))
     means, covs = track_moments(single.tracks)
     with model_errors():
         paths = predict_paths(kernel_motion(motion, ALWAYS_SURVIVES), float(period), int(num_steps), means, covs)

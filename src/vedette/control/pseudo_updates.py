@@ -22,7 +22,7 @@ from vedette.densities import (
 from vedette.densities.batches import DensityBatch
 from vedette.densities.checks import offsets_of
 from vedette.densities.containers import for_kernel
-from vedette.densities.label_sets import label_sets, relinked, take_hypotheses
+from vedette.densities.label_sets import label_sets, take_hypotheses, with_replaced_tracks
 from vedette.densities.tracks import single_gaussians
 from vedette.filters.inputs import model_errors
 from vedette.filters.lmb import association_of
@@ -157,7 +157,7 @@ def merge_similar_tracks(belief: GLMB, most: float) -> GLMB:
     """
     if most == 0.0 or len(belief.hyp_tracks) == 0:
         return belief
-    return relinked(belief, _leaders(belief, _divergences(belief.tracks.means, belief.tracks.covs), most))
+    return with_replaced_tracks(belief, _leaders(belief, _divergences(belief.tracks.means, belief.tracks.covs), most))
 
 
 def _divergences(means: Floats, covs: Floats) -> Floats:

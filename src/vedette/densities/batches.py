@@ -11,7 +11,7 @@ import numpy as np
 from vedette.densities.checks import offsets_of
 from vedette.densities.containers import for_kernel, unchecked
 from vedette.densities.glmb import GLMB
-from vedette.densities.label_sets import Label, LabelSet, label_sets, possible
+from vedette.densities.label_sets import Label, LabelSet, label_sets, without_zero_weights
 from vedette.densities.labelled import LMB, LabelledDensity
 from vedette.densities.tracks import gaussian_tracks, single_gaussians
 from vedette.internal.probabilities import log_expit
@@ -21,7 +21,7 @@ from vedette.kernels.labelled.case_conversions import LmbCases, glmb_cases_to_lm
 from vedette.kernels.labelled.power_integrals import SensorCases
 
 # A label set, and the name of its factor: for an LMB the label, for a GLMB nothing.
-Place: TypeAlias = tuple[LabelSet, LabelSet]
+FactorSet: TypeAlias = tuple[LabelSet, LabelSet]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,7 +106,7 @@ class DensityBatch:
         return offsets_of([len(labels) for labels in self.sets])
 
     @property
-    def places(self) -> tuple[Place, ...]:
+    def places(self) -> tuple[FactorSet, ...]:
         """Each label set with the name of its factor; the sets of several batches are matched by it."""
         sizes = np.diff(self.factor_offsets).tolist()
         names = (name for name, size in zip(self.factors, sizes, strict=True) for _ in range(size))
@@ -131,7 +131,7 @@ class DensityBatch:
         if self.is_lmb:
             return unchecked(LMB, tracks, self.existence_logits[case].copy())
         members = np.arange(len(labels))
-        return possible(unchecked(GLMB, tracks, self.set_offsets, members, self.log_weights[case].copy()))
+        return without_zero_weights(unchecked(GLMB, tracks, self.set_offsets, members, self.log_weights[case].copy()))
 
 
 def lmb_batch(own: DensityBatch) -> DensityBatch:

@@ -100,7 +100,7 @@ def as_single_factor(glmb: GLMB) -> FactoredGLMB:
     return FactoredGLMB.of(whole)
 
 
-def possible(belief: _Labelled) -> _Labelled:
+def without_zero_weights(belief: _Labelled) -> _Labelled:
     """Return the belief without hypotheses of weight zero; a product keeps all tracks."""
     given: Any = belief
     if belief.is_lmb or (kept := given.hyp_log_weights > -math.inf).all():
@@ -124,8 +124,8 @@ def without_labels(belief: _Labelled, labels: Ints) -> tuple[_Labelled, float]:
     if len(labels) == 0:
         return belief, 0.0
     known, existence = belief.label_existence()
-    dropped = float(existence[are_among(known, labels)].sum())
-    kept = ~are_among(belief.tracks.labels, labels)
+    dropped = float(existence[are_in_table(known, labels)].sum())
+    kept = ~are_in_table(belief.tracks.labels, labels)
     given: Any = belief
     if belief.is_lmb:
         return given.take(np.flatnonzero(kept)), dropped
@@ -133,7 +133,7 @@ def without_labels(belief: _Labelled, labels: Ints) -> tuple[_Labelled, float]:
     return found, dropped
 
 
-def are_among(labels: Ints, table: Ints) -> Bools:
+def are_in_table(labels: Ints, table: Ints) -> Bools:
     """Mask (num_labels,), True if a label is in a table."""
     distinct, place = distinct_labels(np.concatenate([table, labels]))
     known = np.zeros(len(distinct), np.bool_)
@@ -151,11 +151,11 @@ def _factors_without(belief: FactoredGLMB, kept: Bools) -> FactoredGLMB:
 
 
 def _glmb_without(belief: GLMB, kept: Bools) -> GLMB:
-    fewer = relinked(belief, np.where(kept, np.arange(len(kept)), -1))
+    fewer = with_replaced_tracks(belief, np.where(kept, np.arange(len(kept)), -1))
     return take_hypotheses(fewer, np.argsort(-fewer.hyp_log_weights, kind="stable"))
 
 
-def relinked(belief: GLMB, links: Ints) -> GLMB:
+def with_replaced_tracks(belief: GLMB, links: Ints) -> GLMB:
     """Return the GLMB with each track replaced by the track in `links` (num_tracks,), or left out if that is -1.
 
     Both tracks must have the same label. Hypotheses that then hold the same tracks are merged, with the sum of their

@@ -93,14 +93,16 @@ def sample_poisson(density: Poisson, num_samples: int, *, rng: np.random.Generat
         raise InputError(
             f"density.expected_number: expected at most {_MOST_TARGETS:g} targets in all samples; got {got}"
         )
-    return _alike(density, rng.poisson(expected, num_samples), rng)
+    return _identically_distributed(density, rng.poisson(expected, num_samples), rng)
 
 
 def sample_iid_cluster(density: IidCluster, num_samples: int, *, rng: np.random.Generator) -> MultiTargetSamples:
     """Draw independent samples of an iid cluster: a number of targets, then independent states."""
     _check(num_samples, rng)
     all_numbers = np.array([0, len(density.log_cardinality)])
-    return _alike(density, _choose(density.log_cardinality, all_numbers, np.zeros(num_samples, np.int64), rng), rng)
+    return _identically_distributed(
+        density, _choose(density.log_cardinality, all_numbers, np.zeros(num_samples, np.int64), rng), rng
+    )
 
 
 def sample_multi_bernoulli(
@@ -117,7 +119,9 @@ def _independent(density: Lmb, existence: Floats, num_samples: int, rng: np.rand
     return _drawn(checks.offsets_of(exists.sum(axis=1)), density.tracks, np.nonzero(exists)[1], rng)
 
 
-def _alike(density: Poisson | IidCluster, numbers: Ints, rng: np.random.Generator) -> MultiTargetSamples:
+def _identically_distributed(
+    density: Poisson | IidCluster, numbers: Ints, rng: np.random.Generator
+) -> MultiTargetSamples:
     """Draw samples of these numbers of targets, all from the density's one mixture."""
     offsets, whole = checks.offsets_of(numbers), np.array([0, len(density.log_weights)])
     mixture = Tracks(np.full((1, 2), -1), whole, components_of(density.log_weights, density.means, density.covs))

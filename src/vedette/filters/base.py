@@ -153,7 +153,7 @@ class LabelledFilterBase(WithBirths, ABC, Generic[BeliefT]):
         return empty
 
     def _before_scan(self, prior: BeliefT, dt: float, step: Any, births: LMB | None) -> Any:
-        """Return the prior as `_stepped` expects it. dt: seconds since it; step: of the scan, None for an update."""
+        """Return the prior as `_run_kernel` expects it. dt: seconds since it; step: of the scan, None for an update."""
         return prior.to_kernel()
 
     @abstractmethod
@@ -161,7 +161,7 @@ class LabelledFilterBase(WithBirths, ABC, Generic[BeliefT]):
         """Return the log total weight. Raises `NumericalError`, with `place` first, if nothing has positive weight."""
 
     @abstractmethod
-    def _concluded(
+    def _conclude(
         self, posterior: Any, reports: Sequence[Any], *, log_likelihood: float, repeats: Sequence[Ints]
     ) -> tuple[BeliefT, FilterInfo]:
         """Return the posterior and the report, after one update per report. repeats: per scan, the rows left out."""
@@ -243,15 +243,15 @@ class LabelledFilter(SingleSensorFilter, LabelledFilterBase[BeliefT]):
         place: str,
     ) -> tuple[BeliefT, FilterInfo]:
         try:
-            posterior, report = self._stepped(prior, SensorStep(inputs, self.limits, self.sensor, rng=rng))
+            posterior, report = self._run_kernel(prior, SensorStep(inputs, self.limits, self.sensor, rng=rng))
         except Exception as error:
             raise_model_error(error)
             raise
         log_likelihood = self._check(posterior, report, place) + report.log_clutter - self.sensor.clutter.rate
-        return self._concluded(posterior, [report], log_likelihood=log_likelihood, repeats=repeats)
+        return self._conclude(posterior, [report], log_likelihood=log_likelihood, repeats=repeats)
 
     @abstractmethod
-    def _stepped(self, prior: Any, step: SensorStep) -> tuple[Any, Any]:
+    def _run_kernel(self, prior: Any, step: SensorStep) -> tuple[Any, Any]:
         """Return the posterior and report in kernel form."""
 
     @abstractmethod

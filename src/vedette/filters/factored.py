@@ -13,28 +13,28 @@ from vedette.densities import LMB, FactoredGLMB, LabelledDensity, UndetectedTarg
 from vedette.densities.checks import offsets_of
 from vedette.densities.label_sets import take_factors
 from vedette.errors import InputError, NumericalError
-from vedette.filters.appearing import (
-    appearing,
-    arrivals_of,
-    with_cells,
-    with_deaths,
-    with_faint_candidates,
-    with_learnt_rate,
-)
 from vedette.filters.base import LabelledFilter, LabelledFilterBase, SensorStep, blind_sensor
 from vedette.filters.inputs import born_at, check_new, no_births_for_kernel
 from vedette.filters.limits import Limits
 from vedette.filters.multi_sensor import MultiSensorFilter, SequentialUpdate
 from vedette.filters.protocols import FilterInfo
+from vedette.filters.region_births import (
+    arrivals_of,
+    region_births,
+    with_cells,
+    with_deaths,
+    with_faint_candidates,
+    with_learnt_rate,
+)
 from vedette.filters.undetected import (
     SplitBirths,
     after_scan,
     before_scan,
-    most_components,
     no_arrivals,
     no_births,
     no_undetected,
     split_births,
+    undetected_component_cap,
     with_dropped,
     with_step,
 )
@@ -79,7 +79,7 @@ class _FactoredFilterBase(LabelledFilterBase[FactoredGLMB]):
     @property
     def starts_tracks(self) -> bool:
         """True if the filter makes births from measurements itself: births in a region, with a Poisson intensity."""
-        return self.births == "poisson" and appearing(self.targets.birth) is not None
+        return self.births == "poisson" and region_births(self.targets.birth) is not None
 
     def initial(self) -> FactoredGLMB:
         """Return the belief before the first scan: no target."""
@@ -112,7 +112,7 @@ class _FactoredFilterBase(LabelledFilterBase[FactoredGLMB]):
             # Births given by the caller replace those of the model, both in the region and at sites.
             targets, appear = self.targets, births is None
             born = self._born(dt, step) if appear else no_births(targets.state_dim)
-            most, error = most_components(self.limits, targets.birth), born.error
+            most, error = undetected_component_cap(self.limits, targets.birth), born.error
             arrivals = arrivals_of(undetected, targets, born.undetected, dt, most, appear=appear)
             undetected = with_cells(undetected, targets.birth, dt, appear=appear)
             undetected = with_deaths(undetected, prior, targets.survival, dt)
@@ -120,7 +120,7 @@ class _FactoredFilterBase(LabelledFilterBase[FactoredGLMB]):
             undetected = with_step(undetected, step, self.targets.birth.num_sites)
         return _Before(density, undetected, arrivals, error)
 
-    def _stepped(self, prior: _Before, step: SensorStep) -> tuple[_Before, FactoredReport]:
+    def _run_kernel(self, prior: _Before, step: SensorStep) -> tuple[_Before, FactoredReport]:
         scan, reduction, birth = step.inputs[0], step.limits.reduction(), self.targets.birth
         max_merging = 0.0 if self.births == "labelled" else _MAX_MERGING
         factoring = _factoring(self.max_split_error, self.max_factor_labels, step.num_scans, max_merging)
@@ -142,7 +142,7 @@ class _FactoredFilterBase(LabelledFilterBase[FactoredGLMB]):
             raise NumericalError(f"{place}no hypothesis was found within Limits.max_search_nodes; raise it")
         raise NumericalError(f"{place}no hypothesis has positive weight; do the models forbid this scan?")
 
-    def _concluded(
+    def _conclude(
         self, posterior: _Before, reports: Sequence[FactoredReport], *, log_likelihood: float, repeats: Sequence[Ints]
     ) -> tuple[FactoredGLMB, FilterInfo]:
         undetected = posterior.undetected
@@ -221,8 +221,8 @@ class FactoredGlmbFilter(_FactoredFilterBase, LabelledFilter[FactoredGLMB]):
     def _blind(self) -> FactoredGlmbFilter:
         return replace(self, sensor=blind_sensor(), limits=self.limits.keeping_labels())
 
-    def _stepped(self, prior: _Before, step: SensorStep) -> tuple[_Before, FactoredReport]:
-        return _FactoredFilterBase._stepped(self, prior, step._replace(num_scans=self.scans_together))
+    def _run_kernel(self, prior: _Before, step: SensorStep) -> tuple[_Before, FactoredReport]:
+        return _FactoredFilterBase._run_kernel(self, prior, step._replace(num_scans=self.scans_together))
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -247,7 +247,7 @@ class SequentialFactoredFilter(_FactoredFilterBase, SequentialUpdate[FactoredGLM
     def _updated_in_view(
         self, prior: _Before, settled: Bools, step: SensorStep
     ) -> tuple[_Before, FactoredReport, Bools]:
-        """Return `_stepped` of the factors that the scan may affect; the other factors come first, unchanged."""
+        """Return `_run_kernel` of the factors that the scan may affect; the other factors come first, unchanged."""
         scan, _, sensor, truncation = step.inputs
         density, marks = (
             FactoredGLMB.from_kernel(prior.density),
@@ -255,7 +255,7 @@ class SequentialFactoredFilter(_FactoredFilterBase, SequentialUpdate[FactoredGLM
         )
         seen = np.diff(offsets_of(marks.astype(np.int64))[density.track_offsets]) > 0
         near, far = (take_factors(density, np.flatnonzero(places)) for places in (seen, ~seen))
-        posterior, report = self._stepped(prior._replace(density=near.to_kernel()), step)
+        posterior, report = self._run_kernel(prior._replace(density=near.to_kernel()), step)
         both = [far, FactoredGLMB.from_kernel(posterior.density)]
         joined = FactoredGLMB.product(both, density.state_dim).to_kernel()
         return posterior._replace(density=joined), report, settled

@@ -31,7 +31,7 @@ class _GlmbFilterBase(LabelledFilterBase[GLMB]):
     limits: Limits
     marginalised: bool
 
-    def _stepped(self, prior: Glmb, step: SensorStep) -> tuple[Glmb, StepReport]:
+    def _run_kernel(self, prior: Glmb, step: SensorStep) -> tuple[Glmb, StepReport]:
         return step_ranked(prior, *step.inputs)
 
     def _check(self, posterior: Glmb, report: StepReport, place: str) -> float:
@@ -39,7 +39,7 @@ class _GlmbFilterBase(LabelledFilterBase[GLMB]):
             raise NumericalError(f"{place}no hypothesis has positive weight; do the models forbid this scan?")
         return report.log_total
 
-    def _concluded(
+    def _conclude(
         self, posterior: Glmb, reports: Sequence[StepReport], *, log_likelihood: float, repeats: Sequence[Ints]
     ) -> tuple[GLMB, FilterInfo]:
         if self.marginalised:
@@ -107,7 +107,7 @@ class DeltaGlmbFilter(_GlmbFilterBase, LabelledFilter[GLMB]):
     def _blind(self) -> DeltaGlmbFilter:
         return replace(self, sensor=blind_sensor(), assignment=RankedAssignment())
 
-    def _stepped(self, prior: Glmb, step: SensorStep) -> tuple[Glmb, StepReport]:
+    def _run_kernel(self, prior: Glmb, step: SensorStep) -> tuple[Glmb, StepReport]:
         scan, motion, sensor, truncation = step.inputs
         if isinstance(self.assignment, Gibbs) and motion is not None and step.rng is not None:
             return step_gibbs(prior, scan, motion, sensor, truncation, int(self.assignment.num_samples), step.rng)

@@ -60,7 +60,7 @@ def check_scan(scan: Any, sensor: SensorModel) -> tuple[Floats, Ints]:
     if is_below:
         _warn_negative(array, measurement, sensor.noise.least_stds)
     if largest > 3.14:  # rare
-        array, may_repeat = _in_one_turn(array, measurement.angular), True
+        array, may_repeat = _wrap_angles(array, measurement.angular), True
     if not may_repeat:  # most scans
         return array, _NO_ROWS
     _, first = np.unique(array, axis=0, return_index=True)
@@ -76,7 +76,7 @@ def _warn_negative(scan: Floats, measurement: MeasurementModel, stds: Floats | N
         warn_implausible("scan", least, got, "a sign, or components exchanged")
 
 
-def _in_one_turn(scan: Floats, angular: Bools) -> Floats:
+def _wrap_angles(scan: Floats, angular: Bools) -> Floats:
     sizes = np.abs(scan[:, angular])
     if sizes.max() > 2.0 * math.pi:
         row = int(np.argmax(sizes.max(axis=1)))

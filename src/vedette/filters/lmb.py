@@ -36,7 +36,7 @@ class LmbFilterBase(LabelledFilterBase[LMB]):
             raise NumericalError(f"{place}no association has positive weight; do the models forbid this scan?")
         return report.sums.log_total
 
-    def _concluded(
+    def _conclude(
         self, posterior: Lmb, reports: Sequence[LmbReport], *, log_likelihood: float, repeats: Sequence[Ints]
     ) -> tuple[LMB, FilterInfo]:
         kept, spread = self.limits.without_spread(LMB.from_kernel(posterior))
@@ -81,7 +81,7 @@ class LmbFilter(LmbFilterBase, LabelledFilter[LMB]):
     def _blind(self) -> LmbFilter:
         return LmbFilter(self.targets, blind_sensor(), Limits.none())
 
-    def _stepped(self, prior: Lmb, step: SensorStep) -> tuple[Lmb, LmbReport]:
+    def _run_kernel(self, prior: Lmb, step: SensorStep) -> tuple[Lmb, LmbReport]:
         association, (_, motion, _, _) = self.assignment.to_kernel(), step.inputs
         if association is None and motion is None:
             return _by_combinations(prior, step)
@@ -108,17 +108,17 @@ class SequentialLmbFilter(LmbFilterBase, SequentialUpdate[LMB]):
         MultiSensorFilter.__post_init__(self)  # super() fails here, as slots=True replaces the class
         check_marginals(self.assignment)
 
-    def _stepped(self, prior: Lmb, step: SensorStep) -> tuple[Lmb, LmbReport]:
+    def _run_kernel(self, prior: Lmb, step: SensorStep) -> tuple[Lmb, LmbReport]:
         association = self.assignment.to_kernel()
         if association is None:
             return _by_combinations(prior, step)
         return step_lmb(prior, *step.inputs, step.limits.reduction(), association)
 
     def _updated_in_view(self, prior: Lmb, settled: Bools, step: SensorStep) -> tuple[Lmb, LmbReport, Bools]:
-        """Return `_stepped` of the labels that the scan may affect; settled: see `merge_updated`, empty if none."""
+        """Return `_run_kernel` of the labels that the scan may affect; settled: see `merge_updated`, empty if none."""
         scan, _, sensor, truncation = step.inputs
         marks = in_view(prior.tracks, scan, sensor, truncation)
-        updated, report = self._stepped(marked(prior, marks), step)
+        updated, report = self._run_kernel(marked(prior, marks), step)
         before = settled if len(settled) else np.zeros(len(marks), np.bool_)
         posterior, settled = merge_updated(prior, marks, updated, step.limits.track_caps(), before)
         return posterior, report, settled

@@ -33,7 +33,7 @@ class SensorScans(NamedTuple):
         """Return the scans in kernel form, each with the births and the period."""
         return [ScanInput(born, *own, dt) for own in zip(self.scans, self.poses, strict=True)]
 
-    def inputs_in_turn(self, born: Lmb, dt: float) -> list[ScanInput]:
+    def sequential_inputs(self, born: Lmb, dt: float) -> list[ScanInput]:
         """Return `inputs` with births and a period for the first scan only."""
         none = no_births_for_kernel(born.tracks.components.means.shape[1])
         first, *others = self.inputs(born, dt)
@@ -159,25 +159,25 @@ class SequentialUpdate(MultiSensorFilter[BeliefT]):
         motion, posterior = self._motion(dt), prior
         keeping, settled = self.limits.keeping_labels(), np.zeros(0, np.bool_)
         reports, log_total, last = list[Any](), 0.0, len(taken.names) - 1
-        given = zip(taken.names, taken.sensors, taken.inputs_in_turn(born, dt), strict=True)
+        given = zip(taken.names, taken.sensors, taken.sequential_inputs(born, dt), strict=True)
         for s, (name, sensor, scan) in enumerate(given):
             limits = self.limits if s == last else keeping
             own = sensor.to_kernel(), limits.truncation(sensor.meas_dim)
             step = SensorStep((scan, motion if s == 0 else None, *own), limits, sensor, len(taken.names))
             with model_errors():
                 if s in (0, last):  # the last update decides for every label whether it is kept
-                    posterior, report = self._stepped(posterior, step)
+                    posterior, report = self._run_kernel(posterior, step)
                 else:
                     posterior, report, settled = self._updated_in_view(posterior, settled, step)
             log_total += self._check(posterior, report, f"{place}, {name}: ")
             reports.append(report)
         log_likelihood = taken.log_likelihood(log_total, [report.log_clutter for report in reports])
-        return self._concluded(posterior, reports, log_likelihood=log_likelihood, repeats=taken.repeats)
+        return self._conclude(posterior, reports, log_likelihood=log_likelihood, repeats=taken.repeats)
 
     @abstractmethod
-    def _stepped(self, prior: Any, step: SensorStep) -> tuple[Any, Any]:
+    def _run_kernel(self, prior: Any, step: SensorStep) -> tuple[Any, Any]:
         """Return the posterior and report in kernel form."""
 
     def _updated_in_view(self, prior: Any, settled: Bools, step: SensorStep) -> tuple[Any, Any, Bools]:
-        """Return `_stepped`; subclasses may skip what the scan cannot affect. settled: result of the previous call."""
-        return (*self._stepped(prior, step), settled)
+        """Return `_run_kernel`; subclasses may skip unaffected parts. settled: result of the previous call."""
+        return (*self._run_kernel(prior, step), settled)

@@ -64,4 +64,4 @@ class MultiSensorLmbFilter(LmbFilterBase, MultiSensorFilter[LMB]):
         )
         log_total = self._check(posterior, whole, f"{place}: ")
         log_likelihood = taken.log_likelihood(log_total, [report.log_clutter for report in reports])
-        return self._concluded(posterior, [whole], log_likelihood=log_likelihood, repeats=taken.repeats)
+        return self._conclude(posterior, [whole], log_likelihood=log_likelihood, repeats=taken.repeats)

@@ -11,9 +11,9 @@ import numpy as np
 from vedette.densities import LMB, FactoredGLMB, Poisson, UndetectedIntensity, UndetectedTargets, as_lmb
 from vedette.densities.containers import unchecked
 from vedette.densities.label_sets import without_labels
-from vedette.filters.appearing import appearing, no_cells, rate_after, tables_of, without_change
 from vedette.filters.inputs import births_of, births_within
 from vedette.filters.limits import Limits
+from vedette.filters.region_births import no_cells, rate_after, region_births, tables_of, without_change
 from vedette.internal.probabilities import expit
 from vedette.kernels.base.types import Floats, Lmb, Mixture
 from vedette.kernels.gaussian.components import stacked_mixtures
@@ -41,7 +41,7 @@ def no_arrivals(state_dim: int) -> Arrivals:
     return without_change(no_births(state_dim).undetected, 1)
 
 
-def most_components(limits: Limits, birth: BirthModel) -> int:
+def undetected_component_cap(limits: Limits, birth: BirthModel) -> int:
     """Return the largest number of components of the intensity of undetected targets."""
     return max(limits.max_intensity_components, _COMPONENTS_A_SITE * birth.num_sites)
 
@@ -101,7 +101,7 @@ def before_scan(
     undetected: UndetectedTargets, birth: BirthModel, sensor: SensorModel, scan: Floats, pose: Floats
 ) -> Undetected:
     """Return the undetected targets and the places of the measurements in the form that `step_factored` needs."""
-    (step, index), found, measured = undetected.next_label, appearing(birth), birth.from_measurements
+    (step, index), found, measured = undetected.next_label, region_births(birth), birth.from_measurements
     intensity, none = undetected.intensity.to_kernel(), no_undetected(birth.state_dim)
     before = none._replace(intensity=intensity, step=step, first_index=index)
     if found is None or undetected.cells is None:

@@ -9,7 +9,7 @@ import numpy as np
 from vedette.densities import GLMB, LMB, FactoredGLMB
 from vedette.densities.containers import unchecked
 from vedette.densities.conversions import as_glmb
-from vedette.densities.label_sets import in_label_order, join_factors, possible, take_factors
+from vedette.densities.label_sets import in_label_order, join_factors, take_factors, without_zero_weights
 from vedette.densities.tracks import take_tracks
 from vedette.kernels.base.types import Floats, Ints
 
@@ -24,7 +24,7 @@ def align_factors(beliefs: Sequence[FactoredGLMB], max_products: int) -> tuple[l
     joined = join_factors(beliefs)
     log_kept, regrouped = np.zeros(len(joined.alone)), []
     for belief, groups in zip(beliefs, joined.groups, strict=True):
-        own, log_own = _one_a_group(possible(belief), groups, len(joined.alone), max_products)
+        own, log_own = _one_a_group(without_zero_weights(belief), groups, len(joined.alone), max_products)
         regrouped.append(own)
         log_kept += log_own
     return regrouped, log_kept

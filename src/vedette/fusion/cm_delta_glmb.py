@@ -1,4 +1,4 @@
-"""Generalized covariance intersection of marginalised delta-GLMB densities."""
+"""Generalised covariance intersection of marginalised delta-GLMB densities."""
 
 from __future__ import annotations
 

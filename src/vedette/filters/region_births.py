@@ -19,7 +19,7 @@ from vedette.densities import (
 )
 from vedette.densities.checks import distinct_labels
 from vedette.densities.containers import for_kernel
-from vedette.densities.label_sets import are_among
+from vedette.densities.label_sets import are_in_table
 from vedette.kernels.base.types import Floats, Ints, Mixture
 from vedette.kernels.steps.lmb import Reduction
 from vedette.kernels.steps.undetected import Arrivals, Cells, Left
@@ -33,7 +33,7 @@ _NODES, _NODES_OF_CHOSEN = 2, 3
 _STAY, _NO_BIRTHS = np.ones(1), np.zeros(2)
 
 
-class Appearing(NamedTuple):
+class RegionBirths(NamedTuple):
     """Model and cells of targets that appear anywhere in a region."""
 
     model: UndetectedModel
@@ -41,7 +41,7 @@ class Appearing(NamedTuple):
 
 
 @lru_cache(maxsize=100)
-def appearing(birth: BirthModel) -> Appearing | None:
+def region_births(birth: BirthModel) -> RegionBirths | None:
     """Return the cells of targets that appear anywhere; None if the births have no region."""
     measured, model, nodes = birth.from_measurements, birth.anywhere, _NODES_OF_CHOSEN
     if model is None:
@@ -51,7 +51,7 @@ def appearing(birth: BirthModel) -> Appearing | None:
     grid, dim = model.grid, birth.state_dim
     corner, size = np.array([grid.region.x_min, grid.region.y_min]), np.array(grid.cell_size)
     middles, states = grid.states(dim, 1)[:, 0].copy(), grid.states(dim, nodes)
-    return Appearing(
+    return RegionBirths(
         model, Cells(grid.columns, corner, size, middles, states, grid.node_weights(nodes), model.entering)
     )
 
@@ -76,7 +76,7 @@ def with_cells(before: UndetectedTargets, birth: BirthModel, dt: float, *, appea
 
     appear: whether the region has births in this period. Raises `InputError` for a belief with other cells.
     """
-    places, cells = appearing(birth), before.cells
+    places, cells = region_births(birth), before.cells
     if cells is not None:
         return _on_grid(before, cells, places)
     if places is None or not appear:
@@ -89,7 +89,7 @@ def with_cells(before: UndetectedTargets, birth: BirthModel, dt: float, *, appea
     return replace(before, cells=UndetectedIntensity(model.grid, first), birth_rate=learnt)
 
 
-def _on_grid(before: UndetectedTargets, cells: UndetectedIntensity, places: Appearing | None) -> UndetectedTargets:
+def _on_grid(before: UndetectedTargets, cells: UndetectedIntensity, places: RegionBirths | None) -> UndetectedTargets:
     """Return the same targets on the grid object of the model."""
     if places is None or cells.grid != places.model.grid:
         expected = "none" if places is None else f"those of the filter's births, {places.model.grid}"
@@ -104,7 +104,7 @@ def _in_scans(birth: BirthModel) -> bool:
     return birth.anywhere is None and measured is not None and not measured.is_learnt
 
 
-def _rate_of(before: UndetectedTargets, birth: BirthModel, places: Appearing, dt: float) -> float:
+def _rate_of(before: UndetectedTargets, birth: BirthModel, places: RegionBirths, dt: float) -> float:
     """Return the rate of births in the region, 1/s."""
     if _in_scans(birth):
         return birth.from_measurements.expected / (dt if birth.period is None else birth.period)  # type: ignore[union-attr, operator]
@@ -119,7 +119,7 @@ def arrivals_of(
     born: intensity of births at sites; most: largest number of components; appear: whether the region has births in
     this period. Cells that the first prediction adds do not change (`with_cells`).
     """
-    birth, places = targets.birth, appearing(targets.birth)
+    birth, places = targets.birth, region_births(targets.birth)
     if places is None or before.cells is None:
         return without_change(born, most)
     model = places.model
@@ -175,11 +175,11 @@ def with_learnt_rate(
 
     before, kept: the belief with the labels that were dropped and without them.
     """
-    learnt, cells, places = undetected.birth_rate, undetected.cells, appearing(birth)
+    learnt, cells, places = undetected.birth_rate, undetected.cells, region_births(birth)
     if learnt is None or cells is None or places is None:
         return undetected
     labels, existence = existence_probabilities(before)
-    is_held = are_among(labels, kept.tracks.labels)
+    is_held = are_in_table(labels, kept.tracks.labels)
     shares = _shares_of(learnt, labels)
     past = learnt.past + float((shares * existence)[~is_held].sum())
     number = past + float((shares * existence)[is_held].sum())
@@ -195,7 +195,7 @@ def with_faint_candidates(reduction: Reduction, undetected: UndetectedTargets, b
 
     Otherwise, at a low rate, no measurement could start a label and none would be counted.
     """
-    learnt, places = undetected.birth_rate, appearing(birth)
+    learnt, places = undetected.birth_rate, region_births(birth)
     if learnt is None or places is None:
         return reduction
     log_share = min(0.0, math.log(learnt.rate / places.model.first_rate))
