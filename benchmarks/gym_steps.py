@@ -81,9 +81,9 @@ def shares(kind: str) -> dict[str, float]:
     for run in range(10):
         walked(env, run, stages)
     env.reset(seed=1)
-    outlook, start = env.episodes.outlook, time.perf_counter()
+    context, start = env.episodes.context, time.perf_counter()
     for _ in range(30):
-        env.episodes.built.observer.outlook(outlook.state, outlook.poses)
+        env.episodes.built.encoder.decision_context(context.state, context.poses)
     spent = stages.seconds | {"observation": time.perf_counter() - start}
     return {name: seconds / sum(spent.values()) for name, seconds in spent.items()}
 
