@@ -167,16 +167,16 @@ def table(redraws: list[Redraw], biases: ByRadar = BIASES) -> Iterator[str]:
     yield "| parameter | truth | mean found | root mean square error | said (mean) | greatest error | covered |"
     yield "| --- | ---: | ---: | ---: | ---: | ---: | ---: |"
     total, by_redraw = [0, 0], np.zeros((2, len(redraws)))
-    for i, first in enumerate(redraws[0].calibration.found):
+    for i, first in enumerate(redraws[0].calibration.estimates):
         radar, name = list(RADARS)[first.parameter.sensor], first.parameter.name
         truth = biases[radar].get(name, 0.0) if first.parameter.kind == "bias" else MODELS[name]
-        all_found = [each.calibration.found[i] for each in redraws]
-        found = [each for each in all_found if not each.why]
+        all_found = [each.calibration.estimates[i] for each in redraws]
+        found = [each for each in all_found if not each.reason]
         values = np.array([each.value for each in found])
-        said = np.mean([(each.high - each.low) / 3.92 for each in found])
-        covered = sum(each.low <= truth <= each.high for each in found)
-        by_redraw[0] += [each.low <= truth <= each.high for each in all_found]
-        by_redraw[1] += [not each.why for each in all_found]
+        said = np.mean([(each.ci_high - each.ci_low) / 3.92 for each in found])
+        covered = sum(each.ci_low <= truth <= each.ci_high for each in found)
+        by_redraw[0] += [each.ci_low <= truth <= each.ci_high for each in all_found]
+        by_redraw[1] += [not each.reason for each in all_found]
         total = [total[0] + covered, total[1] + len(found)]
         rms, most = math.sqrt(np.mean((values - truth) ** 2)), np.abs(values - truth).max()
         cells = [f"{radar}, {name}", f"{truth:.3g}", f"{values.mean():.4g}", f"{rms:.2g}", f"{said:.2g}", f"{most:.2g}"]

@@ -114,10 +114,10 @@ def lines(redraws: int) -> Iterator[str]:
         for seed in range(redraws):
             calibration, truth = redraw(name, seed)
             converged += calibration.converged
-            for each in calibration.found:
+            for each in calibration.estimates:
                 value = truth[each.parameter.sensor, each.parameter.name]
-                if not math.isnan(each.low):
-                    covers = each.low <= value <= each.high
+                if not math.isnan(each.ci_low):
+                    covers = each.ci_low <= value <= each.ci_high
                     counts += np.outer([1, each.parameter.kind == "bias"], [covers, 1])
         total += counts
         shares = " | ".join(f"{own[0]} of {own[1]}" for own in counts)

@@ -26,7 +26,7 @@ from vedette.campaigns import Shard, cluster, resolve, run_campaign
 from vedette.campaigns.codec import encode
 from vedette.campaigns.rows import row_of
 from vedette.campaigns.spec import spec_from_data
-from vedette.campaigns.tasks import Landed, Outcome, Task
+from vedette.campaigns.tasks import CompletedRun, Task, TaskOutcome
 from vedette.evaluation.metrics import encode_metrics
 from vedette.evaluation.runs import measure_run, run_scenario
 from vedette.simulation.kept import encode_timings
@@ -46,11 +46,11 @@ def finished_run() -> tuple[bytes, bytes, bytes]:
     return encode(record), encode_timings(record), encode_metrics(measure_run(record, scenario))
 
 
-def stub(task: Task) -> Outcome:
+def stub(task: Task) -> TaskOutcome:
     """In place of `vedette.campaigns.tasks.perform`."""
     content = finished_run()
     time.sleep(SECONDS * len(task.runs))
-    return tuple(Landed(row_of(task.cell.name, run, *content), 1.0, SECONDS) for run in task.runs)
+    return tuple(CompletedRun(row_of(task.cell.name, run, *content), 1.0, SECONDS) for run in task.runs)
 
 
 def main() -> None:

@@ -4,8 +4,8 @@
     python benchmarks/drifting.py --write docs/evidence/drifting-biases.md
 
 The radars of benchmarks/calibrating.py, whose biases change by 0.5 m/s, and of two by 0.1 degrees a minute, too. They
-are calibrated by their first scans; the others come one by one to a `BiasFollower`, and without biases to a tracker
-that knows the noise, detection and clutter: with biases taken off as they are followed, as they were found at first, as
+are calibrated by their first scans; the others come one by one to an `OnlineBiasEstimator`, and without biases to a
+tracker that knows the noise, detection and clutter: with biases taken off as they are followed, as found at first, as
 they are in truth, and with none taken off. Prints the root mean square error of what is taken off, over radars and
 redraws, minute by minute; and mean OSPA from a minute later on. Equal arguments print equal tables, but for the times.
 """
@@ -25,7 +25,7 @@ import numpy as np
 from calibrating import BIASES, RADARS, SCENES, Scene, write_scans
 from pages import write_between
 
-from vedette.calibration import BiasFollower, Problem, calibrate, starting_from
+from vedette.calibration import OnlineBiasEstimator, Problem, calibrate, warm_started
 from vedette.evaluation import ospa
 from vedette.kernels.base.types import Floats
 from vedette.models import Bias
@@ -73,10 +73,10 @@ def redraw(folder: Path, scene: Scene, seconds: float, seed: int, first: float, 
     true = scenario_of_recording(folder / "true.yaml", folder / "scans.csv", speed=scene.speed).scenario
     problem, tracking = problem_of(told), build_tracking(true)
     at_first = calibrate(replace(problem, recording=problem.recording.between(0.0, first)))
-    problem = starting_from(problem, at_first)
+    problem = warm_started(problem, at_first)
     once = problem.with_biases(np.array([each.start for each in problem.parameters]))
     late = LateScans(tracking.tracker, build_poses(true), window=5.0)
-    follower, spent = BiasFollower(problem, window, every), 0.0
+    follower, spent = OnlineBiasEstimator(problem, window, every), 0.0
     state = follower.initial()
     timelines, rows, scores = [late.initial()] * len(WAYS), list[tuple[float, ...]](), list[list[float]]()
     for scan in problem.recording.arrivals():
@@ -85,7 +85,7 @@ def redraw(folder: Path, scene: Scene, seconds: float, seed: int, first: float, 
         begun = time.process_time()
         state, _ = follower.take(state, scan)
         spent += time.process_time() - begun
-        if state.num_found == 0:
+        if state.num_estimates == 0:
             continue
         now = problem.with_biases(follower.biases(state, scan.time))[scan.sensor].bias
         truth = true_bias(scan.sensor, scan.time + problem.recording.start)
@@ -105,7 +105,7 @@ def redraw(folder: Path, scene: Scene, seconds: float, seed: int, first: float, 
     settled = table[:, 0] > first + 60.0  # tracks have to begin
     num = len(WAYS) - 1
     parts = table[:, 0], table[:, 1 : num + 1], table[:, num + 1 :]
-    return Outcome(*parts, np.array(scores)[settled].mean(axis=0), spent, state.num_found)
+    return Outcome(*parts, np.array(scores)[settled].mean(axis=0), spent, state.num_estimates)
 
 
 def without(scan: SensorScan, problem: Problem, bias: Bias) -> SensorScan:

@@ -13,7 +13,7 @@ import pytest
 
 from recordings import SENSORS, write_recording
 from vedette.calibration import Calibration, Problem, calibrate
-from vedette.calibration.maximum import _scores, covariance, maximise
+from vedette.calibration.maximum_likelihood import _scores, covariance, maximise
 from vedette.filters import Limits, SequentialLmbFilter, common_target_model
 from vedette.kernels.base.types import Floats
 from vedette.scenarios.build import build_sensors
@@ -81,12 +81,12 @@ def test_clutter_of_the_region_weighs_as_much_wherever_a_bias_takes_it(tmp_path:
     total = problem.log_likelihoods(before).sum()
     assert problem.log_likelihoods(turned).sum() == pytest.approx(total, abs=1e-3)
     calibration = calibrate(problem)
-    found = {each.parameter.name: each for each in calibration.found}
-    assert "no other sensor" in found["bearing_deg"].why
-    assert math.isnan(found["bearing_deg"].low)
+    found = {each.parameter.name: each for each in calibration.estimates}
+    assert "no other sensor" in found["bearing_deg"].reason
+    assert math.isnan(found["bearing_deg"].ci_low)
     assert found["bearing_deg"].value == 0.0
-    assert found["noise.sigma_range"].low < 20.0 < found["noise.sigma_range"].high
-    told = problem.free([each.value for each in calibration.found])
+    assert found["noise.sigma_range"].ci_low < 20.0 < found["noise.sigma_range"].ci_high
+    told = problem.free([each.value for each in calibration.estimates])
     assert problem.log_likelihoods(told).sum() == pytest.approx(calibration.log_likelihood, abs=1e-9)
 
 
@@ -131,12 +131,12 @@ def calibrated(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, OfRecord
 
 def test_biases_of_two_radars_are_found(calibrated: tuple[Path, OfRecording, Calibration]) -> None:
     _, _, calibration = calibrated
-    assert calibration.log_likelihood > calibration.before + 300.0
+    assert calibration.log_likelihood > calibration.initial_log_likelihood + 300.0
     assert calibration.converged
-    assert not any(each.why for each in calibration.found)
-    for each in calibration.found:
+    assert not any(each.reason for each in calibration.estimates)
+    for each in calibration.estimates:
         name = each.parameter.sensor, each.parameter.name
-        wide = 1.6 * (each.high - each.low) / 2.0  # three standard deviations
+        wide = 1.6 * (each.ci_high - each.ci_low) / 2.0  # three standard deviations
         if name in TRUTH:
             assert abs(each.value - TRUTH[name]) < wide, name
         elif name[1] in ("noise.sigma_range", "noise.sigma_bearing_deg"):
@@ -155,14 +155,14 @@ def test_the_file_that_comes_out_reads_back_with_all_that_was_in_it(
     assert again.origin == scenario.model.origin
     assert again.recording is not None
     assert again.recording.columns == {"sensor": "radar", "bearing": "brg_deg"}
-    for each in calibration.found:
+    for each in calibration.estimates:
         sensor, (kind, *rest) = again.sensors[each.parameter.sensor], each.parameter.name.split(".")
         holder = getattr(sensor, kind if rest else "bias")
         assert getattr(holder, rest[0] if rest else kind) == pytest.approx(each.value, rel=1e-6)
     # What was found is where it begins: it is said already.
     problem = problem_of(scenario_of_recording(folder / "found.yaml", folder / "scans.csv").scenario)
     assert [each.start for each in problem.parameters] == pytest.approx(
-        [each.value for each in calibration.found], 1e-6
+        [each.value for each in calibration.estimates], 1e-6
     )
 
 
@@ -197,7 +197,7 @@ def test_radars_without_common_targets_are_named(tmp_path: Path) -> None:
         "utf-8",
     )
     problem = problem_of(scenario_of_recording(tmp_path / "radars.yaml", tmp_path / "scans.csv").scenario)
-    why = {(each.parameter.sensor, each.parameter.name): each.why for each in calibrate(problem).found}
+    why = {(each.parameter.sensor, each.parameter.name): each.reason for each in calibrate(problem).estimates}
     for one in ((0, "bearing_deg"), (1, "bearing_deg"), (1, "clock")):
         assert "no other sensor observes enough of the same targets" in why[one]
     assert "rotation" in why[0, "bearing_deg"]
@@ -222,12 +222,12 @@ def test_positions_are_compared_with_those_of_the_first_sensor(tmp_path: Path) -
         "utf-8",
     )
     problem = problem_of(scenario_of_recording(tmp_path / "sensors.yaml", tmp_path / "scans.csv").scenario)
-    found = {(each.parameter.sensor, each.parameter.name): each for each in calibrate(problem).found}
+    found = {(each.parameter.sensor, each.parameter.name): each for each in calibrate(problem).estimates}
     assert (0, "x") not in found
     for name, truth in (("x", 200.0), ("y", -100.0)):
         one = found[1, name]
-        assert abs(one.value - truth) < 0.8 * (one.high - one.low)
-        assert one.high - one.low < 40.0
+        assert abs(one.value - truth) < 0.8 * (one.ci_high - one.ci_low)
+        assert one.ci_high - one.ci_low < 40.0
 
 
 def test_places_are_asked_of_the_others_alone(tmp_path: Path) -> None:
@@ -272,10 +272,10 @@ def biases_of(problem: Problem) -> Calibration:
 def test_where_a_radar_really_is_is_found_by_targets_all_around(tmp_path: Path) -> None:
     targets = [(2000.0, 3000.0, 5.0, 3.0), (-3000.0, 1000.0, -4.0, 4.0), (1000.0, -3000.0, 3.0, -6.0)]
     calibration = biases_of(two_radars(tmp_path, targets))
-    found = {(each.parameter.sensor, each.parameter.name): each for each in calibration.found}
+    found = {(each.parameter.sensor, each.parameter.name): each for each in calibration.estimates}
     assert (calibration.rank, len(found)) == (5, 6)
     assert (
-        found[1, "clock"].why
+        found[1, "clock"].reason
         == "not identifiable: the targets that other sensors observe too hardly move in so short a time"
     )
     for name, truth in (("x", 80.0), ("y", -60.0), ("range", 0.0), ("bearing_deg", 0.0)):
@@ -288,7 +288,7 @@ def test_of_far_targets_in_one_direction_a_place_is_like_a_range(tmp_path: Path)
     """Ranges that are too long, or a place too far north."""
     targets = [(1600.0, 9000.0, 5.0, 3.0), (1400.0, 9600.0, -4.0, 4.0), (1500.0, 8400.0, 3.0, -6.0)]
     calibration = biases_of(two_radars(tmp_path, targets))
-    why = {(each.parameter.sensor, each.parameter.name): each.why for each in calibration.found}
+    why = {(each.parameter.sensor, each.parameter.name): each.reason for each in calibration.estimates}
     assert why[1, "range"].startswith("not identifiable separately from y bias of b")
     assert why[1, "y"].startswith("not identifiable separately from range bias of b")
     assert (why[1, "bearing_deg"], why[1, "x"]) == ("", "")
@@ -297,8 +297,8 @@ def test_of_far_targets_in_one_direction_a_place_is_like_a_range(tmp_path: Path)
 
 def test_of_a_radar_alone_no_place_is_found(tmp_path: Path) -> None:
     calibration = biases_of(two_radars(tmp_path, [(2000.0, 3000.0, 5.0, 3.0), (-3000.0, 1000.0, -4.0, 4.0)], "a"))
-    assert [each.parameter.name for each in calibration.found] == ["range"]
-    assert "there is no other sensor" in calibration.found[0].why
+    assert [each.parameter.name for each in calibration.estimates] == ["range"]
+    assert "there is no other sensor" in calibration.estimates[0].reason
     assert calibration.rank == 0
 
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from vedette.calibration.registration import BIASES, Pairs, _linearised, _pieces, register
+from vedette.calibration.registration import BIASES, MatchedMeasurements, _linearised, _pieces, register
 from vedette.kernels.base.types import Floats
 from vedette.recorded import Site
 
@@ -27,7 +27,7 @@ ASKED = TRUE != 0.0
 UNKNOWN = np.array([1000.0, 0.2, 5.0, 1000.0, 1000.0]) * np.ones((4, 1))
 
 
-def pairs_of(seconds: float = 200.0) -> Pairs:
+def pairs_of(seconds: float = 200.0) -> MatchedMeasurements:
     """What each sensor measures of each target, without noise, and tracks that are a little off."""
     rows = []
     for s, site in enumerate(SITES):
@@ -44,7 +44,9 @@ def pairs_of(seconds: float = 200.0) -> Pairs:
                 rows.append([time, s, k, *measured, *site.pose[:2], *track])
     table, none = np.array(rows), np.zeros(4, np.int64)
     whole = table[:, 1:3].astype(np.int64)
-    return Pairs(table[:, 0], whole[:, 0], whole[:, 1], table[:, 3:5], table[:, 5:7], table[:, 7:], none, none, none)
+    return MatchedMeasurements(
+        table[:, 0], whole[:, 0], whole[:, 1], table[:, 3:5], table[:, 5:7], table[:, 7:], none, none, none
+    )
 
 
 def test_without_noise_the_biases_are_found() -> None:

@@ -196,9 +196,11 @@ def test_calibrate_finds_bias_and_noise_of_range_rates(tmp_path: Path) -> None:
     )
     made = scenario_of_recording(tmp_path / "radars.yaml", tmp_path / "scans.csv", speed=20.0)
     assert made.scenario.model.sensors[0].clutter.max_range_rate > 9.0
-    found = {(each.parameter.sensor, each.parameter.name): each for each in calibrate(problem_of(made.scenario)).found}
+    found = {
+        (each.parameter.sensor, each.parameter.name): each for each in calibrate(problem_of(made.scenario)).estimates
+    }
     for s, bias in enumerate(biases.values()):
-        assert found[s, "range_rate"].why == ""
+        assert found[s, "range_rate"].reason == ""
         assert found[s, "range_rate"].value == pytest.approx(bias, abs=0.3)
         assert found[s, "noise.sigma_range_rate"].value == pytest.approx(0.6, rel=0.15)
     assert found[0, "range_rate"].parameter.label == "range rate bias"

@@ -1,18 +1,24 @@
 """What sensors are like, by their recorded scans alone: biases, noise, detection, clutter."""
 
-from vedette.calibration.calibrating import Calibration, Found, calibrate
-from vedette.calibration.drifting import BiasFollower, Followed, Window, calibrate_windows, starting_from
+from vedette.calibration.bias_drift import (
+    BiasEstimatorState,
+    CalibrationWindow,
+    OnlineBiasEstimator,
+    calibrate_windows,
+    warm_started,
+)
+from vedette.calibration.calibrating import Calibration, ParameterEstimate, calibrate
 from vedette.calibration.parameters import Parameter, Problem
 
 __all__ = [
-    "BiasFollower",
+    "BiasEstimatorState",
     "Calibration",
-    "Followed",
-    "Found",
+    "CalibrationWindow",
+    "OnlineBiasEstimator",
     "Parameter",
+    "ParameterEstimate",
     "Problem",
-    "Window",
     "calibrate",
     "calibrate_windows",
-    "starting_from",
+    "warm_started",
 ]

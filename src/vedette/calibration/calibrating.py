@@ -10,9 +10,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.calibration.maximum import Maximum, Terms, covariance, holding, maximise
+from vedette.calibration.maximum_likelihood import Maximum, Terms, conditional_maximum, covariance, maximise
 from vedette.calibration.parameters import Parameter, Problem
-from vedette.calibration.registration import BIASES, Pairs, linked, matched, register
+from vedette.calibration.registration import (
+    BIASES,
+    MatchedMeasurements,
+    match_measurements,
+    register,
+    sensors_with_common_targets,
+)
 from vedette.internal.quantities import COMPONENTS, QUANTITIES
 from vedette.kernels.base.types import Floats
 
@@ -23,7 +29,7 @@ _SHORT = 1.0  # of log likelihood, by which a search that holds parameters at mo
 _PART = 0.1  # of a parameter that lies where nothing is known: it cannot be found
 
 
-class Found(NamedTuple):
+class ParameterEstimate(NamedTuple):
     """What was found of a parameter.
 
     value, low, high: with the interval that covers it 95 times of 100; NaN where the search did not converge. why: why
@@ -32,14 +38,14 @@ class Found(NamedTuple):
 
     parameter: Parameter
     value: float
-    low: float
-    high: float
-    why: str
+    ci_low: float
+    ci_high: float
+    reason: str
 
     @property
     def std(self) -> float:
         """Standard deviation of a parameter whose scale is plain; NaN where there is no interval."""
-        return (self.high - self.low) / (2.0 * _QUANTILE)
+        return (self.ci_high - self.ci_low) / (2.0 * _QUANTILE)
 
 
 class Calibration(NamedTuple):
@@ -49,9 +55,9 @@ class Calibration(NamedTuple):
     rank: of the information, the number of directions of the parameters that the recording says something of.
     """
 
-    found: tuple[Found, ...]
+    estimates: tuple[ParameterEstimate, ...]
     log_likelihood: float
-    before: float
+    initial_log_likelihood: float
     converged: bool
     rank: int
 
@@ -82,9 +88,9 @@ def calibrate(
     before = float(terms(said[asked], asked).sum())
     guessed, pairs = _guess(problem, said, asked, watch)
     start = guessed if float(terms(guessed[asked], asked).sum()) > before else said.copy()
-    together = linked(pairs, len(problem.sites))
+    together = sensors_with_common_targets(pairs, len(problem.sites))
     apart = np.flatnonzero(~together | (together.sum() == 1)).tolist()  # with nobody else, the first one is, too
-    found, directions, own = dict[int, Found](), list[int](), asked
+    found, directions, own = dict[int, ParameterEstimate](), list[int](), asked
     highest, again = math.inf, False
     while True:
         maximum, judged, rank = _found(problem, own, partial(terms, own=own), start[own], apart)
@@ -96,23 +102,23 @@ def calibrate(
         highest = maximum.log_likelihood
         found |= zip(own, judged, strict=True)
         directions.append(rank)
-        told = [i for i in own if not found[i].why]
+        told = [i for i in own if not found[i].reason]
         if told == own or not told:
             break
         # What cannot be found stays as it was said: the others are at the maximum beside that.
         unknown = np.array([problem.parameters[i].unknown for i in own])
-        start[own] = holding(maximum, unknown, [i not in told for i in own], said[own])
+        start[own] = conditional_maximum(maximum, unknown, [i not in told for i in own], said[own])
         own = told
     log_likelihood = maximum.log_likelihood if told else before
     kept = tuple(found[i] for i in asked)
     if not maximum.converged:  # second derivatives elsewhere than at a maximum are no information
-        kept = tuple(each._replace(low=math.nan, high=math.nan) for each in kept)
+        kept = tuple(each._replace(ci_low=math.nan, ci_high=math.nan) for each in kept)
     return Calibration(kept, log_likelihood, before, maximum.converged, directions[0])
 
 
 def _found(
     problem: Problem, own: Sequence[int], terms: Terms, start: Floats, apart: Sequence[int]
-) -> tuple[Maximum, tuple[Found, ...], int]:
+) -> tuple[Maximum, tuple[ParameterEstimate, ...], int]:
     """The maximum over some of the parameters, what it says of each, and of how many directions it says something."""
     parameters = tuple(problem.parameters[i] for i in own)
     unknown = np.array([each.unknown for each in parameters])
@@ -133,7 +139,9 @@ def _blocks(parameters: tuple[Parameter, ...]) -> list[list[int]]:
     return blocks
 
 
-def _guess(problem: Problem, said: Floats, own: Sequence[int], watch: Callable[[], None]) -> tuple[Floats, Pairs]:
+def _guess(
+    problem: Problem, said: Floats, own: Sequence[int], watch: Callable[[], None]
+) -> tuple[Floats, MatchedMeasurements]:
     """A first guess, of `own` among the biases, and what it was made from.
 
     Tracks by noise as wide as biases may be, then by narrower noise, and what fits them.
@@ -151,7 +159,7 @@ def _guess(problem: Problem, said: Floats, own: Sequence[int], watch: Callable[[
     for _ in range(3):
         recording = problem.without_biases(values)
         watch()
-        pairs = matched(problem.tracker(_with_noise(problem, values, stds, wide))[0], recording, sites, stds)
+        pairs = match_measurements(problem.tracker(_with_noise(problem, values, stds, wide))[0], recording, sites, stds)
         found = register(pairs, sites, asked, unknown, stds, _period(problem))
         for i, at in places.items():
             values[i] += problem.parameters[i].per_si * found.biases[at]
@@ -178,7 +186,7 @@ def _with_noise(problem: Problem, values: Floats, stds: Floats, rates: float | N
     return values
 
 
-def _with_counts(problem: Problem, values: Floats, pairs: Pairs) -> Floats:
+def _with_counts(problem: Problem, values: Floats, pairs: MatchedMeasurements) -> Floats:
     """The values with probabilities of detection and clutter as tracks and measurements were matched."""
     values, hits = values.copy(), np.bincount(pairs.sensors, minlength=len(problem.sites))
     for i, each in enumerate(problem.parameters):
@@ -190,7 +198,9 @@ def _with_counts(problem: Problem, values: Floats, pairs: Pairs) -> Floats:
     return values
 
 
-def _judged(problem: Problem, at: Floats, cov: Floats, lost: Floats, apart: Sequence[int]) -> tuple[Found, ...]:
+def _judged(
+    problem: Problem, at: Floats, cov: Floats, lost: Floats, apart: Sequence[int]
+) -> tuple[ParameterEstimate, ...]:
     """Each parameter with its interval, or why it cannot be found.
 
     cov, lost: as of `covariance`. apart: sensors without targets that others see.
@@ -201,11 +211,11 @@ def _judged(problem: Problem, at: Floats, cov: Floats, lost: Floats, apart: Sequ
         compared = each.sensor in apart and each.component in _COMPARED
         if compared or lost[i, i] > _PART:
             why = _why(problem, i, [] if compared else partners, each.sensor in apart)
-            found.append(Found(each, each.start, math.nan, math.nan, why))
+            found.append(ParameterEstimate(each, each.start, math.nan, math.nan, why))
             continue
         reach = _QUANTILE * math.sqrt(cov[i, i])
         value, low, high = (each.from_free(x) for x in (free, free - reach, free + reach))
-        found.append(Found(each, value, low, high, ""))
+        found.append(ParameterEstimate(each, value, low, high, ""))
     return tuple(found)
 
 

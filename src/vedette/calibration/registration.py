@@ -32,7 +32,7 @@ _MAD = 1.4826  # standard deviation of normal numbers over the median of their s
 _POSITION, _SPEED = 1e4, 30.0  # m, m/s: what holds a piece of which measurements say too little
 
 
-class Pairs(NamedTuple):
+class MatchedMeasurements(NamedTuple):
     """Measurements that were matched with tracks.
 
     times: (n,) s. sensors, tracks: (n,) numbers. measured: (n, 2) the first two components, NaN where there is no
@@ -52,7 +52,9 @@ class Pairs(NamedTuple):
     scans: Ints
 
 
-def matched(tracker: Tracker, recording: RecordedScans, sites: Sequence[Site], stds: Floats) -> Pairs:
+def match_measurements(
+    tracker: Tracker, recording: RecordedScans, sites: Sequence[Site], stds: Floats
+) -> MatchedMeasurements:
     """What a tracker's tracks and the scans have in common.
 
     Args:
@@ -82,7 +84,9 @@ def matched(tracker: Tracker, recording: RecordedScans, sites: Sequence[Site], s
         state = tracker.step(state, list(scans), poses, time, rngs=rngs)[0]
     table = np.array(rows, np.float64).reshape(len(rows), 11)
     whole = table[:, 1:3].astype(np.int64)
-    return Pairs(table[:, 0], whole[:, 0], whole[:, 1], table[:, 3:5], table[:, 5:7], table[:, 7:], *counts)
+    return MatchedMeasurements(
+        table[:, 0], whole[:, 0], whole[:, 1], table[:, 3:5], table[:, 5:7], table[:, 7:], *counts
+    )
 
 
 def _assigned(scan: Floats, offsets: Floats, place: Floats, kind: str, stds: Floats) -> list[tuple[int, int]]:
@@ -118,7 +122,7 @@ def _slopes(offsets: Floats, kind: str) -> Floats:
     return np.stack([np.stack(values[component], axis=1) for component in COMPONENTS[kind][:2]], axis=1)
 
 
-def linked(pairs: Pairs, num_sensors: int) -> Bools:
+def sensors_with_common_targets(pairs: MatchedMeasurements, num_sensors: int) -> Bools:
     """(num_sensors,) which sensors have targets in common with the first, or with others that have."""
     counts = np.zeros((num_sensors, pairs.tracks.max(initial=-1) + 1), np.int64)
     np.add.at(counts, (pairs.sensors, pairs.tracks), 1)
@@ -137,7 +141,7 @@ class Registration(NamedTuple):
 
 
 def register(
-    pairs: Pairs, sites: Sequence[Site], asked: Bools, unknown: Floats, stds: Floats, period: float
+    pairs: MatchedMeasurements, sites: Sequence[Site], asked: Bools, unknown: Floats, stds: Floats, period: float
 ) -> Registration:
     """The biases that fit best, with the straight pieces of the tracks.
 
@@ -174,7 +178,7 @@ class _Rows(NamedTuple):
     pieces: Ints
 
 
-def _pieces(pairs: Pairs, length: float) -> tuple[Ints, Floats, Floats]:
+def _pieces(pairs: MatchedMeasurements, length: float) -> tuple[Ints, Floats, Floats]:
     """(n,) number of the piece of a track that each pair is of, -1: of none; their middles, s, and states there."""
     keys = np.stack([pairs.tracks, np.floor(pairs.times / length).astype(np.int64)], axis=1)
     _, pieces, counts = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
@@ -191,7 +195,7 @@ def _pieces(pairs: Pairs, length: float) -> tuple[Ints, Floats, Floats]:
 
 
 def _linearised(
-    pairs: Pairs, sites: Sequence[Site], biases: Floats, pieces: Ints, middles: Floats, states: Floats
+    pairs: MatchedMeasurements, sites: Sequence[Site], biases: Floats, pieces: Ints, middles: Floats, states: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """(n, 2) residuals, and what they lose by (n, 2, 4) the states of the pieces and (n, 2, 5) the sensor's biases."""
     num = len(pairs.times)

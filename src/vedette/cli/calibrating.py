@@ -47,7 +47,7 @@ def calibrate(
 
     From recorded scans alone, by maximum likelihood, with 95 % intervals.
     """
-    from vedette.calibration.drifting import calibrate_windows
+    from vedette.calibration.bias_drift import calibrate_windows
     from vedette.internal.files import unwritable, write_file
     from vedette.scenarios.calibrated import calibrated_text, problem_of
 

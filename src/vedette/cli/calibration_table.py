@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from vedette.cli.output import console, note, say
 
 if TYPE_CHECKING:
-    from vedette.calibration import Calibration, Found, Window
+    from vedette.calibration import Calibration, CalibrationWindow, ParameterEstimate
 
 _NOT_CONVERGED = (
     "the optimiser stopped before it converged. The estimates may be inaccurate and have no intervals. "
@@ -25,64 +25,68 @@ def calibration_document(calibration: Calibration, names: tuple[str, ...]) -> di
                 "parameter": each.parameter.name,
                 "unit": each.parameter.unit,
                 "assumed": each.parameter.start,
-                "estimate": each.value if not each.why else None,
-                "low": each.low,
-                "high": each.high,
-                "why_not": each.why or None,
+                "estimate": each.value if not each.reason else None,
+                "low": each.ci_low,
+                "high": each.ci_high,
+                "why_not": each.reason or None,
             }
-            for each in calibration.found
+            for each in calibration.estimates
         ],
         "log_likelihood": calibration.log_likelihood,
-        "log_likelihood_assumed": calibration.before,
+        "log_likelihood_assumed": calibration.initial_log_likelihood,
         "converged": calibration.converged,
         "rank": calibration.rank,
     }
 
 
-def print_windows(windows: list[Window], names: tuple[str, ...], *, position: bool) -> None:
+def print_windows(windows: list[CalibrationWindow], names: tuple[str, ...], *, position: bool) -> None:
     """Print the estimates of each window, what they are relative to, warnings and likelihoods."""
     _print_table(windows, names)
-    if any(_is_outside(each) for window in windows for each in window.calibration.found):
+    if any(_is_outside(each) for window in windows for each in window.calibration.estimates):
         say("* the assumed value lies outside the interval")
     reasons = [
-        f"{each.parameter.label} of {names[each.parameter.sensor]}: {each.why}"
+        f"{each.parameter.label} of {names[each.parameter.sensor]}: {each.reason}"
         for window in windows
-        for each in window.calibration.found
-        if each.why
+        for each in window.calibration.estimates
+        if each.reason
     ]
     for text in dict.fromkeys(reasons):
         say(text)
-    _print_references(windows[0].calibration.found, names, position)
+    _print_references(windows[0].calibration.estimates, names, position)
     for window in windows:
         calibration = window.calibration
         part = f"From {window.begin:.0f} s on: " if len(windows) > 1 else ""
         if not calibration.converged:
             note(f"Warning: {part[:1].lower()}{part[1:]}{_NOT_CONVERGED}")
-        if any(each.why for each in calibration.found):
-            say(f"{part}The recording determines {calibration.rank} of {len(calibration.found)} parameter directions.")
+        if any(each.reason for each in calibration.estimates):
+            say(
+                f"{part}The recording determines {calibration.rank} of "
+                f"{len(calibration.estimates)} parameter directions."
+            )
         values = (
-            f"{calibration.before:.1f} with the assumed values, {calibration.log_likelihood:.1f} with the estimates"
+            f"{calibration.initial_log_likelihood:.1f} with the assumed values, "
+            f"{calibration.log_likelihood:.1f} with the estimates"
         )
         say(f"{part}Log-likelihood: {values}.")
 
 
-def _print_table(windows: list[Window], names: tuple[str, ...]) -> None:
+def _print_table(windows: list[CalibrationWindow], names: tuple[str, ...]) -> None:
     """One row for each parameter and window."""
     from rich.table import Table
 
     several = ["from (s)"] if len(windows) > 1 else []
     table = Table("sensor", "parameter", "unit", *several, "assumed", "estimate", "95 % interval", "", box=None)
-    ends = [_ends(each) for window in windows for each in window.calibration.found if not math.isnan(each.low)]
+    ends = [_ends(each) for window in windows for each in window.calibration.estimates if not math.isnan(each.ci_low)]
     low_width, high_width = (max(map(len, side)) for side in zip(*ends, strict=True)) if ends else (0, 0)
-    for same in zip(*(window.calibration.found for window in windows), strict=True):
+    for same in zip(*(window.calibration.estimates for window in windows), strict=True):
         for window, each in zip(windows, same, strict=True):
             own, since = each.parameter, [f"{window.begin:.0f}"] if several else []
             head = (names[own.sensor], own.label, own.unit, *since, f"{own.start:.4g}")
-            if each.why:
+            if each.reason:
                 table.add_row(*head, "not identifiable", "", "")
                 continue
             interval = ""
-            if not math.isnan(each.low):
+            if not math.isnan(each.ci_low):
                 low, high = _ends(each)
                 interval = f"{low:>{low_width}} to {high:>{high_width}}"
             table.add_row(*head, _number(each.value, each), interval, "*" if _is_outside(each) else "")
@@ -90,7 +94,7 @@ def _print_table(windows: list[Window], names: tuple[str, ...]) -> None:
     console().print(table)
 
 
-def _print_references(found: tuple[Found, ...], names: tuple[str, ...], position: bool) -> None:
+def _print_references(found: tuple[ParameterEstimate, ...], names: tuple[str, ...], position: bool) -> None:
     """Print which estimates are relative to those of the first sensor."""
     first = {each.parameter.component for each in found if each.parameter.sensor == found[0].parameter.sensor}
     others = {each.parameter.component for each in found if each.parameter.sensor != found[0].parameter.sensor}
@@ -102,17 +106,17 @@ def _print_references(found: tuple[Found, ...], names: tuple[str, ...], position
         say(f"{what} are relative to {name}, the first sensor{'' if others else ', and there is no other'}.")
 
 
-def _is_outside(each: Found) -> bool:
+def _is_outside(each: ParameterEstimate) -> bool:
     """Return True if the interval excludes the assumed value; False without an interval."""
-    return each.parameter.start < each.low or each.parameter.start > each.high
+    return each.parameter.start < each.ci_low or each.parameter.start > each.ci_high
 
 
-def _ends(each: Found) -> tuple[str, str]:
+def _ends(each: ParameterEstimate) -> tuple[str, str]:
     """Both ends of the interval as text."""
-    return _number(each.low, each), _number(each.high, each)
+    return _number(each.ci_low, each), _number(each.ci_high, each)
 
 
-def _number(value: float, each: Found) -> str:
+def _number(value: float, each: ParameterEstimate) -> str:
     """Return a value with two significant digits of half the interval's width; with four of its own without one."""
-    half = 0.5 * (each.high - each.low)
+    half = 0.5 * (each.ci_high - each.ci_low)
     return f"{value:.{max(0, 1 - math.floor(math.log10(half)))}f}" if half > 0.0 else f"{value:.4g}"

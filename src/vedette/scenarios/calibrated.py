@@ -203,10 +203,10 @@ def calibrated_text(scenario: Scenario, sensors: FilePath, calibration: Calibrat
     """
     said = dict(read_yaml(read_text(sensors, "sensors file", MOST_BYTES), str(sensors)).data)
     biases = [sensor.bias.model_dump(exclude_defaults=True) for sensor in scenario.model.sensors]
-    parameters = [each.parameter for each in calibration.found]
-    values = [float(f"{each.value:.7g}") for each in calibration.found]  # digits far beyond what is known
-    for each, value in zip(calibration.found, values, strict=True):
-        if each.parameter.kind == "bias" and not each.why:
+    parameters = [each.parameter for each in calibration.estimates]
+    values = [float(f"{each.value:.7g}") for each in calibration.estimates]  # digits far beyond what is known
+    for each, value in zip(calibration.estimates, values, strict=True):
+        if each.parameter.kind == "bias" and not each.reason:
             biases[each.parameter.sensor][each.parameter.name] = value
     sections = _with_values(scenario.model.sensors, parameters, values)
     said["sensors"] = [

@@ -22,7 +22,7 @@ from vedette.tracking.late import name_of, own_scan
 _KEPT = 4.0  # windows for which what was found is remembered
 
 
-class Window(NamedTuple):
+class CalibrationWindow(NamedTuple):
     """What was found of a part of a recording, from `begin` to before `end`, s after its first scan."""
 
     begin: float
@@ -30,7 +30,9 @@ class Window(NamedTuple):
     calibration: Calibration
 
 
-def calibrate_windows(problem: Problem, seconds: float, watch: Callable[[], None] = lambda: None) -> Iterator[Window]:
+def calibrate_windows(
+    problem: Problem, seconds: float, watch: Callable[[], None] = lambda: None
+) -> Iterator[CalibrationWindow]:
     """Calibrate the parts of a recording one after the other, each by itself.
 
     Args:
@@ -49,17 +51,17 @@ def calibrate_windows(problem: Problem, seconds: float, watch: Callable[[], None
     for begin, end in pairwise(bounds):
         own = problem.recording.between(begin, end)
         if own.scans:
-            yield Window(begin, end, calibrate(replace(problem, recording=own), watch))
+            yield CalibrationWindow(begin, end, calibrate(replace(problem, recording=own), watch))
 
 
-def starting_from(problem: Problem, calibration: Calibration) -> Problem:
+def warm_started(problem: Problem, calibration: Calibration) -> Problem:
     """The problem whose parameters start where they were found."""
-    found = {replace(each.parameter, start=0.0): each.value for each in calibration.found}
+    found = {replace(each.parameter, start=0.0): each.value for each in calibration.estimates}
     parameters = [replace(each, start=found.get(replace(each, start=0.0), each.start)) for each in problem.parameters]
     return replace(problem, parameters=tuple(parameters))
 
 
-class Piece(NamedTuple):
+class WindowEstimate(NamedTuple):
     """The parameters as a window has them.
 
     time: s, its middle. values, stds: (num_parameters,) with standard deviations, NaN where they were not found.
@@ -71,7 +73,7 @@ class Piece(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Followed:
+class BiasEstimatorState:
     """What is known of the sensors so far.
 
     Attributes:
@@ -81,24 +83,24 @@ class Followed:
         due: s, from which on biases are found again.
         pieces: of the last windows, in order of time.
         latest: what was found last; None before anything was.
-        num_found: how often.
+        num_estimates: how often.
     """
 
     parameters: tuple[Parameter, ...]
     scans: tuple[SensorScan, ...] = ()
     newest: float | None = None
     due: float = math.inf
-    pieces: tuple[Piece, ...] = ()
+    pieces: tuple[WindowEstimate, ...] = ()
     latest: Calibration | None = None
-    num_found: int = 0
+    num_estimates: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class BiasFollower:
+class OnlineBiasEstimator:
     """Takes scans as they come, finds the sensors' biases in the last of them every so often, and takes them off.
 
     Biases of what is measured and of places are followed, from the first full window on. Clocks, noise, detection and
-    clutter, of which a window says little, are as the parameters start: see `starting_from` for what a longer recording
+    clutter, of which a window says little, are as the parameters start: see `warm_started` for what a longer recording
     says of them. Within a window biases are constant, as of its middle; from there on they go straight, through what
     was found in the window before it, as far as the change stands out of the errors: by d^2 / (d^2 + var d) of it.
 
@@ -121,11 +123,11 @@ class BiasFollower:
         positive("window", self.window)
         positive("every", self.every)
 
-    def initial(self) -> Followed:
+    def initial(self) -> BiasEstimatorState:
         """Before the first scan: biases as the parameters start."""
-        return Followed(self.problem.parameters)
+        return BiasEstimatorState(self.problem.parameters)
 
-    def take(self, state: Followed, scan: SensorScan) -> tuple[Followed, SensorScan]:
+    def take(self, state: BiasEstimatorState, scan: SensorScan) -> tuple[BiasEstimatorState, SensorScan]:
         """Take a scan, and find the biases again where that is due.
 
         Args:
@@ -148,7 +150,7 @@ class BiasFollower:
             state = self._found(state)
         return state, self.corrected(state, scan)
 
-    def corrected(self, state: Followed, scan: SensorScan) -> SensorScan:
+    def corrected(self, state: BiasEstimatorState, scan: SensorScan) -> SensorScan:
         """The scan without the biases of its time, as they are known; errors as of `take`."""
         own = self._checked(scan)
         site = self.problem.with_biases(self.biases(state, own.time))[own.sensor]
@@ -162,7 +164,7 @@ class BiasFollower:
         measured = own.measurements if own.measurements.size else np.empty((0, shape[1]))
         return replace(own, measurements=float_array(f"{name_of(own)}: scan", measured, shape))
 
-    def biases(self, state: Followed, time: float) -> Floats:
+    def biases(self, state: BiasEstimatorState, time: float) -> Floats:
         """(num_parameters,) the values of the parameters at a time, at most a window after the last that were found."""
         values = np.array([each.start for each in state.parameters])
         for i, each in enumerate(state.parameters):
@@ -178,7 +180,7 @@ class BiasFollower:
                 values[i] += ahead * change * change**2 / (change**2 + spread**2)
         return values
 
-    def _found(self, state: Followed) -> Followed:
+    def _found(self, state: BiasEstimatorState) -> BiasEstimatorState:
         """The state with what the last window says."""
         assert state.newest is not None
         recorded, start = self.problem.recording, min(scan.time for scan in state.scans)
@@ -191,13 +193,13 @@ class BiasFollower:
         problem = replace(self.problem, recording=window, parameters=state.parameters)
         drifts = [each for each in state.parameters if each.kind == "bias" and each.component != "clock"]
         calibration = calibrate(problem, only=drifts)
-        parameters = starting_from(problem, calibration).parameters
+        parameters = warm_started(problem, calibration).parameters
         stds = np.full(len(parameters), math.nan)
-        for each in calibration.found:
+        for each in calibration.estimates:
             stds[[p.sensor == each.parameter.sensor and p.name == each.parameter.name for p in parameters]] = each.std
         middle = start + 0.5 * float(window.times[-1])
-        piece = Piece(middle, np.array([each.start for each in parameters]), stds)
+        piece = WindowEstimate(middle, np.array([each.start for each in parameters]), stds)
         kept = tuple(each for each in state.pieces if each.time > middle - _KEPT * self.window)
         due = state.due + self.every * (1.0 + math.floor((state.newest - state.due) / self.every))
         found = replace(state, parameters=parameters, due=due, pieces=(*kept, piece), latest=calibration)
-        return replace(found, num_found=state.num_found + 1)
+        return replace(found, num_estimates=state.num_estimates + 1)

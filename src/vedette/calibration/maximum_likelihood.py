@@ -84,7 +84,7 @@ def covariance(information: Floats, unknown: Floats) -> tuple[Floats, Floats]:
     return scale * ((sure / values[known]) @ sure.T), lost @ lost.T
 
 
-def holding(maximum: Maximum, unknown: Floats, held: Sequence[bool], values: Floats) -> Floats:
+def conditional_maximum(maximum: Maximum, unknown: Floats, held: Sequence[bool], values: Floats) -> Floats:
     """(p,) about where the maximum is when some parameters are held at these values.
 
     By the second derivatives, as of the mean of a Gaussian given some of its components; what they cannot tell keeps

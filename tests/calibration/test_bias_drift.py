@@ -10,8 +10,15 @@ import numpy as np
 import pytest
 
 from recordings import SENSORS, write_recording
-from vedette.calibration import BiasFollower, Followed, Problem, calibrate, calibrate_windows, starting_from
-from vedette.calibration.drifting import Piece
+from vedette.calibration import (
+    BiasEstimatorState,
+    OnlineBiasEstimator,
+    Problem,
+    calibrate,
+    calibrate_windows,
+    warm_started,
+)
+from vedette.calibration.bias_drift import WindowEstimate
 from vedette.errors import InputError
 from vedette.scenarios.calibrated import problem_of
 from vedette.scenarios.of_recording import scenario_of_recording, scenario_of_sensors
@@ -51,11 +58,11 @@ def test_each_window_has_the_bias_of_its_middle(problem: Problem) -> None:
     i = place(problem, 1, "range")
     assert [round(window.begin) for window in windows] == [0, 78]
     for window in windows:
-        found = window.calibration.found[i]
+        found = window.calibration.estimates[i]
         truth = 300.0 + DRIFT * 0.5 * (window.begin + window.end)
         assert abs(found.value - truth) < 3.0 * found.std
-        assert 3.92 * found.std == pytest.approx(found.high - found.low, rel=1e-3)
-        values = part.free([each.value for each in window.calibration.found])
+        assert 3.92 * found.std == pytest.approx(found.ci_high - found.ci_low, rel=1e-3)
+        values = part.free([each.value for each in window.calibration.estimates])
         own = replace(part, recording=part.recording.between(window.begin, window.end))
         assert own.log_likelihoods(values).sum() == pytest.approx(window.calibration.log_likelihood, abs=1e-9)
 
@@ -64,7 +71,7 @@ def test_one_window_is_the_whole_recording(problem: Problem) -> None:
     short = replace(problem, recording=problem.recording.between(0.0, 40.0))
     (window,) = calibrate_windows(short, math.inf)
     whole = calibrate(short)
-    assert [each.value for each in window.calibration.found] == [each.value for each in whole.found]
+    assert [each.value for each in window.calibration.estimates] == [each.value for each in whole.estimates]
     with pytest.raises(InputError, match="seconds: expected a number above 0; got 0"):
         next(calibrate_windows(short, 0.0))
 
@@ -73,9 +80,9 @@ def test_only_what_is_asked_for_changes(problem: Problem) -> None:
     short = replace(problem, recording=problem.recording.between(0.0, 60.0))
     only = [problem.parameters[place(problem, s, "range")] for s in (0, 1)]
     calibration = calibrate(short, only=only)
-    assert [each.parameter for each in calibration.found] == only
-    values = np.array([each.start for each in starting_from(problem, calibration).parameters])
-    assert [values[problem.parameters.index(each)] for each in only] == [each.value for each in calibration.found]
+    assert [each.parameter for each in calibration.estimates] == only
+    values = np.array([each.start for each in warm_started(problem, calibration).parameters])
+    assert [values[problem.parameters.index(each)] for each in only] == [each.value for each in calibration.estimates]
     assert calibration.log_likelihood == pytest.approx(
         short.log_likelihoods(short.free(values.tolist())).sum(), abs=1e-9
     )
@@ -86,19 +93,19 @@ def test_biases_are_followed_and_taken_off_as_scans_come(problem: Problem, tmp_p
     told = {(0, "bearing_deg"): -1.0, (0, "range"): -150.0, (1, "bearing_deg"): 2.0, (1, "range"): 300.0}
     known = [replace(each, start=told.get((each.sensor, each.name), each.start)) for each in problem.parameters]
     problem = replace(problem, parameters=tuple(known))
-    follower, i = BiasFollower(problem, window=90.0, every=60.0), place(problem, 1, "range")
+    follower, i = OnlineBiasEstimator(problem, window=90.0, every=60.0), place(problem, 1, "range")
     state, scans = follower.initial(), list(problem.recording.arrivals())
     for scan in scans:
         state, without = follower.take(state, scan)
-        if state.num_found == 0:
+        if state.num_estimates == 0:
             np.testing.assert_allclose(
                 without.measurements[:, 1], np.maximum(scan.measurements[:, 1] - (-150.0, 300.0)[scan.sensor], 1.0)
             )
-        if state.num_found == 1 and len(state.scans) % 5 == 0:
+        if state.num_estimates == 1 and len(state.scans) % 5 == 0:
             save_snapshot(tmp_path / "state.npz", {"state": state, "rest": scans.index(scan) + 1})
-    assert state.num_found == 3
+    assert state.num_estimates == 3
     assert state.latest is not None
-    assert {each.parameter.component for each in state.latest.found} == {"bearing", "range"}
+    assert {each.parameter.component for each in state.latest.estimates} == {"bearing", "range"}
     now = scans[-1].time
     bias, std = follower.biases(state, now)[i], state.pieces[-1].stds[i]
     assert abs(bias - (300.0 + DRIFT * now)) < 3.0 * std + DRIFT * 45.0
@@ -115,18 +122,18 @@ def test_biases_are_followed_and_taken_off_as_scans_come(problem: Problem, tmp_p
     assert follower.biases(again, now).tobytes() == follower.biases(state, now).tobytes()
 
 
-def followed(problem: Problem, *pieces: tuple[float, float, float]) -> Followed:
+def followed(problem: Problem, *pieces: tuple[float, float, float]) -> BiasEstimatorState:
     """Of the range of the second sensor: time, value, standard deviation."""
     made = []
     for time, value, std in pieces:
         values, stds = np.zeros(len(problem.parameters)), np.full(len(problem.parameters), math.nan)
         values[place(problem, 1, "range")], stds[place(problem, 1, "range")] = value, std
-        made.append(Piece(time, values, stds))
-    return Followed(problem.parameters, pieces=tuple(made))
+        made.append(WindowEstimate(time, values, stds))
+    return BiasEstimatorState(problem.parameters, pieces=tuple(made))
 
 
 def test_a_bias_goes_on_as_far_as_its_change_stands_out(problem: Problem) -> None:
-    follower, i = BiasFollower(problem, window=60.0, every=30.0), place(problem, 1, "range")
+    follower, i = OnlineBiasEstimator(problem, window=60.0, every=30.0), place(problem, 1, "range")
 
     def at(time: float, *pieces: tuple[float, float, float]) -> float:
         return float(follower.biases(followed(problem, *pieces), time)[i])
@@ -148,18 +155,18 @@ def test_sensors_of_scans_that_are_to_come_can_be_followed(tmp_path: Path) -> No
     problem = problem_of(scenario_of_sensors(tmp_path / "radars.yaml").scenario, bearings="north")
     assert {each.sensor for each in problem.parameters} == {0, 1}
     assert problem.recording.scans == ()
-    follower = BiasFollower(problem)
+    follower = OnlineBiasEstimator(problem)
     state, scan = follower.take(follower.initial(), SensorScan(0, 3.0, [[0.1, 500.0]], (1.0, 2.0, 0.0)))
-    assert (state.newest, state.due, state.num_found) == (3.0, 63.0, 0)
+    assert (state.newest, state.due, state.num_estimates) == (3.0, 63.0, 0)
     np.testing.assert_array_equal(scan.measurements, [[0.1, 500.0]])
 
 
 def test_bad_parts_are_refused(problem: Problem) -> None:
     with pytest.raises(InputError, match="problem: expected a Problem"):
-        BiasFollower("problem")  # type: ignore[arg-type]
+        OnlineBiasEstimator("problem")  # type: ignore[arg-type]
     with pytest.raises(InputError, match="window: expected a number above 0; got 0"):
-        BiasFollower(problem, window=0.0)
-    follower = BiasFollower(problem)
+        OnlineBiasEstimator(problem, window=0.0)
+    follower = OnlineBiasEstimator(problem)
     with pytest.raises(InputError, match=r"scan.sensor: expected a whole number from 0 to 1; got 2"):
         follower.take(follower.initial(), SensorScan(2, 0.0, [[0.1, 500.0]], (1.0, 2.0, 0.0)))
     with pytest.raises(InputError, match=r"scan of sensor 1 at 2 s: scan: expected an array of shape \(any, 2\)"):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vedette.calibration.maximum import covariance, maximise
+from vedette.calibration.maximum_likelihood import covariance, maximise
 from vedette.kernels.base.types import Floats
 
 TRUTH = np.array([3.0, -2.0, 0.5])
@@ -89,6 +89,6 @@ def test_where_terms_jump_second_derivatives_say_whether_it_converged() -> None:
 
 
 def test_far_from_the_maximum_it_did_not_converge(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("vedette.calibration.maximum._MOST_STEPS", 1)
+    monkeypatch.setattr("vedette.calibration.maximum_likelihood._MOST_STEPS", 1)
     far = np.array([60.0])
     assert not maximise(lambda at: np.full(20, -0.5 * (at[0] - 1.0) ** 2), far, np.array([100.0]), [[0]]).converged
