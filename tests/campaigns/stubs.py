@@ -12,8 +12,8 @@ from campaigns.filled import make_campaign, make_run
 from vedette.campaigns import Campaign, Shard, engine, run_campaign
 from vedette.campaigns.codec import encode
 from vedette.campaigns.rows import row_of
-from vedette.campaigns.running import Unwatched
-from vedette.campaigns.tasks import Landed, Outcome, Task
+from vedette.campaigns.running import NullObserver
+from vedette.campaigns.tasks import CompletedRun, Task, TaskOutcome
 from vedette.evaluation.metrics import RunMetrics, encode_metrics
 from vedette.simulation.kept import encode_timings
 from vedette.simulation.records import RunRecord
@@ -29,25 +29,25 @@ def _first(planner: str) -> tuple[RunRecord, RunMetrics]:
     return make_run(planner, 0)
 
 
-def stub_perform(task: Task) -> Outcome:
+def stub_perform(task: Task) -> TaskOutcome:
     """In place of `vedette.campaigns.tasks.perform`: the same numbers every time, under the run's own number."""
     record, metrics = _first(task.cell.planner)
     return tuple(
-        Landed(row_of(task.cell.name, run, encode(mine), encode_timings(mine), encode_metrics(metrics)), 1.0, 0.2)
+        CompletedRun(row_of(task.cell.name, run, encode(mine), encode_timings(mine), encode_metrics(metrics)), 1.0, 0.2)
         for run in task.runs
         for mine in [replace(record, run=run)]
     )
 
 
-class _Killed(Unwatched):
+class _Killed(NullObserver):
     """Ends the process once so many rows are there."""
 
     def __init__(self, every: int) -> None:
         self._every = every
         self._count = 0
 
-    def landed(self, result: Landed) -> None:
-        """See `vedette.campaigns.Watch`."""
+    def completed(self, result: CompletedRun) -> None:
+        """See `vedette.campaigns.ProgressObserver`."""
         self._count += 1
         if self._count % self._every == 0:
             os.kill(os.getpid(), signal.SIGKILL)

@@ -16,7 +16,7 @@ import pytest
 
 from campaigns.filled import fill, make_campaign
 from evaluation.synthetic import ACTIONS, make_record
-from vedette.campaigns import gathering, open_results
+from vedette.campaigns import aggregation, open_results
 from vedette.errors import InputError, VedetteError
 from vedette.evaluation import ensembles
 from vedette.evaluation.ensembles import Ensemble, ensemble_of, joined
@@ -37,7 +37,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def small_parts(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(gathering, "_A_PART", 4)
+    monkeypatch.setattr(aggregation, "_A_PART", 4)
 
 
 def plain(value: Any) -> Any:
@@ -120,8 +120,8 @@ def test_readers_of_a_script_without_a_guarded_main_say_so(folder: Path, monkeyp
 def test_a_reader_that_dies_is_told(folder: Path, tmp_path: Path) -> None:
     script = tmp_path / "unguarded.py"
     script.write_text(
-        "from vedette.campaigns import gathering, open_results\n"
-        f"gathering._A_PART = 4\nopen_results({str(folder)!r}, num_workers=2).ensemble({CELL!r})\n"
+        "from vedette.campaigns import aggregation, open_results\n"
+        f"aggregation._A_PART = 4\nopen_results({str(folder)!r}, num_workers=2).ensemble({CELL!r})\n"
     )
     done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=PATIENCE, check=False)
     assert done.returncode == 1

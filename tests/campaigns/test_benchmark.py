@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from vedette.campaigns import benchmark, run_campaign, standings
+from vedette.campaigns import benchmark, leaderboard, run_campaign
 from vedette.campaigns.benchmark import OWN, Scene, campaign_of, entrant, make_way, scenes
+from vedette.campaigns.leaderboard import benchmark_csv, benchmark_markdown, header, origin, row, scene_table
 from vedette.campaigns.manifest import read_manifest
-from vedette.campaigns.standings import benchmark_csv, benchmark_markdown, header, origin, row, scene_table
 from vedette.cli import app
 from vedette.errors import InputError
 from vedette.evaluation import Summary
@@ -194,8 +194,8 @@ def test_a_typo_is_no_lost_run(what: str, words: str, tmp_path: Path, monkeypatc
 
 def test_of_few_runs_no_interval_is_shown() -> None:
     numbers = (np.array(3.0), np.array(1.0), np.array(2.0), np.array(4.0))
-    assert standings._interval(Summary(*numbers, 2), "+.2f") == ""
-    assert standings._interval(Summary(*numbers, 5), "+.2f") == "+2.00 to +4.00"
+    assert leaderboard._interval(Summary(*numbers, 2), "+.2f") == ""
+    assert leaderboard._interval(Summary(*numbers, 5), "+.2f") == "+2.00 to +4.00"
 
 
 def test_an_entrant_without_a_scene_is_refused(tmp_path: Path) -> None:

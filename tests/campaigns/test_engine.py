@@ -25,7 +25,7 @@ from vedette.campaigns.cluster import remote_workers
 from vedette.campaigns.engine import in_process, on_workers
 from vedette.campaigns.local import local_workers
 from vedette.campaigns.rows import Row, pack
-from vedette.campaigns.tasks import Failed, Landed, Outcome, Task, TaskQueue, WorkerDied, perform
+from vedette.campaigns.tasks import CompletedRun, FailedRun, Task, TaskOutcome, TaskQueue, WorkerDied, perform
 from vedette.errors import InputError, VedetteError
 from waiting import wait_for_port, wait_until
 
@@ -33,10 +33,10 @@ pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::Depr
 RUNS = 30
 
 
-def payloads(results: Iterable[Landed | Failed]) -> dict[tuple[str, int], Row]:
+def payloads(results: Iterable[CompletedRun | FailedRun]) -> dict[tuple[str, int], Row]:
     done = list(results)
-    landed = [result for result in done if isinstance(result, Landed)]
-    assert len(landed) == len(done), [r for r in done if isinstance(r, Failed)]
+    landed = [result for result in done if isinstance(result, CompletedRun)]
+    assert len(landed) == len(done), [r for r in done if isinstance(r, FailedRun)]
     assert len({(result.cell, result.run) for result in landed}) == len(landed)
     # The timings are of the clock.
     return {(each.cell, each.run): replace(each.row, timings=pack("", 0, b"")) for each in landed}
@@ -47,7 +47,7 @@ def alone() -> dict[tuple[str, int], Row]:
     return payloads(chain.from_iterable(in_process(TaskQueue(small_campaign(runs=RUNS), ()))))
 
 
-def on_local_workers(num_workers: int = 2, tell: Callable[[str], None] = print) -> Iterator[Landed | Failed]:
+def on_local_workers(num_workers: int = 2, tell: Callable[[str], None] = print) -> Iterator[CompletedRun | FailedRun]:
     with local_workers(num_workers, tell) as workers:
         yield from chain.from_iterable(on_workers(workers, TaskQueue(small_campaign(runs=RUNS), ())))
 
@@ -70,10 +70,10 @@ def test_a_task_that_kills_its_workers_is_told_and_the_others_are_done(
     """Its own runs alone, one after the other, with those that can be done."""
     monkeypatch.setattr(local, "perform", partial(deadly, tmp_path / "deaths"))
     results = list(on_local_workers())
-    failed = [result for result in results if isinstance(result, Failed)]
-    assert failed == [Failed("still", 7, "every worker that took it died (out of memory?)")]
+    failed = [result for result in results if isinstance(result, FailedRun)]
+    assert failed == [FailedRun("still", 7, "every worker that took it died (out of memory?)")]
     expected = {key: value for key, value in alone.items() if key != ("still", 7)}
-    assert payloads(result for result in results if isinstance(result, Landed)) == expected
+    assert payloads(result for result in results if isinstance(result, CompletedRun)) == expected
     assert len((tmp_path / "deaths").read_text()) == 2 + 2 * 2  # as one of a task, and alone
 
 
@@ -145,10 +145,10 @@ def test_workers_that_end_while_they_start_are_told_of(monkeypatch: pytest.Monke
 def test_what_is_finished_when_ctrl_c_comes_is_given_back(monkeypatch: pytest.MonkeyPatch) -> None:
     """Though it waits for others, to be kept together."""
 
-    def until(task: Task) -> Outcome:
+    def until(task: Task) -> TaskOutcome:
         if task.runs[0] == 2:
             raise KeyboardInterrupt
-        return (Failed(task.cell.name, task.runs[0], "made up"),)
+        return (FailedRun(task.cell.name, task.runs[0], "made up"),)
 
     monkeypatch.setattr(engine, "perform", until)
     results = in_process(TaskQueue(small_campaign(runs=3), ()))
@@ -189,7 +189,7 @@ def test_workers_are_waited_for_and_missed(
 ) -> None:
     """By the file that the scheduler writes; they are looked at often here."""
     monkeypatch.setattr("vedette.campaigns.cluster._REFRESH_SECONDS", 0.2)
-    file, told, results = tmp_path / "scheduler.json", list[str](), list[Landed | Failed]()
+    file, told, results = tmp_path / "scheduler.json", list[str](), list[CompletedRun | FailedRun]()
     known = ("--scheduler-file", str(file))
     with (
         dask("scheduler", "--host", "127.0.0.1", *known, "--port", str(free_port)),

@@ -58,7 +58,7 @@ def test_a_failed_run_says_where_it_stopped_until_it_is_done(broken: pytest.Monk
     (again,) = run_campaign(campaign, folder).failed
     assert open_results(folder).failures() == (Failure("still", 1, 2, again.message),)
     broken.undo()
-    assert run_campaign(campaign, folder).num_landed == 1
+    assert run_campaign(campaign, folder).num_completed == 1
     results = open_results(folder)
     assert (results.failures(), results.missing("still")) == ((), ())
     write_report(results, tmp_path / "report.html")

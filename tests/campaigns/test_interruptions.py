@@ -19,7 +19,7 @@ from campaigns.examples import SPEC as SPEC_DATA
 from campaigns.examples import small_campaign
 from vedette.campaigns.database import Reader
 from vedette.campaigns.results import open_results
-from vedette.campaigns.running import Unwatched, run_campaign
+from vedette.campaigns.running import NullObserver, run_campaign
 from vedette.errors import InputError
 from waiting import PATIENCE, heed_interrupts, wait_for_port, wait_until
 
@@ -55,7 +55,7 @@ def contents(folder: Path) -> dict[str, str]:
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     folder = tmp_path_factory.mktemp("undisturbed") / "results"
     outcome = run_campaign(small_campaign(runs=RUNS), folder)
-    assert (outcome.num_landed, outcome.num_found, outcome.failed) == (2 * RUNS, 0, ())
+    assert (outcome.num_completed, outcome.num_existing, outcome.failed) == (2 * RUNS, 0, ())
     return contents(folder)
 
 
@@ -187,9 +187,13 @@ def test_a_finished_campaign_runs_nothing_and_more_runs_add_to_it(tmp_path: Path
     first = run_campaign(small_campaign(runs=2), tmp_path / "results")
     again = run_campaign(small_campaign(runs=2), tmp_path / "results")
     more = run_campaign(small_campaign(runs=3), tmp_path / "results")
-    assert [(outcome.num_landed, outcome.num_found) for outcome in (first, again, more)] == [(4, 0), (0, 4), (2, 4)]
+    assert [(outcome.num_completed, outcome.num_existing) for outcome in (first, again, more)] == [
+        (4, 0),
+        (0, 4),
+        (2, 4),
+    ]
     alone = run_campaign(small_campaign(runs=3), tmp_path / "alone")
-    assert alone.num_landed == 6
+    assert alone.num_completed == 6
     assert contents(tmp_path / "results") == contents(tmp_path / "alone")
 
 
@@ -203,11 +207,11 @@ def test_a_damaged_run_is_named_and_done_again_if_that_is_asked_for(tmp_path: Pa
         run_campaign(small_campaign(runs=2), folder)
     told: list[str] = []
     outcome = run_campaign(small_campaign(runs=2), folder, redo_damaged=True, watch=Notes(told))
-    assert (outcome.num_landed, told) == (1, ["damaged, and done again: idm 1"])
+    assert (outcome.num_completed, told) == (1, ["damaged, and done again: idm 1"])
     assert contents(folder) == before
 
 
-class Notes(Unwatched):
+class Notes(NullObserver):
     """Keeps what is said."""
 
     def __init__(self, told: list[str]) -> None:
@@ -235,7 +239,7 @@ def test_runs_that_were_lost_are_done_again_and_that_is_said(tmp_path: Path, lef
     (folder / "campaign.sqlite").unlink()
     if left is not None:
         (folder / "campaign.sqlite").write_bytes(left)
-    assert run_campaign(small_campaign(runs=1), folder, watch=Notes(told)).num_landed == 2
+    assert run_campaign(small_campaign(runs=1), folder, watch=Notes(told)).num_completed == 2
     assert any("was not there, or empty: every run is done again" in text for text in told)
 
 

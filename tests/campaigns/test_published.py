@@ -9,6 +9,7 @@ import pytest
 
 from campaigns.filled import NUM_RUNS, fill, make_campaign
 from vedette.campaigns import load_spec, open_results, resolve
+from vedette.campaigns.published import published_comparisons, published_markdown
 from vedette.campaigns.scores import (
     StrategyScore,
     score_header,
@@ -17,14 +18,13 @@ from vedette.campaigns.scores import (
     score_strategies,
 )
 from vedette.campaigns.spec import builtin_specs
-from vedette.campaigns.yardsticks import yardstick_markdown, yardsticks
 from vedette.scenarios.sections.tracking import Filter
 
 PUBLISHED = StrategyScore("published: X", 1.734, 0.31, None, None, -0.1, None, 111.1, 10)
 
 
 def test_every_campaign_that_comes_with_the_library_is_a_yardstick_of_its_own_name() -> None:
-    known = yardsticks()
+    known = published_comparisons()
     assert sorted(known) == list(builtin_specs())
     for name, yardstick in known.items():
         assert yardstick.spec == load_spec(name)
@@ -50,13 +50,13 @@ def test_they_resolve_to_decisions_after_every_scan_but_the_last(name: str) -> N
 def test_published_figures_are_those_of_the_source() -> None:
     found = {
         name: {score.label.removeprefix("published: "): (score.ospa, score.num_runs) for score in yardstick.published}
-        for name, yardstick in yardsticks().items()
+        for name, yardstick in published_comparisons().items()
     }
     assert found["deciding-eight-mobile"]["FDCD"] == (1.73, 10)
     assert found["deciding-eight-mobile"]["fixed"] == (68.58, 10)
     assert found["deciding-six-cameras"]["FDCD"] == (3.39, 30)
     assert found["deciding-six-cameras"]["fixed"] == (60.36, 30)
-    for yardstick in yardsticks().values():
+    for yardstick in published_comparisons().values():
         means = [score.ospa for score in yardstick.published]
         assert means == sorted(means)
         assert all(score.worst is not None and score.worst > score.ospa for score in yardstick.published)
@@ -103,8 +103,8 @@ def test_what_is_not_known_is_left_empty() -> None:
 
 def test_the_page_of_a_yardstick_has_a_table_for_each_setting_and_its_sources(tmp_path: Path) -> None:
     results = open_results(fill(tmp_path, make_campaign()))
-    yardstick = yardsticks()["deciding-eight-mobile"]
-    page = yardstick_markdown(results, yardstick)
+    yardstick = published_comparisons()["deciding-eight-mobile"]
+    page = published_markdown(results, yardstick)
     assert page.startswith(f"# {yardstick.title}\n\n## sensors.*.clutter.rate 5.0\n\n| Strategy |")
     assert page.count("| published: FDCD |") == 2
     assert page.count("\nMedian and worst run (m), share of runs that end with a lost target: ") == 2

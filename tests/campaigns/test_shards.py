@@ -94,13 +94,13 @@ def test_shares_of_real_runs_make_the_folder_of_a_single_process(tmp_path: Path)
     again = merge(shares[::-1], tmp_path / "merged")
     assert (again.num_taken, again.missing) == (0, ())
     assert rows(tmp_path / "merged") == rows(tmp_path / "alone")
-    assert run_campaign(campaign, tmp_path / "merged").num_found == 8
+    assert run_campaign(campaign, tmp_path / "merged").num_existing == 8
 
 
 def test_a_share_says_what_is_missing_of_it_and_goes_on_as_no_other(tmp_path: Path, stub: None) -> None:
     campaign = replace(stub_campaign(runs=10), shard=Shard(2, 3))
     folder = tmp_path / "2-of-3"
-    assert run_campaign(campaign, folder).num_landed == campaign.total == 7
+    assert run_campaign(campaign, folder).num_completed == campaign.total == 7
     opened = open_results(folder)
     assert opened.campaign.shard == Shard(2, 3)
     assert all(opened.missing(cell.name) == () for cell in campaign.cells)
@@ -109,7 +109,7 @@ def test_a_share_says_what_is_missing_of_it_and_goes_on_as_no_other(tmp_path: Pa
         with pytest.raises(InputError, match=r"it is of another, .*: shard is '2/3' there"):
             run_campaign(replace(campaign, shard=other), folder)
     longer = run_campaign(campaign.with_runs(20), folder)
-    assert (longer.num_found, longer.num_found + longer.num_landed) == (7, campaign.with_runs(20).total)
+    assert (longer.num_existing, longer.num_existing + longer.num_completed) == (7, campaign.with_runs(20).total)
 
 
 def test_missing_shares_are_named_and_added_later(tmp_path: Path, stub: None) -> None:

@@ -12,14 +12,14 @@ from vedette.campaigns import tasks
 from vedette.campaigns.cells import Campaign
 from vedette.campaigns.codec import decode
 from vedette.campaigns.rows import row_of, unpack
-from vedette.campaigns.tasks import MIN_TASK_SECONDS, Failed, Landed, Task, TaskQueue, perform
+from vedette.campaigns.tasks import MIN_TASK_SECONDS, CompletedRun, FailedRun, Task, TaskQueue, perform
 from vedette.errors import ModelError, VedetteError
 from vedette.evaluation.metrics import decode_metrics, measure
 from vedette.evaluation.runs import run_scenario
 
 
-def landed(cell: str, seconds: float) -> Landed:
-    return Landed(row_of(cell, 0, b"", b""), 1.0, seconds)
+def landed(cell: str, seconds: float) -> CompletedRun:
+    return CompletedRun(row_of(cell, 0, b"", b""), 1.0, seconds)
 
 
 def drain(queue: TaskQueue) -> list[tuple[str, tuple[int, ...]]]:
@@ -37,7 +37,7 @@ def first_task(campaign: Campaign) -> Task:
     return task
 
 
-def learnt(queue: TaskQueue, *results: Landed) -> None:
+def learnt(queue: TaskQueue, *results: CompletedRun) -> None:
     for result in results:
         task = queue.take()
         assert task is not None
@@ -99,8 +99,8 @@ def test_a_task_gives_back_the_runs_it_was_given() -> None:
     campaign = small_campaign()
     task = replace(first_task(campaign), runs=(0, 2))
     first, second = perform(task)
-    assert isinstance(first, Landed)
-    assert isinstance(second, Landed)
+    assert isinstance(first, CompletedRun)
+    assert isinstance(second, CompletedRun)
     assert (first.cell, first.run, second.run) == ("idm", 0, 2)
     record = decode(unpack(second.row.payload.content))
     metrics, own = decode_metrics(unpack(second.row.metrics.content), record.num_scans)
@@ -128,9 +128,9 @@ def test_a_run_that_fails_leaves_the_others(monkeypatch: pytest.MonkeyPatch, err
     monkeypatch.setattr(tasks, "run_scenario", sometimes)
     task = replace(first_task(small_campaign()), runs=(0, 1, 2))
     first, failed, third = perform(task)
-    assert isinstance(first, Landed)
-    assert isinstance(third, Landed)
-    assert failed == Failed("idm", 1, message)
+    assert isinstance(first, CompletedRun)
+    assert isinstance(third, CompletedRun)
+    assert failed == FailedRun("idm", 1, message)
 
 
 def test_a_worker_of_other_versions_refuses() -> None:

@@ -14,7 +14,7 @@ import typer
 from typer.testing import CliRunner, Result
 
 from recordings import write_recording
-from vedette.campaigns.yardsticks import yardsticks
+from vedette.campaigns.published import published_comparisons
 from vedette.cli import app, completing
 from vedette.scenarios import list_builtin, load_scenario
 from vedette.scenarios.dumping import dump_scenario
@@ -181,7 +181,7 @@ def test_a_run_names_it_too(place: Path) -> None:
 
 @pytest.mark.parametrize("columns", [10, 24, 40, 60, 120])
 def test_names_are_whole_at_any_width(columns: int) -> None:
-    for words, names in ((("list",), list_builtin()), (("reproduce", "--list"), yardsticks())):
+    for words, names in ((("list",), list_builtin()), (("reproduce", "--list"), published_comparisons())):
         lines = call(*words, columns=columns).stdout.splitlines()
         assert [line.split()[0] for line in lines if not line.startswith(" ")] == list(names)
 
@@ -189,7 +189,7 @@ def test_names_are_whole_at_any_width(columns: int) -> None:
 def test_completion_knows_what_there_is(place: Path) -> None:
     (place / "scenes").mkdir()
     assert completing.built_in_scenarios("") == list(list_builtin())
-    assert completing.campaigns("deciding") == [name for name in sorted(yardsticks()) if name != "paper-a"]
+    assert completing.campaigns("deciding") == [name for name in sorted(published_comparisons()) if name != "paper-a"]
     assert completing.scenarios("s") == [*(n for n in list_builtin() if n[0] == "s"), "scenes/", "short.yaml"]
     (place / "scenes" / "a.yml").touch()
     (place / "scenes" / "a.txt").touch()

@@ -8,27 +8,27 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner, Result
 
-from vedette.campaigns import open_results, yardsticks
-from vedette.campaigns.yardsticks import Yardstick
+from vedette.campaigns import open_results, published
+from vedette.campaigns.published import PublishedComparison
 from vedette.cli import app
 
 NAME = "deciding-six-cameras"
 
 
 @pytest.fixture
-def short(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Yardstick:
+def short(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> PublishedComparison:
     """The first three scans of a yardstick, in a working folder of its own."""
-    whole = yardsticks.yardsticks()[NAME]
+    whole = published.published_comparisons()[NAME]
     targets = {"kind": "scripted", "tracks": [{"state": [0.0, 296.0, 0.0, -4.0]}, {"state": [0.0, 500.0, 0.0, 0.0]}]}
     fields = {"time.num_steps": 3, "control.decision_steps": [1, 2], "control.num_samples": 1, "targets": targets}
-    cut = Yardstick(
+    cut = PublishedComparison(
         whole.spec.model_copy(update={"set": {**whole.spec.set, **fields}, "runs": 2}),
         whole.title,
         whole.source,
         whole.remark,
         whole.published,
     )
-    monkeypatch.setattr(yardsticks, "yardsticks", lambda: {NAME: cut})
+    monkeypatch.setattr(published, "published_comparisons", lambda: {NAME: cut})
     monkeypatch.chdir(tmp_path)
     return cut
 
@@ -40,10 +40,10 @@ def call(*words: str, columns: int = 80) -> Result:
 def test_the_list_names_every_yardstick() -> None:
     result = call("--list", columns=160)
     assert (result.exit_code, result.stderr) == (0, "")
-    assert [line.split()[0] for line in result.stdout.splitlines()] == list(yardsticks.yardsticks())
+    assert [line.split()[0] for line in result.stdout.splitlines()] == list(published.published_comparisons())
 
 
-def test_a_yardstick_is_run_and_printed_beside_what_is_published(short: Yardstick) -> None:
+def test_a_yardstick_is_run_and_printed_beside_what_is_published(short: PublishedComparison) -> None:
     result = call(NAME, "--planners", "random,fixed")
     assert result.exit_code == 0, result.output
     assert "published: FDCD     3.39 ± 0.15" in result.stdout
@@ -59,7 +59,7 @@ def test_a_yardstick_is_run_and_printed_beside_what_is_published(short: Yardstic
     assert page.startswith(f"# {short.title}\n\n| Strategy | OSPA (m) |")
 
 
-def test_the_same_command_goes_on_and_may_ask_for_more_runs(short: Yardstick) -> None:
+def test_the_same_command_goes_on_and_may_ask_for_more_runs(short: PublishedComparison) -> None:
     assert call(NAME, "--planners", "fixed", "--runs", "1", "--out", "there").exit_code == 0
     assert open_results("there").finished("fixed") == (0,)
     result = call(NAME, "--planners", "fixed", "--runs", "2", "--out", "there")
@@ -72,7 +72,7 @@ def test_the_same_command_goes_on_and_may_ask_for_more_runs(short: Yardstick) ->
 
 
 @pytest.mark.parametrize("columns", [40, 60, 80, 120])
-def test_every_number_is_shown_at_any_width(short: Yardstick, columns: int) -> None:
+def test_every_number_is_shown_at_any_width(short: PublishedComparison, columns: int) -> None:
     result = call(NAME, "--planners", "fixed", "--runs", "1", columns=columns)
     assert result.exit_code == 0, result.output
     table = result.stdout[: result.stdout.index("Published: ")]
@@ -81,7 +81,7 @@ def test_every_number_is_shown_at_any_width(short: Yardstick, columns: int) -> N
         assert number in table
 
 
-def test_ctrl_c_says_how_to_go_on(short: Yardstick, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_says_how_to_go_on(short: PublishedComparison, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
@@ -108,7 +108,7 @@ def test_ctrl_c_says_how_to_go_on(short: Yardstick, monkeypatch: pytest.MonkeyPa
         ((NAME, "--runs", "0"), 2, "--runs"),
     ],
 )
-def test_mistakes(short: Yardstick, words: tuple[str, ...], status: int, message: str) -> None:
+def test_mistakes(short: PublishedComparison, words: tuple[str, ...], status: int, message: str) -> None:
     result = call(*words)
     assert result.exit_code == status
     assert message in " ".join(result.stderr.split())
@@ -125,9 +125,9 @@ def test_a_campaign_may_be_one_that_comes_with_the_library(name: str) -> None:
 def test_the_paper_is_compared_with_the_default_and_its_claims_are_checked(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    whole = yardsticks.yardsticks()["paper-a"]
+    whole = published.published_comparisons()["paper-a"]
     cut = replace(whole, spec=whole.spec.model_copy(update={"runs": 2}))
-    monkeypatch.setattr(yardsticks, "yardsticks", lambda: {"paper-a": cut})
+    monkeypatch.setattr(published, "published_comparisons", lambda: {"paper-a": cut})
     monkeypatch.chdir(tmp_path)
     result = call()
     assert result.exit_code == 0, result.output

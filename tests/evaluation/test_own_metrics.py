@@ -116,7 +116,7 @@ def test_a_measure_that_a_scenario_gains_is_of_the_same_campaign(tmp_path: Path)
     assert "metrics: {}" in text
     (tmp_path / "scene.yaml").write_text(text.replace("metrics: {}", gains))
     outcome = run_campaign(resolve(spec_from_data(spec), tmp_path), folder)
-    assert (outcome.num_found, outcome.num_landed) == (2, 0)
+    assert (outcome.num_existing, outcome.num_completed) == (2, 0)
     for run in open_results(folder).runs():
         assert run.checksum == before[run.record.run]
         np.testing.assert_array_equal(run.metrics.own["farthest_m"], farthest(run.record))

@@ -210,7 +210,7 @@ def test_a_campaign_with_it_gives_the_same_bytes_whatever_the_workers(tmp_path: 
     campaign, kept = resolve(parse_spec(spec), tmp_path), []
     for workers in (1, 2):
         outcome = run_campaign(campaign, tmp_path / f"out{workers}", num_workers=workers)
-        assert (outcome.num_landed, outcome.failed) == (4, ())
+        assert (outcome.num_completed, outcome.failed) == (4, ())
         kept.append(sorted(file.read_bytes() for file in (tmp_path / f"out{workers}").rglob("scans.parquet")))
     assert kept[0]
     assert kept[0] == kept[1]

@@ -10,7 +10,7 @@ from vedette.campaigns.cells import Campaign, resolve
 from vedette.campaigns.results import CampaignResults, open_results
 from vedette.campaigns.spec import spec_from_data
 from vedette.campaigns.store import Store
-from vedette.campaigns.tasks import Landed, Task, perform
+from vedette.campaigns.tasks import CompletedRun, Task, perform
 
 
 def campaign_of(**fields: Any) -> Campaign:
@@ -25,7 +25,7 @@ def results_of(folder: Path, campaign: Campaign, *, skipped: Collection[tuple[st
         for cell, run in campaign.tasks:
             if (cell.name, run) not in skipped:
                 (result,) = perform(Task(cell, campaign.seed, (run,), {}))
-                assert isinstance(result, Landed), result
+                assert isinstance(result, CompletedRun), result
                 store.add(result.row)
     return open_results(folder)
 

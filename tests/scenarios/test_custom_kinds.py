@@ -91,7 +91,7 @@ def test_a_campaign_with_workers_gives_the_same_bytes(folder: Path) -> None:
     kept = []
     for workers in (1, 2):
         outcome = run_campaign(campaign, folder / f"out{workers}", num_workers=workers)
-        assert (outcome.num_landed, outcome.failed) == (8, ())
+        assert (outcome.num_completed, outcome.failed) == (8, ())
         kept.append({file.name: file.read_bytes() for file in (folder / f"out{workers}").rglob("*.parquet")})
         scans = open_results(folder / f"out{workers}").tables()["scans"]
         assert len(scans.column("found")) == 8 * 6

@@ -5,27 +5,27 @@ from vedette.internal.extras import require_packages
 require_packages("a campaign", "pyarrow")
 
 from vedette.campaigns.cells import Campaign, Cell, resolve
-from vedette.campaigns.merging import Merged, merge
+from vedette.campaigns.merging import MergeResult, merge
 from vedette.campaigns.progress import Progress
 from vedette.campaigns.results import CampaignResults, open_results
-from vedette.campaigns.running import Outcome, Watch, run_campaign
+from vedette.campaigns.running import CampaignOutcome, ProgressObserver, run_campaign
 from vedette.campaigns.shards import Shard, parse_shard
 from vedette.campaigns.spec import CampaignSpec, Variant, load_spec, parse_spec
-from vedette.campaigns.tasks import Failed, Landed
+from vedette.campaigns.tasks import CompletedRun, FailedRun
 
 __all__ = [
     "Campaign",
+    "CampaignOutcome",
     "CampaignResults",
     "CampaignSpec",
     "Cell",
-    "Failed",
-    "Landed",
-    "Merged",
-    "Outcome",
+    "CompletedRun",
+    "FailedRun",
+    "MergeResult",
     "Progress",
+    "ProgressObserver",
     "Shard",
     "Variant",
-    "Watch",
     "load_spec",
     "merge",
     "open_results",

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _A_PART = 4 * TOGETHER  # runs; fewer are read sooner than another process starts
 
 
-def gathered(results: CampaignResults, cell: str, runs: Sequence[int], num_workers: int) -> Ensemble:
+def read_ensemble(results: CampaignResults, cell: str, runs: Sequence[int], num_workers: int) -> Ensemble:
     """What is compared and reported of these finished runs of a cell; the same for any number of processes (0: all).
 
     Raises `InputError` for no run, or one that is damaged, and `VedetteError` where a process dies.

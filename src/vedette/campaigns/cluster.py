@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vedette.campaigns.tasks import Outcome, Task, WorkerDied, perform
+from vedette.campaigns.tasks import Task, TaskOutcome, WorkerDied, perform
 from vedette.errors import InputError, VedetteError
 from vedette.internal.reading import error_summary
 from vedette.internal.text import pluralise, shown
@@ -97,7 +97,7 @@ class RemoteWorkers:
             time.sleep(_POLL_SECONDS)
             self._look()
 
-    def next(self) -> list[tuple[Task, Outcome | WorkerDied]]:
+    def next(self) -> list[tuple[Task, TaskOutcome | WorkerDied]]:
         """See `Workers`."""
         while not self._done.has_ready():
             self._look()
@@ -105,12 +105,12 @@ class RemoteWorkers:
         futures = self._done.next_batch(block=False)
         return [(self._tasks.pop(future), self._outcome(future)) for future in futures]
 
-    def _outcome(self, future: Future) -> Outcome | WorkerDied:
+    def _outcome(self, future: Future) -> TaskOutcome | WorkerDied:
         from distributed import KilledWorker
 
         while True:
             try:
-                outcome: Outcome = future.result(timeout=_REFRESH_SECONDS)
+                outcome: TaskOutcome = future.result(timeout=_REFRESH_SECONDS)
             except TimeoutError:  # the worker died before it handed the results over: the task is done again
                 self._look()
             except KilledWorker:

@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator
 from typing import Protocol
 
-from vedette.campaigns.tasks import Failed, Outcome, Task, TaskQueue, WorkerDied, perform
+from vedette.campaigns.tasks import FailedRun, Task, TaskOutcome, TaskQueue, WorkerDied, perform
 from vedette.errors import VedetteError
 
 _TRIES_ALONE = 2
@@ -24,7 +24,7 @@ class Workers(Protocol):
         """Hand out a task."""
         ...
 
-    def next(self) -> list[tuple[Task, Outcome | WorkerDied]]:
+    def next(self) -> list[tuple[Task, TaskOutcome | WorkerDied]]:
         """The tasks that have ended by now with what they gave back, once there is one.
 
         `WorkerDied` where a worker died of it, and so did the next that it was given to; or may have died of it.
@@ -34,12 +34,12 @@ class Workers(Protocol):
         ...
 
 
-def in_process(queue: TaskQueue) -> Iterator[Outcome]:
+def in_process(queue: TaskQueue) -> Iterator[TaskOutcome]:
     """Every run, one after the other, by this process; those of a second come together.
 
     Raises `KeyboardInterrupt`, once those that are finished have been given back.
     """
-    batch: Outcome = ()
+    batch: TaskOutcome = ()
     since = time.monotonic()
     try:
         while (task := queue.take()) is not None:
@@ -54,7 +54,7 @@ def in_process(queue: TaskQueue) -> Iterator[Outcome]:
         yield batch
 
 
-def on_workers(workers: Workers, queue: TaskQueue) -> Iterator[Outcome]:
+def on_workers(workers: Workers, queue: TaskQueue) -> Iterator[TaskOutcome]:
     """Every run, in the order of finishing; those that have finished by the same time come together.
 
     The runs of a worker that died are done again by another.
@@ -62,7 +62,7 @@ def on_workers(workers: Workers, queue: TaskQueue) -> Iterator[Outcome]:
     Raises as `Workers.next`.
     """
     suspects: list[Task] = []
-    batch: Outcome = ()
+    batch: TaskOutcome = ()
     under_way = 0
     while True:
         while under_way < (room := workers.room()) and (task := queue.take(room)) is not None:
@@ -83,7 +83,7 @@ def on_workers(workers: Workers, queue: TaskQueue) -> Iterator[Outcome]:
         yield queue.learn(task, _alone(workers, task))
 
 
-def _alone(workers: Workers, task: Task) -> Outcome:
+def _alone(workers: Workers, task: Task) -> TaskOutcome:
     """What a task of one run gives back when no other one can bring its worker down.
 
     A task counts as suspect too when it only waited at a worker that another one killed, or another took its memory.
@@ -93,10 +93,10 @@ def _alone(workers: Workers, task: Task) -> Outcome:
         ((_, outcome),) = _next(workers)
         if not isinstance(outcome, WorkerDied):
             return outcome
-    return (Failed(task.cell.name, task.runs[0], "every worker that took it died (out of memory?)"),)
+    return (FailedRun(task.cell.name, task.runs[0], "every worker that took it died (out of memory?)"),)
 
 
-def _next(workers: Workers) -> list[tuple[Task, Outcome | WorkerDied]]:
+def _next(workers: Workers) -> list[tuple[Task, TaskOutcome | WorkerDied]]:
     try:
         return workers.next()
     except VedetteError:

@@ -30,7 +30,7 @@ _SAYS_NOTHING = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class LeaderboardRow:
     """How one strategy stands on a scene, over the runs that were tried of it. A lost run counts as the cutoff.
 
     Attributes:
@@ -77,7 +77,7 @@ class SceneTable:
     unit: str
     digest: str
     entrants: Mapping[str, str]
-    standings: tuple[Standing, ...]
+    standings: tuple[LeaderboardRow, ...]
 
 
 def scene_table(scene: Scene, folder: Path) -> SceneTable | None:
@@ -98,7 +98,7 @@ def scene_table(scene: Scene, folder: Path) -> SceneTable | None:
     return SceneTable(scene, scenario.model.ospa.unit, hashlib.sha256(text.encode()).hexdigest(), entrants, standings)
 
 
-def _tried(scene: Scene, results: CampaignResults) -> Iterator[tuple[Standing, dict[int, float]]]:
+def _tried(scene: Scene, results: CampaignResults) -> Iterator[tuple[LeaderboardRow, dict[int, float]]]:
     """The strategies that have runs, not yet compared with another; and their OSPA by run, lost ones at the cutoff."""
     for cell in results.campaign.cells:
         label = str(cell.settings["planner" if scene.role == "planner" else "variant"])
@@ -116,7 +116,7 @@ def _tried(scene: Scene, results: CampaignResults) -> Iterator[tuple[Standing, d
             nees, seconds = nees[~np.isnan(nees)], _spent(scene, ensemble)
         if not ospa:
             continue
-        standing = Standing(
+        standing = LeaderboardRow(
             label,
             results.folder.name == OWN,
             len(ospa),
@@ -162,7 +162,7 @@ def header(table: SceneTable) -> tuple[str, ...]:
     return (table.scene.role.capitalize(), *names, *counts, "Lost", "Runs")
 
 
-def row(table: SceneTable, own: Standing) -> tuple[str, ...]:
+def row(table: SceneTable, own: LeaderboardRow) -> tuple[str, ...]:
     """One row under `header`; empty where something is not known."""
     more, nees = own.difference, own.nees
     counts = [_known(own.counts[name], ",.0f") for name in COUNTED] if table.scene.role == "planner" else []

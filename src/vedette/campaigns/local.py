@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from multiprocessing import active_children
 from multiprocessing.process import BaseProcess
 
-from vedette.campaigns.tasks import Outcome, Task, WorkerDied, perform
+from vedette.campaigns.tasks import Task, TaskOutcome, WorkerDied, perform
 from vedette.errors import VedetteError
 from vedette.internal.processes import as_children, context, end_with_parent, let_go_of_results, load_ahead
 from vedette.internal.reading import error_summary
@@ -69,7 +69,7 @@ class _Worker:
     pool: ProcessPoolExecutor
     begun: Future[int]
     processes: set[BaseProcess]  # the one, or none where it has died by now
-    tasks: dict[Future[Outcome], Task] = field(default_factory=dict)  # in the order in which it does them
+    tasks: dict[Future[TaskOutcome], Task] = field(default_factory=dict)  # in the order in which it does them
 
     @classmethod
     def start(cls) -> _Worker:
@@ -111,7 +111,7 @@ class LocalWorkers:
         self._since = time.monotonic()
         self._failed_starts = 0
         self._killers: set[Task] = set()
-        self._ended: list[tuple[Task, Outcome | WorkerDied]] = []
+        self._ended: list[tuple[Task, TaskOutcome | WorkerDied]] = []
         self._workers: list[_Worker] = []
 
     def start(self, num_workers: int) -> None:
@@ -133,7 +133,7 @@ class LocalWorkers:
             except BrokenProcessPool:
                 self._replace(worker)
 
-    def next(self) -> list[tuple[Task, Outcome | WorkerDied]]:
+    def next(self) -> list[tuple[Task, TaskOutcome | WorkerDied]]:
         """See `Workers`."""
         while not self._ended:
             wait([each for worker in self._workers for each in worker.tasks], _WAIT_SECONDS, FIRST_COMPLETED)

@@ -31,7 +31,7 @@ from vedette.kernels.base.types import Ints
 
 
 @dataclass(frozen=True, slots=True)
-class Merged:
+class MergeResult:
     """What became of the shares of a campaign.
 
     Attributes:
@@ -51,7 +51,7 @@ class Merged:
     shards: Path
 
 
-def merge(folders: Sequence[Path | str], out: Path | str | None = None, *, tables: bool = True) -> Merged:
+def merge(folders: Sequence[Path | str], out: Path | str | None = None, *, tables: bool = True) -> MergeResult:
     """Make one results folder of those of shares; its runs are those that a single process leaves, byte for byte.
 
     What several folders hold is taken once. Folders of shares that are unfinished are taken as they are: the same call
@@ -78,7 +78,7 @@ def merge(folders: Sequence[Path | str], out: Path | str | None = None, *, table
     if tables and not lacking.any():
         export_tables(results, target / TABLES)
     missing = tuple(np.flatnonzero(lacking).tolist())
-    return Merged(results, num_taken, count, missing, int(lacking.sum()), places[0].parent)
+    return MergeResult(results, num_taken, count, missing, int(lacking.sum()), places[0].parent)
 
 
 def _lacking(results: CampaignResults, count: int) -> Ints:

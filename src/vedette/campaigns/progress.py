@@ -7,8 +7,8 @@ import time
 from typing import TYPE_CHECKING
 
 from vedette.campaigns.cells import Campaign
-from vedette.campaigns.running import Watch
-from vedette.campaigns.tasks import Failed, Landed
+from vedette.campaigns.running import ProgressObserver
+from vedette.campaigns.tasks import CompletedRun, FailedRun
 from vedette.internal.text import with_unit
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ _LOG_SECONDS, _NOTEBOOK_SECONDS = 600.0, 15.0  # between lines
 _ROOM_FOR_BAR = 90
 
 
-class Progress(Watch):
+class Progress(ProgressObserver):
     """Runs done, their rate, the time left, and the running mean error of what is compared.
 
     A context manager to be given to `run_campaign` as its `watch`. In a notebook the line moves where ipywidgets is
@@ -66,20 +66,20 @@ class Progress(Watch):
     def __exit__(self, *_: object) -> None:
         self._bar.stop()
 
-    def begin(self, num_found: int, num_runs: int) -> None:
-        """See `vedette.campaigns.Watch`."""
-        self._found, self._total = num_found, num_runs
-        there = f", {num_found} are there already" if num_found else ""
-        if num_found < num_runs and (num_found or not self._terminal):
+    def begin(self, num_existing: int, num_runs: int) -> None:
+        """See `vedette.campaigns.ProgressObserver`."""
+        self._found, self._total = num_existing, num_runs
+        there = f", {num_existing} are there already" if num_existing else ""
+        if num_existing < num_runs and (num_existing or not self._terminal):
             self.note(f"{self._name}: {num_runs} runs{there}")
-        self._bar.update(self._bars, total=num_runs, completed=num_found, description=f"{num_found}/{num_runs}")
+        self._bar.update(self._bars, total=num_runs, completed=num_existing, description=f"{num_existing}/{num_runs}")
 
     def note(self, text: str) -> None:
-        """See `vedette.campaigns.Watch`."""
+        """See `vedette.campaigns.ProgressObserver`."""
         self._console.print(text, soft_wrap=True)
 
-    def landed(self, result: Landed) -> None:
-        """See `vedette.campaigns.Watch`."""
+    def completed(self, result: CompletedRun) -> None:
+        """See `vedette.campaigns.ProgressObserver`."""
         now = time.monotonic()
         if self._landed == 0:  # the rate is of runs alone: what was loaded or compiled before them is not in it
             self._first_at = now
@@ -93,8 +93,8 @@ class Progress(Watch):
             self._said_at = now
             self.note(self._description(now))
 
-    def failed(self, result: Failed) -> None:
-        """See `vedette.campaigns.Watch`."""
+    def failed(self, result: FailedRun) -> None:
+        """See `vedette.campaigns.ProgressObserver`."""
         self._failures += 1
         if self._failures <= _SHOWN_FAILURES:
             self.note(f"cell {result.cell}, run {result.run} failed: {result.message}")

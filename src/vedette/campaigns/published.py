@@ -48,11 +48,11 @@ class CheckedClaim(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Yardstick:
+class PublishedComparison:
     """A campaign on a published scene.
 
     Attributes:
-        spec: the campaign; its name is that of the yardstick.
+        spec: the campaign; its name is that of the reference.
         title: what it is about, in a line.
         source: where the published figures come from; empty where there are none.
         remark: what sets them apart from those of the campaign.
@@ -70,11 +70,11 @@ class Yardstick:
 
 
 @cache
-def yardsticks() -> dict[str, Yardstick]:
+def published_comparisons() -> dict[str, PublishedComparison]:
     """All that come with the library, by name."""
     published = tomllib.loads(_PUBLISHED.read_text(encoding="utf-8"))
     return {
-        name: Yardstick(
+        name: PublishedComparison(
             spec=load_spec(name),
             title=said["title"],
             source=said["source"],
@@ -87,19 +87,19 @@ def yardsticks() -> dict[str, Yardstick]:
     }
 
 
-def yardstick_of(campaign: Campaign) -> Yardstick | None:
+def published_comparison_of(campaign: Campaign) -> PublishedComparison | None:
     """The yardstick that a campaign is a run of; None for any other campaign."""
-    found = yardsticks().get(campaign.name)
+    found = published_comparisons().get(campaign.name)
     return found if found is not None and list(found.spec.scenarios) == list(campaign.axes["scenario"]) else None
 
 
-def checked_claims(yardstick: Yardstick, comparison: Comparison) -> tuple[CheckedClaim, ...]:
+def checked_claims(reference: PublishedComparison, comparison: Comparison) -> tuple[CheckedClaim, ...]:
     """The published claims on strategies that were compared, each with its outcome over the paired runs."""
-    return (*_checked_orders(yardstick, comparison), *_checked_decisions(yardstick, comparison))
+    return (*_checked_orders(reference, comparison), *_checked_decisions(reference, comparison))
 
 
-def _checked_orders(yardstick: Yardstick, comparison: Comparison) -> Iterator[CheckedClaim]:
-    for text, better, than in yardstick.claims:
+def _checked_orders(reference: PublishedComparison, comparison: Comparison) -> Iterator[CheckedClaim]:
+    for text, better, than in reference.claims:
         if not {better, than} <= set(comparison.strategies) or comparison.num_runs < 2:
             continue
         paired = comparison.difference(than, better)
@@ -113,9 +113,9 @@ def _checked_orders(yardstick: Yardstick, comparison: Comparison) -> Iterator[Ch
         )
 
 
-def _checked_decisions(yardstick: Yardstick, comparison: Comparison) -> Iterator[CheckedClaim]:
+def _checked_decisions(reference: PublishedComparison, comparison: Comparison) -> Iterator[CheckedClaim]:
     times = comparison.decision_times.tolist()
-    for planner, time, actions in yardstick.decisions:
+    for planner, time, actions in reference.decisions:
         if planner not in comparison.strategies or time not in times:
             continue
         shares = comparison.decision_shares(planner, times.index(time))
@@ -147,18 +147,18 @@ def _published(row: dict[str, str | float]) -> StrategyScore:
     )
 
 
-def yardstick_markdown(results: CampaignResults, yardstick: Yardstick) -> str:
+def published_markdown(results: CampaignResults, reference: PublishedComparison) -> str:
     """What was reached beside what is published, a table for each setting of the campaign, as Markdown."""
-    lines = [f"# {yardstick.title}", ""]
+    lines = [f"# {reference.title}", ""]
     for group in results.comparisons():
         title = results.title(group)
-        scores = (*score_strategies(group), *yardstick.published)
+        scores = (*score_strategies(group), *reference.published)
         table = score_markdown(scores, group.comparison.unit, group.labels[0])
         lines += [*([f"## {title}", ""] if title else []), table, tails(group.comparison), ""]
-    return "\n".join([*lines, "\n\n".join(provenance(yardstick)), ""])
+    return "\n".join([*lines, "\n\n".join(provenance(reference)), ""])
 
 
-def provenance(yardstick: Yardstick) -> tuple[str, ...]:
+def provenance(reference: PublishedComparison) -> tuple[str, ...]:
     """Lines on where the published figures come from, and what sets them apart."""
-    source = f"Published: {yardstick.source}." if yardstick.source else ""
-    return tuple(line for line in (source, yardstick.remark) if line)
+    source = f"Published: {reference.source}." if reference.source else ""
+    return tuple(line for line in (source, reference.remark) if line)

@@ -10,11 +10,11 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, SupportsIndex
 
+from vedette.campaigns.aggregation import read_ensemble
 from vedette.campaigns.cells import Campaign, Cell
 from vedette.campaigns.codec import decode, decode_outline
 from vedette.campaigns.database import DATABASE, Failure, Reader
 from vedette.campaigns.dataset import dataset_of_scans
-from vedette.campaigns.gathering import gathered
 from vedette.campaigns.manifest import campaign_of, contents_checksum, read_manifest
 from vedette.campaigns.rows import Entry
 from vedette.campaigns.tables import FinishedRun, joined_tables, tables_of_runs
@@ -126,7 +126,7 @@ class CampaignResults(SummaryRepr):
         Raises `InputError` for no run.
         """
         wanted = self.finished(cell) if runs is None else tuple(map(operator.index, runs))
-        return gathered(self, cell, wanted, 1 if self._own else self._num_workers)
+        return read_ensemble(self, cell, wanted, 1 if self._own else self._num_workers)
 
     def outlines(self, cell: str, runs: Sequence[int]) -> Iterator[tuple[Outline, RunMetrics]]:
         """What is compared of these finished runs, with their measures."""

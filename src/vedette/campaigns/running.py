@@ -17,8 +17,8 @@ from vedette.campaigns.local import local_workers
 from vedette.campaigns.manifest import MANIFEST
 from vedette.campaigns.results import open_results
 from vedette.campaigns.store import Store
-from vedette.campaigns.tasks import Failed, Landed, TaskQueue
-from vedette.campaigns.tasks import Outcome as Done
+from vedette.campaigns.tasks import CompletedRun, FailedRun, TaskQueue
+from vedette.campaigns.tasks import TaskOutcome as Done
 from vedette.errors import InputError, VedetteError
 from vedette.evaluation.metrics import encode_metrics
 from vedette.evaluation.runs import own_metrics
@@ -28,10 +28,10 @@ from vedette.internal.text import pluralise
 TABLES = "tables"
 
 
-class Watch(Protocol):
+class ProgressObserver(Protocol):
     """What is told of a campaign while it runs."""
 
-    def begin(self, num_found: int, num_runs: int) -> None:
+    def begin(self, num_existing: int, num_runs: int) -> None:
         """How many runs were there already, and how many there are to be."""
         return
 
@@ -39,32 +39,32 @@ class Watch(Protocol):
         """Something that a person should know."""
         return
 
-    def landed(self, result: Landed) -> None:
+    def completed(self, result: CompletedRun) -> None:
         """A run is in the store."""
         return
 
-    def failed(self, result: Failed) -> None:
+    def failed(self, result: FailedRun) -> None:
         """A run could not be finished."""
         return
 
 
-class Unwatched(Watch):
+class NullObserver(ProgressObserver):
     """Tells nobody."""
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class CampaignOutcome:
     """How a campaign ended.
 
     Attributes:
-        num_landed: runs that this call added.
-        num_found: runs that were there before.
+        num_completed: runs that this call added.
+        num_existing: runs that were there before.
         failed: runs that could not be finished; the same call tries them again.
     """
 
-    num_landed: int
-    num_found: int
-    failed: tuple[Failed, ...]
+    num_completed: int
+    num_existing: int
+    failed: tuple[FailedRun, ...]
 
 
 def run_campaign(
@@ -74,8 +74,8 @@ def run_campaign(
     num_workers: int = 1,
     scheduler: str | None = None,
     redo_damaged: bool = False,
-    watch: Watch | None = None,
-) -> Outcome:
+    watch: ProgressObserver | None = None,
+) -> CampaignOutcome:
     """Run what the folder does not hold yet, and write the tables when all is done.
 
     May be stopped at any moment, by any means: the same call goes on from there, and what it leaves in the end is what
@@ -103,8 +103,8 @@ def run_campaign(
         )
     if scheduler is not None:
         require_packages("a campaign on a cluster", "distributed")
-    watch = watch or Unwatched()
-    failed, num_landed = [], 0
+    watch = watch or NullObserver()
+    failed, num_completed = [], 0
     database = Path(folder) / DATABASE
     lost = (Path(folder) / MANIFEST).is_file() and (not database.exists() or database.stat().st_size == 0)
     with Store.open(Path(folder), campaign) as store:
@@ -113,17 +113,17 @@ def run_campaign(
         _check_undamaged(store, redo_damaged, watch)
         _measure_anew(store, campaign, watch)
         queue = TaskQueue(campaign, store.finished())
-        num_found = campaign.total - len(queue)
-        watch.begin(num_found, campaign.total)
+        num_existing = campaign.total - len(queue)
+        watch.begin(num_existing, campaign.total)
         for change in store.version_changes:
             watch.note(f"{change}; runs of both may differ in their last digits")
         with closing(_results(queue, num_workers, scheduler, watch)) as results:
             for batch in results:
-                store.add(*(result.row for result in batch if isinstance(result, Landed)))
+                store.add(*(result.row for result in batch if isinstance(result, CompletedRun)))
                 for result in batch:
-                    if isinstance(result, Landed):
-                        num_landed += 1
-                        watch.landed(result)
+                    if isinstance(result, CompletedRun):
+                        num_completed += 1
+                        watch.completed(result)
                     else:
                         failed.append(result)
                         store.note_failure(result.cell, result.run, result.message)
@@ -131,10 +131,10 @@ def run_campaign(
     if campaign.shard.count == 1:  # of shares they are written when these are one
         # Each time: what was left of them by another end of this call, or altered since, is put right.
         export_tables(open_results(folder, campaign=campaign), Path(folder) / TABLES)
-    return Outcome(num_landed, num_found, tuple(failed))
+    return CampaignOutcome(num_completed, num_existing, tuple(failed))
 
 
-def _check_undamaged(store: Store, redo: bool, watch: Watch) -> None:
+def _check_undamaged(store: Store, redo: bool, watch: ProgressObserver) -> None:
     """`InputError` if a finished run was altered, unless it is to be done again: then it is taken out."""
     damaged = store.damaged()
     names = ", ".join(f"{cell} {run}" for cell, run in damaged)
@@ -149,7 +149,7 @@ def _check_undamaged(store: Store, redo: bool, watch: Watch) -> None:
         watch.note(f"damaged, and done again: {names}")
 
 
-def _measure_anew(store: Store, campaign: Campaign, watch: Watch) -> None:
+def _measure_anew(store: Store, campaign: Campaign, watch: ProgressObserver) -> None:
     """Measures that the program or the scenarios have gained since runs were kept, of their records."""
     own = {cell.name: own_metrics(cell.scenario) for cell in campaign.cells}
     lacking = store.unmeasured({cell: [metric.name for metric in of_cell] for cell, of_cell in own.items()})
@@ -161,7 +161,7 @@ def _measure_anew(store: Store, campaign: Campaign, watch: Watch) -> None:
         watch.note(f"measured anew: {pluralise(len(lacking), 'run')}")
 
 
-def _results(queue: TaskQueue, num_workers: int, scheduler: str | None, watch: Watch) -> Generator[Done]:
+def _results(queue: TaskQueue, num_workers: int, scheduler: str | None, watch: ProgressObserver) -> Generator[Done]:
     if scheduler is not None:
         from vedette.campaigns.cluster import remote_workers  # asyncio, which nobody else needs
 

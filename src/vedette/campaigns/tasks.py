@@ -45,7 +45,7 @@ class Task:
 
 
 @dataclass(frozen=True, slots=True)
-class Landed:
+class CompletedRun:
     """A finished run.
 
     Attributes:
@@ -70,7 +70,7 @@ class Landed:
 
 
 @dataclass(frozen=True, slots=True)
-class Failed:
+class FailedRun:
     """A run that could not be finished, and why."""
 
     cell: str
@@ -79,7 +79,7 @@ class Failed:
 
 
 # What a task gives back: each of its runs.
-Outcome: TypeAlias = tuple[Landed | Failed, ...]
+TaskOutcome: TypeAlias = tuple[CompletedRun | FailedRun, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +87,7 @@ class WorkerDied:
     """In place of an outcome: the workers that were given the task died."""
 
 
-def perform(task: Task) -> Outcome:
+def perform(task: Task) -> TaskOutcome:
     """What a worker does. An error in a run is a result of its own and leaves the other runs alone.
 
     Raises:
@@ -102,18 +102,18 @@ def perform(task: Task) -> Outcome:
     return tuple(_one(task.cell, task.seed, run) for run in task.runs)
 
 
-def _one(cell: Cell, seed: int, run: int) -> Landed | Failed:
+def _one(cell: Cell, seed: int, run: int) -> CompletedRun | FailedRun:
     start = time.perf_counter()
     try:
         record = run_scenario(cell.scenario, cell.planner, seed=seed, run=run, num_threads=1)
         metrics = encode_metrics(measure_run(record, cell.scenario, own_metrics(cell.scenario)))
         row = row_of(cell.name, run, encode(record), encode_timings(record), metrics)
     except VedetteError as error:
-        return Failed(cell.name, run, str(error))
+        return FailedRun(cell.name, run, str(error))
     except Exception as error:  # in what surrounds a run: one bad one must not end a night's work
-        return Failed(cell.name, run, f"{type(error).__name__}: {error}")
+        return FailedRun(cell.name, run, f"{type(error).__name__}: {error}")
     mean = float(record.ospa[:, 0].mean())
-    return Landed(row, mean, time.perf_counter() - start)
+    return CompletedRun(row, mean, time.perf_counter() - start)
 
 
 class TaskQueue:
@@ -145,14 +145,14 @@ class TaskQueue:
         """Runs not yet handed out."""
         return self._num_left
 
-    def learn(self, task: Task, outcome: Outcome) -> Outcome:
+    def learn(self, task: Task, outcome: TaskOutcome) -> TaskOutcome:
         """Note that a task has ended, and how long its runs took; returns its outcome."""
         kernels = self._kernels[task.cell.name]
         self._compiled[kernels] = True
         for place in self._waiting.pop(kernels, ()):
             self._put_back(place)
         for result in outcome:
-            if isinstance(result, Landed):
+            if isinstance(result, CompletedRun):
                 self._fastest[result.cell] = min(self._fastest.get(result.cell, math.inf), result.seconds)
         return outcome
 

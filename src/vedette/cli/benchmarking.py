@@ -19,7 +19,7 @@ from vedette.internal.extras import require_packages
 
 if TYPE_CHECKING:
     from vedette.campaigns.benchmark import Entrant, Scene
-    from vedette.campaigns.standings import SceneTable
+    from vedette.campaigns.leaderboard import SceneTable
 
 _RUNS, _QUICK_RUNS = 30, 2
 _WHAT = "NAME=COMMAND of a program that speaks JSON lines, NAME=file.py:attribute or NAME=package.module:attribute."
@@ -60,7 +60,7 @@ def benchmark(
     if not list_:
         load_workers(workers)
     from vedette.campaigns.benchmark import OWN, campaign_of, entrant, make_way, scenes, try_entrant
-    from vedette.campaigns.standings import scene_table
+    from vedette.campaigns.leaderboard import scene_table
 
     if list_:
         print_names({name: scene.about for name, scene in scenes().items()})
@@ -109,7 +109,7 @@ def _chosen(names: str | None, quick: bool, entered: list[Entrant]) -> list[Scen
 
 
 def _write(tables: list[SceneTable], seed: int, out: Path) -> Path:
-    from vedette.campaigns.standings import benchmark_csv, benchmark_markdown, origin
+    from vedette.campaigns.leaderboard import benchmark_csv, benchmark_markdown, origin
     from vedette.reports.benchmark import write_benchmark
 
     with interruptible(f"{out} keeps every run; the same command writes the tables"):

@@ -22,7 +22,7 @@ from vedette.internal.text import pluralise
 from vedette.internal.threads import processors
 
 if TYPE_CHECKING:
-    from vedette.campaigns import Campaign, Failed, Outcome
+    from vedette.campaigns import Campaign, CampaignOutcome, FailedRun
 
 
 def campaign(
@@ -101,7 +101,7 @@ def campaign(
     if shard is not None:
         folder = folder / resolved.shard.folder
     outcome = carry_out(resolved, folder, workers, scheduler, redo_damaged)
-    finished = outcome.num_landed + outcome.num_found
+    finished = outcome.num_completed + outcome.num_existing
     say(f"{folder}: {finished} of {resolved.total} runs")
     place = shlex.quote(str(folder if shard is None else folder.parent))
     say(f"next: vedette {f'results {place}; vedette report' if shard is None else 'merge'} {place}")
@@ -136,7 +136,7 @@ def load_workers(workers: int) -> None:
 
 def carry_out(
     campaign: Campaign, folder: Path, workers: int, scheduler: str | None = None, redo_damaged: bool = False
-) -> Outcome:
+) -> CampaignOutcome:
     """Run a campaign with its progress shown; Ctrl-C says how to go on."""
     from vedette.campaigns import Progress, run_campaign
 
@@ -154,7 +154,7 @@ def carry_out(
             )
 
 
-def report_failures(failed: tuple[Failed, ...]) -> None:
+def report_failures(failed: tuple[FailedRun, ...]) -> None:
     """Name runs that could not be finished, and end with status 1 if there are any."""
     if not failed:
         return

@@ -17,14 +17,14 @@ from vedette.internal.text import elided_apart, named_in, pluralise
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from vedette.campaigns.leaderboard import SceneTable
     from vedette.campaigns.scores import StrategyScore
-    from vedette.campaigns.standings import SceneTable
     from vedette.evaluation import Comparison
 
 # Of `vedette.evaluation.tables.header`, for a terminal of 80 columns; the caption under the table says the rest.
 _SHORT_HEADER = ("loc.", "card.", "difference", "95 %", "won")
 _SHORT_SCORES = ("worst", "difference", "N error", "tracked", "s", "runs")  # of `vedette.campaigns.scores.score_header`
-_LEFT_OUT = ("NEES, 95 %", "Filter steps", "Fusions", "Rewards")  # of `vedette.campaigns.standings.header`
+_LEFT_OUT = ("NEES, 95 %", "Filter steps", "Fusions", "Rewards")  # of `vedette.campaigns.leaderboard.header`
 _SHORT_STANDINGS = ("more", "95 %", "N error", "NEES", "ms", "lost", "runs")  # of the others
 _LONGEST_LABEL, _SHORTEST_LABEL = 24, 8
 _MOST_DECISIONS = 6  # decision times that are printed; the tables and the report have all
@@ -81,7 +81,7 @@ def print_scores(scores: Sequence[StrategyScore], comparison: Comparison) -> Non
 
 def print_standings(table: SceneTable) -> None:
     """How entrants stand on a scene, as far as a terminal has room; the page has the rest."""
-    from vedette.campaigns.standings import header, row
+    from vedette.campaigns.leaderboard import header, row
     from vedette.evaluation.tails import tail_header, tails_in_words
 
     names, rows = header(table), [row(table, own) for own in table.standings]

@@ -14,7 +14,7 @@ from vedette.internal.extras import require_packages
 from vedette.internal.text import pluralise
 
 if TYPE_CHECKING:
-    from vedette.campaigns import Merged
+    from vedette.campaigns import MergeResult
 
 _SHOWN_COMMANDS = 3
 
@@ -64,7 +64,7 @@ def merge(
     raise typer.Exit(1)
 
 
-def _commands(merged: Merged) -> list[str]:
+def _commands(merged: MergeResult) -> list[str]:
     """What runs each share that is missing; one command where the campaign was not cut."""
     words = ["vedette", "campaign", "SPEC", f"--runs={merged.results.campaign.num_runs}", "--out"]
     if merged.count == 1:

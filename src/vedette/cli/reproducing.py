@@ -24,8 +24,8 @@ from vedette.internal.extras import require_packages
 
 if TYPE_CHECKING:
     from vedette.campaigns import CampaignResults, CampaignSpec
+    from vedette.campaigns.published import CheckedClaim, PublishedComparison
     from vedette.campaigns.results import GroupComparison
-    from vedette.campaigns.yardsticks import CheckedClaim, Yardstick
 
 YARDSTICK = "yardstick.md"
 _RUNS = 30
@@ -69,9 +69,9 @@ def reproduce(
     if not list_:
         load_workers(workers)
     from vedette.campaigns import open_results, resolve
-    from vedette.campaigns.yardsticks import yardsticks
+    from vedette.campaigns.published import published_comparisons
 
-    known = yardsticks()
+    known = published_comparisons()
     if list_:
         _list(known)
         return
@@ -106,12 +106,12 @@ def reproduce(
 def compared(scenario: str, planners: str | None, runs: int | None, seed: int, name: str = _FOLDER) -> CampaignSpec:
     """A campaign of strategies on one scenario, by what a command line says of it; `VedetteError` for none."""
     from vedette.campaigns import CampaignSpec
-    from vedette.campaigns.yardsticks import yardsticks
+    from vedette.campaigns.published import published_comparisons
     from vedette.scenarios import list_builtin, load_scenario
     from vedette.scenarios.loading import missing_scenario
 
     if scenario not in list_builtin() and not os.path.isfile(scenario):
-        raise missing_scenario(scenario, f"a yardstick ({', '.join(yardsticks())}), ", list(list_builtin()))
+        raise missing_scenario(scenario, f"a yardstick ({', '.join(published_comparisons())}), ", list(list_builtin()))
     loaded = load_scenario(scenario)
     for strategy in _names(planners) or ():
         check_planner(loaded, strategy, "--planners")
@@ -131,13 +131,15 @@ def _names(planners: str | None) -> tuple[str, ...] | None:
     return None if planners is None else tuple(name.strip() for name in planners.split(","))
 
 
-def _list(known: dict[str, Yardstick]) -> None:
+def _list(known: dict[str, PublishedComparison]) -> None:
     titles = {name: yardstick.title for name, yardstick in known.items()}
     print_names(titles)
     publish([{"name": name, "title": title} for name, title in titles.items()])
 
 
-def _print_beside_published(opened: CampaignResults, groups: Sequence[GroupComparison], yardstick: Yardstick) -> None:
+def _print_beside_published(
+    opened: CampaignResults, groups: Sequence[GroupComparison], yardstick: PublishedComparison
+) -> None:
     from vedette.campaigns.scores import score_strategies
 
     for group in groups:
@@ -147,15 +149,15 @@ def _print_beside_published(opened: CampaignResults, groups: Sequence[GroupCompa
         say("")
 
 
-def _print_provenance(yardstick: Yardstick) -> None:
-    from vedette.campaigns.yardsticks import provenance
+def _print_provenance(yardstick: PublishedComparison) -> None:
+    from vedette.campaigns.published import provenance
 
     for line in provenance(yardstick):
         console().print(line, style="dim")
 
 
-def _checked(yardstick: Yardstick, groups: Sequence[GroupComparison]) -> tuple[CheckedClaim, ...]:
-    from vedette.campaigns.yardsticks import checked_claims
+def _checked(yardstick: PublishedComparison, groups: Sequence[GroupComparison]) -> tuple[CheckedClaim, ...]:
+    from vedette.campaigns.published import checked_claims
 
     return tuple(claim for group in groups for claim in checked_claims(yardstick, group.comparison))
 
@@ -168,9 +170,9 @@ def _print_claims(claims: Sequence[CheckedClaim]) -> None:
         say(f"  {claim.outcome}: {claim.claim} ({claim.evidence})")
 
 
-def _write(opened: CampaignResults, yardstick: Yardstick | None, folder: Path) -> Path:
+def _write(opened: CampaignResults, yardstick: PublishedComparison | None, folder: Path) -> Path:
     """The report, and tables and figures beside it."""
-    from vedette.campaigns.yardsticks import yardstick_markdown
+    from vedette.campaigns.published import published_markdown
     from vedette.reports import write_figures, write_report, write_summary
 
     with interruptible(f"{folder} keeps every run; the same command writes the report"):
@@ -179,7 +181,7 @@ def _write(opened: CampaignResults, yardstick: Yardstick | None, folder: Path) -
             write_summary(opened, folder)
             write_figures(opened, folder / "figures")
         else:  # of decisions at every scan, figures by the decision would be hundreds: `vedette report --figures`
-            write_text(folder / YARDSTICK, yardstick_markdown(opened, yardstick))
+            write_text(folder / YARDSTICK, published_markdown(opened, yardstick))
         write_report(opened, page := folder / "report.html", trust=True)  # what it names has just been run
     say(f"Wrote {folder}. Open {page} in a browser.")
     return page

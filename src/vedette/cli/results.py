@@ -21,7 +21,7 @@ from vedette.internal.extras import require_packages
 from vedette.internal.text import pluralise
 
 if TYPE_CHECKING:
-    from vedette.campaigns import Failed
+    from vedette.campaigns import FailedRun
     from vedette.campaigns.database import Failure
     from vedette.campaigns.results import CampaignResults, GroupComparison
     from vedette.scenarios import Scenario
@@ -237,7 +237,7 @@ def _scenario_of(folder: Path) -> Scenario | None:
         return None
 
 
-def print_failures(failed: Sequence[Failed | Failure], tell: Callable[[str], None] = say) -> None:
+def print_failures(failed: Sequence[FailedRun | Failure], tell: Callable[[str], None] = say) -> None:
     """The first of the runs that could not be finished, each with where it stopped."""
     for result in failed[:_SHOWN_FAILURES]:
         tell(f"  cell {result.cell}, run {result.run}: {result.message}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from vedette.campaigns.standings import SceneTable, header, row
+from vedette.campaigns.leaderboard import SceneTable, header, row
 from vedette.reports.tables import Table
 from vedette.reports.writing import make_room, render, write_page
 

@@ -16,8 +16,8 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from vedette.campaigns.published import CheckedClaim, checked_claims, published_comparison_of
 from vedette.campaigns.results import CampaignResults
-from vedette.campaigns.yardsticks import CheckedClaim, checked_claims, yardstick_of
 from vedette.errors import InputError
 from vedette.evaluation.figures.labels import elided_names
 from vedette.evaluation.scans import code_of_sensors
@@ -95,10 +95,10 @@ def write_report(
     runs: list[dict[str, Any]] = []
     errors: dict[str, Floats] = {}
     claims: list[CheckedClaim] = []
-    yardstick = yardstick_of(results.campaign)
+    reference = published_comparison_of(results.campaign)
     for number, group in enumerate(gather(results)):
-        if yardstick is not None and group.comparison is not None:
-            claims += checked_claims(yardstick, group.comparison)
+        if reference is not None and group.comparison is not None:
+            claims += checked_claims(reference, group.comparison)
         errors.update(run_errors(group))
         is_brief = sum(section.size for section in sections) > MAX_FIGURE_BYTES
         sections.append(section_of(group, f"g{number}", is_brief))
@@ -117,7 +117,7 @@ def write_report(
         folder=shlex.quote(campaign.default_folder),
         compared=axis_label(campaign.compare),
         claims=claims,
-        remark="" if yardstick is None else yardstick.remark,
+        remark="" if reference is None else reference.remark,
         sections=sections,
         sweeps=sweeps,
         finished=sum(len(results.finished(cell.name)) for cell in campaign.cells),
