@@ -22,7 +22,7 @@ from vedette.internal.unit_warnings import suppress_unit_warnings
 from vedette.models import CellGrid
 from vedette.scenarios import Scenario, with_fields
 from vedette.scenarios.build import build_experiment
-from vedette.simulation import World
+from vedette.simulation import SimulationRun
 
 Floats = NDArray[np.float64]
 
@@ -211,7 +211,9 @@ def calibration(scene: Scene, case: Case, seeds: Iterable[int], num_runs: int, f
     region = scene.scenario(0).model.region.build()
     grid = CellGrid.covering(region, CELL)
     scores = [
-        _Scores(grid, World(experiment, seed=seed, run=run, moving=False), np.random.default_rng([seed, run])).scored()
+        _Scores(
+            grid, SimulationRun(experiment, seed=seed, run=run, moving=False), np.random.default_rng([seed, run])
+        ).scored()
         for seed in seeds
         for run in range(first_run, first_run + num_runs)
     ]
@@ -226,7 +228,7 @@ class _Scores:
     """The scores of one run. rng: breaks ties of ranks."""
 
     grid: CellGrid
-    world: World
+    world: SimulationRun
     rng: np.random.Generator
 
     def scored(self) -> tuple[Floats, Floats, Floats]:

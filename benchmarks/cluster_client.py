@@ -29,7 +29,7 @@ from vedette.campaigns.spec import spec_from_data
 from vedette.campaigns.tasks import CompletedRun, Task, TaskOutcome
 from vedette.evaluation.metrics import encode_metrics
 from vedette.evaluation.runs import measure_run, run_scenario
-from vedette.simulation.kept import encode_timings
+from vedette.simulation.serialization import encode_timings
 
 SECONDS = float(os.environ.get("STUB_SECONDS", "0.2"))
 

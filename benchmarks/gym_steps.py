@@ -19,7 +19,7 @@ from timing import Figures, Measure, Once, cpu_seconds
 
 from vedette.gym import ScenarioEnv
 from vedette.scenarios import Scenario, load_scenario, with_fields
-from vedette.simulation import World
+from vedette.simulation import SimulationRun
 from vedette.tracking import Stages
 
 FILTERS: dict[str, dict[str, Any]] = {
@@ -34,9 +34,9 @@ def scene(kind: str) -> Scenario:
 
 
 def walked(env: ScenarioEnv, run: int, stages: Stages | None = None) -> int:
-    """All scans of a run, by `World.step` alone; how many."""
+    """All scans of a run, by `SimulationRun.step` alone; how many."""
     experiment = env.episodes.built.experiment
-    world, rng = World(experiment, seed=1, run=run), np.random.default_rng(run)
+    world, rng = SimulationRun(experiment, seed=1, run=run), np.random.default_rng(run)
     while not world.is_over:
         moment = world.step(stages=stages)
         if moment.step in experiment.decision_steps:

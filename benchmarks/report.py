@@ -31,7 +31,7 @@ from vedette.campaigns.store import Store
 from vedette.evaluation.metrics import encode_metrics
 from vedette.evaluation.runs import measure_run, run_scenario
 from vedette.internal.reading import read_members
-from vedette.simulation.kept import encode_timings
+from vedette.simulation.serialization import encode_timings
 
 PLANNERS = ("jdm", "idm", "assigned", "random")
 

@@ -35,7 +35,7 @@ from vedette.campaigns.rows import row_of, verified
 from vedette.campaigns.spec import load_spec
 from vedette.evaluation.metrics import encode_metrics
 from vedette.evaluation.runs import measure_run, run_scenario
-from vedette.simulation.kept import encode_timings
+from vedette.simulation.serialization import encode_timings
 
 SPEC = """
 name = "bench"

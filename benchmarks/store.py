@@ -39,8 +39,8 @@ from vedette.evaluation.runs import run_scenario
 from vedette.internal.files import sync_folder
 from vedette.scenarios import load_scenario
 from vedette.simulation.arrow import read_table, to_arrow
-from vedette.simulation.kept import encode_timings
 from vedette.simulation.records import RunRecord
+from vedette.simulation.serialization import encode_timings
 from vedette.simulation.tables import LAYOUTS, record_of, run_facts, tables_of
 
 Way = tuple[Callable[[int], None], Callable[[], int]]

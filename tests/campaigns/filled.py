@@ -12,8 +12,8 @@ from vedette.campaigns.rows import row_of
 from vedette.campaigns.spec import spec_from_data
 from vedette.campaigns.store import Store
 from vedette.evaluation.metrics import RunMetrics, encode_metrics, measure
-from vedette.simulation.kept import encode_timings
 from vedette.simulation.records import RunRecord
+from vedette.simulation.serialization import encode_timings
 
 NUM_RUNS = 3
 

@@ -15,8 +15,8 @@ from vedette.campaigns.rows import row_of
 from vedette.campaigns.running import NullObserver
 from vedette.campaigns.tasks import CompletedRun, Task, TaskOutcome
 from vedette.evaluation.metrics import RunMetrics, encode_metrics
-from vedette.simulation.kept import encode_timings
 from vedette.simulation.records import RunRecord
+from vedette.simulation.serialization import encode_timings
 
 
 def stub_campaign(runs: int) -> Campaign:

@@ -23,7 +23,7 @@ from vedette.evaluation.ensembles import Ensemble, ensemble_of, joined
 from vedette.evaluation.health import added, health_sums
 from vedette.evaluation.rewards import RewardSums
 from vedette.platforms import Actions
-from vedette.simulation.records import Decision, Outline, RunRecord
+from vedette.simulation.records import Decision, RunRecord, RunSummary
 from waiting import PATIENCE
 
 NUM_RUNS = 10
@@ -87,12 +87,12 @@ def test_it_holds_what_the_records_do(folder: Path) -> None:
     )
 
 
-def test_an_outline_is_the_same_from_the_record_and_from_its_bytes(folder: Path) -> None:
+def test_a_summary_is_the_same_from_the_record_and_from_its_bytes(folder: Path) -> None:
     results = open_results(folder)
-    ((read, metrics),) = results.outlines(CELL, [2])
+    ((read, metrics),) = results.summaries(CELL, [2])
     run = results.run(CELL, 2)
-    of_record = run.record.outline()
-    for each in fields(Outline):
+    of_record = run.record.summary()
+    for each in fields(RunSummary):
         if each.name not in ("decisions", "health", "timings"):
             assert plain(np.asarray(getattr(read, each.name))) == plain(np.asarray(getattr(of_record, each.name)))
     assert contents(ensemble_of([(read, metrics)])) == contents(ensemble_of([(of_record, run.metrics)]))
@@ -138,7 +138,7 @@ def test_no_run_and_runs_that_are_not_there_are_refused(folder: Path) -> None:
 
 
 def test_runs_of_other_scenarios_and_times_are_refused() -> None:
-    first, other = ((make_record("jdm", run).outline(), None) for run in (0, 1))
+    first, other = ((make_record("jdm", run).summary(), None) for run in (0, 1))
     elsewhere = replace(other[0], scenario="elsewhere"), None
     later = replace(other[0], times=other[0].times + 1.0), None
     for wrong, message in ((elsewhere, "run 1 is of elsewhere"), (later, "same scan times in every run; run 1")):
@@ -183,8 +183,8 @@ def test_rewards_add_up_whatever_the_parts() -> None:
 
 
 def test_no_more_rewards_are_held_than_memory_has_room_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    outlines = [make_record("jdm", run).outline() for run in range(5)]
-    whole = ensemble_of((each, None) for each in outlines)
+    summaries = [make_record("jdm", run).summary() for run in range(5)]
+    whole = ensemble_of((each, None) for each in summaries)
     monkeypatch.setattr(ensembles, "_MOST_REWARDS", 2 * 3 * 169)  # two runs of three decisions
     held: list[int] = []
 
@@ -193,7 +193,7 @@ def test_no_more_rewards_are_held_than_memory_has_room_for(monkeypatch: pytest.M
         return joined(parts)
 
     monkeypatch.setattr(ensembles, "joined", noted)
-    parts = ensemble_of((each, None) for each in outlines)
+    parts = ensemble_of((each, None) for each in summaries)
     assert held == [2, 2, 1]
     np.testing.assert_array_equal(parts.ospa, whole.ospa)
     np.testing.assert_allclose(parts.rewards[1].mean().tables[0].mean, whole.rewards[1].mean().tables[0].mean)

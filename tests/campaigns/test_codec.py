@@ -23,7 +23,7 @@ from vedette.errors import InputError
 from vedette.evaluation.metrics import decode_metrics, encode_metrics
 from vedette.platforms import Actions
 from vedette.simulation.arrow import read_table, write_table
-from vedette.simulation.kept import FORMAT_VERSION, decode_timings, encode_timings
+from vedette.simulation.serialization import FORMAT_VERSION, decode_timings, encode_timings
 from vedette.simulation.tables import LAYOUTS, OPTIONAL
 
 NUMBERS = st.floats(width=64, allow_nan=True, allow_infinity=True)

@@ -26,7 +26,7 @@ from vedette.cli import app
 from vedette.errors import InputError
 from vedette.evaluation.comparison import scored
 from vedette.evaluation.ensembles import ensemble_of
-from vedette.simulation.kept import encode_timings
+from vedette.simulation.serialization import encode_timings
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +92,7 @@ def test_strategies_are_compared_over_the_runs_that_all_have(whole, campaign):
     assert group.labels == group.comparison.strategies == ("jdm", "random")
     assert [cell.name for cell in group.cells] == ["jdm-rate-5.0", "random-rate-5.0"]
     runs = {planner: [make_run(planner, run) for run in range(2)] for planner in ("jdm", "random")}
-    ensembles = {name: ensemble_of((record.outline(), metrics) for record, metrics in of) for name, of in runs.items()}
+    ensembles = {name: ensemble_of((record.summary(), metrics) for record, metrics in of) for name, of in runs.items()}
     assert_same(group.comparison, scored(campaign.cells[0].scenario, ensembles))
 
 

@@ -30,8 +30,8 @@ from vedette.reports.saving import write_summary
 from vedette.reports.tables import measure_table
 from vedette.scenarios import load_scenario
 from vedette.scenarios.dumping import dump_scenario
-from vedette.simulation.kept import encode_timings
 from vedette.simulation.records import RunRecord
+from vedette.simulation.serialization import encode_timings
 
 LIMITS: dict[str, Any] = {"cutoff": 100.0, "order": 1.0, "window": 10}
 

@@ -57,7 +57,7 @@ def test_threads_change_no_byte(scenario, runs):
 
 
 def ensembles_of(runs):
-    return {name: ensemble_of((record.outline(), None) for record in of) for name, of in runs.items()}
+    return {name: ensemble_of((record.summary(), None) for record in of) for name, of in runs.items()}
 
 
 def test_the_scans_that_count_are_the_scenarios(scenario, runs):

@@ -28,7 +28,7 @@ from vedette.filters import Limits
 from vedette.models import BirthModel, CellGrid, Region, TargetModel, constant_survival, constant_velocity
 from vedette.scenarios import with_fields
 from vedette.scenarios.build import build_experiment
-from vedette.simulation import CLUTTER, Scan, World
+from vedette.simulation import CLUTTER, Scan, SimulationRun
 
 CASES = {case.name: case for case in cases()}
 UNLIMITED = {name: min(value, 10**9) for name, value in asdict(Limits.none()).items() if name != "max_position_std"}
@@ -219,7 +219,7 @@ def test_one_site_and_one_scan_have_the_posterior_in_closed_form() -> None:
     experiment = replace(experiment, targets=PriorTargets(experiment.tracker.targets))
     predicted = multivariate_normal([20.0, 30.0], (std**2 + 10.0**2) * np.eye(2))
     for run in range(20):
-        moment = World(experiment, seed=1, run=run).step()
+        moment = SimulationRun(experiment, seed=1, run=run).step()
         ratios = detection * predicted.pdf(moment.measurements[0]) / (clutter / 1e6)
         odds = r / (1.0 - r) * (1.0 - detection + np.sum(ratios))
         labels, existence = existence_probabilities(moment.state.fused)
@@ -283,7 +283,7 @@ def test_first_detections_of_two_sensors_exist_as_often_as_their_posterior_says(
     experiment = replace(experiment, targets=PriorTargets(experiment.tracker.targets))
     sums, num_first = [], 0
     for run in range(NUM_DRAWS):
-        world = World(experiment, seed=1, run=run)
+        world = SimulationRun(experiment, seed=1, run=run)
         scans = [scan for scan in world.step().scans if scan is not None]
         names = Names(experiment.tracker.targets.birth)
         names.take(1, scans)

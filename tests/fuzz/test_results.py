@@ -33,7 +33,7 @@ from vedette.densities.files import load_density, save_density
 from vedette.errors import VedetteError
 from vedette.evaluation.metrics import encode_metrics, measure
 from vedette.reports import write_figures, write_report
-from vedette.simulation.kept import encode_timings
+from vedette.simulation.serialization import encode_timings
 from vedette.simulation.storage import load_run, read_manifest, save_run
 
 pytestmark = pytest.mark.fuzz

@@ -20,7 +20,7 @@ from vedette.evaluation import ospa, run_scenario
 from vedette.gym import Observation, ScenarioEnv, ScenarioParallelEnv, expected_loss, policy_planner
 from vedette.gym.observing import belief_arrays
 from vedette.scenarios import Scenario, load_scenario, with_fields
-from vedette.simulation import Moment, RunRecord, Truth
+from vedette.simulation import RunRecord, ScanOutcome, Truth
 from vedette.simulation.loop import SCENES, run_stream
 
 LMBS = {"filter.kind": "lmb", "fusion.kind": "clmb", "control.reward": {"kind": "expected_loss"}}
@@ -120,9 +120,9 @@ def test_the_reward_is_minus_the_mean_ospa_to_the_next_decision() -> None:
 
 
 def test_own_rewards_and_the_expected_loss() -> None:
-    seen: list[tuple[Sequence[Moment], Truth]] = []
+    seen: list[tuple[Sequence[ScanOutcome], Truth]] = []
 
-    def mine(moments: Sequence[Moment], truth: Truth) -> float:
+    def mine(moments: Sequence[ScanOutcome], truth: Truth) -> float:
         seen.append((moments, truth))
         return 7.0
 

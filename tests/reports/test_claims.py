@@ -15,7 +15,7 @@ from vedette.reports.claims import all_pairs, claim, claims
 def comparison_of(*errors: list[float]) -> Comparison:
     """Strategies a, b, ... on one scan, with the given OSPA in each run."""
     names = tuple("abcde"[: len(errors)])
-    scan = make_record("fixed", num_scans=1).outline()
+    scan = make_record("fixed", num_scans=1).summary()
     ensembles = [
         ensemble_of(
             (replace(scan, run=run, ospa=np.array([[total, total, 0.0]])), None) for run, total in enumerate(of)

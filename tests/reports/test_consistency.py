@@ -39,7 +39,7 @@ def off_once(record: RunRecord, step: int) -> RunRecord:
 
 def with_runs(group: Group, label: str, runs: Iterable[tuple[RunRecord, RunMetrics]]) -> Group:
     """The group with other runs of a strategy."""
-    ensemble = ensemble_of((record.outline(), metrics) for record, metrics in runs)
+    ensemble = ensemble_of((record.summary(), metrics) for record, metrics in runs)
     others = [replace(each, ensemble=ensemble) if each.label == label else each for each in group.strategies]
     return replace(group, strategies=tuple(others))
 

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from simulation.test_explained import explanation_of
 
 from evaluation.still_network import NAMES, POLYGON, STILL_NETWORK
 from evaluation.synthetic import make_record
 from reports.examples import MIXED_SENSORS, SUMS, campaign_of, results_of
-from simulation.test_explained import explanation_of
 from vedette.control import TargetGains
 from vedette.errors import InputError
 from vedette.reports.groups import Strategy, gather

@@ -22,7 +22,7 @@ from vedette.scenarios import Scenario, load_scenario
 from vedette.scenarios.dumping import dump_scenario
 from vedette.scenarios.overrides import with_fields
 from vedette.scenarios.trust import code_of, not_own
-from vedette.simulation.kept import encode_timings
+from vedette.simulation.serialization import encode_timings
 
 MODELS = """
 from pathlib import Path

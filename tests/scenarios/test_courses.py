@@ -38,7 +38,7 @@ from vedette.scenarios.build import build_planner, build_sensors
 from vedette.scenarios.loading import parse_scenario
 from vedette.scenarios.of_recording import scenario_of_sensors
 from vedette.scenarios.overrides import with_fields
-from vedette.simulation.planned import planned_tables
+from vedette.simulation.decision_tables import decision_tables
 
 FAR = Origin(-1.05, 50.7)
 POSE = np.array([98900.0, 30.0, 0.3])
@@ -241,7 +241,7 @@ def test_tables_and_words_of_a_run_have_courses() -> None:
     plan = record.decisions[0].plan
     assert {"course_deg", "speed_mps"} <= set(plan.to_table())
     assert "heading" not in f"{plan} {plan.explain()}"
-    tables = planned_tables(record.decisions, record.num_sensors)
+    tables = decision_tables(record.decisions, record.num_sensors)
     assert {"course_deg", "speed_mps"} <= set(tables["actions"])
     assert "heading_deg" not in tables["actions"]
     tracks = table_of_run(record, scenario)

@@ -12,11 +12,11 @@ from vedette.errors import InputError
 from vedette.evaluation import run_scenario
 from vedette.scenarios import Scenario, parse_scenario, with_fields
 from vedette.scenarios.generated import GeneratedScene, scene_text
-from vedette.simulation import planned
+from vedette.simulation import decision_tables
 from vedette.simulation.arrow import read_table, write_table
-from vedette.simulation.kept import decode_run, encode_run
-from vedette.simulation.planned import OWN_REWARDS
+from vedette.simulation.decision_tables import OWN_REWARDS
 from vedette.simulation.records import RunRecord
+from vedette.simulation.serialization import decode_run, encode_run
 from vedette.simulation.tables import run_facts
 
 
@@ -56,7 +56,7 @@ def test_rewards_that_stand_apart_come_back(monkeypatch: pytest.MonkeyPatch) -> 
     assert "own_rewards.arrow" in files
     assert_same_plans(read(files, run), run)
     assert encode_run(read(files, run)) == files
-    monkeypatch.setattr(planned, "_FEW_SENSORS", 1000)  # as they all stood before, and do for few sensors
+    monkeypatch.setattr(decision_tables, "_FEW_SENSORS", 1000)  # as they all stood before, and do for few sensors
     together = encode_run(run)
     assert "own_rewards.arrow" not in together
     assert len(together["rewards.arrow"]) > 5 * len(files["own_rewards.arrow"]) / 2

@@ -18,7 +18,7 @@ from vedette.models import Region
 from vedette.platforms import Actions, HeadingPlatform, Operated
 from vedette.scenarios import load_scenario, with_fields
 from vedette.scenarios.build import build_experiment, build_planner, build_sensors
-from vedette.simulation import OraclePlanner, RequiresTruth, Timetable, Truth, simulate
+from vedette.simulation import OraclePlanner, RequiresTruth, Schedule, Truth, simulate
 from vedette.simulation.cramer_rao import scan_information, transition_jacobians
 from vedette.tracking import State
 
@@ -50,8 +50,8 @@ def state(scale: float = 1.0) -> State:
     return State(tuple(own), own[0], step=1, time=1.0)
 
 
-def timetable(**fields: Any) -> Timetable:
-    return Timetable(TIMES, (1, 4), (0.4, 0.6), one_belief=False, rebirths=False)._replace(**fields)
+def schedule(**fields: Any) -> Schedule:
+    return Schedule(TIMES, (1, 4), (0.4, 0.6), one_belief=False, rebirths=False)._replace(**fields)
 
 
 def information(sensor: int, target: Any, pose: Any) -> Any:
@@ -67,7 +67,7 @@ def information(sensor: int, target: Any, pose: Any) -> Any:
 
 
 def cost(
-    table: Timetable, first: int, last: int, joint: Any, poses: Any, covs: Any, scans: int = 4
+    table: Schedule, first: int, last: int, joint: Any, poses: Any, covs: Any, scans: int = 4
 ) -> tuple[float, Any, Any]:
     """The cost of a joint action from one scan to another, target by target; where it ends, and what is then known."""
     motion, total = SENSORS[0].filter.targets.motion, 0.0
@@ -104,7 +104,7 @@ def cost(
 @pytest.mark.parametrize("one_belief", [False, True])
 @pytest.mark.parametrize(("depth", "scans"), [(1, 4), (2, 4), (2, 3), (2, 1)])
 def test_it_takes_what_costs_least(one_belief: bool, depth: int, scans: int) -> None:
-    table = timetable(one_belief=one_belief, powers=(1.0, 1.0) if one_belief else (0.4, 0.6))
+    table = schedule(one_belief=one_belief, powers=(1.0, 1.0) if one_belief else (0.4, 0.6))
     covs = [COVS] if one_belief else [COVS, [2.0 * cov for cov in COVS]]
     joints = list(itertools.product(range(3), repeat=2))
     costs = {}
@@ -137,11 +137,11 @@ def test_the_bearing_may_jump() -> None:
 def test_who_does_not_scan_tells_nothing() -> None:
     scans = np.array([[True] * 6, [False] * 6])
     covs = [COVS, [2.0 * cov for cov in COVS]]
-    chosen = OraclePlanner(SENSORS, timetable(scans_at=scans), truth=truth()).plan(
+    chosen = OraclePlanner(SENSORS, schedule(scans_at=scans), truth=truth()).plan(
         state(), POSES, rng=np.random.default_rng(0)
     )
     assert chosen.chosen[1] == 0  # all its courses are worth the same
-    first = [cost(timetable(powers=(1.0, 0.0)), 1, 4, (action, 0), POSES, covs)[0] for action in range(3)]
+    first = [cost(schedule(powers=(1.0, 0.0)), 1, 4, (action, 0), POSES, covs)[0] for action in range(3)]
     assert chosen.chosen[0] == int(np.argmin(first))
 
 
@@ -156,10 +156,10 @@ def test_who_is_off_tells_nothing() -> None:
             return self.switched_on_and_off(self.platform.actions(pose))[3:]
 
     plans = []
-    table = timetable(scans_at=np.array([[True] * 6, [False] * 6]))
+    table = schedule(scans_at=np.array([[True] * 6, [False] * 6]))
     switched = [Operated(own.platform, switchable=True) for own in SENSORS]
     off = Off(SENSORS[1].platform, switchable=True)
-    for table_of, platforms in ((table, (SENSORS[0].platform, SENSORS[1].platform)), (timetable(), (switched[0], off))):
+    for table_of, platforms in ((table, (SENSORS[0].platform, SENSORS[1].platform)), (schedule(), (switched[0], off))):
         sensors = tuple(replace(own, platform=platform) for own, platform in zip(SENSORS, platforms, strict=True))
         planner = OraclePlanner(sensors, table_of, truth=truth())
         plans.append(planner.plan(state(), POSES, rng=np.random.default_rng(0)))
@@ -169,9 +169,9 @@ def test_who_is_off_tells_nothing() -> None:
 
 def test_what_is_lost_is_given_up_where_nothing_is_born() -> None:
     sees = replace(state(), fused=LMB.from_bernoullis([(1, 0)], [0.99], STARTS[:1], COVS[:1]))
-    planner = OraclePlanner(SENSORS, timetable(), truth=truth())
+    planner = OraclePlanner(SENSORS, schedule(), truth=truth())
     assert planner._tracked(sees, *truth().at(0))[0].tolist() == [0]
-    again = replace(planner, timetable=timetable(rebirths=True))
+    again = replace(planner, schedule=schedule(rebirths=True))
     ids, covs = again._tracked(sees, *truth().at(0))
     assert ids.tolist() == [0, 1, 2]
     assert covs[0].shape == (3, 4, 4)
@@ -181,7 +181,7 @@ def test_a_target_whose_label_is_held_but_not_estimated_is_kept() -> None:
     """Two labels near the first target: the one that is estimated counts; the second target's is improbable."""
     labels, means = [(1, 0), (1, 1), (1, 2)], np.array([STARTS[0], STARTS[1] + 3.0, STARTS[0]])
     belief = LMB.from_bernoullis(labels, [0.99, 0.05, 0.02], means, COVS)
-    planner = OraclePlanner(SENSORS, timetable(one_belief=True), truth=truth())
+    planner = OraclePlanner(SENSORS, schedule(one_belief=True), truth=truth())
     ids, covs = planner._tracked(replace(state(), fused=belief), *truth().at(0))
     assert ids.tolist() == [0, 1]
     np.testing.assert_allclose(covs[0], COVS[:2], rtol=1e-12)
@@ -191,12 +191,12 @@ def test_a_target_whose_label_is_held_but_not_estimated_is_kept() -> None:
 def test_where_nobody_can_be_helped_each_takes_its_first_course(step: int) -> None:
     """No target is tracked; after the last scan there is nothing to follow either."""
     none = State((LMB.empty(4),) * 2, LMB.empty(4), step=step, time=float(TIMES[step - 1]))
-    plan = OraclePlanner(SENSORS, timetable(), depth=2, truth=truth()).plan(none, POSES, rng=np.random.default_rng(0))
+    plan = OraclePlanner(SENSORS, schedule(), depth=2, truth=truth()).plan(none, POSES, rng=np.random.default_rng(0))
     assert plan.chosen == (0, 0)
 
 
 def test_it_keeps_to_constraints_and_wants_its_truth() -> None:
-    planner = OraclePlanner(SENSORS, timetable(), constraints=(StayInside(Region(-600.0, -100.0, -900.0, 900.0)),))
+    planner = OraclePlanner(SENSORS, schedule(), constraints=(StayInside(Region(-600.0, -100.0, -900.0, 900.0)),))
     with pytest.raises(InputError, match="truth: expected the targets of the run"):
         planner.plan(state(), POSES, rng=np.random.default_rng(0))
     plan = planner.with_truth(truth()).plan(state(), POSES, rng=np.random.default_rng(0))

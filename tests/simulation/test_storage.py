@@ -15,8 +15,8 @@ from vedette.densities.estimates import Estimate
 from vedette.errors import InputError
 from vedette.simulation import storage
 from vedette.simulation.arrow import Columns, read_table, write_table
-from vedette.simulation.kept import encode_run
 from vedette.simulation.records import RunRecord
+from vedette.simulation.serialization import encode_run
 from vedette.simulation.storage import load_run, read_manifest, save_run
 from vedette.simulation.tables import LAYOUTS, TIMINGS
 

@@ -59,7 +59,7 @@ def _by_processes(
 
 
 def _part(results: CampaignResults, cell: str, runs: Sequence[int]) -> Ensemble:
-    return ensemble_of(results.outlines(cell, runs))
+    return ensemble_of(results.summaries(cell, runs))
 
 
 _whose: list[tuple[CampaignResults, str]] = []  # of this process, if it is one that reads

@@ -1,7 +1,7 @@
 """A run as bytes, and back, bit for bit.
 
-The bytes are a zip archive, without compression, of the Arrow files that a saved run has (`vedette.simulation.kept`)
-and of `run.json`, which names the run. They depend on nothing but the numbers in them.
+The bytes are an uncompressed zip archive of the Arrow files of a saved run (`vedette.simulation.serialization`) and of
+`run.json`, which identifies the run. They depend only on the numbers in the run.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from typing import Any
 
 from vedette.errors import InputError
 from vedette.internal.reading import error_summary, parse_json, read_members
-from vedette.simulation import kept
-from vedette.simulation.records import Outline, RunRecord
+from vedette.simulation import serialization
+from vedette.simulation.records import RunRecord, RunSummary
 from vedette.simulation.tables import run_facts
 from vedette.simulation.upgrading import upgraded_files
 
@@ -29,7 +29,7 @@ def encode(record: RunRecord) -> bytes:
 
     Raises `InputError` for a record that contradicts itself or holds an invalid plan.
     """
-    files = {_RUN: json.dumps(run_facts(record)).encode() + b"\n", **kept.encode_run(record)}
+    files = {_RUN: json.dumps(run_facts(record)).encode() + b"\n", **serialization.encode_run(record)}
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w", zipfile.ZIP_STORED) as archive:
         for name, content in files.items():
@@ -45,19 +45,19 @@ def decode(payload: bytes, timings: bytes | None = None) -> RunRecord:
     Raises `InputError` for bytes that are not those of a run.
     """
     facts, members = _members(payload)
-    return kept.decode_run(facts, members, "run", timings)
+    return serialization.decode_run(facts, members, "run", timings)
 
 
-def decode_outline(payload: bytes, timings: bytes | None = None) -> Outline:
+def decode_summary(payload: bytes, timings: bytes | None = None) -> RunSummary:
     """What is compared and reported of a run, in a third of the time; raises as `decode`."""
-    facts, members = _members(payload, {_RUN, *kept.OUTLINED})
-    return kept.decode_outline(facts, members, "run", timings)
+    facts, members = _members(payload, {_RUN, *serialization.SUMMARY_FILES})
+    return serialization.decode_summary(facts, members, "run", timings)
 
 
 def upgraded(payload: bytes, number: int) -> bytes:
     """The bytes of a run of a format `number` in the present one. Raises `InputError` as `decode`."""
     facts, members = _members(payload)
-    return encode(kept.decode_run(facts, upgraded_files(members, number), "run"))
+    return encode(serialization.decode_run(facts, upgraded_files(members, number), "run"))
 
 
 def _members(payload: bytes, wanted: Container[str] | None = None) -> tuple[dict[str, Any], dict[str, bytes]]:

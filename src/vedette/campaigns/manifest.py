@@ -23,7 +23,7 @@ from vedette.internal.text import shown
 from vedette.scenarios import Scenario
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.yaml_reader import read_yaml
-from vedette.simulation.kept import FORMAT_VERSION
+from vedette.simulation.serialization import FORMAT_VERSION
 from vedette.simulation.storage import VersionCheck, check_version, versions
 
 MANIFEST = "manifest.json"

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, SupportsIndex
 
 from vedette.campaigns.aggregation import read_ensemble
 from vedette.campaigns.cells import Campaign, Cell
-from vedette.campaigns.codec import decode, decode_outline
+from vedette.campaigns.codec import decode, decode_summary
 from vedette.campaigns.database import DATABASE, Failure, Reader
 from vedette.campaigns.dataset import dataset_of_scans
 from vedette.campaigns.manifest import campaign_of, contents_checksum, read_manifest
@@ -25,7 +25,7 @@ from vedette.evaluation.metrics import Metric, RunMetrics, decode_metrics
 from vedette.evaluation.runs import measure_run
 from vedette.internal.representation import SummaryRepr
 from vedette.internal.text import elided, pluralise, shown
-from vedette.simulation.records import Outline, RunRecord
+from vedette.simulation.records import RunRecord, RunSummary
 
 if TYPE_CHECKING:
     import pyarrow
@@ -128,10 +128,10 @@ class CampaignResults(SummaryRepr):
         wanted = self.finished(cell) if runs is None else tuple(map(operator.index, runs))
         return read_ensemble(self, cell, wanted, 1 if self._own else self._num_workers)
 
-    def outlines(self, cell: str, runs: Sequence[int]) -> Iterator[tuple[Outline, RunMetrics]]:
+    def summaries(self, cell: str, runs: Sequence[int]) -> Iterator[tuple[RunSummary, RunMetrics]]:
         """What is compared of these finished runs, with their measures."""
         for entry in self._reader.entries(self.campaign.cell(cell).name, runs):
-            yield self._outlined(entry)
+            yield self._summarised(entry)
 
     def comparisons(self) -> tuple[GroupComparison, ...]:
         """One for each group of cells, in order, that has finished runs in common."""
@@ -188,16 +188,16 @@ class CampaignResults(SummaryRepr):
         settings = {name: value for name, value in cells[0].settings.items() if name != axis}
         return GroupComparison(settings, cells, labels, scored(cells[0].scenario, ensembles))
 
-    def _outlined(self, entry: Entry) -> tuple[Outline, RunMetrics]:
+    def _summarised(self, entry: Entry) -> tuple[RunSummary, RunMetrics]:
         if entry.metrics and not self._own:
             with self._placed(entry):
-                outline = decode_outline(entry.payload, entry.timings)
-                self._check(entry, outline.run, outline.health.num_tracks.shape[1])
-                metrics, _ = decode_metrics(entry.metrics, len(outline.times))
+                summary = decode_summary(entry.payload, entry.timings)
+                self._check(entry, summary.run, summary.health.num_tracks.shape[1])
+                metrics, _ = decode_metrics(entry.metrics, len(summary.times))
             if metrics is not None:  # otherwise another version's
-                return outline, metrics
+                return summary, metrics
         run = self._decoded(entry)
-        return run.record.outline(), run.metrics
+        return run.record.summary(), run.metrics
 
     def _decoded(self, entry: Entry) -> FinishedRun:
         with self._placed(entry):

@@ -17,7 +17,7 @@ from vedette.errors import VedetteError
 from vedette.evaluation.metrics import encode_metrics
 from vedette.evaluation.runs import measure_run, own_metrics, run_scenario
 from vedette.scenarios.sections.planners import STRATEGIES
-from vedette.simulation.kept import encode_timings
+from vedette.simulation.serialization import encode_timings
 from vedette.simulation.storage import versions
 
 # Below this a task costs more to hand out than it is worth.

@@ -7,7 +7,7 @@ from pathlib import Path
 from vedette.campaigns import codec, journal
 from vedette.campaigns.manifest import contents_checksum, read_manifest, write_manifest
 from vedette.errors import InputError
-from vedette.simulation.kept import FORMAT_VERSION
+from vedette.simulation.serialization import FORMAT_VERSION
 from vedette.simulation.storage import check_upgradable, holds_run
 from vedette.simulation.upgrading import upgrade_run
 

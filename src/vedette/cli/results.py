@@ -135,7 +135,7 @@ def upgrade(
     require_packages("vedette upgrade", "pyarrow")
     with interruptible("nothing is lost; the same command goes on"):
         from vedette.campaigns.upgrading import upgrade_results
-        from vedette.simulation.kept import FORMAT_VERSION
+        from vedette.simulation.serialization import FORMAT_VERSION
 
         number = upgrade_results(folder)
         if number == FORMAT_VERSION:

@@ -144,7 +144,7 @@ def compare(
         raise InputError("runs: expected at least one run of each of one or more strategies")
     measured = {name: [None] * len(of) for name, of in runs.items()} if metrics is None else metrics
     ensembles = {
-        name: ensemble_of((record.outline(), own) for record, own in zip(of, measured[name], strict=True))
+        name: ensemble_of((record.summary(), own) for record, own in zip(of, measured[name], strict=True))
         for name, of in runs.items()
     }
     return compare_ensembles(ensembles, since=since, until=until, unit=unit)
@@ -184,7 +184,7 @@ def counted_scans(record: RunRecord, scenario: Scenario | None) -> Bools:
     The scans are those that `scored` counts; without a scenario, those after the first decision. All count where the
     run stopped before the first of them.
     """
-    runs = {record.planner: ensemble_of([(record.outline(), None)])}
+    runs = {record.planner: ensemble_of([(record.summary(), None)])}
     try:
         return (compare_ensembles(runs) if scenario is None else scored(scenario, runs)).counted
     except InputError:

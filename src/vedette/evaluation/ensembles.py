@@ -18,13 +18,13 @@ from vedette.evaluation.rewards import RewardSums
 from vedette.internal.representation import SummaryRepr
 from vedette.internal.text import elided, pluralise
 from vedette.kernels.base.types import Floats, Ints
-from vedette.simulation.records import Outline
+from vedette.simulation.records import RunSummary
 
 PARTS = ("total", "localisation", "cardinality")
 # What was chosen at one decision, one row a sensor.
 Choice: TypeAlias = tuple[Row, ...]
 # A run with its measures, if it has any.
-Measured: TypeAlias = tuple[Outline, RunMetrics | None]
+Measured: TypeAlias = tuple[RunSummary, RunMetrics | None]
 
 # Runs that are held as they come, and entries of their tables of rewards.
 TOGETHER, _MOST_REWARDS = 256, 2**22
@@ -145,26 +145,26 @@ def _batches(runs: Iterable[Measured]) -> Iterator[list[Measured]]:
 
 
 def _of_few(runs: Sequence[Measured]) -> Ensemble:
-    outlines, first = [run for run, _ in runs], runs[0][0]
-    for each in outlines[1:]:
+    summaries, first = [run for run, _ in runs], runs[0][0]
+    for each in summaries[1:]:
         _check_alike(first.scenario, first.times, each.scenario, each.times, each.run)
     columns = [{} if metrics is None else metrics.columns() for _, metrics in runs]
     names = [name for name in columns[0] if all(name in of_run for of_run in columns)]
-    decided = _columns([each.decisions for each in outlines])
+    decided = _columns([each.decisions for each in summaries])
     return Ensemble(
         scenario=first.scenario,
-        seeds=np.array([each.seed for each in outlines], np.int64),
-        runs=np.array([each.run for each in outlines], np.int64),
+        seeds=np.array([each.seed for each in summaries], np.int64),
+        runs=np.array([each.run for each in summaries], np.int64),
         times=first.times,
-        ospa=np.array([each.ospa for each in outlines]),
-        num_targets=_in_few_bytes(np.array([each.num_targets for each in outlines])),
+        ospa=np.array([each.ospa for each in summaries]),
+        num_targets=_in_few_bytes(np.array([each.num_targets for each in summaries])),
         measures={name: _in_few_bytes(np.array([of_run[name] for of_run in columns])) for name in names},
-        choices=tuple(tuple(choice_of(decision.plan) for decision in each.decisions) for each in outlines),
-        decision_times=np.unique([decision.time for each in outlines for decision in each.decisions]),
-        health=health_sums([each.health for each in outlines]),
+        choices=tuple(tuple(choice_of(decision.plan) for decision in each.decisions) for each in summaries),
+        decision_times=np.unique([decision.time for each in summaries for decision in each.decisions]),
+        health=health_sums([each.health for each in summaries]),
         rewards=tuple(RewardSums.of(number, made) for number, made in enumerate(decided)),
-        seconds={stage: of.astype(np.float32) for stage, of in _by_name(list(map(_seconds, outlines))).items()},
-        counts={name: _in_few_bytes(np.array(of, np.int64)) for name, of in _counts(outlines).items()},
+        seconds={stage: of.astype(np.float32) for stage, of in _by_name(list(map(_seconds, summaries))).items()},
+        counts={name: _in_few_bytes(np.array(of, np.int64)) for name, of in _counts(summaries).items()},
     )
 
 
@@ -193,14 +193,14 @@ def _by_name(parts: Sequence[Mapping[str, NDArray[Any]]]) -> dict[str, NDArray[A
     return {name: np.concatenate([part[name] for part in parts if name in part]) for name in names}
 
 
-def _seconds(outline: Outline) -> dict[str, Floats]:
-    decided = np.array([decision.step - 1 for decision in outline.decisions], np.int64)
-    return {stage: of[decided] if stage == "planning" else of for stage, of in outline.timings.items()}
+def _seconds(summary: RunSummary) -> dict[str, Floats]:
+    decided = np.array([decision.step - 1 for decision in summary.decisions], np.int64)
+    return {stage: of[decided] if stage == "planning" else of for stage, of in summary.timings.items()}
 
 
-def _counts(outlines: Sequence[Outline]) -> dict[str, list[int]]:
+def _counts(summaries: Sequence[RunSummary]) -> dict[str, list[int]]:
     found: dict[str, list[int]] = {}
-    for decision in (decision for each in outlines for decision in each.decisions):
+    for decision in (decision for each in summaries for decision in each.decisions):
         for name, number in decision.plan.counts.items():
             found.setdefault(name, []).append(number)
     return found

@@ -21,14 +21,14 @@ from vedette.models.arguments import count, reject
 from vedette.scenarios import Scenario, load_scenario
 from vedette.scenarios.build import build_experiment, build_parts, build_sensors
 from vedette.scenarios.sections.strategies import Strategy
-from vedette.simulation import Experiment, Moment, RunRecord, Truth, World
+from vedette.simulation import Experiment, RunRecord, ScanOutcome, SimulationRun, Truth
 from vedette.simulation.health import Health
 from vedette.simulation.journal import Journal
 from vedette.simulation.loop import SCENES, advance, run_stream, truth_of_run
 
 AnyScenario: TypeAlias = str | Path | Scenario
 Scenarios: TypeAlias = AnyScenario | Sequence[AnyScenario] | Callable[[np.random.Generator], AnyScenario]
-Reward: TypeAlias = Callable[[Sequence[Moment], Truth], float]
+Reward: TypeAlias = Callable[[Sequence[ScanOutcome], Truth], float]
 AnyReward: TypeAlias = Literal["ospa", "expected_loss"] | Reward
 RENDER_MODES = ["rgb_array", "human"]
 # These grow with every scan, or are -inf if nothing fits, so their mean over a period is not informative.
@@ -114,7 +114,7 @@ class Episodes:
         self.built = self._drawn(self._seed, number)
         experiment = self.built.experiment
         truth = truth_of_run(experiment, self._seed, number)
-        self.world = World(experiment, seed=self._seed, run=number, truth=truth)
+        self.world = SimulationRun(experiment, seed=self._seed, run=number, truth=truth)
         self._journal = Journal(experiment.name, "policy", self._seed, number, truth, experiment.num_sensors)
         self.num_moved = 0
         self._advance()

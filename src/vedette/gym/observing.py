@@ -17,7 +17,7 @@ from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import as_array, dimension, reject
 from vedette.platforms import Options
-from vedette.simulation import Timetable
+from vedette.simulation import Schedule
 from vedette.tracking import State
 
 Observation: TypeAlias = dict[str, NDArray[Any]]
@@ -45,7 +45,7 @@ class ObservationEncoder:
         sensors: all sensors; those with more than one action are decided about.
         settings: the horizon, over which courses are distinguished.
         constraints: constraints on the sensors.
-        timetable: times of scans and decisions.
+        schedule: times of scans and decisions.
         num_labels: number of targets in an observation, the most probable ones.
 
     Raises:
@@ -55,7 +55,7 @@ class ObservationEncoder:
     sensors: tuple[MobileSensor, ...]
     settings: PlanningSettings
     constraints: tuple[Constraint, ...]
-    timetable: Timetable
+    schedule: Schedule
     num_labels: int = 10
 
     def __post_init__(self) -> None:
@@ -64,8 +64,8 @@ class ObservationEncoder:
     @classmethod
     def of(cls, parts: Mapping[str, Any], num_labels: int = 10) -> ObservationEncoder:
         """Return the encoder for the parts of a scenario's planner (`vedette.scenarios.build.build_parts`)."""
-        timetable = parts["oracle"]["timetable"]
-        return cls(parts["sensors"], parts["settings"], parts["constraints"], timetable, num_labels)
+        schedule = parts["oracle"]["schedule"]
+        return cls(parts["sensors"], parts["settings"], parts["constraints"], schedule, num_labels)
 
     def decision_context(self, state: State, poses: Floats) -> DecisionContext:
         """Return the pending decision.
@@ -117,8 +117,8 @@ class ObservationEncoder:
 
     def _times(self, step: int) -> NDArray[np.float32]:
         """Time in s to the next decision (to the end if there is none), and to the end, shape (2,)."""
-        times, last = self.timetable.times, len(self.timetable.times)
-        due = next((own for own in self.timetable.decision_steps if own > step), last)
+        times, last = self.schedule.times, len(self.schedule.times)
+        due = next((own for own in self.schedule.decision_steps if own > step), last)
         return np.asarray(times[[due - 1, -1]] - times[step - 1], np.float32)
 
 

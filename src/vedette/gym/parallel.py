@@ -14,7 +14,7 @@ from vedette.gym.episodes import RENDER_MODES, AnyReward, Episodes, Scenarios
 from vedette.gym.observing import Observation, belief_arrays
 from vedette.gym.spaces import space_of
 from vedette.models.arguments import one_of, reject
-from vedette.simulation import RunRecord, World
+from vedette.simulation import RunRecord, SimulationRun
 
 _BELIEF = ("existence", "means", "sqrt_covs", "mask")
 
@@ -66,7 +66,7 @@ class ScenarioParallelEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is u
         return self._action_spaces[agent]
 
     @property
-    def world(self) -> World:
+    def world(self) -> SimulationRun:
         """The current run, with its truth."""
         return self.episodes.world
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from vedette.gym.episodes import RENDER_MODES, AnyReward, Episodes, Scenarios
 from vedette.gym.observing import Observation
 from vedette.gym.spaces import space_of
-from vedette.simulation import RunRecord, World
+from vedette.simulation import RunRecord, SimulationRun
 
 
 class ScenarioEnv(gymnasium.Env[dict[str, Any], Any]):
@@ -43,7 +43,7 @@ class ScenarioEnv(gymnasium.Env[dict[str, Any], Any]):
                 sensors, of actions and of components of states and poses.
             reward: "ospa": minus the OSPA under the scenario's cutoff and order, mean over the scans of the step [m];
                 "expected_loss": minus `vedette.gym.expected_loss` of the fused belief, also the mean, which does not
-                use the truth; or a function of these `Moment`s and their `Truth`.
+                use the truth; or a function of these `ScanOutcome`s and their `Truth`.
             num_labels: number of targets in an observation.
             render_mode: "rgb_array" or "human"; None: nothing is drawn.
 
@@ -55,7 +55,7 @@ class ScenarioEnv(gymnasium.Env[dict[str, Any], Any]):
         self.action_space = spaces.Discrete(sizes[0]) if len(sizes) == 1 else spaces.MultiDiscrete(list(sizes))
 
     @property
-    def world(self) -> World:
+    def world(self) -> SimulationRun:
         """The current run, with its truth."""
         return self.episodes.world
 

@@ -136,7 +136,7 @@ def group_of_run(record: RunRecord, scenario: Scenario) -> Group:
     settings = {"scenario": record.scenario, "planner": record.planner}
     cell = Cell(_file_part(record.planner) or "run", settings, scenario, record.planner)
     is_known = scenario.model.targets.kind != "unknown"
-    ensemble = ensemble_of([(record.outline(), measure_run(record, scenario) if is_known else None)])
+    ensemble = ensemble_of([(record.summary(), measure_run(record, scenario) if is_known else None)])
     comparison, reason = None, "nobody knows the targets"
     if is_known:
         try:

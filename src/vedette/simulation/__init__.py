@@ -3,35 +3,35 @@
 from vedette.control import RequiresTruth
 from vedette.kernels.gaussian.scans import CLUTTER
 from vedette.simulation.born_targets import PoissonTargets
-from vedette.simulation.crowds import CrowdTargets
 from vedette.simulation.experiment import Experiment
-from vedette.simulation.loop import Moment, World, simulate
-from vedette.simulation.oracle import OraclePlanner, Timetable
+from vedette.simulation.loop import ScanOutcome, SimulationRun, simulate
+from vedette.simulation.oracle import OraclePlanner, Schedule
 from vedette.simulation.records import Decision, RunRecord
 from vedette.simulation.scans import Scan, simulate_scan, simulate_scans
 from vedette.simulation.storage import load_run, save_run
 from vedette.simulation.true_sensors import TrueSensor
-from vedette.simulation.true_targets import ToldPlanner
+from vedette.simulation.true_targets import TrueTargetsPlanner
 from vedette.simulation.truth import ScriptedTargets, TargetSource, Truth
+from vedette.simulation.uniform_targets import UniformTargets
 
 __all__ = [
     "CLUTTER",
-    "CrowdTargets",
     "Decision",
     "Experiment",
-    "Moment",
+    "KnowsTruth",
     "OraclePlanner",
     "PoissonTargets",
-    "RequiresTruth",
     "RunRecord",
     "Scan",
+    "ScanOutcome",
+    "Schedule",
     "ScriptedTargets",
+    "SimulationRun",
     "TargetSource",
-    "Timetable",
-    "ToldPlanner",
     "TrueSensor",
+    "TrueTargetsPlanner",
     "Truth",
-    "World",
+    "UniformTargets",
     "load_run",
     "save_run",
     "simulate",

@@ -15,7 +15,7 @@ _STEP = 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Stretch:
+class CovarianceRecursion:
     """The scans from one decision to the next, at the true targets.
 
     Covariances go through P <- F P F' + Q, then P^-1 <- P^-1 + P_D H' R^-1 H of each sensor that scans, where P_D is
@@ -24,7 +24,7 @@ class Stretch:
     Attributes:
         transitions, noises: F and Q, (num_scans, num_targets, dim, dim).
         alive: (num_scans, num_targets) 1 where the target is there, else 0.
-        told: of each sensor (num_courses, num_scans, num_targets, dim, dim) P_D H' R^-1 H of its scans.
+        sensor_information: of each sensor (num_courses, num_scans, num_targets, dim, dim) P_D H' R^-1 H of its scans.
         powers: of each sensor, with which its information counts in the fused density.
         one_belief: whether all scans go into one belief, to which sensors return after every scan.
         cutoff: the error that counts as a lost target, m.
@@ -33,7 +33,7 @@ class Stretch:
     transitions: Floats
     noises: Floats
     alive: Floats
-    told: tuple[Floats, ...]
+    sensor_information: tuple[Floats, ...]
     powers: tuple[float, ...]
     one_belief: bool
     cutoff: float
@@ -47,7 +47,7 @@ class Stretch:
         costs = np.zeros(len(actions))
         beliefs: list[Floats] = [np.broadcast_to(own, (len(actions), *own.shape)) for own in covs]
         for k, (moved, noise) in enumerate(zip(self.transitions, self.noises, strict=True)):
-            said = [own[actions[:, s], k] for s, own in enumerate(self.told)]
+            said = [own[actions[:, s], k] for s, own in enumerate(self.sensor_information)]
             infos: list[Floats] = [_inverse(moved @ own @ moved.swapaxes(-1, -2) + noise) for own in beliefs]
             if self.one_belief:
                 beliefs = [_inverse(infos[0] + self._summed(said))]

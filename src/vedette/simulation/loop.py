@@ -70,7 +70,7 @@ class RunningTracker:
         return state, info, estimate
 
 
-class Moment(NamedTuple):
+class ScanOutcome(NamedTuple):
     """What one scan of all sensors has brought."""
 
     step: int  # number of the scan, from 1
@@ -84,7 +84,7 @@ class Moment(NamedTuple):
     estimate: Estimate  # read off the fused belief
 
 
-class World:
+class SimulationRun:
     """A run of an experiment, a scan at a time; who steps it sends the sensors where they please.
 
     Attributes:
@@ -92,7 +92,7 @@ class World:
         seed, run: fix every random number: the targets and scans are those of that run of a campaign.
         truth: the targets at all scans, which are for scoring.
         fleet: the sensors on their ways.
-        moment: what the last scan has brought; None before the first.
+        outcome: what the last scan has brought; None before the first.
     """
 
     def __init__(
@@ -114,23 +114,23 @@ class World:
         self._scans_at = scans_of_run(experiment.scans_at, experiment.drop_out, len(experiment.times), seed, run)
         self._tracker = RunningTracker(experiment.tracker, experiment.estimate, self.truth, filters)
         self.fleet = experiment.fleet(moving=moving)
-        self.moment: Moment | None = None
+        self.outcome: ScanOutcome | None = None
 
     @property
     def is_over(self) -> bool:
         """Whether the last scan is done."""
-        return self.moment is not None and self.moment.step == len(self.experiment.times)
+        return self.outcome is not None and self.outcome.step == len(self.experiment.times)
 
     def follow(self, actions: Sequence[Floats | None]) -> None:
         """Send the sensors on their ways from where they are, one row of `Platform.actions` each; None: lie still.
 
         Raises `InputError` for actions that are none, or before the first scan.
         """
-        if self.moment is None:
+        if self.outcome is None:
             raise InputError("world: expected a scan before the sensors are sent anywhere; got none yet")
-        self.fleet = self.fleet.follow(actions, self.moment.time)
+        self.fleet = self.fleet.follow(actions, self.outcome.time)
 
-    def step(self, actions: Sequence[Floats | None] | None = None, *, stages: Stages | None = None) -> Moment:
+    def step(self, actions: Sequence[Floats | None] | None = None, *, stages: Stages | None = None) -> ScanOutcome:
         """One scan of every sensor, the tracker's step on it, and the estimate.
 
         Args:
@@ -146,7 +146,7 @@ class World:
         if actions is not None:
             self.follow(actions)
         experiment, clock = self.experiment, Stages() if stages is None else stages
-        step = 1 if self.moment is None else self.moment.step + 1
+        step = 1 if self.outcome is None else self.outcome.step + 1
         time = float(experiment.times[step - 1])
         poses, off = self.fleet.poses(time), self.fleet.off(time)
         with clock.timing("scans"):
@@ -155,8 +155,8 @@ class World:
             scans = kept_scans(simulate_scans(states, poses, sensors, ids=ids, rngs=self._scan_rngs), off)
             measurements = tuple([None if scan is None else scan.measurements for scan in scans])
         tracked = self._tracker.step(step, measurements, poses, time, clock)
-        self.moment = Moment(step, time, poses, measurements, scans, off, *tracked)
-        return self.moment
+        self.outcome = ScanOutcome(step, time, poses, measurements, scans, off, *tracked)
+        return self.outcome
 
 
 def truth_of_run(experiment: Experiment, seed: int, run: int) -> Truth:
@@ -164,13 +164,13 @@ def truth_of_run(experiment: Experiment, seed: int, run: int) -> Truth:
     return experiment.targets.truth(experiment.times, rng=run_stream(seed, run, TRUTH))
 
 
-def advance(world: World, journal: Journal, watch: Callable[[int], None] | None = None) -> list[Moment]:
+def advance(world: SimulationRun, journal: Journal, watch: Callable[[int], None] | None = None) -> list[ScanOutcome]:
     """The scans up to the next decision, or else to the end, each written down in the journal of the run.
 
-    watch: told the number of every scan that is done. Raises as `World.step`.
+    watch: told the number of every scan that is done. Raises as `SimulationRun.step`.
     """
-    first, steps = 1 if world.moment is None else world.moment.step + 1, world.experiment.decision_steps
-    moments: list[Moment] = []
+    first, steps = 1 if world.outcome is None else world.outcome.step + 1, world.experiment.decision_steps
+    moments: list[ScanOutcome] = []
     for step in range(first, len(world.experiment.times) + 1):
         moments.append(world.step(stages=journal.begin(step)))
         journal.note(moments[-1].poses, moments[-1].off, moments[-1].info, moments[-1].estimate)
@@ -207,21 +207,25 @@ def simulate(
     truth = truth_of_run(experiment, seed, run)
     journal = Journal(experiment.name, name, seed, run, truth, experiment.num_sensors)
     with suppress_unit_warnings():  # no warnings of implausible numbers in simulated scans
-        return journal.filled(partial(_go, experiment, planner, journal, watch), score)
+        return journal.filled(partial(_run_scans, experiment, planner, journal, watch), score)
 
 
-def _told(planner: Any, truth: Truth) -> Planner | None:
+def _with_truth(planner: Any, truth: Truth) -> Planner | None:
     """The planner of this run, where it is one that knows the targets."""
     told: Planner | None = planner.with_truth(truth) if isinstance(planner, RequiresTruth) else planner
     return told
 
 
-def _go(experiment: Experiment, planner: Planner | None, journal: Journal, watch: Callable[[int], None] | None) -> None:
+def _run_scans(
+    experiment: Experiment, planner: Planner | None, journal: Journal, watch: Callable[[int], None] | None
+) -> None:
     """Every scan of a run, one after the other, written down in the journal."""
-    planner = _told(planner, journal.truth)
+    planner = _with_truth(planner, journal.truth)
     stream = RANDOM_CONTROL if isinstance(planner, RandomPlanner) else PLANNER
     planner_rng = run_stream(journal.seed, journal.run, stream)
-    world = World(experiment, seed=journal.seed, run=journal.run, moving=planner is not None, truth=journal.truth)
+    world = SimulationRun(
+        experiment, seed=journal.seed, run=journal.run, moving=planner is not None, truth=journal.truth
+    )
     while not world.is_over:
         moment = advance(world, journal, watch)[-1]
         if planner is not None and moment.step in experiment.decision_steps:

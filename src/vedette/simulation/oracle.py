@@ -27,13 +27,13 @@ from vedette.models.arguments import dimension, generator, instance, positive
 from vedette.models.fields import Count
 from vedette.platforms import Options
 from vedette.platforms.base import courses_of, scans_of
-from vedette.simulation.cramer_rao import Stretch, scan_information, transition_jacobians
-from vedette.simulation.true_targets import held_covs, with_components
+from vedette.simulation.cramer_rao import CovarianceRecursion, scan_information, transition_jacobians
+from vedette.simulation.true_targets import match_tracks, with_components
 from vedette.simulation.truth import Truth
 from vedette.tracking import State
 
 
-class Timetable(NamedTuple):
+class Schedule(NamedTuple):
     """When sensors scan and decide, and how what they say becomes one.
 
     times: (num_scans,) s. decision_steps: scans, from 1, after which they decide. powers: of each sensor, with which
@@ -50,7 +50,7 @@ class Timetable(NamedTuple):
     scans_at: Bools | None = None
 
 
-class _Moment(NamedTuple):
+class _DecisionState(NamedTuple):
     """Where a decision begins."""
 
     step: int
@@ -62,14 +62,15 @@ class _Moment(NamedTuple):
 class OraclePlanner:
     """The joint action of least Cramer-Rao error at the true targets, over all scans up to the next decision.
 
-    It begins with the covariances that the filters have of the targets that they track, and follows them through all
-    scans (`vedette.simulation.cramer_rao.Stretch`). Scans may miss and filters may err, so that no single run is bound
-    by it; of what control does for localisation it is the floor. Targets that appear later are not foreseen. Components
-    of the motion's states that recorded targets lack, such as a turn rate, are taken as 0.
+    It starts from the filters' covariances of the targets that they track, and propagates them through all scans
+    (`vedette.simulation.cramer_rao.CovarianceRecursion`). Scans may miss targets and filters may err, so the result
+    does not bound a single run; it is a lower bound on the localisation error that control can reach on average.
+    Targets that appear later are not foreseen. State components of the motion model that recorded targets lack, such as
+    a turn rate, are taken as 0.
 
     Attributes:
         sensors: the sensors.
-        timetable: when they scan and decide.
+        schedule: when they scan and decide.
         cutoff: the error that counts as a lost target, m.
         depth: decisions in a row that it looks at.
         beam_width: joint actions, those best for one decision, that it follows to the next.
@@ -84,7 +85,7 @@ class OraclePlanner:
     """
 
     sensors: tuple[MobileSensor, ...]
-    timetable: Timetable
+    schedule: Schedule
     cutoff: float = 100.0
     depth: Count = 1
     beam_width: Count = 8
@@ -124,26 +125,26 @@ class OraclePlanner:
         mask = mask_of_decision(self.constraints, self.sensors, options, state.fused, at, self.settings)
         step = max(state.step, 1)
         ids, covs = self._tracked(state, *self.truth.at(step - 1))
-        best, _ = self._decide(_Moment(step, at, covs), self.truth, ids, self.depth, mask, rng)
+        best, _ = self._decide(_DecisionState(step, at, covs), self.truth, ids, self.depth, mask, rng)
         chosen = tuple(own.first_action(course) for own, course in zip(options, best, strict=True))
         notes = mask.notes if mask is not None else ()
         return Plan(self.name, tuple(own.actions for own in options), chosen, (), {}, notes)
 
     def _tracked(self, state: State, ids: Ints, states: Floats) -> tuple[Ints, tuple[Floats, ...]]:
         """The targets that can be helped, and their covariances in each belief."""
-        table = self.timetable
+        table = self.schedule
         held = [
-            held_covs(self.estimate, belief, state.step, states, self.cutoff)
+            match_tracks(self.estimate, belief, state.step, states, self.cutoff)
             for belief in (state.fused, *(() if table.one_belief else state.local))
         ]
         kept = held[0].found | table.rebirths
         return ids[kept], tuple(own.covs[kept] for own in (held if table.one_belief else held[1:]))
 
     def _decide(
-        self, moment: _Moment, truth: Truth, ids: Ints, depth: int, mask: Mask | None, rng: np.random.Generator
+        self, moment: _DecisionState, truth: Truth, ids: Ints, depth: int, mask: Mask | None, rng: np.random.Generator
     ) -> tuple[tuple[int, ...], float]:
         """The best joint action, and what it costs together with the decisions after it."""
-        last = next((own for own in self.timetable.decision_steps if own > moment.step), len(self.timetable.times))
+        last = next((own for own in self.schedule.decision_steps if own > moment.step), len(self.schedule.times))
         options = options_of(self.sensors, moment.poses, self.settings)
         courses, scans = self._courses(moment, options, last)
         stretch = self._stretch(moment.step, last, courses, scans, truth, ids)
@@ -158,23 +159,23 @@ class OraclePlanner:
         first = first if mask is None else nearest_feasible(mask, first)
         problem = JointProblem(tuple(len(own.courses) for own in options), evaluate, lambda: first, mask)
         best = self.search.search(problem, rng=rng)
-        if depth == 1 or last >= len(self.timetable.times):
+        if depth == 1 or last >= len(self.schedule.times):
             return best, known[best]
         totals, stay = {}, np.isin(ids, truth.at(last - 1)[0])
         for joint in sorted(known, key=lambda joint: (known[joint], joint))[: self.beam_width]:
             ends = np.stack([own[course, -1] for own, course in zip(courses, joint, strict=True)])
             covs = tuple(own[0][stay] for own in stretch.follow(moment.covs, np.array([joint]))[1])
-            later = self._decide(_Moment(last, ends, covs), truth, ids[stay], depth - 1, None, rng)
+            later = self._decide(_DecisionState(last, ends, covs), truth, ids[stay], depth - 1, None, rng)
             totals[joint] = known[joint] + later[1]
         best = min(totals, key=lambda joint: (totals[joint], joint))
         return best, totals[best]
 
     def _courses(
-        self, moment: _Moment, options: tuple[Options, ...], last: int
+        self, moment: _DecisionState, options: tuple[Options, ...], last: int
     ) -> tuple[tuple[Floats, ...], tuple[Bools, ...]]:
         """Of each sensor (num_courses, num_scans, pose_dim) where it is at the times of scans up to the next decision,
         and (num_courses, num_scans) whether it scans then."""
-        times, table = self.timetable.times, self.timetable.scans_at
+        times, table = self.schedule.times, self.schedule.scans_at
         waits, found, scans = times[moment.step : last] - times[moment.step - 1], [], []
         for s, (sensor, own) in enumerate(zip(self.sensors, options, strict=True)):
             actions = own.actions.values[[own.first_action(course) for course in range(len(own.courses))]]
@@ -191,9 +192,9 @@ class OraclePlanner:
         scans: tuple[Bools, ...],
         truth: Truth,
         ids: Ints,
-    ) -> Stretch:
+    ) -> CovarianceRecursion:
         """The scans after scan `first`, when all of `ids` are there, to scan `last`; who ends stays where it was."""
-        table, times = self.timetable, self.timetable.times
+        table, times = self.schedule, self.schedule.times
         motion = self._motion
         dim, num = motion.state_dim, len(ids)
         states, alive = np.full((last - first + 1, num, dim), np.nan), np.zeros((last - first + 1, num))
@@ -209,7 +210,7 @@ class OraclePlanner:
             for course, k in np.argwhere(when).tolist():
                 said[course, k] = scan_information(sensor.filter.sensor, states[k + 1], own[course, k])
             told.append(said)
-        return Stretch(
+        return CovarianceRecursion(
             np.array([transition_jacobians(motion, own, dt) for own, dt in steps]).reshape(len(steps), num, dim, dim),
             np.array([motion.noise_covs(own, dt) for own, dt in steps]).reshape(len(steps), num, dim, dim),
             alive[1:],

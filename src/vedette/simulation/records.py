@@ -60,7 +60,7 @@ class Decision(SummaryRepr):
 
 
 @dataclass(frozen=True, slots=True)
-class Outline:
+class RunSummary:
     """What is compared and reported of a run: its record without the targets and tracks.
 
     Attributes:
@@ -141,10 +141,10 @@ class RunRecord(TabularRepr):
         """Number of sensors."""
         return int(self.poses.shape[1])
 
-    def outline(self) -> Outline:
+    def summary(self) -> RunSummary:
         """What is compared and reported of the run."""
         whose = (self.scenario, self.seed, self.run, self.times, self.decisions)
-        return Outline(*whose, self.ospa, np.diff(self.truth.offsets), self.health, self.timings)
+        return RunSummary(*whose, self.ospa, np.diff(self.truth.offsets), self.health, self.timings)
 
     def scan_columns(self) -> Columns:
         """A row a scan, as the table `scans` of a run that is kept has them; see docs/results.md."""

@@ -23,8 +23,8 @@ from vedette.errors import InputError
 from vedette.internal.files import unwritable
 from vedette.internal.reading import parse_json, read_file, unreadable
 from vedette.internal.text import printable, shown
-from vedette.simulation.kept import FORMAT_VERSION, LACKING, decode_run, encode_run, encode_timings
 from vedette.simulation.records import RunRecord
+from vedette.simulation.serialization import FORMAT_VERSION, LACKING, decode_run, encode_run, encode_timings
 from vedette.simulation.tables import run_facts
 
 FORMAT = "vedette-run"

@@ -18,10 +18,10 @@ from vedette.densities.estimates import Estimate
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.simulation.arrow import Columns, Kind, Layout
-from vedette.simulation.explained import EXPLAINED, explained_tables, with_explanations
+from vedette.simulation.decision_tables import DECISION_TABLES, OWN_REWARDS, decision_tables, decisions_of
+from vedette.simulation.explanation_tables import EXPLANATION_TABLES, explanation_tables, with_explanations
 from vedette.simulation.health import FUSION_COLUMNS, SENSOR_COLUMNS, Health
-from vedette.simulation.planned import OWN_REWARDS, PLANNED, decisions_of, planned_tables
-from vedette.simulation.records import OSPA_COLUMNS, Outline, RunRecord, ScansFile
+from vedette.simulation.records import OSPA_COLUMNS, RunRecord, RunSummary, ScansFile
 from vedette.simulation.truth import Truth
 from vedette.simulation.undetected_tables import UNDETECTED, undetected_tables, with_undetected
 
@@ -34,7 +34,7 @@ _TIME = {"step": Kind.INTEGER, "time_s": Kind.NUMBER}
 _LABEL = {"birth_step": Kind.INTEGER, "birth_site": Kind.INTEGER}
 _COUNTS = {"num_targets": Kind.INTEGER, "num_estimates": Kind.INTEGER}
 
-# All of a run but what names it and how long it took; runs of recorded scans have none of `PLANNED`.
+# All of a run but what names it and how long it took; runs of recorded scans have none of `DECISION_TABLES`.
 LAYOUTS: dict[str, Layout] = {
     "scans": Layout({**_TIME, **_COUNTS, **dict.fromkeys(OSPA_COLUMNS, Kind.NUMBER), **FUSION_COLUMNS}),
     "truth": Layout({**_TIME, "target": Kind.INTEGER}, {"state_": Kind.NUMBER}),
@@ -43,10 +43,10 @@ LAYOUTS: dict[str, Layout] = {
         {**_TIME, "sensor": Kind.INTEGER, **dict.fromkeys(POSE_COLUMNS, Kind.NUMBER), **SENSOR_COLUMNS},
         {"pose_": Kind.NUMBER, OFF: Kind.COUNT},
     ),
-    **PLANNED,
+    **DECISION_TABLES,
 }
-# What a run may have beside those; of `EXPLAINED` all or none.
-OPTIONAL: dict[str, Layout] = {**OWN_REWARDS, **EXPLAINED, **UNDETECTED}
+# What a run may have beside those; of `EXPLANATION_TABLES` all or none.
+OPTIONAL: dict[str, Layout] = {**OWN_REWARDS, **EXPLANATION_TABLES, **UNDETECTED}
 TIMINGS = Layout({"step": Kind.INTEGER}, {"": Kind.NUMBER})
 
 
@@ -84,10 +84,10 @@ def tables_of(record: RunRecord) -> Tables:
     }
     if record.recording is not None:
         return of_scans
-    planned = {**planned_tables(record.decisions, record.num_sensors), **undetected_tables(record.decisions)}
+    planned = {**decision_tables(record.decisions, record.num_sensors), **undetected_tables(record.decisions)}
     if not any(decision.plan.explanation is not None for decision in record.decisions):
         return {**of_scans, **planned}
-    return {**of_scans, **planned, **explained_tables(record.decisions, record.num_sensors)}
+    return {**of_scans, **planned, **explanation_tables(record.decisions, record.num_sensors)}
 
 
 def timing_table(record: RunRecord) -> Columns:
@@ -117,17 +117,17 @@ def record_of(
 
     Raises `InputError`, `KeyError`, `TypeError` or `ValueError` for tables that do not fit together.
     """
-    outline, poses = outline_of(facts, tables, timings), _poses_of(tables)
-    times, decisions = outline.times, outline.decisions
-    if any(name in tables for name in EXPLAINED):
+    summary, poses = summary_of(facts, tables, timings), _poses_of(tables)
+    times, decisions = summary.times, summary.decisions
+    if any(name in tables for name in EXPLANATION_TABLES):
         decisions = with_explanations(decisions, tables)
     if "undetected" in tables:
         decisions = with_undetected(decisions, tables["undetected"])
     return RunRecord(
-        scenario=outline.scenario,
+        scenario=summary.scenario,
         planner=str(facts["planner"]),
-        seed=outline.seed,
-        run=outline.run,
+        seed=summary.seed,
+        run=summary.run,
         times=times,
         truth=Truth(
             times, _offsets(tables["truth"], len(times)), tables["truth"]["target"], _matrix(tables["truth"], "state_")
@@ -136,8 +136,8 @@ def record_of(
         off=_off_of(tables, poses),
         estimates=_estimates_of(tables["tracks"], len(times)),
         decisions=decisions,
-        ospa=outline.ospa,
-        health=outline.health,
+        ospa=summary.ospa,
+        health=summary.health,
         timings=timings,
         stopped=None if facts["stopped"] is None else str(facts["stopped"]),
         recording=_recording_of(facts.get("recording")),
@@ -148,14 +148,14 @@ def _recording_of(fact: Any) -> ScansFile | None:
     return None if fact is None else ScansFile(str(fact["name"]), str(fact["sha256"]))
 
 
-# What `outline_of` needs, of all the tables that a run may have.
-OUTLINED_TABLES = frozenset({"scans", "sensors", *PLANNED, *OWN_REWARDS})
+# What `summary_of` needs, of all the tables that a run may have.
+SUMMARY_TABLES = frozenset({"scans", "sensors", *DECISION_TABLES, *OWN_REWARDS})
 
 
-def outline_of(
+def summary_of(
     facts: Mapping[str, Any], tables: Mapping[str, Mapping[str, Any]], timings: dict[str, Floats]
-) -> Outline:
-    """What is compared and reported of a run, from those of its tables that are in `OUTLINED_TABLES`.
+) -> RunSummary:
+    """What is compared and reported of a run, from those of its tables that are in `SUMMARY_TABLES`.
 
     Raises as `record_of`.
 
@@ -163,7 +163,7 @@ def outline_of(
     """
     scans, sensors, num_scans = tables["scans"], tables["sensors"], len(tables["scans"]["step"])
     poses = _poses_of(tables)
-    return Outline(
+    return RunSummary(
         scenario=str(facts["scenario"]),
         seed=int(facts["seed"]),
         run=int(facts["run"]),

@@ -21,7 +21,7 @@ from vedette.tracking import State
 _LOST = 0.1
 
 
-class Held(NamedTuple):
+class TrackedTargets(NamedTuple):
     """What a belief holds of given targets."""
 
     covs: Floats  # (num, dim, dim) of the label of each; of the size of the cutoff where it has none
@@ -30,7 +30,7 @@ class Held(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ToldPlanner:
+class TrueTargetsPlanner:
     """The decisions of another planner with beliefs about the true targets in place of those of the filters.
 
     Each true target that a label of a belief is assigned to, within the cutoff, is a label at its true state, with the
@@ -65,7 +65,7 @@ class ToldPlanner:
             truth = with_components(self.truth, check_sensors(self.sensors).state_dim)
             object.__setattr__(self, "truth", truth)
 
-    def with_truth(self, truth: Truth) -> ToldPlanner:
+    def with_truth(self, truth: Truth) -> TrueTargetsPlanner:
         """The same for the targets of a run."""
         return replace(self, truth=truth)
 
@@ -82,7 +82,7 @@ class ToldPlanner:
         instance("state.fused", state.fused, LabelledDensity)
         birth, step = check_sensors(self.sensors).birth, state.step
         ids, states = truth.at(max(step, 1) - 1)
-        held = held_covs(self.estimate, state.fused, step, states, self.cutoff)
+        held = match_tracks(self.estimate, state.fused, step, states, self.cutoff)
         kept = held.found | _may_be_born(birth, step)
         places = np.concatenate([states[kept], held.false_means])
         # Labels (0, id) of targets, and then (1, number) of false estimates.
@@ -90,13 +90,13 @@ class ToldPlanner:
         made: dict[int, Any] = {}
         for belief in (state.fused, *state.local):
             if id(belief) not in made:
-                covs = held_covs(self.estimate, belief, step, places, self.cutoff).covs
+                covs = match_tracks(self.estimate, belief, step, places, self.cutoff).covs
                 made[id(belief)] = _certain(belief, labels, places, covs)
         local = tuple(made[id(belief)] for belief in state.local)
         return replace(state, local=local, fused=made[id(state.fused)], undetected=None)
 
 
-def held_covs(estimate: Estimator, belief: Any, step: int, states: Floats, cutoff: float) -> Held:
+def match_tracks(estimate: Estimator, belief: Any, step: int, states: Floats, cutoff: float) -> TrackedTargets:
     """What a belief holds of targets at (num, dim) states.
 
     Estimates are assigned first; targets that are left go by the labels that the belief holds besides, however
@@ -114,7 +114,7 @@ def held_covs(estimate: Estimator, belief: Any, step: int, states: Floats, cutof
         if others:
             means, of_means = (np.array([getattr(own, name) for own in others]) for name in ("mean", "cov"))
             _assign(means, of_means, states, cutoff, covs, found)
-    return Held(covs, found, estimated.means[false])
+    return TrackedTargets(covs, found, estimated.means[false])
 
 
 def with_components(truth: Truth, dim: int) -> Truth:

@@ -12,7 +12,7 @@ from vedette.densities import UndetectedIntensity
 from vedette.errors import InputError
 from vedette.models import CellGrid, Region
 from vedette.simulation.arrow import Columns, Kind, Layout, stacked
-from vedette.simulation.planned import DECISION, moment
+from vedette.simulation.decision_tables import DECISION, decision_columns
 from vedette.simulation.records import Decision
 
 _SIDES = ("x_min_m", "x_max_m", "y_min_m", "y_max_m")
@@ -30,7 +30,7 @@ UNDETECTED: dict[str, Layout] = {
 def undetected_tables(decisions: Sequence[Decision]) -> dict[str, Columns]:
     """The table of `UNDETECTED`, or none where no decision has an intensity of undetected targets."""
     parts = [
-        {**moment(number, each), **_row(each.undetected)}
+        {**decision_columns(number, each), **_row(each.undetected)}
         for number, each in enumerate(decisions)
         if each.undetected is not None
     ]

@@ -15,7 +15,7 @@ import numpy as np
 from vedette.errors import InputError
 from vedette.internal.files import sync_folder, write_whole
 from vedette.simulation.arrow import Columns, Layout, read_table, write_table
-from vedette.simulation.kept import ENDING, FORMAT_VERSION, LACKING, decode_run, encode_run
+from vedette.simulation.serialization import ENDING, FORMAT_VERSION, LACKING, decode_run, encode_run
 from vedette.simulation.storage import MANIFEST, TIMINGS, check_upgradable, read_files, read_manifest
 from vedette.simulation.tables import LAYOUTS
 

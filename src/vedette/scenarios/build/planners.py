@@ -16,7 +16,7 @@ from vedette.scenarios.sections.deciding import Lookahead
 from vedette.scenarios.sections.fusion import IN_FULL, ONE_BELIEF, CustomFusion
 from vedette.scenarios.sections.planners import STRATEGIES, Named, NamedIndependent, strategy_of
 from vedette.scenarios.sections.strategies import Parts, Strategy
-from vedette.simulation.oracle import Timetable
+from vedette.simulation.oracle import Schedule
 from vedette.tracking import Network
 
 
@@ -72,12 +72,12 @@ def build_parts(
         _notes_of_decisions(scenario, fusion, strategy),
         (control.lookahead or Lookahead()).build(),
         model.estimates_by.build(folder),
-        {"timetable": _timetable(scenario), "cutoff": model.ospa.cutoff},
+        {"schedule": _schedule(scenario), "cutoff": model.ospa.cutoff},
         partial(told_of, scenario),
     )
 
 
-def _timetable(scenario: Scenario) -> Timetable:
+def _schedule(scenario: Scenario) -> Schedule:
     """When the sensors scan and decide, and how what they say becomes one, for an oracle."""
     model, num = scenario.model, len(scenario.model.sensors)
     section, powers = model.fusion, (1.0,) * num
@@ -86,7 +86,7 @@ def _timetable(scenario: Scenario) -> Timetable:
         powers = section.scaled_weights(num)
     born, scans = model.birth, build_scan_times(scenario)
     rebirths = born.from_measurements is not None or born.steps == "every"
-    return Timetable(
+    return Schedule(
         model.time.build(), model.decision_steps, powers, shared or model.network is not None, rebirths, scans
     )
 

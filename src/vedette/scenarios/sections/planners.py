@@ -64,11 +64,11 @@ class NamedTold(NamedJoint):
 
     def planner(self, parts: Parts, folder: Path) -> Planner:
         """The joint planner on beliefs about the true targets, none of which is undetected."""
-        from vedette.simulation import ToldPlanner
+        from vedette.simulation import TrueTargetsPlanner
 
         settings = replace(parts.settings, undetected_worth=0.0)
         joint = super().planner(parts._replace(settings=settings), folder)
-        return ToldPlanner(joint, parts.sensors, parts.oracle["cutoff"], parts.estimate)
+        return TrueTargetsPlanner(joint, parts.sensors, parts.oracle["cutoff"], parts.estimate)
 
 
 class NamedIndependent(ValuedStrategy):

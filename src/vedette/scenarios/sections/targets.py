@@ -31,9 +31,9 @@ if TYPE_CHECKING:  # with the models comes the compiler, which a check does with
     from vedette.models import MotionModel
     from vedette.recorded import RecordedTargets as RecordedSource
     from vedette.scenarios.sections.scenario import ScenarioModel
-    from vedette.simulation import CrowdTargets as CrowdSource
     from vedette.simulation import PoissonTargets as PoissonSource
     from vedette.simulation import ScriptedTargets as ScriptedSource
+    from vedette.simulation import UniformTargets as UniformSource
 
 # Components of the state of a recorded target: position and velocity.
 RECORDED_DIM = 4
@@ -247,12 +247,12 @@ class CrowdTargets(Section):
         """The number at every scan, on average."""
         return float(self.number)
 
-    def build(self, world: ScenarioModel, motion: MotionModel, folder: Path) -> CrowdSource:
+    def build(self, world: ScenarioModel, motion: MotionModel, folder: Path) -> UniformSource:
         """The targets, as `motion` moves them."""
-        from vedette.simulation import CrowdTargets
+        from vedette.simulation import UniformTargets
 
         # In either order of a file the components but the position follow each other as in the library.
-        return CrowdTargets(motion, self.number, world.region.build(), np.array(self.std), self.death_probability)
+        return UniformTargets(motion, self.number, world.region.build(), np.array(self.std), self.death_probability)
 
 
 class UnknownTargets(Section):

@@ -20,7 +20,7 @@ from vedette.simulation.records import Decision
 
 DECISION = {"decision": Kind.INTEGER, "step": Kind.INTEGER, "time_s": Kind.NUMBER}
 
-PLANNED: dict[str, Layout] = {
+DECISION_TABLES: dict[str, Layout] = {
     "decisions": Layout({**DECISION, "planner": Kind.TEXT, "notes": Kind.TEXT}, {"num_": Kind.COUNT}),
     "actions": Layout(
         {**DECISION, "sensor": Kind.INTEGER, "action": Kind.INTEGER, "chosen": Kind.TRUTH}, {"": Kind.VALUE}
@@ -54,21 +54,26 @@ OWN_REWARDS: dict[str, Layout] = {
 _FEW_SENSORS = 16  # of up to so many all rewards stand in `rewards`
 _MOST_REWARDS = 2**26  # of a run, those that were not evaluated included: what a file leaves out takes memory, too
 # Names that tables of many runs have beside these: a platform's own number of such a name gets `action_` in front.
-_TAKEN = {*PLANNED["actions"].fixed, *RUN_COLUMNS}
+_TAKEN = {*DECISION_TABLES["actions"].fixed, *RUN_COLUMNS}
 
 
-def moment(number: int, decision: Decision) -> dict[str, Any]:
+def decision_columns(number: int, decision: Decision) -> dict[str, Any]:
     """The columns that say which decision a row is of."""
     return {"decision": number, "step": decision.step, "time_s": decision.time}
 
 
-def planned_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[str, Columns]:
-    """The tables of `PLANNED`, and that of `OWN_REWARDS` where there is something to stand in it.
+def decision_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[str, Columns]:
+    """The tables of `DECISION_TABLES`, and that of `OWN_REWARDS` where there is something to stand in it.
 
     Raises `InputError` for plans that no table can hold.
     """
     of_decisions = [
-        {**moment(number, each), "planner": each.plan.planner, "notes": _notes(each.plan), **_counts(each.plan)}
+        {
+            **decision_columns(number, each),
+            "planner": each.plan.planner,
+            "notes": _notes(each.plan),
+            **_counts(each.plan),
+        }
         for number, each in enumerate(decisions)
     ]
     if sum(table.mean.size for each in decisions for table in each.plan.tables) > _MOST_REWARDS:
@@ -76,7 +81,7 @@ def planned_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[str,
     joint, own = [], []
     for number, each in enumerate(decisions):
         for place, table in enumerate(each.plan.tables):
-            rows = {**moment(number, each), "reward_table": place, **_evaluated(table, each.plan)}
+            rows = {**decision_columns(number, each), "reward_table": place, **_evaluated(table, each.plan)}
             if len(table.sensors) > 1 or num_sensors <= _FEW_SENSORS:
                 joint.append(rows)
             else:
@@ -85,9 +90,9 @@ def planned_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[str,
     start, end = (*DECISION, "reward_table"), ("reward", "reward_se", "chosen")
     names = (*start, *(f"action_{sensor}" for sensor in range(num_sensors)), *end)
     found = {
-        "decisions": stacked(of_decisions, PLANNED["decisions"]),
+        "decisions": stacked(of_decisions, DECISION_TABLES["decisions"]),
         "actions": _actions(decisions),
-        "rewards": stacked(joint, PLANNED["rewards"], names),
+        "rewards": stacked(joint, DECISION_TABLES["rewards"], names),
     }
     layout = OWN_REWARDS["own_rewards"]
     return {**found, "own_rewards": stacked(own, layout, list(layout.fixed))} if own else found
@@ -119,7 +124,7 @@ def decisions_of(tables: Mapping[str, Mapping[str, Any]], poses: Floats) -> tupl
     num = len(table["decision"])
     if not np.array_equal(table["decision"], np.arange(num)):
         raise InputError("decisions, column decision: expected them numbered from 0")
-    counted = PLANNED["decisions"].others(table)
+    counted = DECISION_TABLES["decisions"].others(table)
     of_actions, of_rewards = (parts_of(tables[name], "decision", num) for name in ("actions", "rewards"))
     of_own = parts_of(tables["own_rewards"], "decision", num) if "own_rewards" in tables else [{}] * num
     decisions, room = [], _MOST_REWARDS
@@ -153,7 +158,7 @@ def _plan(
             raise InputError("actions, column action: expected those of a sensor numbered from 0")
         (choice,) = np.flatnonzero(own["chosen"])
         chosen.append(int(choice))
-        names = [name for name in PLANNED["actions"].others(own) if not np.isnan(own[name]).all()]
+        names = [name for name in DECISION_TABLES["actions"].others(own) if not np.isnan(own[name]).all()]
         values = np.empty((len(own["action"]), len(names)))
         for place, name in enumerate(names):
             values[:, place] = own[name]
@@ -213,10 +218,10 @@ def _notes(plan: Plan) -> str:
 
 def _actions(decisions: Sequence[Decision]) -> Columns:
     """One row a decision, sensor and action; null where a number is none of the sensor's."""
-    layout = PLANNED["actions"]
+    layout = DECISION_TABLES["actions"]
     parts = [
         {
-            **moment(number, decision),
+            **decision_columns(number, decision),
             "sensor": sensor,
             "action": np.arange(len(own)),
             "chosen": np.arange(len(own)) == decision.plan.chosen[sensor],

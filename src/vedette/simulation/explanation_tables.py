@@ -15,10 +15,10 @@ import numpy as np
 from vedette.control import Bound, Explanation, Plan, RunnerUp, TargetGains
 from vedette.errors import InputError
 from vedette.simulation.arrow import Columns, Kind, Layout, stacked
-from vedette.simulation.planned import DECISION, moment
+from vedette.simulation.decision_tables import DECISION, decision_columns
 from vedette.simulation.records import Decision
 
-EXPLAINED: dict[str, Layout] = {
+EXPLANATION_TABLES: dict[str, Layout] = {
     "explanations": Layout(
         {
             **DECISION,
@@ -50,8 +50,8 @@ EXPLAINED: dict[str, Layout] = {
 }
 
 
-def explained_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[str, Columns]:
-    """The tables of `EXPLAINED`, without rows where no decision was explained.
+def explanation_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[str, Columns]:
+    """The tables of `EXPLANATION_TABLES`, without rows where no decision was explained.
 
     Raises `InputError` for explanations of other sensors.
     """
@@ -63,11 +63,11 @@ def explained_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[st
             if values is not None and np.shape(values) != (num_sensors,):
                 raise InputError(f"plan.explanation.{name}: expected {num_sensors} numbers; got {np.shape(values)}")
     priced = ("price",) if any(why.price for _, _, why in kept) else ()  # a column of runs whose actions have prices
-    names = [*EXPLAINED["explanations"].fixed, *priced, *(f"action_{sensor}" for sensor in range(num_sensors))]
-    parts: dict[str, list[dict[str, Any]]] = {name: [] for name in EXPLAINED}
+    names = [*EXPLANATION_TABLES["explanations"].fixed, *priced, *(f"action_{sensor}" for sensor in range(num_sensors))]
+    parts: dict[str, list[dict[str, Any]]] = {name: [] for name in EXPLANATION_TABLES}
     for number, each, why in kept:
-        of, gains = moment(number, each), why.of_targets
-        parts["explanations"].append({**of, **_told(why), **dict.fromkeys(priced, why.price)})
+        of, gains = decision_columns(number, each), why.of_targets
+        parts["explanations"].append({**of, **_explanation_columns(why), **dict.fromkeys(priced, why.price)})
         if gains is not None:
             labels = {"birth_step": gains.labels[:, 0], "birth_site": gains.labels[:, 1]}
             gained = {"existence_gain": gains.existence, "localisation_gain": gains.localisation}
@@ -76,12 +76,14 @@ def explained_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[st
             shares = {"sensor": np.arange(num_sensors), "gain": why.of_sensors, "without": why.without}
             parts["sensor_gains"].append({**of, **shares})
     return {
-        name: stacked(of, EXPLAINED[name], names if name == "explanations" else list(EXPLAINED[name].fixed))
+        name: stacked(
+            of, EXPLANATION_TABLES[name], names if name == "explanations" else list(EXPLANATION_TABLES[name].fixed)
+        )
         for name, of in parts.items()
     }
 
 
-def _told(why: Explanation) -> dict[str, Any]:
+def _explanation_columns(why: Explanation) -> dict[str, Any]:
     """What an explanation says in one row."""
     bound, second = why.bound, why.runner_up
     return {
@@ -106,7 +108,7 @@ def with_explanations(decisions: Sequence[Decision], tables: Mapping[str, Mappin
 
     Raises `InputError`, `KeyError`, `IndexError` or `ValueError` for tables that do not fit together.
     """
-    table, targets, sensors = (tables[name] for name in EXPLAINED)
+    table, targets, sensors = (tables[name] for name in EXPLANATION_TABLES)
     found = list(decisions)
     if len(np.unique(table["decision"])) < len(table["decision"]):
         raise InputError("explanations, column decision: expected each once")

@@ -17,7 +17,7 @@ from vedette.models import BirthModel, CellGrid, MeasurementBirth, Region
 from vedette.platforms import Actions, HeadingPlatform
 from vedette.scenarios import load_scenario, with_fields
 from vedette.scenarios.build import build_planner
-from vedette.simulation import ToldPlanner, Truth
+from vedette.simulation import TrueTargetsPlanner, Truth
 from vedette.tracking import State
 
 POSES = np.array([[-500.0, 300.0, 0.2], [-450.0, -350.0, -0.4]])
@@ -107,7 +107,7 @@ def test_beliefs_are_of_true_targets_and_false_estimates(kind: str, births: bool
 
 
 def test_it_needs_its_truth_and_labels() -> None:
-    planner, (fused, local) = ToldPlanner(Keeps(), sensors("lmb", True)), beliefs()
+    planner, (fused, local) = TrueTargetsPlanner(Keeps(), sensors("lmb", True)), beliefs()
     state, rng = State((fused, local), fused, step=1, time=1.0), np.random.default_rng(0)
     with pytest.raises(InputError, match="truth: expected the targets of the run"):
         planner.plan(state, POSES, rng=rng)
@@ -133,4 +133,4 @@ def test_a_named_one_takes_a_reward_of_its_own_and_looks_for_nothing() -> None:
     assert built.name == "floor"
     assert type(built.planner.planner.reward).__name__ == "PeecsReward"
     assert built.planner.planner.settings.undetected_worth == 0.0
-    assert isinstance(build_planner(scenario, "told"), ToldPlanner)
+    assert isinstance(build_planner(scenario, "told"), TrueTargetsPlanner)

@@ -9,7 +9,7 @@ import pytest
 
 from vedette import models
 from vedette.errors import InputError, ModelError
-from vedette.simulation import CrowdTargets, Truth
+from vedette.simulation import Truth, UniformTargets
 
 MOTION = models.constant_velocity(0.5)
 REGION = models.Region(-100.0, 300.0, 50.0, 250.0)
@@ -18,7 +18,7 @@ TIMES = np.arange(1.0, 41.0)
 
 def drawn(seed: int = 0, times: np.ndarray = TIMES, motion: models.MotionModel = MOTION, **fields: Any) -> Truth:
     given: dict[str, Any] = {"number": 200, "region": REGION, "std": [3.0, 1.0], "death_probability": 0.02} | fields
-    truth = CrowdTargets(motion, **given).truth(times, rng=np.random.default_rng(seed))
+    truth = UniformTargets(motion, **given).truth(times, rng=np.random.default_rng(seed))
     truth.validate()
     return truth
 
@@ -119,11 +119,11 @@ def test_a_motion_that_leads_nowhere() -> None:
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        ({"number": 0}, "CrowdTargets.number: expected"),
-        ({"region": None}, "CrowdTargets.region: expected a Region; got"),
-        ({"std": [1.0]}, "CrowdTargets.std: expected"),
-        ({"std": [1.0, -1.0]}, "CrowdTargets.std: expected numbers of at least 0; got"),
-        ({"death_probability": 2.0}, "CrowdTargets.death_probability: expected"),
+        ({"number": 0}, "UniformTargets.number: expected"),
+        ({"region": None}, "UniformTargets.region: expected a Region; got"),
+        ({"std": [1.0]}, "UniformTargets.std: expected"),
+        ({"std": [1.0, -1.0]}, "UniformTargets.std: expected numbers of at least 0; got"),
+        ({"death_probability": 2.0}, "UniformTargets.death_probability: expected"),
     ],
 )
 def test_bad_crowds(fields: dict[str, Any], message: str) -> None:

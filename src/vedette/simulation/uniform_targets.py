@@ -14,7 +14,7 @@ from vedette.simulation.truth import Truth, check_moved, scan_times, semidefinit
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CrowdTargets:
+class UniformTargets:
     """A steady crowd: `number` targets at the first scan, and on average ever after, uniform over the region.
 
     From scan to scan a target dies or moves, with the motion's process noise; a Poisson number is born, of the mean
@@ -39,14 +39,14 @@ class CrowdTargets:
     death_probability: float = 0.0
 
     def __post_init__(self) -> None:
-        dimension("CrowdTargets.number", self.number)
+        dimension("UniformTargets.number", self.number)
         if not isinstance(self.region, Region):
-            raise reject("CrowdTargets.region", "a Region", self.region)
-        std = float_array("CrowdTargets.std", self.std, (self.motion.state_dim - 2,))
+            raise reject("UniformTargets.region", "a Region", self.region)
+        std = float_array("UniformTargets.std", self.std, (self.motion.state_dim - 2,))
         if (std < 0.0).any():
-            raise reject("CrowdTargets.std", "numbers of at least 0", std.tolist())
+            raise reject("UniformTargets.std", "numbers of at least 0", std.tolist())
         object.__setattr__(self, "std", std)
-        probability("CrowdTargets.death_probability", self.death_probability)
+        probability("UniformTargets.death_probability", self.death_probability)
 
     def truth(self, times: ArrayLike, *, rng: np.random.Generator) -> Truth:
         """Scan after scan: who dies, how the others move, who is born.

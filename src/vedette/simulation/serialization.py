@@ -12,16 +12,16 @@ from vedette.internal.reading import error_summary
 from vedette.internal.text import shown
 from vedette.kernels.base.types import Floats
 from vedette.simulation.arrow import Columns, read_table, write_table
-from vedette.simulation.planned import PLANNED
-from vedette.simulation.records import Outline, RunRecord
+from vedette.simulation.decision_tables import DECISION_TABLES
+from vedette.simulation.records import RunRecord, RunSummary
 from vedette.simulation.tables import (
     LAYOUTS,
     OPTIONAL,
-    OUTLINED_TABLES,
+    SUMMARY_TABLES,
     TIMINGS,
     check_record,
-    outline_of,
     record_of,
+    summary_of,
     tables_of,
     timing_table,
     timings_of,
@@ -35,7 +35,7 @@ FORMAT_VERSION = 6
 LACKING: dict[int, dict[str, dict[str, float]]] = {5: {"sensors": {"factoring_error": math.nan}}}
 ENDING = ".arrow"
 _FILES = frozenset(f"{name}{ENDING}" for name in (*LAYOUTS, *OPTIONAL))
-OUTLINED = frozenset(f"{name}{ENDING}" for name in OUTLINED_TABLES)  # that `decode_outline` reads
+SUMMARY_FILES = frozenset(f"{name}{ENDING}" for name in SUMMARY_TABLES)  # that `decode_summary` reads
 
 
 def encode_run(record: RunRecord) -> dict[str, bytes]:
@@ -56,22 +56,22 @@ def decode_run(
     Raises `InputError`, naming `place` and the file, for files that are missing, damaged or do not fit together.
     """
     tables, spent = _tables(facts, files, place, timings)
-    with _fitting_together(place):
+    with _errors_naming(place):
         record = record_of(facts, tables, spent)
         check_record(record)
     return record
 
 
-def decode_outline(
+def decode_summary(
     facts: Mapping[str, Any], files: Mapping[str, bytes], place: str, timings: bytes | None = None
-) -> Outline:
+) -> RunSummary:
     """What is compared and reported of a run, from its files, in a third of the time; raises as `decode_run`.
 
     Tables of targets and tracks are not looked at.
     """
-    tables, spent = _tables(facts, files, place, timings, OUTLINED)
-    with _fitting_together(place):
-        return outline_of(facts, tables, spent)
+    tables, spent = _tables(facts, files, place, timings, SUMMARY_FILES)
+    with _errors_naming(place):
+        return summary_of(facts, tables, spent)
 
 
 def _tables(
@@ -89,13 +89,13 @@ def _tables(
             continue
         if file in files:
             tables[name] = read_table(files[file], layout, f"{place}/{file}")
-        elif name in LAYOUTS and not (name in PLANNED and facts.get("recording") is not None):
+        elif name in LAYOUTS and not (name in DECISION_TABLES and facts.get("recording") is not None):
             raise InputError(f"{place}: expected a file {file}; got {shown(', '.join(files)) if files else 'none'}")
     return tables, {} if timings is None else decode_timings(timings, f"{place}/timings{ENDING}")
 
 
 @contextmanager
-def _fitting_together(place: str) -> Iterator[None]:
+def _errors_naming(place: str) -> Iterator[None]:
     """What files of no run raise, as errors that name the place."""
     try:
         yield

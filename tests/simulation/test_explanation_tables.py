@@ -17,13 +17,13 @@ from vedette.errors import InputError
 from vedette.evaluation import run_scenario
 from vedette.scenarios import load_scenario, with_fields
 from vedette.simulation.arrow import read_table, write_table
-from vedette.simulation.explained import EXPLAINED
-from vedette.simulation.kept import decode_run, encode_run
+from vedette.simulation.explanation_tables import EXPLANATION_TABLES
 from vedette.simulation.records import RunRecord
+from vedette.simulation.serialization import decode_run, encode_run
 from vedette.simulation.storage import load_run, save_run
 from vedette.simulation.tables import run_facts
 
-FILES = tuple(f"{name}.arrow" for name in EXPLAINED)
+FILES = tuple(f"{name}.arrow" for name in EXPLANATION_TABLES)
 
 
 def explanation_of(plan: Plan, **fields: Any) -> Explanation:
@@ -90,8 +90,8 @@ def test_damaged_explanations_are_named() -> None:
         decode_run(run_facts(record), {name: files[name] for name in files if name != FILES[1]}, "run")
 
     def with_column(table: str, column: str, values: Any) -> dict[str, bytes]:
-        content = read_table(files[f"{table}.arrow"], EXPLAINED[table], table)
-        return {**files, f"{table}.arrow": write_table({**content, column: values}, EXPLAINED[table])}
+        content = read_table(files[f"{table}.arrow"], EXPLANATION_TABLES[table], table)
+        return {**files, f"{table}.arrow": write_table({**content, column: values}, EXPLANATION_TABLES[table])}
 
     for table, column, values, message in (
         ("explanations", "decision", np.array([0, 7]), "expected numbers below 3; got 7"),

@@ -10,7 +10,7 @@ from vedette.errors import InputError
 from vedette.evaluation import ospa_of_run, run_scenario
 from vedette.scenarios import Scenario, load_scenario, with_fields
 from vedette.scenarios.build import build_experiment, build_planner
-from vedette.simulation import World
+from vedette.simulation import SimulationRun
 from vedette.simulation.loop import PLANNER, run_stream
 from vedette.simulation.replay import scans_of
 
@@ -28,7 +28,7 @@ def test_who_steps_it_as_the_loop_does_has_its_run(name: str) -> None:
     record = run_scenario(scenario, "jdm", seed=3, run=2, num_threads=1)
     experiment, planner = build_experiment(scenario), build_planner(scenario, "jdm", num_threads=1)
     assert planner is not None
-    world, rng, actions, estimates = World(experiment, seed=3, run=2), run_stream(3, 2, PLANNER), None, []
+    world, rng, actions, estimates = SimulationRun(experiment, seed=3, run=2), run_stream(3, 2, PLANNER), None, []
     kept = scans_of(record, experiment)
     while not world.is_over:
         moment = world.step(actions)
@@ -50,7 +50,7 @@ def test_who_steps_it_as_the_loop_does_has_its_run(name: str) -> None:
 
 def test_another_world_is_the_run_once_more() -> None:
     experiment = build_experiment(load_scenario("linear-10"))
-    first, again, other = (World(experiment, seed=1, run=run) for run in (0, 0, 1))
+    first, again, other = (SimulationRun(experiment, seed=1, run=run) for run in (0, 0, 1))
     for _ in range(3):
         one, two, three = first.step(), again.step(), other.step()
         mine, same, others = (np.asarray(moment.measurements[0]) for moment in (one, two, three))
@@ -61,7 +61,7 @@ def test_another_world_is_the_run_once_more() -> None:
 def test_it_says_when_it_is_over_and_where_nothing_can_be_sent() -> None:
     whole = build_experiment(load_scenario("linear-10"))
     experiment = replace(whole, times=whole.times[:1])
-    world = World(experiment, seed=1)
+    world = SimulationRun(experiment, seed=1)
     with pytest.raises(InputError, match="world: expected a scan before the sensors are sent anywhere; got none yet"):
         world.step([None])
     world.step()
