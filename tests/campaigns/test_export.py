@@ -192,7 +192,7 @@ def test_what_a_part_lacks_is_null(results):
 
 def test_decisions_that_were_explained_have_tables_of_their_own(results):
     """Of those runs alone; the runs that were kept without have no rows there."""
-    from simulation.test_explained import explained
+    from simulation.test_explanation_tables import explained
 
     first, second = results.run("jdm-rate-5.0", 0), results.run("jdm-rate-5.0", 1)
     assert "explanations" not in tables_of_runs(results.campaign, [first, second])

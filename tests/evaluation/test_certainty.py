@@ -6,9 +6,9 @@ import math
 from dataclasses import replace
 
 import pytest
-from simulation.test_explained import explanation_of
 
 from evaluation.synthetic import make_record
+from simulation.test_explanation_tables import explanation_of
 from vedette.control import Bound, RunnerUp
 from vedette.evaluation.certainty import lead_words, optimality_words
 

@@ -13,7 +13,7 @@ from vedette.evaluation import RunMetrics
 from vedette.evaluation.ensembles import ensemble_of
 from vedette.evaluation.runs import measure_run
 from vedette.reports.groups import Group, Strategy, gather
-from vedette.reports.health import findings, strategy_diagnostics
+from vedette.reports.health import failed_checks, strategy_diagnostics
 from vedette.reports.tables import measure_table, nees_spread
 from vedette.simulation.records import RunRecord
 
@@ -71,9 +71,9 @@ def test_the_worst_estimate_is_named_with_its_run(group: Group) -> None:
     assert (spread.run, spread.time, spread.is_by_chance) == (1, 20.0, False)
     assert spread.median == pytest.approx(before.median, rel=0.05)
     worst = f"Largest NEES / 2: {spread.largest:.4g} in run 1 at 20 s"
-    assert worst in findings(tuple(strategy_diagnostics(off.strategies[1])))
+    assert worst in failed_checks(tuple(strategy_diagnostics(off.strategies[1])))
     for fine in (*group.strategies, off.strategies[0]):
-        assert not any("Largest NEES" in each for each in findings(tuple(strategy_diagnostics(fine))))
+        assert not any("Largest NEES" in each for each in failed_checks(tuple(strategy_diagnostics(fine))))
     rows = rows_of(off)
     assert rows["  largest"][1] == f"{spread.largest:.4g} (run 1, 20 s)"
     assert rows["  median"][1] == f"{spread.median:.2f}"

@@ -13,7 +13,7 @@ from reports.examples import campaign_of, results_of
 from vedette.campaigns.results import CampaignResults
 from vedette.errors import InputError
 from vedette.reports import write_figures, write_report, writing
-from vedette.reports.origin import spec_toml, versions_table
+from vedette.reports.provenance import spec_toml, versions_table
 from vedette.scenarios import load_scenario
 from vedette.scenarios.dumping import dump_scenario
 from vedette.scenarios.generated import GeneratedScene, scene_text

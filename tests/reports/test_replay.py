@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from simulation.test_explained import explanation_of
 
 from evaluation.still_network import NAMES, POLYGON, STILL_NETWORK
 from evaluation.synthetic import make_record
 from reports.examples import MIXED_SENSORS, SUMS, campaign_of, results_of
+from simulation.test_explanation_tables import explanation_of
 from vedette.control import TargetGains
 from vedette.errors import InputError
+from vedette.reports.decision_explanations import explanation_data
 from vedette.reports.groups import Strategy, gather
 from vedette.reports.replay import replay_data
-from vedette.reports.why import why_data
 from vedette.scenarios.build import build_experiment
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.simulation.replay import scans_of
@@ -155,12 +155,12 @@ def test_many_targets_are_told_by_the_ten_that_matter_most() -> None:
     plan = make_record().decisions[0].plan
     total = np.arange(1.0, 21.0)
     gains = TargetGains(np.stack([np.ones(20, np.int64), np.arange(20)], axis=1), 0.25 * total, 0.75 * total)
-    found = why_data(replace(plan, explanation=explanation_of(plan, of_targets=gains, runner_up=None)))
+    found = explanation_data(replace(plan, explanation=explanation_of(plan, of_targets=gains, runner_up=None)))
     assert found is not None
     assert found["targets"][0] == ("1.19", 5.0, 15.0)
     assert len(found["targets"]) == 10
     assert found["more"] == (10, 13.75, 41.25)
-    assert why_data(plan) is None
+    assert explanation_data(plan) is None
 
 
 def test_decisions_that_tell_less_say_why(strategies: Mapping[str, Strategy]) -> None:

@@ -75,12 +75,12 @@ def _report_campaign(
 ) -> Reported:
     """The figures that were written, and code that was not run."""
     from vedette.campaigns.results import open_results
-    from vedette.reports import code_in_replays, write_figures, write_report
+    from vedette.reports import replay_code, write_figures, write_report
 
     results = open_results(folder, num_workers=0)
     with named_options({"path": "--out", "replays": "--runs", "cell": "--runs"}):
         write_report(results, page, replays=replays, trust=trust)
-    unmeasured = () if trust else code_in_replays(results)
+    unmeasured = () if trust else replay_code(results)
     _tell_page(page, unmeasured)
     return _figures(figures, lambda path: write_figures(results, path)), unmeasured
 

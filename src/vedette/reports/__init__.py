@@ -4,12 +4,12 @@ from vedette.internal.extras import require_packages
 
 require_packages("a report", "jinja2", "matplotlib", "pyarrow")
 
+from vedette.reports.html import replay_code, write_demo, write_report
 from vedette.reports.saving import write_figures, write_run_figures, write_summary
 from vedette.reports.single import write_run_report
-from vedette.reports.writing import code_in_replays, write_demo, write_report
 
 __all__ = [
-    "code_in_replays",
+    "replay_code",
     "write_demo",
     "write_figures",
     "write_report",

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from vedette.campaigns.leaderboard import SceneTable, header, row
+from vedette.reports.html import make_room, render, write_page
 from vedette.reports.tables import Table
-from vedette.reports.writing import make_room, render, write_page
 
 _NOTE = "All on the same runs; 95 %: interval, of skewed differences by bootstrap. A lost run counts as the cutoff."
 

@@ -9,8 +9,8 @@ from matplotlib.ticker import MaxNLocator
 
 from vedette.evaluation.tables import heading, significance
 from vedette.internal.text import named_in, with_error, with_minus
-from vedette.reports.claims import claims
 from vedette.reports.groups import Group
+from vedette.reports.pairwise import compare_with_first
 
 _ROOM = 0.06  # of the axis, left free at each side
 # Verdicts are of the first strategy against another; the page shows that of the other.
@@ -71,7 +71,7 @@ def forest_of(group: Group) -> Forest | None:
     comparison = group.comparison
     if comparison is None or len(comparison.strategies) < 2:
         return None
-    found = claims(comparison)
+    found = compare_with_first(comparison)
     shown = [value for each in found for value in (each.mean, each.low, each.high) if math.isfinite(value)]
     ticks = [
         float(tick) for tick in MaxNLocator(5, steps=[1, 2, 5, 10]).tick_values(min(0.0, *shown), max(0.0, *shown))

@@ -45,7 +45,7 @@ def strategy_diagnostics(strategy: Strategy) -> Iterator[Diagnostic]:
     yield from diagnostics(summarise_health(strategy.ensemble.health, strategy.scene.names))
 
 
-def findings(found: Sequence[Diagnostic]) -> tuple[str, ...]:
+def failed_checks(found: Sequence[Diagnostic]) -> tuple[str, ...]:
     """Return name and result of the checks that may cost accuracy."""
     return tuple(f"{each.name}: {each.text}" for each in found if each.level == "check")
 

@@ -17,6 +17,7 @@ from vedette.evaluation.figures.scene import scene_of
 from vedette.evaluation.scans import UNKNOWN
 from vedette.kernels.base.types import Floats
 from vedette.live import Answer, Live, LiveState
+from vedette.reports.html import render
 from vedette.reports.replay import (
     drawn_decision,
     drawn_estimate,
@@ -26,7 +27,6 @@ from vedette.reports.replay import (
     places_of,
     rounded_to,
 )
-from vedette.reports.writing import render
 from vedette.scenarios import Scenario
 from vedette.scenarios.sections.tracking import UNLABELLED
 from vedette.simulation.health import Health
@@ -39,7 +39,7 @@ _STEPS_OF_EXTENT = 10.0
 
 
 @dataclass(slots=True)
-class Remembering:
+class LastPlanCache:
     """A planner that remembers its last plan, and says what the planner says that it asks."""
 
     planner: Planner
@@ -73,7 +73,7 @@ class LiveScreen:
 
     def __init__(self, scenario: Scenario, live: Live, state: Callable[[], LiveState]) -> None:
         self._scenario, self._state = scenario, state
-        self._planner = None if live.planner is None else Remembering(live.planner)
+        self._planner = None if live.planner is None else LastPlanCache(live.planner)
         self.live = live if self._planner is None else replace(live, planner=self._planner)
         self._fault = ""
         self._decided: tuple[Plan | None, dict[str, Any] | None] = (None, None)

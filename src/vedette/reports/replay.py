@@ -18,8 +18,8 @@ from vedette.evaluation.figures.rewards import best_over_others, best_over_pair,
 from vedette.evaluation.scans import LIE, code_of_sensors, in_plane, scans_of_record
 from vedette.evaluation.told import told_by
 from vedette.kernels.base.types import Floats
+from vedette.reports.decision_explanations import explanation_data
 from vedette.reports.groups import Strategy
-from vedette.reports.why import why_data
 from vedette.scenarios import Scenario
 from vedette.scenarios.sections.field_of_view import field_of_view
 from vedette.scenarios.sections.sensors import Sensor as SensorSection
@@ -226,7 +226,7 @@ def drawn_decision(decision: Decision, axes: dict[str, dict[str, Any]], names: S
         "notes": plan.notes,
         "curves": _curves(plan, axes),
         "map": _map(plan),
-        "why": why_data(plan, names),
+        "why": explanation_data(plan, names),
         **({} if decision.undetected is None else {"undetected": _shades(decision.undetected)}),
     }
 

@@ -8,10 +8,10 @@ from typing import Any
 
 from vedette.evaluation.scans import code_of_sensors
 from vedette.reports.groups import group_of_run
-from vedette.reports.origin import citation
+from vedette.reports.html import make_room, render, section_of, write_page
+from vedette.reports.provenance import citation
 from vedette.reports.replay import replay_data
 from vedette.reports.tables import Table
-from vedette.reports.writing import make_room, render, section_of, write_page
 from vedette.scenarios import Scenario
 from vedette.simulation.records import RunRecord
 

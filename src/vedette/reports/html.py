@@ -24,12 +24,12 @@ from vedette.evaluation.scans import code_of_sensors
 from vedette.internal.files import write_whole
 from vedette.internal.text import named_in
 from vedette.kernels.base.types import Floats
-from vedette.reports.claims import Claim, all_pairs
 from vedette.reports.drawings import Drawing, error_drawings, group_drawings, paired_records, sweep_drawings
 from vedette.reports.forest import Forest, forest_of
 from vedette.reports.groups import Group, axis_label, gather
 from vedette.reports.health import DiagnosticsTable, diagnostics_table
-from vedette.reports.origin import citation, made_with, spec_toml, versions_table
+from vedette.reports.pairwise import PairwiseComparison, all_pairs
+from vedette.reports.provenance import citation, made_with, spec_toml, versions_table
 from vedette.reports.replay import replay_data
 from vedette.reports.saving import run_errors
 from vedette.reports.svg import inline_png, inline_svg
@@ -54,7 +54,7 @@ class _Section:
     difference: str  # heading of the paired differences
     is_brief: bool
     forest: Forest | None
-    pairs: tuple[Claim, ...]
+    pairs: tuple[PairwiseComparison, ...]
     diagnostics: DiagnosticsTable | None
     tables: tuple[tuple[str, Table], ...]
     figures: tuple[tuple[Drawing, Markup], ...]
@@ -83,7 +83,7 @@ def write_report(
         path: of the file; its folder is made.
         replays: cell and number of the runs that can be replayed; None: the run that is typical of the first strategy,
             under every strategy, as many as keep the page small.
-        trust: run the code that the scenarios of the results name (`code_in_replays`).
+        trust: run the code that the scenarios of the results name (`replay_code`).
 
     Raises:
         InputError: a run that is not there, or a file that cannot be written.
@@ -105,7 +105,7 @@ def write_report(
         runs += _replays(results, group, replays, trust)
     sweeps = _drawn(tuple(sweep_drawings(results.campaign, errors)), "sweep")
     kept = _within(runs, MAX_REPLAY_BYTES) if replays is None else runs
-    untrusted = () if trust else code_in_replays(results)
+    untrusted = () if trust else replay_code(results)
     campaign = results.campaign
     made = made_with(results.manifest)
     page = render(
@@ -154,14 +154,14 @@ def write_demo(results: CampaignResults, path: str | Path, *, trust: bool = Fals
         "demo.html",
         _replays(results, group, first, trust),
         campaign=results.campaign,
-        untrusted=() if trust else code_in_replays(results),
+        untrusted=() if trust else replay_code(results),
         together=True,
     )
     write_page(target, page)
     return target
 
 
-def code_in_replays(results: CampaignResults) -> tuple[str, ...]:
+def replay_code(results: CampaignResults) -> tuple[str, ...]:
     """Code that the replays of a report would run if it is trusted: sensor models that are not the library's."""
     return tuple(dict.fromkeys(name for cell in results.campaign.cells for name in code_of_sensors(cell.scenario)))
 

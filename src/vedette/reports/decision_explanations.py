@@ -18,7 +18,7 @@ _SAME = 1e-9
 _WORDS = {"of_targets": "gain by target", "of_sensors": "shares of the sensors", "runner_up": "second best"}
 
 
-def why_data(plan: Plan, names: Sequence[str] = ()) -> dict[str, Any] | None:
+def explanation_data(plan: Plan, names: Sequence[str] = ()) -> dict[str, Any] | None:
     """What is shown, with the sensors' names; None for a decision that was kept without explanation.
 
     Facts as pairs of texts; of the ten targets that matter most label and gains, of the others their number and sums;

@@ -18,7 +18,7 @@ Verdict = Literal["better", "worse", "unclear", "unknown"]
 
 
 @dataclass(frozen=True, slots=True)
-class Claim:
+class PairwiseComparison:
     """One strategy against another.
 
     Attributes:
@@ -42,33 +42,35 @@ class Claim:
     share_won: str
 
 
-def claims(comparison: Comparison) -> tuple[Claim, ...]:
+def compare_with_first(comparison: Comparison) -> tuple[PairwiseComparison, ...]:
     """The first strategy against each of the others."""
-    return _together(comparison, [(comparison.strategies[0], other) for other in comparison.strategies[1:]])
+    return _compare_pairs(comparison, [(comparison.strategies[0], other) for other in comparison.strategies[1:]])
 
 
-def all_pairs(comparison: Comparison) -> tuple[Claim, ...]:
+def all_pairs(comparison: Comparison) -> tuple[PairwiseComparison, ...]:
     """Every strategy against every later one."""
     names = comparison.strategies
-    return _together(comparison, [(first, second) for i, first in enumerate(names) for second in names[i + 1 :]])
+    return _compare_pairs(comparison, [(first, second) for i, first in enumerate(names) for second in names[i + 1 :]])
 
 
-def claim(comparison: Comparison, first: str, second: str) -> Claim:
+def compare_pair(comparison: Comparison, first: str, second: str) -> PairwiseComparison:
     """One strategy against another, run by run, in mean OSPA over the counted scans; by itself."""
-    return _together(comparison, [(first, second)])[0]
+    return _compare_pairs(comparison, [(first, second)])[0]
 
 
-def _together(comparison: Comparison, pairs: Sequence[tuple[str, str]]) -> tuple[Claim, ...]:
+def _compare_pairs(comparison: Comparison, pairs: Sequence[tuple[str, str]]) -> tuple[PairwiseComparison, ...]:
     """What holds of all pairs at once, by Holm's method."""
     differences = [comparison.difference(second, first) for first, second in pairs]
     p_values = holm(np.array([paired.p_value for paired in differences]))
     return tuple(
-        _claim(pair, paired, float(p_value), len(pairs), comparison.unit)
+        _comparison(pair, paired, float(p_value), len(pairs), comparison.unit)
         for pair, paired, p_value in zip(pairs, differences, p_values, strict=True)
     )
 
 
-def _claim(pair: tuple[str, str], paired: PairedDifference, p_value: float, number: int, unit: str) -> Claim:
+def _comparison(
+    pair: tuple[str, str], paired: PairedDifference, p_value: float, number: int, unit: str
+) -> PairwiseComparison:
     verdict, names = _verdict(paired, p_value), (strategy_label(pair[0]), strategy_label(pair[1]))
     sentence = _SENTENCES[verdict](*names, paired, unit)
     sentence = sentence[0].upper() + sentence[1:]
@@ -78,7 +80,7 @@ def _claim(pair: tuple[str, str], paired: PairedDifference, p_value: float, numb
     mean, low, high = (float(each) for each in (paired.summary.mean, paired.summary.low, paired.summary.high))
     share = "unknown" if verdict == "unknown" else percent(paired.share_won)
     interval = "" if verdict == "unknown" else f" ({low:+.2f} to {high:+.2f})"
-    return Claim(verdict, *names, sentence, mean, low, high, with_minus(f"{mean:+.2f}{interval}"), share)
+    return PairwiseComparison(verdict, *names, sentence, mean, low, high, with_minus(f"{mean:+.2f}{interval}"), share)
 
 
 def _verdict(paired: PairedDifference, p_value: float) -> Verdict:
