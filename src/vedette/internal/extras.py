@@ -1,7 +1,7 @@
-"""Packages that only some of the program needs, and what is said where one is missing.
+"""Optional packages, and the message if one is missing.
 
-Filters, fusion, decisions and scenarios do without them: `pip install vedette`. The others come with an extra, as
-pyproject.toml has them: `pip install 'vedette[report]'`.
+Filters, fusion, decisions and scenarios need only `pip install vedette`. The other packages come with the extras of
+pyproject.toml: `pip install 'vedette[report]'`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from importlib.util import find_spec
 
 from vedette.errors import MissingPackageError
 
-# Package -> the extra that brings it. Every extra brings what `campaigns` does.
+# Package -> the extra that installs it. Every extra includes the packages of `campaigns`.
 EXTRA_OF = {
     "pyarrow": "campaigns",
     "jinja2": "report",
@@ -29,16 +29,16 @@ EXTRA_OF = {
 
 
 def require_packages(what: str, *packages: str) -> None:
-    """Nothing where all the packages (of `EXTRA_OF`) are installed.
+    """Do nothing if all the packages (keys of `EXTRA_OF`) are installed.
 
-    Raises `MissingPackageError` otherwise: that `what` needs those that are missing, and how they are installed.
+    Raises `MissingPackageError` otherwise; the message says which packages `what` needs and how to install them.
     """
     if lacking := without(what, *packages):
         raise MissingPackageError(lacking)
 
 
 def without(what: str, *packages: str) -> str:
-    """That `what` needs the packages (of `EXTRA_OF`) that are missing, and how to install them; empty: none is."""
+    """Return a message if packages (keys of `EXTRA_OF`) that `what` needs are missing, else an empty text."""
     missing = [package for package in packages if not _is_installed(package)]
     if not missing:
         return ""
@@ -51,5 +51,5 @@ def without(what: str, *packages: str) -> str:
 def _is_installed(package: str) -> bool:
     try:
         return find_spec(package) is not None
-    except (ImportError, ValueError):  # something in between refuses it
+    except (ImportError, ValueError):  # raised by a parent package or an import hook
         return False

@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all."""
+"""Atomic file writes and lock files: a file appears complete or not at all."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from vedette.errors import InputError
 
 
 def write_whole(target: Path, write: Callable[[BinaryIO], object]) -> None:
-    """Let `write` fill a new file beside `target`, make it durable, and put it in the place of `target`.
+    """Let `write` fill a new file next to `target`, sync it to disk, and move it to `target`.
 
-    Raises `OSError` where that cannot be done, or `target` is a device or a pipe; `target` is then as it was.
+    Raises `OSError` if this fails, or if `target` is a device or a pipe; `target` is then unchanged.
     """
     if target.exists() and not target.is_file() and not target.is_dir():
         raise OSError(errno.EINVAL, "it is no regular file", str(target))
@@ -36,7 +36,7 @@ def write_whole(target: Path, write: Callable[[BinaryIO], object]) -> None:
 
 
 def write_file(target: Path, write: Callable[[BinaryIO], object], *, make_folder: bool = False) -> None:
-    """The same, on request with the folder made. Raises `InputError` where that cannot be done."""
+    """Do the same as `write_whole`, making the folder if `make_folder`. Raises `InputError` if this fails."""
     try:
         if make_folder:
             target.parent.mkdir(parents=True, exist_ok=True)
@@ -46,7 +46,7 @@ def write_file(target: Path, write: Callable[[BinaryIO], object], *, make_folder
 
 
 def unwritable(target: Path) -> str:
-    """The reason why nothing can be written at `target`; empty where the folder around it may be written to."""
+    """Return the reason why no file can be written at `target`; empty if its nearest existing folder is writable."""
     around = next(folder for folder in target.absolute().parents if folder.exists())
     if not around.is_dir():
         return f"{around} is no folder"
@@ -54,8 +54,8 @@ def unwritable(target: Path) -> str:
 
 
 def sync_folder(folder: Path) -> None:
-    """Make the names in a folder durable, where the system can."""
-    with contextlib.suppress(OSError):  # Windows opens no folders
+    """Sync the names in a folder to disk, if the operating system supports it."""
+    with contextlib.suppress(OSError):  # Windows cannot open folders
         handle = os.open(folder, os.O_RDONLY)
         try:
             os.fsync(handle)
@@ -64,9 +64,9 @@ def sync_folder(folder: Path) -> None:
 
 
 def lock_beside(path: Path) -> sqlite3.Connection:
-    """A lock of a file that one process may write, as an open transaction on `PATH.lock`: it ends with the process.
+    """Return a lock that lets a single process write a file: an open transaction on `PATH.lock`.
 
-    Raises `InputError` where another process has it, or the folder cannot be written.
+    The lock ends with the process. Raises `InputError` if another process holds it, or the folder cannot be written.
     """
     lock = None
     try:

@@ -1,6 +1,6 @@
-"""Logistic functions and the quantile of chi-squared: the few that every run needs.
+"""Logistic functions and the quantile of the chi-squared distribution.
 
-SciPy has them too, but to load `scipy.special` takes as long as the first scan of a run.
+SciPy has them too, but importing `scipy.special` takes as long as the first scan of a run.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 
 def expit(log_odds: ArrayLike) -> NDArray[np.float64]:
-    """The probability that has these log-odds; exact to rounding at both ends, 0 and 1 at the infinities."""
+    """Return the probability with these log-odds; exact to rounding at both ends, 0 and 1 at the infinities."""
     log_odds = np.asarray(log_odds, np.float64)
     small = np.exp(-np.abs(log_odds))
     found: NDArray[np.float64] = np.where(log_odds < 0.0, small, 1.0) / (1.0 + small)
@@ -20,23 +20,23 @@ def expit(log_odds: ArrayLike) -> NDArray[np.float64]:
 
 
 def log_expit(log_odds: ArrayLike) -> NDArray[np.float64]:
-    """The log of the probability that has these log-odds."""
+    """Return the logarithm of the probability with these log-odds."""
     log_odds = np.asarray(log_odds, np.float64)
     found: NDArray[np.float64] = np.minimum(log_odds, 0.0) - np.log1p(np.exp(-np.abs(log_odds)))
     return found
 
 
 def logit(probability: float) -> float:
-    """The log-odds of a probability: infinite for 0 and 1."""
+    """Return the log-odds of a probability; infinite for 0 and 1."""
     if probability <= 0.0 or probability >= 1.0:
         return math.copysign(math.inf, probability - 0.5)
     return math.log(probability / (1.0 - probability))
 
 
 def chi_squared_quantile(dim: int, probability: float) -> float:
-    """The value below which a chi-squared variable of `dim` degrees of freedom lies with this probability.
+    """Return the quantile at `probability` of the chi-squared distribution with `dim` degrees of freedom.
 
-    Newton's method on the log of the tail, kept inside a bracket; exact to some 1e-15 / probability.
+    Newton's method on the log of the tail, kept inside a bracket; exact to about 1e-15 / probability.
     """
     if probability <= 0.0 or probability >= 1.0:
         return math.inf if probability >= 1.0 else 0.0
@@ -55,7 +55,7 @@ def chi_squared_quantile(dim: int, probability: float) -> float:
 
 
 def _chi_squared(dim: int, value: float) -> tuple[float, float]:
-    """The tail above a positive value, and the density there (Abramowitz and Stegun 1964, eq. 26.4.4 and 26.4.5)."""
+    """Tail above a positive value, and density there (Abramowitz and Stegun 1964, eq. 26.4.4 and 26.4.5)."""
     half = 0.5 * value
     power = 0.5 * (dim % 2)
     tail = math.erfc(math.sqrt(half)) if dim % 2 else 0.0

@@ -1,4 +1,4 @@
-"""Processes beside this one: they share what one process has loaded, leave Ctrl-C to this one, and end with it."""
+"""Child processes that share modules loaded once by a server process, ignore Ctrl-C, and end with this process."""
 
 from __future__ import annotations
 
@@ -14,34 +14,37 @@ from multiprocessing.context import BaseContext
 from pathlib import Path
 from typing import Any
 
-# Elsewhere a fork of a process that has loaded half of the system's libraries is not safe, or there is none.
+# On other platforms, forking a process that has loaded many system libraries is unsafe or impossible.
 _METHOD = "forkserver" if sys.platform == "linux" else "spawn"
-# What the workers of a campaign need, with Numba.
+# Modules that the workers of a campaign need, including Numba.
 _LOADED = ("vedette.campaigns.local", "vedette.kernels.base.dispatchers", "scipy.optimize")
 _SOURCE = Path(__file__).resolve().parents[2]
-# One thread in each: as many processes as processors share the work already.
+# One thread each, as there are as many processes as processors.
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def context() -> BaseContext:
-    """How processes are started; with `as_children` around every start, and `end_with_parent` first of all in each."""
+    """Return the start method of child processes.
+
+    Use `as_children` around every start, and call `end_with_parent` first in each process.
+    """
     return multiprocessing.get_context(_METHOD)
 
 
 def load_ahead(*more: str) -> None:
-    """Begin to load what processes of `context` need, while this one goes on, in one that they will be forks of.
+    """Start the server process from which children are forked; it loads their modules while this process continues.
 
     Args:
-        more: modules beside those of the workers of a campaign.
+        more: modules to load in addition to those that the workers of a campaign need.
 
-    Where the platform has no such process, or this program has one already, each loads what it needs itself.
+    If the platform has no fork server, or this program already has one, each child loads its own modules.
     """
     if _METHOD == "forkserver":
         from multiprocessing import forkserver
 
         context().set_forkserver_preload([*_LOADED, *more])
         before = os.environ.get("PYTHONPATH")
-        if _SOURCE.name == "src":  # found by a path that may have been relative to where this process was
+        if _SOURCE.name == "src":  # the path may have been relative to another working directory
             os.environ["PYTHONPATH"] = os.pathsep.join([str(_SOURCE), *([before] if before else [])])
         try:
             with as_children():
@@ -54,13 +57,13 @@ def load_ahead(*more: str) -> None:
 
 @contextmanager
 def as_children(*, of_server: bool = False) -> Iterator[None]:
-    """Processes started inside inherit that Ctrl-C is not for them, and that linear algebra has one thread.
+    """Context manager: processes started inside ignore Ctrl-C, and their linear algebra uses one thread.
 
     The main process stops them.
 
     Args:
-        of_server: they are of `context`, after `load_ahead`. Where that has a process of which they are forks, that one
-            is deaf to Ctrl-C already; it may take a second to load, and Ctrl-C waits for it instead of being lost.
+        of_server: the processes belong to `context` and start after `load_ahead`. If there is a fork server, it already
+            ignores Ctrl-C. As it may take a second to load, Ctrl-C is then deferred instead of lost.
     """
     ours = {name: "1" for name in _THREADS if name not in os.environ}
     in_main = threading.current_thread() is threading.main_thread()
@@ -82,15 +85,15 @@ def as_children(*, of_server: bool = False) -> Iterator[None]:
 
 
 def let_go_of_results(pool: ProcessPoolExecutor) -> None:
-    """Close this process's end of what the processes of a pool write to; they have started, and have their own.
+    """Close this process's write end of the result pipe of a pool whose processes have started; they have their own.
 
-    While it is open, half a message of one that was killed is waited for for ever.
+    While it is open, a reader waits for ever for the rest of a message from a killed process.
     """
     pool._result_queue._writer.close()  # type: ignore[attr-defined]
 
 
 def end_with_parent() -> None:
-    """Have this process end when the one that started it has ended, however that came about."""
+    """Make this process end when its parent has ended, for whatever reason."""
     threading.Thread(target=_wait_and_end, daemon=True).start()
 
 

@@ -1,4 +1,4 @@
-"""Programs beside this one, in any language, that are asked by lines of JSON over a pipe: docs/benchmark.md."""
+"""External programs in any language that exchange lines of JSON over a pipe: docs/benchmark.md."""
 
 from __future__ import annotations
 
@@ -22,27 +22,27 @@ from vedette.internal.reading import parse_json
 from vedette.internal.text import elided, printable
 
 PROTOCOL = "vedette 1"
-MOST_BYTES = 2**24  # of an answer
-_LAST_WORDS = 500  # bytes of standard error that are kept
-_FAREWELL_SECONDS = 1.0  # that a program has to end once its input has ended
-# As many runs as there are processors share the work already.
+MOST_BYTES = 2**24  # maximum length of an answer
+_LAST_WORDS = 500  # bytes of standard error to keep
+_FAREWELL_SECONDS = 1.0  # for a program to end after the end of its input
+# One thread each, as there are as many runs as processors.
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "JULIA_NUM_THREADS")
 
-# Waits for a line, and kills a group of processes where its input ends without one: whoever held it was killed.
+# Waits for a line, and kills a process group if its input ends without one, that is, if the holder was killed.
 _GUARD = ("/bin/sh", "-c", 'read line || kill -s KILL -- "-$0"')
 
 _Questions: TypeAlias = "SimpleQueue[bytes | None]"
 
 
 class Program:
-    """A program that answers each line of JSON with a line of JSON; it ends with this object, or with this process.
+    """External program that answers each line of JSON with a line of JSON; ends with this object, or with this process.
 
     Args:
         command: the program and its arguments.
-        folder: in which it is started.
+        folder: working directory of the program.
 
     Raises:
-        InputError: a command that cannot be started.
+        InputError: the command cannot be started.
     """
 
     def __init__(self, command: Sequence[str], folder: Path) -> None:
@@ -52,7 +52,7 @@ class Program:
         self._questions: _Questions = SimpleQueue()
         self._answers: SimpleQueue[bytes] = SimpleQueue()
         environment, pipe = {**dict.fromkeys(_THREADS, "1"), **os.environ}, subprocess.PIPE
-        try:  # a session of its own: Ctrl-C is for this process, which then ends it
+        try:  # in a new session: Ctrl-C reaches this process only, which then ends the program
             child = subprocess.Popen(
                 list(command), cwd=folder, env=environment, stdin=pipe, stdout=pipe, stderr=pipe, start_new_session=True
             )
@@ -67,9 +67,9 @@ class Program:
         self._end = weakref.finalize(self, _end, child, self._guard, self._questions)
 
     def ask(self, question: Mapping[str, Any], seconds: float) -> dict[str, Any]:
-        """The answer to a question. One that does not come in time, or is no JSON object, ends the program.
+        """Return the answer to a question. If it is late, or not a JSON object, the program is ended.
 
-        Raises `VedetteError` with what was expected, what came and the last words on standard error.
+        Raises `VedetteError` with what was expected, what was received, and the end of the program's standard error.
         """
         self.answered += 1
         self._questions.put(json.dumps(question, separators=(",", ":"), allow_nan=False).encode() + b"\n")
@@ -90,7 +90,7 @@ class Program:
         return answer
 
     def refuse(self, wanted: str, got: str) -> NoReturn:
-        """End the program for its last answer, and say why. Raises `VedetteError`."""
+        """End the program because of its last answer. Raises `VedetteError` that explains why."""
         self._end.detach()
         self._questions.put(None)
         _kill(self._child, self._guard)
@@ -100,7 +100,7 @@ class Program:
         raise VedetteError(f"program {self.name}, answer {self.answered}: expected {wanted}; got {got}{said}")
 
     def _ended(self) -> str:
-        """How it ended, in words."""
+        """Return in words how the program ended."""
         try:
             return f"its end, with status {self._child.wait(_FAREWELL_SECONDS)}"
         except subprocess.TimeoutExpired:
@@ -110,9 +110,9 @@ class Program:
 def start_program(
     command: Sequence[str], folder: Path, role: str, scene: Mapping[str, Any], rng: np.random.Generator, seconds: float
 ) -> Program:
-    """A program that has been told what it is to be and of which scene, and has answered that it is ready.
+    """Return a program that has received its role and its scene, and has answered that it is ready.
 
-    rng: its seed is drawn from it. Raises as `Program` and `Program.ask`.
+    rng: the program's seed is drawn from it. Raises as `Program` and `Program.ask`.
     """
     program = Program(command, folder)
     told = {"protocol": PROTOCOL, "role": role, "seed": int(rng.integers(2**31)), "scene": scene}
@@ -126,12 +126,14 @@ def _shown(line: bytes) -> str:
 
 
 def _talk(child: subprocess.Popen[bytes], questions: _Questions, answers: SimpleQueue[bytes]) -> None:
-    """Pass on questions and answers, so that whoever asks can stop waiting for either; None ends its input."""
+    """Pass on questions and answers in a thread, so that the caller can stop waiting. The question None ends the
+    input.
+    """
     assert child.stdin is not None
     assert child.stdout is not None
     with child.stdout:
         for question in iter(questions.get, None):
-            with suppress(OSError):  # it has ended; what it said last is read
+            with suppress(OSError):  # the program has ended; its last line is still read
                 child.stdin.write(question)
                 child.stdin.flush()
             answers.put(child.stdout.readline(MOST_BYTES + 1))
@@ -140,7 +142,7 @@ def _talk(child: subprocess.Popen[bytes], questions: _Questions, answers: Simple
 
 
 def _listen(stream: IO[bytes], said: bytearray) -> None:
-    """Keep the last words of a stream, so that a program never waits for it to be read."""
+    """Keep the last bytes of a stream, and read the rest, so that the program never blocks on it."""
     with stream:
         while part := os.read(stream.fileno(), 4096):
             said += part
@@ -148,7 +150,7 @@ def _listen(stream: IO[bytes], said: bytearray) -> None:
 
 
 def _guard_of(child: subprocess.Popen[bytes]) -> subprocess.Popen[bytes] | None:
-    """What kills a program, and what it has started, when this process is killed and can no longer do so."""
+    """Return a process that kills a program, and the processes it has started, if this process is killed."""
     if not hasattr(os, "killpg"):
         return None
     nothing = subprocess.DEVNULL
@@ -158,7 +160,7 @@ def _guard_of(child: subprocess.Popen[bytes]) -> subprocess.Popen[bytes] | None:
 
 
 def _end(child: subprocess.Popen[bytes], guard: subprocess.Popen[bytes] | None, questions: _Questions) -> None:
-    """Say by the end of its input that nothing more will be asked; kill what does not end by itself."""
+    """Close the program's input; kill the program if it does not end by itself."""
     questions.put(None)
     with suppress(subprocess.TimeoutExpired):
         child.wait(_FAREWELL_SECONDS)
@@ -166,7 +168,7 @@ def _end(child: subprocess.Popen[bytes], guard: subprocess.Popen[bytes] | None, 
 
 
 def _kill(child: subprocess.Popen[bytes], guard: subprocess.Popen[bytes] | None) -> None:
-    """End it, where it has not ended, and what it has started, in any case."""
+    """End a program if it still runs, and kill the processes that it has started in any case."""
     if guard is not None:
         with suppress(OSError):
             guard.communicate(b"\n")

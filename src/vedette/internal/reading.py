@@ -1,6 +1,6 @@
-"""Content of unknown origin, read within limits: nothing here takes more memory than a small multiple of what is there.
+"""Bounded readers for untrusted content: memory stays below a small multiple of the size of the input.
 
-Every function raises `ValueError` for content that it refuses, in words that fit behind "it is damaged: ".
+Every function raises `ValueError` for content that it refuses; the message fits after "it is damaged: ".
 """
 
 from __future__ import annotations
@@ -22,21 +22,21 @@ import numpy as np
 from vedette.errors import InputError
 from vedette.internal.text import shown
 
-MOST_BYTES = 2**30  # of a file, or of what one unpacks to: a run of 10,000 scans of 100 targets has a fifth of it
+MOST_BYTES = 2**30  # of a file, or of its unpacked content: five times a run of 10,000 scans of 100 targets
 _LONGEST_NUMBER = 300  # digits
-_LONGEST_MESSAGE = 300  # letters of what another library says
+_LONGEST_MESSAGE = 300  # characters of another library's message
 _SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
 
 
 def read_file(path: Path, most: int = MOST_BYTES) -> bytes:
-    """The bytes of a regular file. Raises `OSError` where it cannot be read."""
-    if not stat.S_ISREG(path.stat().st_mode):  # a pipe would wait for ever, and a device may have no end
+    """Return the bytes of a regular file. Raises `OSError` if it cannot be read."""
+    if not stat.S_ISREG(path.stat().st_mode):  # reading a pipe may wait for ever, and a device may have no end
         if path.is_dir():
             raise IsADirectoryError(21, "a folder")
         raise ValueError("it is no regular file")
     with path.open("rb") as file:
-        content = file.read(min(os.fstat(file.fileno()).st_size, most) + 1)  # what is asked for is allocated
-        while len(content) <= most and (more := file.read(min(len(content), most) + 1)):  # written meanwhile
+        content = file.read(min(os.fstat(file.fileno()).st_size, most) + 1)  # read allocates all it is asked for
+        while len(content) <= most and (more := file.read(min(len(content), most) + 1)):  # the file grew meanwhile
             content += more
     if len(content) > most:
         raise ValueError(f"it has more than {most} bytes")
@@ -44,17 +44,17 @@ def read_file(path: Path, most: int = MOST_BYTES) -> bytes:
 
 
 def unreadable(path: Path, what: str, error: OSError) -> InputError:
-    """What to say of a file that the system does not give, where `what` was expected."""
+    """Return the error for a file that the operating system cannot read, where `what` was expected."""
     if isinstance(error, FileNotFoundError | NotADirectoryError):
         return InputError(f"{path}: no such file; expected {what}")
     return InputError(f"{path}: expected {what}; got {error.strerror or error}")
 
 
 def read_text(path: Path, what: str, most: int) -> str:
-    """The text of a UTF-8 file of at most so many bytes; `what` it is called in messages.
+    """Return the text of a UTF-8 file of at most `most` bytes; messages call it `what`.
 
     Raises:
-        InputError: it cannot be read, is too large, or is no such text.
+        InputError: the file cannot be read, is too large, or is not UTF-8 text.
     """
     try:
         return read_file(path, most).decode("utf-8-sig")
@@ -67,7 +67,7 @@ def read_text(path: Path, what: str, most: int) -> str:
 
 
 def parse_json(content: bytes | str) -> Any:
-    """Plain data of JSON text, with finite numbers, each key once, and text that can be written again."""
+    """Return the data of JSON text. Numbers are finite, keys unique, and every text can be encoded again."""
     text = content.decode() if isinstance(content, bytes) else content
     try:
         data = json.loads(
@@ -76,7 +76,7 @@ def parse_json(content: bytes | str) -> Any:
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
     if _SURROGATE.search(text):
-        json.dumps(data, ensure_ascii=False).encode()  # raises for half a letter
+        json.dumps(data, ensure_ascii=False).encode()  # raises for a lone surrogate
     return data
 
 
@@ -107,7 +107,7 @@ def _whole(text: str) -> int:
 
 
 def inflate(packed: bytes, most: int = MOST_BYTES) -> bytes:
-    """What zlib packed into these bytes, and nothing behind it."""
+    """Return the content that zlib packed into these bytes; nothing may follow it."""
     unpacking = zlib.decompressobj()
     try:
         content = unpacking.decompress(packed, most)
@@ -121,7 +121,7 @@ def inflate(packed: bytes, most: int = MOST_BYTES) -> bytes:
 
 
 def read_members(archive: bytes, wanted: Container[str] | None = None) -> dict[str, bytes]:
-    """The members of a zip archive by name, or those of them that are wanted.
+    """Return the members of an uncompressed zip archive by name, or only the `wanted` ones.
 
     Together they are no larger than the archive, as nothing is compressed. Raises `ValueError` for other bytes.
     """
@@ -133,7 +133,7 @@ def read_members(archive: bytes, wanted: Container[str] | None = None) -> dict[s
                 raise ValueError(f"its {len(archive)} bytes would unpack to {size}")
             names = [info.filename for info in infos]
             members = {name: opened.read(name) for name in names if wanted is None or name in wanted}
-    except Exception as error:  # damage can raise nearly anything in there
+    except Exception as error:  # damaged content can raise nearly any error
         raise ValueError(error_summary(error)) from error
     if len(set(names)) < len(names):
         raise ValueError("it has two members of one name")
@@ -157,13 +157,13 @@ def read_array(content: bytes) -> np.ndarray[Any, Any]:
             raise ValueError(f"expected an array of {dtype} in shape {shape}; got {len(content) - file.tell()} bytes")
         file.seek(0)
         array: np.ndarray[Any, Any] = np.lib.format.read_array(file, allow_pickle=False)
-    except Exception as error:  # as above
+    except Exception as error:  # damaged content can raise nearly any error
         raise ValueError(error_summary(error)) from error
     return array
 
 
 def read_arrays(archive: bytes) -> Mapping[str, np.ndarray[Any, Any]]:
-    """The arrays of the bytes of an `.npz` file."""
+    """Return the arrays of an `.npz` file from its bytes."""
     arrays = {}
     for name, content in read_members(archive).items():
         try:
@@ -174,6 +174,6 @@ def read_arrays(archive: bytes) -> Mapping[str, np.ndarray[Any, Any]]:
 
 
 def error_summary(error: object) -> str:
-    """What an error of another library says, in a line of bounded length."""
+    """Return the message of another library's error on one line of bounded length."""
     text = " ".join(str(error).split()) or type(error).__name__
     return text if len(text) <= _LONGEST_MESSAGE else f"{text[:_LONGEST_MESSAGE]} ..."

@@ -1,4 +1,4 @@
-"""What a container says of itself: in a line or two, and in a notebook with the first rows of its table."""
+"""Text and notebook representations of containers: one or two lines, and in a notebook the first rows of the table."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ _WIDEST = 160
 
 
 class SummaryRepr:
-    """A frozen dataclass (of `repr=False`) that says in a line what it is, where its arrays would fill pages."""
+    """Frozen dataclass (with `repr=False`) with a one-line summary as its repr, as its arrays would fill pages."""
 
     __slots__ = ()
 
     def _summary(self) -> str:
-        """What it is and how much of it there is, to follow its name; by default its fields, arrays by their shapes."""
+        """Return content and size, to follow the class name; by default the fields, arrays by their shapes."""
         names = [name for name in self.__match_args__ if not name.startswith("_")]  # type: ignore[attr-defined]
         told = [f"{name} {_brief(getattr(self, name))}" for name in names[:_MOST_FIELDS]]
         return "of " + ", ".join(told + [ELLIPSIS] * (len(names) > _MOST_FIELDS))
 
     def _detail(self) -> str:
-        """What is most worth knowing of what it holds; empty: nothing."""
+        """Return the most important facts about the content; empty if there are none."""
         return ""
 
     def in_short(self) -> str:
-        """What it is, on one line."""
+        """Return class name and summary on one line."""
         return elided(f"{type(self).__name__} {self._summary()}", _WIDEST)
 
     def __repr__(self) -> str:
@@ -43,13 +43,13 @@ class SummaryRepr:
 
 
 class TabularRepr(SummaryRepr):
-    """One that has a table, too."""
+    """Container that also has a table."""
 
     __slots__ = ()
 
     @abstractmethod
     def to_table(self) -> dict[str, list[Any]]:
-        """Its numbers by columns of one length, as `pandas.DataFrame` and `polars.DataFrame` take them."""
+        """Return columns of equal length by name, as `pandas.DataFrame` and `polars.DataFrame` take them."""
 
     def _repr_html_(self) -> str:
         table = self.to_table()
@@ -61,7 +61,7 @@ class TabularRepr(SummaryRepr):
 
 
 def in_short(value: Any) -> str:
-    """A container on one line; of anything else its kind alone."""
+    """Return a container on one line; of other objects only the type name."""
     return value.in_short() if isinstance(value, SummaryRepr) else type(value).__name__
 
 

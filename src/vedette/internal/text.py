@@ -1,4 +1,4 @@
-"""Numbers of things in words, and names of any length where there is little room."""
+"""Text helpers: counts and units in words, elided names, tables in Markdown."""
 
 from __future__ import annotations
 
@@ -14,68 +14,68 @@ ELLIPSIS = "\N{HORIZONTAL ELLIPSIS}"
 
 
 def printable(text: str) -> str:
-    """The text with letters that no screen shows (control characters, lone surrogates) written as escapes."""
+    """Return the text with unprintable characters (control characters, lone surrogates) as escapes."""
     if text.isprintable():
         return text
     return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
 
 
 def pluralise(number: int, thing: str) -> str:
-    """`1 sensor`, `2 sensors`."""
+    """Return a count with its noun: `1 sensor`, `2 sensors`."""
     return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
 
 
 def join_alternatives(names: Sequence[str]) -> str:
-    """Alternatives in words: "a", "a or b", "a, b or c"."""
+    """Return alternatives in words: "a", "a or b", "a, b or c"."""
     return " or ".join([", ".join(names[:-1]), names[-1]] if names[1:] else names)
 
 
 def named_in(name: str, unit: str) -> str:
-    """`OSPA (m)`; of a quantity without a unit its name alone."""
+    """Return a name with its unit: `OSPA (m)`; without a unit only the name."""
     return f"{name} ({unit})" if unit else name
 
 
 def with_unit(number: str, unit: str) -> str:
-    """`1.25 m`; of a quantity without a unit the number alone."""
+    """Return a number with its unit: `1.25 m`; without a unit only the number."""
     return f"{number} {unit}" if unit else number
 
 
 def unique_name(name: str, taken: Collection[str]) -> str:
-    """The name, or where that is taken the first of `name-2`, `name-3` and so on that is not."""
+    """Return the name, or the first of `name-2`, `name-3` and so on that is not taken."""
     candidates = itertools.chain([name], (f"{name}-{number}" for number in itertools.count(2)))
     return next(candidate for candidate in candidates if candidate not in taken)
 
 
 def with_error(mean: float, error: float | None, sign: str = "") -> str:
-    """`12.30 ± 0.45`; without its standard error where that is not known, None or NaN. sign: "+" for always one."""
+    """Return `12.30 ± 0.45`; without the standard error if it is None or NaN. sign: "+" to always show a sign."""
     text = f"{mean:{sign}.2f}"
     return text if error is None or error != error else f"{text} ± {error:.2f}"
 
 
 def with_minus(text: str) -> str:
-    """The text with minus signs in place of hyphens."""
+    """Return the text with hyphens replaced by minus signs."""
     return text.replace("-", "\N{MINUS SIGN}")
 
 
 def markdown_table(header: Sequence[str], rows: Iterable[Sequence[str]], *, numbers: bool = True) -> str:
-    """A table in Markdown, its first column words; with `numbers` the others end at the right."""
+    """Return a table in Markdown; the first column is left-aligned, the others are right-aligned if `numbers`."""
     lines = ["| " + " | ".join(header) + " |", "| --- |" + (" ---: |" if numbers else " --- |") * (len(header) - 1)]
     return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)]) + "\n"
 
 
 def plain(value: Any) -> str:
-    """A value as a person would write it: numbers of NumPy as numbers, also inside lists."""
-    import numpy as np  # here, as the command line starts without it
+    """Return the repr of a value with NumPy numbers as plain numbers, also inside lists."""
+    import numpy as np  # imported here, as the command line starts without NumPy
 
-    with np.printoptions(legacy="1.25"):  # from 2.0 on the repr of a number names its type
+    with np.printoptions(legacy="1.25"):  # since NumPy 2.0 the repr of a number includes its type
         try:
             return repr(value.tolist() if isinstance(value, np.ndarray) else value)
-        except ValueError:  # a whole number of more digits than Python writes
+        except ValueError:  # an integer with more digits than Python converts
             return "a number of thousands of digits"
 
 
 def shown(value: Any) -> str:
-    """A value in a message: in quotes where it is text, in printable letters, and not long."""
+    """Return a value for a message: quoted if it is text, printable, and at most 80 columns wide."""
     return elided(printable(f"the time {value}" if isinstance(value, date | timedelta) else plain(value)), 80)
 
 
@@ -83,12 +83,14 @@ _NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 
 
 def spreadsheet_text(text: str) -> str:
-    """A text for a cell of a CSV file; one that a spreadsheet would run as a formula has an apostrophe before it."""
+    """Return a text for a cell of a CSV file, with an apostrophe before text that a spreadsheet would run as a
+    formula.
+    """
     return f"'{text}" if text.startswith(("=", "+", "-", "@", "\t", "\r")) and not _NUMBER.fullmatch(text) else text
 
 
 def elided(text: str, most: int = 24) -> str:
-    """The text on one line; what is wider than `most` columns keeps its beginning and its end."""
+    """Return the text on one line; if it is wider than `most` columns, only its beginning and its end."""
     text = " ".join(text.split())
     if cell_len(text) <= most:
         return text
@@ -97,13 +99,13 @@ def elided(text: str, most: int = 24) -> str:
 
 
 def _fitting(text: str, most: int) -> str:
-    """As much of the beginning as fits into so many columns, where wide letters (Chinese, emoji) take two."""
+    """Return the longest beginning that fits into `most` columns; wide characters (Chinese, emoji) take two."""
     first = chop_cells(text, max(most, 1))[0]
     return first if cell_len(first) <= most else ""
 
 
 def elided_apart(names: Sequence[str], most: int = 24) -> tuple[str, ...]:
-    """Each name elided; those that would then look alike have their place in the list, from 1, put behind."""
+    """Return each name elided; names that would then be equal get their position, from 1, appended."""
     short = [elided(name, most) for name in names]
     return tuple(
         text if short.count(text) == 1 else f"{elided(name, most - 5)} ({place})"

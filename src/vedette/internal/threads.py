@@ -1,4 +1,4 @@
-"""Sharing independent items of work over threads, in pieces; kernels run without the interpreter lock."""
+"""Distribution of independent items over threads, in pieces; kernels run without the interpreter lock."""
 
 from __future__ import annotations
 
@@ -9,26 +9,26 @@ from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from threading import Lock
 
-# s. An interruption (Ctrl-C) is answered between two pieces, and between two waits.
+# s. Interruptions (Ctrl-C) are handled between two pieces, and between two waits.
 _PIECE_TIME = 0.1
-# Naming the types of its bundles costs a call of a kernel up to half a millisecond: few pieces, the first of one item.
+# Resolving the types of its bundles costs a kernel call up to 0.5 ms, so pieces are few and the first has one item.
 _GROWTH = 8
 _WAIT_TIME = 0.2
 
 
 def processors() -> int:
-    """Processors that this process may use."""
+    """Return the number of processors that this process may use."""
     affinity = getattr(os, "sched_getaffinity", None)
     return len(affinity(0)) if affinity else os.cpu_count() or 1
 
 
 def run_chunks(work: Callable[[int, int], None], num_items: int, num_threads: int, *, first_piece: int = 1) -> None:
-    """Call `work(first, last)`, piece after piece, so that every item in range(num_items) is covered once.
+    """Call `work(first, last)` for consecutive pieces so that every item in range(num_items) is covered once.
 
-    Each item writes its own results, so they depend neither on the pieces nor on the number of threads. Of several
-    exceptions that of the first item is raised. An interruption is raised when the pieces that have begun are done:
-    each takes about a tenth of a second, or as long as its one item. first_piece: items of the first piece of a thread,
-    more than one where they are known to be quick.
+    Each item writes its own results, so results depend neither on the pieces nor on the number of threads. If several
+    items raise, the exception of the first item is raised. An interruption is raised when the running pieces are
+    finished; a piece takes about a tenth of a second, or as long as one item. first_piece: number of items in the first
+    piece of a thread, more than one if items are known to be quick.
     """
     num_workers = max(1, min(num_threads, num_items))
     if num_workers == 1 and 0 < num_items <= first_piece:
@@ -38,13 +38,13 @@ def run_chunks(work: Callable[[int, int], None], num_items: int, num_threads: in
     if num_workers == 1:
         pieces.run()
     else:
-        with ThreadPoolExecutor(num_workers - 1) as pool:  # this thread works, too: to start one takes a millisecond
+        with ThreadPoolExecutor(num_workers - 1) as pool:  # this thread works too, as starting a thread takes 1 ms
             running = set[Future[None]]()
             try:
                 while len(running) < num_workers - 1:
                     running.add(pool.submit(pieces.run))
                 pieces.run()
-                while running:  # without an end, a wait could not be interrupted everywhere
+                while running:  # a wait without timeout cannot be interrupted on all platforms
                     finished, running = wait(running, timeout=_WAIT_TIME)
                     for one in finished:
                         one.result()
@@ -56,7 +56,10 @@ def run_chunks(work: Callable[[int, int], None], num_items: int, num_threads: in
 
 @dataclass(slots=True)
 class _Pieces:
-    """The items that are left, handed out in order; so all before one that fails have begun, and are finished."""
+    """Queue of the remaining items, handed out in order.
+
+    All items before one that fails have therefore started, and are finished.
+    """
 
     work: Callable[[int, int], None]
     num_items: int
@@ -67,7 +70,7 @@ class _Pieces:
     lock: Lock = field(default_factory=Lock)
 
     def run(self) -> None:
-        """Work on pieces until none is left."""
+        """Process pieces until none is left."""
         most = self.first_piece
         while (piece := self._take(most))[0] < piece[1]:
             first, last = piece
@@ -81,7 +84,7 @@ class _Pieces:
             most = max(1, min(_GROWTH * most, int(rate * _PIECE_TIME)))
 
     def stop(self) -> None:
-        """Hand out no more."""
+        """Stop handing out pieces."""
         with self.lock:
             self.num_items = self.next_item
 

@@ -1,4 +1,4 @@
-"""Numbers that are valid but can hardly be meant: angles in degrees, places in degrees."""
+"""Warnings about values that are valid but probably in the wrong unit: angles or positions in degrees."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from vedette.errors import ImplausibleWarning
 
-LARGE_ANGLE = 0.5  # rad; a bearing with a larger standard deviation says little
-# An area of less than a metre, so many times as far from the origin as it is wide, where degrees may be.
+LARGE_ANGLE = 0.5  # rad; a bearing with a larger standard deviation carries little information
+# An area is in degrees if it is smaller than 1 m, its distance from the origin exceeds 20 times its width, and its
+# corners are valid longitudes and latitudes.
 _SMALL, _FAR, _MOST_DEGREES = 1.0, 20.0, np.array([180.0, 90.0])
 
 
@@ -22,7 +23,7 @@ _told = ContextVar("told", default=False)
 
 @contextmanager
 def suppress_unit_warnings() -> Iterator[None]:
-    """Without these warnings: of a scenario the check gives them, and of scans that are drawn nobody wants them."""
+    """Context manager that suppresses these warnings, for checked scenarios and simulated scans."""
     before = _told.set(True)
     try:
         yield
@@ -31,13 +32,13 @@ def suppress_unit_warnings() -> Iterator[None]:
 
 
 def warn_implausible(field: str, expected: str, got: str, meant: str) -> None:
-    """Warn of a value that is valid, and say what was probably meant."""
+    """Warn about a valid value that is probably a mistake, and suggest what was meant."""
     if not _told.get():
         warnings.warn(f"{field}: expected {expected}; got {got} ({meant}?)", ImplausibleWarning, stacklevel=3)
 
 
 def look_like_degrees(corners: NDArray[np.float64]) -> bool:
-    """Whether (n, 2) corners of an area are rather longitudes and latitudes than metres."""
+    """Return True if (n, 2) corners of an area are probably longitudes and latitudes rather than metres."""
     extent = float(np.ptp(corners, axis=0).max())
     could_be = bool((np.abs(corners) <= _MOST_DEGREES).all())
     return could_be and extent < _SMALL and float(np.hypot(*corners.T).min()) > _FAR * extent
