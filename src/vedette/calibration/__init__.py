@@ -1,4 +1,4 @@
-"""What sensors are like, by their recorded scans alone: biases, noise, detection, clutter."""
+"""Sensor calibration from recorded scans alone: biases, noise, detection, clutter."""
 
 from vedette.calibration.bias_drift import (
     BiasEstimatorState,

@@ -1,4 +1,4 @@
-"""Biases that change: found window by window of a recording, or followed while scans come in."""
+"""Time-varying biases: estimated per window of a recording, or online from incoming scans."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from vedette.recorded.instants import Look, in_order, without_bias
 from vedette.tracking import SensorScan
 from vedette.tracking.late import name_of, own_scan
 
-_KEPT = 4.0  # windows for which what was found is remembered
+_KEPT = 4.0  # number of windows whose estimates are kept
 
 
 class CalibrationWindow(NamedTuple):
-    """What was found of a part of a recording, from `begin` to before `end`, s after its first scan."""
+    """Calibration of the part of a recording from `begin` to before `end`, s after its first scan."""
 
     begin: float
     end: float
@@ -33,16 +33,16 @@ class CalibrationWindow(NamedTuple):
 def calibrate_windows(
     problem: Problem, seconds: float, watch: Callable[[], None] = lambda: None
 ) -> Iterator[CalibrationWindow]:
-    """Calibrate the parts of a recording one after the other, each by itself.
+    """Calibrate the parts of a recording separately, in order of time.
 
     Args:
         problem: the recording and the parameters.
-        seconds: of a part; all are equally long, about so; inf: of the whole.
+        seconds: approximate duration of a part, s; all parts have the same; inf: the whole recording.
         watch: see `calibrate`.
 
     Raises:
-        InputError: seconds that are no number above 0.
-        VedetteError: as of `calibrate`.
+        InputError: seconds that are not a number above 0.
+        VedetteError: as `calibrate`.
     """
     if seconds != math.inf:
         positive("seconds", seconds)
@@ -55,16 +55,17 @@ def calibrate_windows(
 
 
 def warm_started(problem: Problem, calibration: Calibration) -> Problem:
-    """The problem whose parameters start where they were found."""
+    """Return the problem with each parameter starting at its estimate."""
     found = {replace(each.parameter, start=0.0): each.value for each in calibration.estimates}
     parameters = [replace(each, start=found.get(replace(each, start=0.0), each.start)) for each in problem.parameters]
     return replace(problem, parameters=tuple(parameters))
 
 
 class WindowEstimate(NamedTuple):
-    """The parameters as a window has them.
+    """Parameters estimated from one window.
 
-    time: s, its middle. values, stds: (num_parameters,) with standard deviations, NaN where they were not found.
+    time: middle of the window, s. values, stds: (num_parameters,) with standard deviations, NaN for parameters that
+    were not estimated.
     """
 
     time: float
@@ -74,16 +75,16 @@ class WindowEstimate(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BiasEstimatorState:
-    """What is known of the sensors so far.
+    """State of an `OnlineBiasEstimator`.
 
     Attributes:
-        parameters: each starting where it was last found.
-        scans: of the last window, as they came.
-        newest: s, the latest time of all; None before the first.
-        due: s, from which on biases are found again.
-        pieces: of the last windows, in order of time.
-        latest: what was found last; None before anything was.
-        num_estimates: how often.
+        parameters: the parameters, each starting at its latest estimate.
+        scans: scans of the last window, in order of arrival.
+        newest: latest time of all scans, s; None before the first.
+        due: time from which the next estimate is due, s.
+        pieces: estimates of the last windows, in order of time.
+        latest: latest calibration; None before the first.
+        num_estimates: number of calibrations so far.
     """
 
     parameters: tuple[Parameter, ...]
@@ -97,21 +98,21 @@ class BiasEstimatorState:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OnlineBiasEstimator:
-    """Takes scans as they come, finds the sensors' biases in the last of them every so often, and takes them off.
+    """Estimates the sensors' biases from incoming scans at regular intervals, and removes them from the scans.
 
-    Biases of what is measured and of places are followed, from the first full window on. Clocks, noise, detection and
-    clutter, of which a window says little, are as the parameters start: see `warm_started` for what a longer recording
-    says of them. Within a window biases are constant, as of its middle; from there on they go straight, through what
-    was found in the window before it, as far as the change stands out of the errors: by d^2 / (d^2 + var d) of it.
+    Biases of measurements and positions are estimated from the first full window on. Clocks, noise, detection and
+    clutter stay at the parameters' start values, as a window contains little information about them; see `warm_started`
+    to start from a longer recording. The estimate of a window is the bias at its middle. From there it is extrapolated
+    linearly through the estimate of the window before, with the change d shrunk by d^2 / (d^2 + var d).
 
     Attributes:
-        problem: the sensors and their parameters, as of `vedette.scenarios.calibrated.problem_of`; of its recording
-            where bearings count from.
-        window: s, of the scans that biases are found in.
-        every: s from one time to the next.
+        problem: the sensors and their parameters, see `vedette.scenarios.calibrated.problem_of`; its recording gives
+            the zero of the bearings.
+        window: duration of the scans that an estimate uses, s.
+        every: time between estimates, s.
 
     Raises:
-        InputError: something else than a problem, no positive times.
+        InputError: not a problem, or times that are not positive.
     """
 
     problem: Problem
@@ -124,22 +125,22 @@ class OnlineBiasEstimator:
         positive("every", self.every)
 
     def initial(self) -> BiasEstimatorState:
-        """Before the first scan: biases as the parameters start."""
+        """Return the state before the first scan: biases at the parameters' start values."""
         return BiasEstimatorState(self.problem.parameters)
 
     def take(self, state: BiasEstimatorState, scan: SensorScan) -> tuple[BiasEstimatorState, SensorScan]:
-        """Take a scan, and find the biases again where that is due.
+        """Process a scan, and estimate the biases again if that is due.
 
         Args:
-            state: as the call before left it.
-            scan: of one sensor, as it came.
+            state: state after the call before.
+            scan: scan of one sensor, as received.
 
         Returns:
-            The state with it, and the scan as the sensor would have made it without its biases, for a tracker.
+            The new state, and the scan without the sensor's biases, for a tracker.
 
         Raises:
-            InputError: a sensor that there is not, a time, a pose or measurements that no scan of it has.
-            VedetteError: as of `calibrate`.
+            InputError: an unknown sensor, or a time, pose or measurements that the sensor cannot have.
+            VedetteError: as `calibrate`.
         """
         scan = self._checked(scan)
         newest = scan.time if state.newest is None else max(state.newest, scan.time)
@@ -151,7 +152,7 @@ class OnlineBiasEstimator:
         return state, self.corrected(state, scan)
 
     def corrected(self, state: BiasEstimatorState, scan: SensorScan) -> SensorScan:
-        """The scan without the biases of its time, as they are known; errors as of `take`."""
+        """Return the scan without the biases estimated for its time; raises as `take`."""
         own = self._checked(scan)
         site = self.problem.with_biases(self.biases(state, own.time))[own.sensor]
         look = Look(own.time, own.sensor, own.measurements, own.pose)
@@ -165,7 +166,10 @@ class OnlineBiasEstimator:
         return replace(own, measurements=float_array(f"{name_of(own)}: scan", measured, shape))
 
     def biases(self, state: BiasEstimatorState, time: float) -> Floats:
-        """(num_parameters,) the values of the parameters at a time, at most a window after the last that were found."""
+        """(num_parameters,) values of the parameters at a time.
+
+        They are extrapolated to at most a window after the last window.
+        """
         values = np.array([each.start for each in state.parameters])
         for i, each in enumerate(state.parameters):
             pieces = [piece for piece in state.pieces if math.isfinite(piece.stds[i])]
@@ -181,7 +185,7 @@ class OnlineBiasEstimator:
         return values
 
     def _found(self, state: BiasEstimatorState) -> BiasEstimatorState:
-        """The state with what the last window says."""
+        """Return the state with the estimates of the last window."""
         assert state.newest is not None
         recorded, start = self.problem.recording, min(scan.time for scan in state.scans)
         looks = [Look(each.time - start, each.sensor, each.measurements, each.pose) for each in state.scans]

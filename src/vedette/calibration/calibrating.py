@@ -1,4 +1,4 @@
-"""The sensors of a recording by maximum likelihood: a first guess, the maximum, and what cannot be found."""
+"""Maximum likelihood calibration of the sensors of a recording: initial guess, maximum, identifiability."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ from vedette.calibration.registration import (
 from vedette.internal.quantities import COMPONENTS, QUANTITIES
 from vedette.kernels.base.types import Floats
 
-_NEARER = 3.0  # times the noise that was found, in the second round
+_NEARER = 3.0  # multiple of the estimated noise, in the next round
 _QUANTILE = 1.959964  # of the normal distribution, 97.5 %
-_COMPARED = ("clock", "x", "y")  # with those of the first sensor
-_SHORT = 1.0  # of log likelihood, by which a search that holds parameters at most exceeds one that does not
-_PART = 0.1  # of a parameter that lies where nothing is known: it cannot be found
+_COMPARED = ("clock", "x", "y")  # components that are relative to those of the first sensor
+_SHORT = 1.0  # log likelihood by which a search with fixed parameters may exceed the full search
+_PART = 0.1  # share of a parameter in undetermined directions above which it is not identifiable
 
 
 class ParameterEstimate(NamedTuple):
-    """What was found of a parameter.
+    """Estimate of a parameter.
 
-    value, low, high: with the interval that covers it 95 times of 100; NaN where the search did not converge. why: why
-    it cannot be found; empty where it is.
+    value, ci_low, ci_high: estimate and its 95 % confidence interval; NaN limits if the search did not converge.
+    reason: why the parameter is not identifiable; empty if it is.
     """
 
     parameter: Parameter
@@ -44,15 +44,16 @@ class ParameterEstimate(NamedTuple):
 
     @property
     def std(self) -> float:
-        """Standard deviation of a parameter whose scale is plain; NaN where there is no interval."""
+        """Standard deviation of a parameter on a plain scale; NaN if there is no interval."""
         return (self.ci_high - self.ci_low) / (2.0 * _QUANTILE)
 
 
 class Calibration(NamedTuple):
-    """What was found of all parameters.
+    """Estimates of all parameters.
 
-    log_likelihood, before: of the recording, as found and as it was said. converged: whether the search came to an end.
-    rank: of the information, the number of directions of the parameters that the recording says something of.
+    log_likelihood, initial_log_likelihood: of the recording, with the estimates and with the assumed values. converged:
+    whether the search converged. rank: rank of the information matrix, the number of directions in parameter space that
+    the recording determines.
     """
 
     estimates: tuple[ParameterEstimate, ...]
@@ -65,15 +66,15 @@ class Calibration(NamedTuple):
 def calibrate(
     problem: Problem, watch: Callable[[], None] = lambda: None, only: Sequence[Parameter] | None = None
 ) -> Calibration:
-    """The maximum of the likelihood of a recording over what its sensors may be like.
+    """Return the parameters that maximise the likelihood of a recording.
 
     Args:
         problem: the recording and the parameters.
-        watch: called whenever the recording was tracked once more.
-        only: the parameters that are found, while others are as they start; None: all.
+        watch: called after each tracking of the recording.
+        only: the parameters to estimate, with the others fixed at their start values; None: all.
 
     Raises:
-        VedetteError: a filter that cannot take the recording.
+        VedetteError: a filter cannot process the recording.
     """
 
     said = problem.free([each.start for each in problem.parameters])
@@ -89,13 +90,13 @@ def calibrate(
     guessed, pairs = _guess(problem, said, asked, watch)
     start = guessed if float(terms(guessed[asked], asked).sum()) > before else said.copy()
     together = sensors_with_common_targets(pairs, len(problem.sites))
-    apart = np.flatnonzero(~together | (together.sum() == 1)).tolist()  # with nobody else, the first one is, too
+    apart = np.flatnonzero(~together | (together.sum() == 1)).tolist()  # without linked sensors the first is apart, too
     found, directions, own = dict[int, ParameterEstimate](), list[int](), asked
     highest, again = math.inf, False
     while True:
         maximum, judged, rank = _found(problem, own, partial(terms, own=own), start[own], apart)
         if not again and maximum.log_likelihood > highest + _SHORT:
-            # With some held it is higher: the search of all ended short of its maximum, and starts from here, once.
+            # Higher with fixed parameters: the full search stopped short of its maximum; restart it from here, once.
             start[own], own, again = maximum.at, asked, True
             directions.clear()
             continue
@@ -105,13 +106,13 @@ def calibrate(
         told = [i for i in own if not found[i].reason]
         if told == own or not told:
             break
-        # What cannot be found stays as it was said: the others are at the maximum beside that.
+        # Fix parameters that are not identifiable at the assumed values, and maximise over the others.
         unknown = np.array([problem.parameters[i].unknown for i in own])
         start[own] = conditional_maximum(maximum, unknown, [i not in told for i in own], said[own])
         own = told
     log_likelihood = maximum.log_likelihood if told else before
     kept = tuple(found[i] for i in asked)
-    if not maximum.converged:  # second derivatives elsewhere than at a maximum are no information
+    if not maximum.converged:  # second derivatives away from a maximum are not the information
         kept = tuple(each._replace(ci_low=math.nan, ci_high=math.nan) for each in kept)
     return Calibration(kept, log_likelihood, before, maximum.converged, directions[0])
 
@@ -119,7 +120,7 @@ def calibrate(
 def _found(
     problem: Problem, own: Sequence[int], terms: Terms, start: Floats, apart: Sequence[int]
 ) -> tuple[Maximum, tuple[ParameterEstimate, ...], int]:
-    """The maximum over some of the parameters, what it says of each, and of how many directions it says something."""
+    """Return the maximum over some of the parameters, their estimates, and the number of determined directions."""
     parameters = tuple(problem.parameters[i] for i in own)
     unknown = np.array([each.unknown for each in parameters])
     maximum = maximise(terms, start, unknown, _blocks(parameters))
@@ -129,9 +130,9 @@ def _found(
 
 
 def _blocks(parameters: tuple[Parameter, ...]) -> list[list[int]]:
-    """Who may depend on whom: all biases; and of a sensor noise, detection and clutter.
+    """Return the groups of parameters that may be correlated: all biases; and per sensor noise, detection and clutter.
 
-    Between biases and the rest the information is 0 where measurements are Gaussian.
+    The information between biases and the rest is 0 if measurements are Gaussian.
     """
     blocks = [[i for i, each in enumerate(parameters) if each.kind == "bias"]]
     for s in sorted({each.sensor for each in parameters}):
@@ -142,14 +143,15 @@ def _blocks(parameters: tuple[Parameter, ...]) -> list[list[int]]:
 def _guess(
     problem: Problem, said: Floats, own: Sequence[int], watch: Callable[[], None]
 ) -> tuple[Floats, MatchedMeasurements]:
-    """A first guess, of `own` among the biases, and what it was made from.
+    """Return an initial guess, for the biases among `own`, and the matched measurements that it is based on.
 
-    Tracks by noise as wide as biases may be, then by narrower noise, and what fits them.
+    The recording is tracked with noise as wide as the biases may be, then with narrower noise; biases are fitted each
+    time.
     """
     values, sites = problem.values(said), problem.sites
     far = np.array([[QUANTITIES[name].far for name in 2 * COMPONENTS[site.kind]][:2] for site in sites])
     asked, unknown = np.zeros((len(sites), len(BIASES)), bool), np.ones((len(sites), len(BIASES)))
-    # Range rates are not in the first guess: their noise is as wide as their bias may be.
+    # The initial guess leaves out range rates: their noise is as wide as their bias may be.
     places, wide = {}, QUANTITIES["range_rate"].far
     for i, each in enumerate(problem.parameters):
         if each.kind == "bias" and i in own and each.component in BIASES:
@@ -169,14 +171,17 @@ def _guess(
 
 
 def _period(problem: Problem) -> float:
-    """s; between scans of the slowest sensor."""
+    """Return the mean period of the slowest sensor, s."""
     recording = problem.recording
     nums = [sum(scans[s] is not None for scans in recording.scans) for s in range(len(problem.sites))]
     return max(1e-3, float(recording.times[-1])) / max(1, min(num for num in nums if num))
 
 
 def _with_noise(problem: Problem, values: Floats, stds: Floats, rates: float | None) -> Floats:
-    """The values with noise of these standard deviations, (num_sensors, 2), and of range rates, m/s; None: as said."""
+    """Return the values with noise of these standard deviations, (num_sensors, 2).
+
+    rates: the same for range rates, m/s; None: as assumed.
+    """
     values = values.copy()
     for i, each in enumerate(problem.parameters):
         if each.kind == "noise":
@@ -187,7 +192,7 @@ def _with_noise(problem: Problem, values: Floats, stds: Floats, rates: float | N
 
 
 def _with_counts(problem: Problem, values: Floats, pairs: MatchedMeasurements) -> Floats:
-    """The values with probabilities of detection and clutter as tracks and measurements were matched."""
+    """Return the values with detection probabilities and clutter rates from the matched tracks and measurements."""
     values, hits = values.copy(), np.bincount(pairs.sensors, minlength=len(problem.sites))
     for i, each in enumerate(problem.parameters):
         s = each.sensor
@@ -201,9 +206,9 @@ def _with_counts(problem: Problem, values: Floats, pairs: MatchedMeasurements) -
 def _judged(
     problem: Problem, at: Floats, cov: Floats, lost: Floats, apart: Sequence[int]
 ) -> tuple[ParameterEstimate, ...]:
-    """Each parameter with its interval, or why it cannot be found.
+    """Return the estimate of each parameter with its interval, or with the reason why it is not identifiable.
 
-    cov, lost: as of `covariance`. apart: sensors without targets that others see.
+    cov, lost: results of `covariance`. apart: sensors that share no targets with the others.
     """
     found = []
     for i, (each, free) in enumerate(zip(problem.parameters, at.tolist(), strict=True)):

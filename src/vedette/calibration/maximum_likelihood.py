@@ -1,7 +1,7 @@
-"""Where a log likelihood of many terms is greatest, and how surely.
+"""Maximum of a log likelihood that is a sum of many terms, and its information matrix.
 
-Steps are by the outer products of the terms' scores (Berndt, Hall, Hall, Hausman 1974), which need no second
-differences and are the information where the model holds; what is said in the end is by second differences.
+Steps use the outer products of the terms' scores (Berndt, Hall, Hall, Hausman 1974), which need no second differences
+and equal the information if the model holds. The final information uses second differences.
 """
 
 from __future__ import annotations
@@ -13,22 +13,22 @@ import numpy as np
 
 from vedette.kernels.base.types import Bools, Floats
 
-Terms = Callable[[Floats], Floats]  # the terms of the log likelihood, of all parameters on their scales
-_ENOUGH = 0.05  # of log likelihood that a further step promises
-_JUMPS = 0.5  # the same, by second derivatives: the terms may jump by so much
+Terms = Callable[[Floats], Floats]  # terms of the log likelihood as a function of all parameters on their scales
+_ENOUGH = 0.05  # convergence: log likelihood that a further step promises
+_JUMPS = 0.5  # the same by second derivatives: the terms may jump by this much
 _MOST_STEPS = 15
-_SHARES = (1.0, 0.5, 0.25, 0.1)  # of a step
-_STEP = 0.5  # of differences, in conditional standard deviations
-_TELLING = 4.0  # eigenvalue of the information, in units of what is unknown, above which a direction is known
+_SHARES = (1.0, 0.5, 0.25, 0.1)  # fractions of a step to try
+_STEP = 0.5  # step of differences, in conditional standard deviations
+_TELLING = 4.0  # eigenvalue of the information, in units of `unknown`, above which a direction is determined
 _REFINEMENTS = 3
-_ALIKE = 1.5  # the curvature found over a step and the one it was chosen by
+_ALIKE = 1.5  # largest ratio of the curvature over a step and the curvature that chose the step
 
 
 class Maximum(NamedTuple):
-    """Of p parameters on their scales.
+    """Maximum over p parameters on their scales.
 
-    at: (p,) where. log_likelihood: there. information: (p, p) minus its second derivatives there. converged: whether
-    a further step promises next to nothing, by outer products or by second derivatives.
+    at: (p,) parameters. log_likelihood: value there. information: (p, p) minus its second derivatives there. converged:
+    whether a further step promises next to nothing, by outer products or by second derivatives.
     """
 
     at: Floats
@@ -38,14 +38,14 @@ class Maximum(NamedTuple):
 
 
 def maximise(terms: Terms, start: Floats, unknown: Floats, blocks: Sequence[Sequence[int]]) -> Maximum:
-    """The greatest sum of terms near a start.
+    """Return the maximum of a sum of terms near a start.
 
     Args:
-        terms: (num_terms,) of parameters (p,).
+        terms: (num_terms,) as a function of parameters (p,).
         start: (p,).
-        unknown: (p,) size of each parameter; a direction in which the terms hardly change over such a size is not
+        unknown: (p,) prior scale of each parameter; directions in which the terms hardly change over it are not
             followed.
-        blocks: parameters between whom second derivatives are taken; they are 0 between others.
+        blocks: groups of parameters with second derivatives within a group; they are 0 between groups.
     """
     at, steps = start.copy(), 0.01 * unknown
     highest, converged = float(terms(at).sum()), False
@@ -63,19 +63,19 @@ def maximise(terms: Terms, start: Floats, unknown: Floats, blocks: Sequence[Sequ
         highest = found
     slope, information = _second(terms, at, highest, 2.0 * steps, blocks)
     way = covariance(information, unknown)[0] @ slope
-    converged = converged or float(0.5 * slope @ way) < _JUMPS  # outer products promise too much where the terms jump
+    converged = converged or float(0.5 * slope @ way) < _JUMPS  # outer products promise too much if the terms jump
     at, highest = _best(terms, at, way, highest)
     return Maximum(at, highest, _refined(terms, at, highest, information, unknown), converged)
 
 
 def covariance(information: Floats, unknown: Floats) -> tuple[Floats, Floats]:
-    """What an information says: (p, p) the covariance within what it can tell, and (p, p) the projector onto what not.
+    """Return (p, p) the covariance in the determined directions, and (p, p) the projector onto the undetermined ones.
 
     Args:
         information: (p, p).
-        unknown: (p,) standard deviation of each parameter from which on nothing is known of it. The projector is of
-            parameters in these units: its diagonal is the share of each that is not known, and beside the diagonal
-            stands which of them cannot be told apart.
+        unknown: (p,) standard deviation of each parameter from which it counts as unknown. The projector is for
+            parameters in these units: its diagonal is the undetermined share of each, and its other entries show which
+            parameters cannot be separated.
     """
     values, vectors = _spectrum(information, unknown)
     known: Bools = values > _TELLING
@@ -85,10 +85,10 @@ def covariance(information: Floats, unknown: Floats) -> tuple[Floats, Floats]:
 
 
 def conditional_maximum(maximum: Maximum, unknown: Floats, held: Sequence[bool], values: Floats) -> Floats:
-    """(p,) about where the maximum is when some parameters are held at these values.
+    """(p,) approximate maximum with some parameters held at these values.
 
-    By the second derivatives, as of the mean of a Gaussian given some of its components; what they cannot tell keeps
-    still within `unknown`.
+    Uses the second derivatives, like the mean of a Gaussian conditioned on some of its components; directions that they
+    do not determine stay within `unknown`.
     """
     known, fixed = ~np.asarray(held), np.asarray(held)
     bend = maximum.information + np.diag(unknown**-2.0)
@@ -99,17 +99,17 @@ def conditional_maximum(maximum: Maximum, unknown: Floats, held: Sequence[bool],
 
 
 def _spectrum(information: Floats, unknown: Floats) -> tuple[Floats, Floats]:
-    """Eigenvalues and eigenvectors for parameters in units of `unknown`."""
+    """Return eigenvalues and eigenvectors of the information for parameters in units of `unknown`."""
     scaled = information * np.outer(unknown, unknown)
     values, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
     return values, vectors
 
 
 def _refined(terms: Terms, at: Floats, highest: float, information: Floats, unknown: Floats) -> Floats:
-    """(p, p) the information with each of its eigenvalues by differences over that direction's standard deviation.
+    """(p, p) information, each eigenvalue by differences over the standard deviation of its direction.
 
-    What few parameters in common leave open is small beside what each says alone, and by differences over steps of
-    each alone is lost in their errors.
+    The information about a poorly determined combination of parameters is small compared with that about each
+    parameter, and differences over steps in single parameters lose it in their errors.
     """
     values, vectors = _spectrum(information, unknown)
     for i in range(len(values)):
@@ -124,9 +124,9 @@ def _refined(terms: Terms, at: Floats, highest: float, information: Floats, unkn
 
 
 def _best(terms: Terms, at: Floats, way: Floats, highest: float) -> tuple[Floats, float]:
-    """Where a share of a step leads that goes up, or several of them; where none does, nowhere.
+    """Return the point after the first share of a step that improves the sum, and its value; the start if none does.
 
-    Far from the maximum outer products make steps that are too short.
+    If the whole step improves it, longer ones are tried, as far from the maximum outer products make too short steps.
     """
     for share in _SHARES:
         found = float(terms(at + share * way).sum())
@@ -149,7 +149,7 @@ def _scores(terms: Terms, at: Floats, steps: Floats) -> Floats:
 def _second(
     terms: Terms, at: Floats, highest: float, steps: Floats, blocks: Sequence[Sequence[int]]
 ) -> tuple[Floats, Floats]:
-    """(p,) slope and (p, p) minus the second derivatives, by central differences over `steps`."""
+    """(p,) gradient and (p, p) minus the second derivatives, by central differences over `steps`."""
     ways = np.diag(steps)
     up = np.array([float(terms(at + way).sum()) for way in ways])
     down = np.array([float(terms(at - way).sum()) for way in ways])

@@ -1,4 +1,4 @@
-"""What is to be found of the sensors of a recording, and how likely the recording is where they are such."""
+"""Sensor parameters to be estimated from a recording, and the likelihood of the recording given their values."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from vedette.recorded import RecordedScans, Site, without_biases
 from vedette.tracking import Tracker
 
 Kind = Literal["bias", "noise", "detection", "clutter"]
-_AT_ONCE = 1e-6  # s; scans nearer than this are of one instant
+_AT_ONCE = 1e-6  # s; scans closer in time are simultaneous
 Scale = Literal["plain", "log", "logit"]
 
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """A number that says what a sensor is like.
+    """Parameter of a sensor.
 
     Attributes:
-        sensor: its number, from 0.
-        kind: what it is of.
-        component: what of: of a bias a field of `vedette.models.Bias`, of noise a component of the measurement.
+        sensor: number of the sensor, from 0.
+        kind: bias, noise, detection or clutter.
+        component: for a bias a field of `vedette.models.Bias`, for noise a component of the measurement.
         name: as in the sensors file: "range", "noise.sigma_range".
         unit: "m", "deg", "s", "per scan", "".
-        start: what it is taken for before anything is known.
-        per_si: its value where the SI value is 1; negative where it counts the other way.
-        scale: of what its intervals are symmetric: itself, its logarithm or its log-odds.
-        unknown: standard deviation, on that scale, from which on nothing is known of it.
+        start: assumed value before estimation.
+        per_si: value that corresponds to one SI unit; negative if the sign is reversed.
+        scale: quantity in which intervals are symmetric: the value, its logarithm or its log-odds.
+        unknown: standard deviation, on that scale, from which the parameter counts as unknown.
     """
 
     sensor: int
@@ -46,20 +46,20 @@ class Parameter:
 
     @property
     def label(self) -> str:
-        """The name in words, such as "range bias"."""
+        """Name in words, such as "range bias"."""
         component = self.component.replace("_", " ")
         if self.kind == "bias":
             return "clock offset" if self.component == "clock" else f"{component} bias"
         return {"noise": f"{component} noise std", "detection": "detection prob.", "clutter": "clutter rate"}[self.kind]
 
     def to_free(self, value: float) -> float:
-        """On the scale."""
+        """Return a value on the scale."""
         if self.scale == "plain":
             return value
         return math.log(value) if self.scale == "log" else math.log(value) - math.log1p(-value)
 
     def from_free(self, free: float) -> float:
-        """The value of what is so on the scale."""
+        """Return the value of a number on the scale."""
         if self.scale == "plain":
             return free
         bounded = min(max(free, -30.0), 30.0)
@@ -67,11 +67,11 @@ class Parameter:
 
 
 def with_biases(sites: Sequence[Site], parameters: Sequence[Parameter], values: Floats) -> list[Site]:
-    """The sensors with the biases among these values of the parameters."""
+    """Return the sensors with the biases among these values of the parameters."""
     found = list(sites)
     for each, value in zip(parameters, values.tolist(), strict=True):
         if each.kind == "bias":
-            # The bearing of a `Bias` has the rows' direction, as its parameter has.
+            # The bearing of a `Bias` has the direction of the recorded rows, like its parameter.
             own, change = found[each.sensor], {each.component: value / abs(each.per_si)}
             found[each.sensor] = replace(own, bias=replace(own.bias, **change))
     return found
@@ -79,14 +79,14 @@ def with_biases(sites: Sequence[Site], parameters: Sequence[Parameter], values: 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Problem:
-    """A recording and what is to be found of its sensors.
+    """Calibration problem: a recording and the sensor parameters to estimate.
 
     Attributes:
-        recording: as it was made, biases in it.
-        sites: the sensors, with their biases where no parameter says otherwise.
-        parameters: what is to be found.
-        tracker: one for sensors as these values of the parameters say, which draws no random numbers; and
-            (num_sensors,) what is to be added to its log likelihood for each scan.
+        recording: as recorded, including biases.
+        sites: the sensors, with their biases except those that are parameters.
+        parameters: the parameters to estimate.
+        tracker: function of the parameter values; returns a deterministic tracker for such sensors, and (num_sensors,)
+            what to add to its log likelihood per scan.
     """
 
     recording: RecordedScans
@@ -95,26 +95,26 @@ class Problem:
     tracker: Callable[[Floats], tuple[Tracker, Floats]]
 
     def values(self, free: Floats) -> Floats:
-        """(num_parameters,) values of what is so on their scales."""
+        """(num_parameters,) values of numbers on the parameters' scales."""
         return np.array([each.from_free(x) for each, x in zip(self.parameters, free.tolist(), strict=True)])
 
     def free(self, values: Sequence[float]) -> Floats:
-        """(num_parameters,) values on their scales."""
+        """(num_parameters,) values on the parameters' scales."""
         return np.array([each.to_free(float(x)) for each, x in zip(self.parameters, values, strict=True)])
 
     def without_biases(self, values: Floats) -> RecordedScans:
-        """The recording as sensors without such biases would have made it."""
+        """Return the recording as sensors without these biases would have made it."""
         return without_biases(self.recording, self.with_biases(values))
 
     def with_biases(self, values: Floats) -> list[Site]:
-        """The sensors with the biases among these values of the parameters."""
+        """Return the sensors with the biases among these values of the parameters."""
         return with_biases(self.sites, self.parameters, values)
 
     def log_likelihoods(self, free: Floats) -> Floats:
-        """(num_scans,) what each scan of each sensor adds to the log likelihood, whatever order they are in.
+        """(num_scans,) contribution of each scan to the log likelihood, ordered by sensor and then by scan.
 
-        Scans of one instant have their sum in the first of them. The sum is of what the tracker's filter reports: the
-        log density of each scan given those before it.
+        The first of simultaneous scans has their sum. The total is the sum of the log densities of each scan given
+        those before, as reported by the tracker's filter.
         """
         values = self.values(free)
         recording, (tracker, more) = self.without_biases(values), self.tracker(values)
@@ -132,6 +132,6 @@ class Problem:
             found[places[scanning[0]]] = sum(each.log_likelihood for each in info.filters) + more[scanning].sum()
             places[scanning] += 1
             if at_once and gap > _AT_ONCE:
-                # When another sensor happens to scan next must not decide where those begin who are born here.
+                # The birth positions must not depend on the time of the next scan of another sensor.
                 state, _ = tracker.step(state, [None] * len(scans), poses, math.nextafter(time, math.inf), rngs=rngs)
         return found

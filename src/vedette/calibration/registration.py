@@ -1,7 +1,7 @@
-"""A first guess of what sensors are like: tracks, what each sensor measured of them, and the biases that fit best.
+"""Initial guess for calibration: tracks, the measurements matched with them, and the biases that fit best.
 
-The biases and straight pieces of the tracks are fitted together to the measurements that were matched with tracks, by
-least squares with Huber's weights; noise, detection and clutter are then read off what fits and what does not.
+Biases and straight pieces of the tracks are fitted jointly to the matched measurements by least squares with Huber
+weights; noise, detection and clutter then follow from the residuals and the unmatched measurements.
 """
 
 from __future__ import annotations
@@ -20,25 +20,25 @@ from vedette.recorded import RecordedScans, Site
 from vedette.recorded.instants import with_wrapped_angles
 from vedette.tracking import Tracker
 
-BIASES = ("range", "bearing", "clock", "x", "y")  # of each sensor, in this order, SI, bearings counter-clockwise
-_SURE = 0.5  # existence of a track that measurements are matched with
+BIASES = ("range", "bearing", "clock", "x", "y")  # per sensor, in this order, SI units, bearings counter-clockwise
+_SURE = 0.5  # existence probability above which a track is matched with measurements
 _GATE = 4.0  # standard deviations
 _HUBER = 1.5
 _ROUNDS = 10
-_SCANS_A_PIECE = 5  # of the slowest sensor
-_LEAST_PAIRS = 4  # of a piece
-_LEAST_SEEN = 3  # measurements of a target, by which a sensor has it in common with others
-_MAD = 1.4826  # standard deviation of normal numbers over the median of their sizes
-_POSITION, _SPEED = 1e4, 30.0  # m, m/s: what holds a piece of which measurements say too little
+_SCANS_A_PIECE = 5  # scans of the slowest sensor per piece
+_LEAST_PAIRS = 4  # least number of pairs in a piece
+_LEAST_SEEN = 3  # least number of measurements of a target for a sensor to share it with others
+_MAD = 1.4826  # standard deviation of Gaussian numbers over their median absolute value
+_POSITION, _SPEED = 1e4, 30.0  # m, m/s: prior that regularises poorly determined pieces
 
 
 class MatchedMeasurements(NamedTuple):
-    """Measurements that were matched with tracks.
+    """Measurements matched with tracks.
 
-    times: (n,) s. sensors, tracks: (n,) numbers. measured: (n, 2) the first two components, NaN where there is no
-    second one; range rates are left to the likelihood. poses: (n, 2) of the sensors. states: (n, 4) of the tracks,
-    predicted. missed, false, scans: (num_sensors,) tracks without a measurement, measurements without a track, and
-    scans.
+    times: (n,) s. sensors, tracks: (n,) numbers. measured: (n, 2) first two components, NaN if there is only one; range
+    rates are left to the likelihood. poses: (n, 2) positions of the sensors. states: (n, 4) predicted states of the
+    tracks. missed, false, scans: (num_sensors,) numbers of tracks without a measurement, of measurements without a
+    track, and of scans.
     """
 
     times: Floats
@@ -55,13 +55,13 @@ class MatchedMeasurements(NamedTuple):
 def match_measurements(
     tracker: Tracker, recording: RecordedScans, sites: Sequence[Site], stds: Floats
 ) -> MatchedMeasurements:
-    """What a tracker's tracks and the scans have in common.
+    """Match measurements with the tracks of a tracker.
 
     Args:
-        tracker: of the sensors; draws nothing.
-        recording: without the biases that are known.
+        tracker: tracker for the sensors; draws no random numbers.
+        recording: recording without the known biases.
         sites: the sensors.
-        stds: (num_sensors, 2) by which measurements may lie beside tracks.
+        stds: (num_sensors, 2) standard deviations for gating measurements around tracks.
     """
     rngs = (np.random.default_rng(0),) * len(sites)
     state, rows, numbers = tracker.initial(), list[tuple[float | int, ...]](), dict[tuple[int, ...], int]()
@@ -90,7 +90,7 @@ def match_measurements(
 
 
 def _assigned(scan: Floats, offsets: Floats, place: Floats, kind: str, stds: Floats) -> list[tuple[int, int]]:
-    """Measurements and tracks that belong together, each at most once, none beyond the gate."""
+    """Return pairs of measurement and track, each at most once and within the gate."""
     if not len(scan) or not len(offsets):
         return []
     predicted = _measured_of(offsets, place, kind)
@@ -123,7 +123,7 @@ def _slopes(offsets: Floats, kind: str) -> Floats:
 
 
 def sensors_with_common_targets(pairs: MatchedMeasurements, num_sensors: int) -> Bools:
-    """(num_sensors,) which sensors have targets in common with the first, or with others that have."""
+    """(num_sensors,) whether a sensor shares targets with the first, directly or through other sensors."""
     counts = np.zeros((num_sensors, pairs.tracks.max(initial=-1) + 1), np.int64)
     np.add.at(counts, (pairs.sensors, pairs.tracks), 1)
     seen: Bools = counts >= _LEAST_SEEN
@@ -134,7 +134,7 @@ def sensors_with_common_targets(pairs: MatchedMeasurements, num_sensors: int) ->
 
 
 class Registration(NamedTuple):
-    """Biases (num_sensors, 5) as `BIASES`, and (num_sensors, 2) standard deviations of what they leave."""
+    """Biases (num_sensors, 5), ordered as `BIASES`, and (num_sensors, 2) standard deviations of the residuals."""
 
     biases: Floats
     stds: Floats
@@ -143,15 +143,15 @@ class Registration(NamedTuple):
 def register(
     pairs: MatchedMeasurements, sites: Sequence[Site], asked: Bools, unknown: Floats, stds: Floats, period: float
 ) -> Registration:
-    """The biases that fit best, with the straight pieces of the tracks.
+    """Return the biases that fit best, jointly with straight pieces of the tracks.
 
     Args:
-        pairs: what is to be fitted.
+        pairs: the matched measurements.
         sites: the sensors.
-        asked: (num_sensors, 5) which biases may be other than 0, as `BIASES`.
-        unknown: (num_sensors, 5) sizes of biases by which what cannot be found is held at 0.
-        stds: (num_sensors, 2) of the measurements, to begin with.
-        period: s, of the slowest sensor.
+        asked: (num_sensors, 5) which biases to estimate, ordered as `BIASES`; the others are 0.
+        unknown: (num_sensors, 5) prior scales of the biases; undetermined ones stay near 0.
+        stds: (num_sensors, 2) initial standard deviations of the measurements.
+        period: of the slowest sensor, s.
     """
     biases = np.zeros(asked.shape)
     pieces, middles, states = _pieces(pairs, _SCANS_A_PIECE * period)
@@ -166,8 +166,10 @@ def register(
 
 
 class _Rows(NamedTuple):
-    """Linear equations: residuals (n, 2), what they lose by the states of pieces and by biases, their standard
-    deviations (n, 2), and the sensor and the piece of each.
+    """Linearised equations.
+
+    residuals: (n, 2). own, of_bias: derivatives of the predictions by the states of the pieces and by the biases. stds:
+    (n, 2) standard deviations. sensors, pieces: (n,) numbers.
     """
 
     residuals: Floats
@@ -179,7 +181,9 @@ class _Rows(NamedTuple):
 
 
 def _pieces(pairs: MatchedMeasurements, length: float) -> tuple[Ints, Floats, Floats]:
-    """(n,) number of the piece of a track that each pair is of, -1: of none; their middles, s, and states there."""
+    """Return (n,) the track piece of each pair, -1 for none; the times of the piece middles, s; and the states
+    there.
+    """
     keys = np.stack([pairs.tracks, np.floor(pairs.times / length).astype(np.int64)], axis=1)
     _, pieces, counts = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
     numbers = np.where(counts >= _LEAST_PAIRS, np.cumsum(counts >= _LEAST_PAIRS) - 1, -1)
@@ -197,7 +201,9 @@ def _pieces(pairs: MatchedMeasurements, length: float) -> tuple[Ints, Floats, Fl
 def _linearised(
     pairs: MatchedMeasurements, sites: Sequence[Site], biases: Floats, pieces: Ints, middles: Floats, states: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """(n, 2) residuals, and what they lose by (n, 2, 4) the states of the pieces and (n, 2, 5) the sensor's biases."""
+    """Return (n, 2) residuals, and (n, 2, 4) and (n, 2, 5) derivatives of the predictions by piece states and
+    biases.
+    """
     num = len(pairs.times)
     residuals, own, of_bias = np.zeros((num, 2)), np.zeros((num, 2, 4)), np.zeros((num, 2, 5))
     for s, site in enumerate(sites):
@@ -223,7 +229,7 @@ def _linearised(
 
 
 def _spreads(residuals: Floats, sensors: Ints, pieces: Ints, stds: Floats) -> Floats:
-    """(num_sensors, 2) robust standard deviations of residuals, at most those given; those where too few say."""
+    """(num_sensors, 2) robust standard deviations of residuals, at most `stds`; equal to it for too few residuals."""
     found = stds.copy()
     for s in range(len(stds)):
         own = residuals[(sensors == s) & (pieces >= 0)]
@@ -233,7 +239,7 @@ def _spreads(residuals: Floats, sensors: Ints, pieces: Ints, stds: Floats) -> Fl
 
 
 def _solved(rows: _Rows, biases: Floats, unknown: Floats, num_pieces: int) -> tuple[Floats, Floats]:
-    """Changes of the biases and of the states of the pieces, which are eliminated first, each piece by itself."""
+    """Return changes of the biases and of the piece states; the states are eliminated first, piece by piece."""
     num, size = biases.shape
     hold = unknown.ravel() ** -2.0
     left, right = np.diag(hold), -hold * biases.ravel()

@@ -1,1 +1,1 @@
-"""Modules that several packages use and that are no part of the public API."""
+"""Modules that several packages use and that are not part of the public API."""

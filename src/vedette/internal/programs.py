@@ -126,9 +126,7 @@ def _shown(line: bytes) -> str:
 
 
 def _talk(child: subprocess.Popen[bytes], questions: _Questions, answers: SimpleQueue[bytes]) -> None:
-    """Pass on questions and answers in a thread, so that the caller can stop waiting. The question None ends the
-    input.
-    """
+    """Pass on questions and answers in a thread, so that the caller need not wait. The question None ends the input."""
     assert child.stdin is not None
     assert child.stdout is not None
     with child.stdout:

@@ -83,9 +83,7 @@ _NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 
 
 def spreadsheet_text(text: str) -> str:
-    """Return a text for a cell of a CSV file, with an apostrophe before text that a spreadsheet would run as a
-    formula.
-    """
+    """Return a text for a cell of a CSV file, with an apostrophe first if a spreadsheet would run it as a formula."""
     return f"'{text}" if text.startswith(("=", "+", "-", "@", "\t", "\r")) and not _NUMBER.fullmatch(text) else text
 
 
