@@ -1,4 +1,4 @@
-"""Monte Carlo campaigns: many runs of many settings, on one machine or many, kept in a folder that nothing tears."""
+"""Monte Carlo campaigns: many runs of many settings, on one machine or many, stored in a crash-safe folder."""
 
 from vedette.internal.extras import require_packages
 

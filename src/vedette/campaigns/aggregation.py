@@ -1,4 +1,4 @@
-"""The runs of a cell read into arrays, by several processes where there are many: each run is gone once it was read."""
+"""Reads the runs of a cell into arrays, with several processes if there are many; a run is dropped once it is read."""
 
 from __future__ import annotations
 
@@ -17,13 +17,15 @@ from vedette.internal.threads import processors
 if TYPE_CHECKING:
     from vedette.campaigns.results import CampaignResults
 
-_A_PART = 4 * TOGETHER  # runs; fewer are read sooner than another process starts
+_A_PART = 4 * TOGETHER  # runs per part; fewer are read faster than another process starts
 
 
 def read_ensemble(results: CampaignResults, cell: str, runs: Sequence[int], num_workers: int) -> Ensemble:
-    """What is compared and reported of these finished runs of a cell; the same for any number of processes (0: all).
+    """Return the arrays that comparisons and reports use, from these finished runs of a cell.
 
-    Raises `InputError` for no run, or one that is damaged, and `VedetteError` where a process dies.
+    num_workers: number of processes, 0 for all processors; does not change the result.
+
+    Raises `InputError` for no run or a damaged one, and `VedetteError` if a process dies.
     """
     parts = [runs[start : start + _A_PART] for start in range(0, len(runs), _A_PART)]
     number = min(num_workers or processors(), len(parts))
@@ -35,7 +37,7 @@ def read_ensemble(results: CampaignResults, cell: str, runs: Sequence[int], num_
 def _by_processes(
     results: CampaignResults, cell: str, parts: Sequence[Sequence[int]], number: int
 ) -> Iterator[Ensemble]:
-    if getattr(current_process(), "_inheriting", False):  # a reader that runs the main module, which starts readers
+    if getattr(current_process(), "_inheriting", False):  # a reader running an unguarded main module
         raise VedetteError('a script that reads with workers needs `if __name__ == "__main__":` around the call')
     load_ahead()
     others = set(active_children())
@@ -50,7 +52,7 @@ def _by_processes(
             "workers: expected processes that read runs; one has died: for want of memory, or, in a script of your "
             'own, as the call that reads is not under `if __name__ == "__main__":`'
         ) from error
-    except BaseException:  # Ctrl-C, or a damaged run: what the others read is of no use, and may take seconds
+    except BaseException:  # Ctrl-C or a damaged run: the other readers would take seconds in vain
         for reader in set(active_children()) - others:
             reader.kill()
         raise
@@ -62,11 +64,11 @@ def _part(results: CampaignResults, cell: str, runs: Sequence[int]) -> Ensemble:
     return ensemble_of(results.summaries(cell, runs))
 
 
-_whose: list[tuple[CampaignResults, str]] = []  # of this process, if it is one that reads
+_whose: list[tuple[CampaignResults, str]] = []  # results and cell of this process, if it is a reader
 
 
 def _begin(results: CampaignResults, cell: str) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server may be another's, which does not
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the fork server may not ignore it
     end_with_parent()
     _whose.append((results, cell))
 

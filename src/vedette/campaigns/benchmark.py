@@ -1,7 +1,7 @@
-"""The benchmark of the field: its scenes, and the campaigns of entrants and of the library's own on them.
+"""The benchmark: its scenes, and the campaigns of entrants and of the library's own strategies on them.
 
-Each scene has a folder, in it a results folder of the library's own strategies and one of each entrant: all of the same
-seed and runs, so that they are paired; entrants, scenes and runs may be added at any time.
+Each scene has a folder with a results folder of the library's own strategies and one of each entrant. All use the same
+seed and runs, so that they are paired. Entrants, scenes and runs may be added at any time.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from vedette.scenarios.sections.program import ProgramSection
 
 Role: TypeAlias = Literal["planner", "tracker"]
 
-OWN = "vedette"  # folder of the library's own strategies
+OWN = "vedette"  # folder name of the library's own strategies
 _FILE = Path(__file__).with_name("benchmark.toml")
 _REFERENCE = "vedette.simulation.reference_filters"
 _TRACKERS: dict[str, dict[str, Any]] = {
@@ -47,13 +47,13 @@ class Scene:
     """A scene of the benchmark.
 
     Attributes:
-        name: of it, and of its folder.
-        role: what entrants are on it.
-        about: it, in a line.
-        beside: the library's own strategies, the first to compare with.
-        sensors, crowd: how many of each, where the scene is generated; else 0.
-        decide_every: scans between decisions, where it is generated with sensors.
-        quick: whether it is one of those that take a minute together.
+        name: name of the scene and of its folder.
+        role: role of the entrants on it.
+        about: description in one line.
+        beside: names of the library's own strategies, the reference first.
+        sensors, crowd: numbers of sensors and targets of a generated scene; else 0.
+        decide_every: scans between decisions of a generated scene with sensors.
+        quick: whether it is one of the scenes that together take a minute.
     """
 
     name: str
@@ -66,7 +66,7 @@ class Scene:
     quick: bool = False
 
     def scenario(self, folder: Path) -> str:
-        """The scenario's name, or its file, which is written into the folder."""
+        """Return the name of the scenario, or the path of its generated file, which is written into the folder."""
         if not self.sensors and not self.crowd:
             return self.name
         text = (
@@ -81,9 +81,9 @@ class Scene:
 
 @cache
 def scenes() -> dict[str, Scene]:
-    """All scenes, by name."""
+    """Return all scenes by name."""
     found = {}
-    data: dict[Role, Any] = tomllib.loads(_FILE.read_text(encoding="utf-8"))  # type: ignore[assignment] # of its keys
+    data: dict[Role, Any] = tomllib.loads(_FILE.read_text(encoding="utf-8"))  # type: ignore[assignment] # role keys
     for role, said in data.items():
         for each in said["scenes"]:
             found[each["name"]] = Scene(role=role, beside=tuple(said["beside"]), **each)
@@ -92,12 +92,12 @@ def scenes() -> dict[str, Scene]:
 
 @dataclass(frozen=True, slots=True)
 class Entrant:
-    """Somebody's planner or tracker.
+    """A planner or tracker entered into the benchmark.
 
     Attributes:
-        name: of it, and of its folders.
-        role: what it is.
-        section: how a scenario names it.
+        name: name of the entrant and of its folders.
+        role: planner or tracker.
+        section: its section in a scenario.
     """
 
     name: str
@@ -106,15 +106,15 @@ class Entrant:
 
 
 def entrant(role: Role, said: str, *, seconds: float, folder: Path) -> Entrant:
-    """An entrant as `NAME=COMMAND`, `NAME=file.py:attribute` or `NAME=package.module:attribute`.
+    """Return the entrant given as `NAME=COMMAND`, `NAME=file.py:attribute` or `NAME=package.module:attribute`.
 
     Args:
-        role: what it is.
-        said: name, and what it is.
-        seconds: that a program may take for an answer.
-        folder: in which commands are started, and that files are relative to.
+        role: planner or tracker.
+        said: the text.
+        seconds: time limit of a program for an answer.
+        folder: working directory of commands; file names are relative to it.
 
-    Raises `InputError` for anything else, a name that is no folder's or one of the library's own.
+    Raises `InputError` for another text, or a name that is unfit for a folder or used by the library.
     """
     name, sign, what = said.partition("=")
     taken = {OWN, *(own for scene in scenes().values() for own in scene.beside)}
@@ -133,7 +133,10 @@ def entrant(role: Role, said: str, *, seconds: float, folder: Path) -> Entrant:
 
 
 def campaign_of(scene: Scene, entrant: Entrant | None, runs: int, seed: int, folder: Path, **how: Any) -> Campaign:
-    """The campaign of a scene: of an entrant, or of the library's own. folder: of the benchmark; how: see `resolve`."""
+    """Return the campaign of a scene for an entrant; None: for the library's own strategies.
+
+    folder: folder of the benchmark. how: see `resolve`.
+    """
     names = scene.beside if entrant is None else (entrant.name,)
     given: dict[str, Any] = {"name": f"{scene.name}-{OWN if entrant is None else entrant.name}", "runs": runs}
     given |= {"seed": seed, "scenarios": (scene.scenario(folder / "scenes"),)}
@@ -151,9 +154,9 @@ def campaign_of(scene: Scene, entrant: Entrant | None, runs: int, seed: int, fol
 
 
 def try_entrant(own: Entrant, campaign: Campaign) -> None:
-    """Make an entrant on the scene of a campaign, and greet it where it is a program.
+    """Create an entrant on the scene of a campaign, and start it once if it is a program.
 
-    Raises `InputError` where it cannot be had: what a typo in a command does, and not a run that was lost.
+    Raises `InputError` if this fails: typos in a command are reported here and not as lost runs.
     """
     scenario, planner = campaign.cells[0].scenario, campaign.cells[0].planner
     rng = np.random.default_rng(campaign.seed)
@@ -170,9 +173,9 @@ def try_entrant(own: Entrant, campaign: Campaign) -> None:
 
 
 def make_way(campaign: Campaign, folder: Path) -> None:
-    """Clear a folder of an entrant that has changed since and finished no run there.
+    """Delete the folder of an entrant that has changed and has finished no run there.
 
-    Raises `InputError` where it has finished some, which are not to be mixed with those of now.
+    Raises `InputError` if it has finished some, as they must not be mixed with new ones.
     """
     if not (folder / MANIFEST).is_file() or read_manifest(folder)["digest"] == campaign.digest():
         return

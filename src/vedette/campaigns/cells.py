@@ -1,4 +1,4 @@
-"""A specification resolved: the cells of a campaign, each one strategy in one setting."""
+"""Cells of a campaign, each one strategy in one setting, and their construction from a specification."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ class Cell:
 
     Attributes:
         name: unique in the campaign, and fit for a file name.
-        settings: axis and value; the same axes in every cell of a campaign.
-        scenario: with the fields of the cell set.
+        settings: value of each axis; all cells of a campaign have the same axes.
+        scenario: scenario with the fields of the cell set.
         planner: name of the strategy.
     """
 
@@ -50,15 +50,15 @@ class Cell:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Campaign(SummaryRepr):
-    """A specification with its cells made.
+    """A specification with its cells.
 
     Attributes:
         name, seed, num_runs: as specified.
         cells: in the order of the specification, the last axis fastest.
         axes: each axis and its values.
         compare: the axis whose values are compared; the first value is the reference.
-        spec: the specification as plain data, every default written out.
-        shard: the share of its runs that are to be done; by default all.
+        spec: the specification as plain data, including defaults.
+        shard: the shard of the runs to execute; by default all.
     """
 
     name: str
@@ -78,37 +78,37 @@ class Campaign(SummaryRepr):
 
     @property
     def total(self) -> int:
-        """Number of runs to be done, of all cells together."""
+        """Number of runs to execute, over all cells."""
         return sum(len(self.runs(place)) for place in range(len(self.cells)))
 
     def runs(self, place: int) -> Sequence[int]:
-        """Numbers of the runs to be done of the cell at that place, increasing."""
+        """Return the increasing numbers of the runs to execute of the cell at that place."""
         return self.shard.runs(place, len(self.cells), self.num_runs)
 
     @property
     def default_folder(self) -> str:
-        """Where its results go unless another place is named."""
+        """Default results folder."""
         return results_folder(self.name)
 
     @property
     def default_shards(self) -> str:
-        """Where the folders of its shards go unless another place is named."""
+        """Default folder of the shards' folders."""
         return f"{safe_name(self.name)}-shards"
 
     @property
     def tasks(self) -> tuple[tuple[Cell, int], ...]:
-        """Every run that there is to do, the runs of equal number of all cells together, so that pairs come early."""
+        """All runs, those of equal number of all cells together, so that pairs come early."""
         return tuple((cell, run) for run in range(self.num_runs) for cell in self.cells)
 
     def cell(self, name: str) -> Cell:
-        """The cell of that name. Raises `InputError` where there is none."""
+        """Return the cell of that name. Raises `InputError` if there is none."""
         for cell in self.cells:
             if cell.name == name:
                 return cell
         raise InputError(f"cell: expected one of {', '.join(cell.name for cell in self.cells)}; got {name!r}")
 
     def groups(self) -> tuple[tuple[Cell, ...], ...]:
-        """Cells that differ in the compared axis alone, groups and cells in the order of the specification."""
+        """Return the groups of cells that differ only in the compared axis, in the order of the specification."""
         groups: dict[str, list[Cell]] = {}
         for cell in self.cells:
             shared = {axis: value for axis, value in cell.settings.items() if axis != self.compare}
@@ -116,24 +116,24 @@ class Campaign(SummaryRepr):
         return tuple(tuple(cells) for cells in groups.values())
 
     def with_runs(self, num_runs: int) -> Campaign:
-        """The same campaign with another number of runs. Raises `InputError` for a number that no campaign has."""
+        """Return the campaign with another number of runs. Raises `InputError` for an invalid number."""
         spec_from_data({**self.spec, "runs": num_runs})
         return replace(self, num_runs=num_runs, spec={**self.spec, "runs": num_runs})
 
     def texts(self) -> tuple[str, ...]:
-        """The scenario of each cell as YAML that can be kept anywhere.
+        """Return the scenario of each cell as self-contained YAML.
 
-        It is without the user's own measures, as these fix nothing of a run.
+        Custom metrics are left out, as they do not affect a run.
         """
-        scenarios = {id(cell.scenario): cell.scenario for cell in self.cells}  # strategies share one
+        scenarios = {id(cell.scenario): cell.scenario for cell in self.cells}  # strategies share scenarios
         texts = {key: dump_scenario(_unmeasured(each), folder=each.folder) for key, each in scenarios.items()}
         return tuple(texts[id(cell.scenario)] for cell in self.cells)
 
     def digest(self, texts: Sequence[str] = ()) -> str:
-        """SHA-256 of all that fixes the bytes of a run: seed, each cell's planner and scenario, and the files it names.
+        """Return the SHA-256 of everything that determines a run: seed, and planner, scenario and files of each cell.
 
-        The number of runs is not part of it: more runs leave the earlier ones as they are. texts: see `texts`; where
-        they are at hand.
+        The number of runs is not included, as more runs leave earlier ones unchanged. texts: result of `texts`, if
+        known.
         """
         cells = [
             (cell.name, cell.planner, text, _contents(cell.scenario))
@@ -149,15 +149,15 @@ def _unmeasured(scenario: Scenario) -> ScenarioModel:
 def resolve(
     spec: CampaignSpec, folder: Path | str = ".", *, approve: Callable[[Scenario], None] = lambda scenario: None
 ) -> Campaign:
-    """Load the scenarios (files are relative to `folder`), set the fields of each cell, check that each can be built.
+    """Load the scenarios, set the fields of each cell, and check that each cell can be built.
 
     Args:
-        spec: what the file says.
-        folder: what the scenario files in it are relative to.
-        approve: is given the scenario of each cell before code that it names is run, and may raise.
+        spec: the specification.
+        folder: folder that scenario files in it are relative to.
+        approve: receives the scenario of each cell before code that it names is run, and may raise.
 
     Raises:
-        InputError: a scenario that is not there, a path that is no field, a combination that cannot be; names the cell.
+        InputError: a missing scenario, an unknown field path, or an invalid combination; the message names the cell.
     """
     axes = spec.axes()
     loaded = {name: _load(name, number, Path(folder)) for number, name in enumerate(spec.scenarios)}
@@ -167,7 +167,7 @@ def resolve(
     for settings in spec.settings():
         name = unique_name(_name({axis: settings[axis] for axis in varying}, axes), {cell.name for cell in cells})
         cells.append(_cell(name, settings, loaded[settings["scenario"]], spec, changed, approve))
-    # Never the scenario unless asked for: runs of different scenarios are not paired.
+    # Only if requested the scenario, as runs of different scenarios are not paired.
     candidates = ("planner", *(axis for axis in axes if axis != "scenario"))
     compare = spec.compare or next((axis for axis in candidates if len(axes[axis]) > 1), "planner")
     return Campaign(spec.name, spec.seed, spec.runs, tuple(cells), axes, compare, spec.model_dump(mode="json"))
@@ -188,7 +188,7 @@ def _cell(
     changed: dict[str, Scenario],
     approve: Callable[[Scenario], None],
 ) -> Cell:
-    """A cell; `changed` holds the scenarios of those before it by their fields, as strategies share one."""
+    """Return a cell; `changed` caches scenarios by their fields, as strategies share them."""
     fields = dict(spec.set)
     fields |= {_SECTIONS[axis]: settings[axis] for axis in _SECTIONS if axis in settings}
     for variant in spec.variants:
@@ -211,7 +211,7 @@ def _cell(
 
 
 def _name(settings: Mapping[str, Any], axes: Mapping[str, tuple[Any, ...]]) -> str:
-    """The values of the axes that vary, fit for a file name: `paper-e-jdm-clmb`, `jdm-num_samples-20`."""
+    """Return the values of the varying axes as a file name: `paper-e-jdm-clmb`, `jdm-num_samples-20`."""
     parts = []
     for axis, value in settings.items():
         if isinstance(value, list | dict):
@@ -226,12 +226,12 @@ def _name(settings: Mapping[str, Any], axes: Mapping[str, tuple[Any, ...]]) -> s
 
 
 def results_folder(name: str) -> str:
-    """Where the results of a campaign of that name go unless another place is named."""
+    """Return the default results folder of a campaign of that name."""
     return f"{safe_name(name)}-results"
 
 
 def safe_name(text: str) -> str:
-    """The text with what is unfit for a file name as underscores."""
+    """Return the text with characters that are unfit for a file name replaced by underscores."""
     return re.sub(r"[^\w.+-]+", "_", text)
 
 

@@ -1,4 +1,4 @@
-"""Workers of a dask cluster that runs already."""
+"""Workers of a running dask cluster."""
 
 from __future__ import annotations
 
@@ -24,24 +24,24 @@ from vedette.internal.text import pluralise, shown
 if TYPE_CHECKING:
     from distributed import Client, Future
 
-_TASKS_A_THREAD = 2  # one that waits, so that none idles while results travel
+_TASKS_A_THREAD = 2  # one waits, so that no worker idles while results travel
 _CONNECT_SECONDS = 10.0
-_REFRESH_SECONDS = 2.0  # between looks at which workers there are
+_REFRESH_SECONDS = 2.0  # between updates of the list of workers
 _POLL_SECONDS = 0.02
 _ADDRESS = re.compile(r"(tcp|tls)://[^\s/]+:[0-9]+")
 
 
 @contextmanager
 def remote_workers(address: str, tell: Callable[[str], None], quorum: int = 1) -> Iterator[RemoteWorkers]:
-    """The workers of a scheduler that runs already.
+    """Context manager with the workers of a running scheduler.
 
     Args:
-        address: of the scheduler, or the file that it writes.
-        tell: is told, in words, when workers come and go.
-        quorum: workers that are waited for, once.
+        address: address of the scheduler, or the file that it writes.
+        tell: receives messages when workers join or leave.
+        quorum: number of workers to wait for at the start.
 
     Raises:
-        InputError: the address is none, or nothing answers there.
+        InputError: the address is invalid, or no scheduler answers there.
     """
     expected = "scheduler: expected the address of a running dask scheduler, such as tcp://host:8786"
     if address.endswith(".json"):
@@ -50,7 +50,7 @@ def remote_workers(address: str, tell: Callable[[str], None], quorum: int = 1) -
         raise InputError(f"{expected}; got {address!r}")
     from distributed import Client
 
-    for logger in ("distributed", "distributed.client"):  # a lost scheduler is said once, by the error
+    for logger in ("distributed", "distributed.client"):  # the error reports a lost scheduler once
         logging.getLogger(logger).setLevel(logging.CRITICAL)
     _check_scheduler(address, f"{expected}; no scheduler answers at {address}")
     try:
@@ -64,7 +64,7 @@ def remote_workers(address: str, tell: Callable[[str], None], quorum: int = 1) -
 
 
 class RemoteWorkers:
-    """See `vedette.campaigns.engine.Workers`."""
+    """Workers of a dask cluster, see `vedette.campaigns.engine.Workers`."""
 
     def __init__(self, client: Client, tell: Callable[[str], None]) -> None:
         from distributed import as_completed
@@ -89,7 +89,7 @@ class RemoteWorkers:
         self._done.add(future)
 
     def wait_for(self, quorum: int) -> None:
-        """Return when so many workers are there."""
+        """Wait until this number of workers is connected."""
         self._look()
         if len(self._there) < quorum:
             self._tell(f"waiting: {len(self._there)} of {pluralise(quorum, 'worker')} there")
@@ -111,7 +111,7 @@ class RemoteWorkers:
         while True:
             try:
                 outcome: TaskOutcome = future.result(timeout=_REFRESH_SECONDS)
-            except TimeoutError:  # the worker died before it handed the results over: the task is done again
+            except TimeoutError:  # the worker died before it sent the results: dask repeats the task
                 self._look()
             except KilledWorker:
                 return WorkerDied()
@@ -121,14 +121,14 @@ class RemoteWorkers:
                 return outcome
 
     def _look(self) -> None:
-        """Count the workers, now and then, and tell of those that have come or gone."""
+        """Update the list of workers every few seconds, and report those that joined or left."""
         now = time.monotonic()
         if now - self._looked_at < _REFRESH_SECONDS or self._client.status != "running":
             return
         self._looked_at = now
         try:
             threads: dict[str, int] = self._client.nthreads()
-        except OSError:  # the connection is lost: the tasks under way say so
+        except OSError:  # the connection is lost: the tasks in progress report it
             return
         self._num_threads = max(1, sum(threads.values()))
         before, self._there = self._there, frozenset(threads)
@@ -140,7 +140,7 @@ class RemoteWorkers:
 
 
 def _address_in(file: Path) -> str:
-    """What a scheduler wrote of itself; `InputError` where it does not within the time that one may take."""
+    """Return the address in a scheduler file; raises `InputError` if there is none within the time limit."""
     problem = "it is not there"
     for _ in range(round(_CONNECT_SECONDS / _POLL_SECONDS)):
         try:
@@ -150,16 +150,16 @@ def _address_in(file: Path) -> str:
             problem = f"its address is {shown(address)}"
         except FileNotFoundError:
             pass
-        except (OSError, ValueError, LookupError, TypeError) as error:  # or it is being written
+        except (OSError, ValueError, LookupError, TypeError) as error:  # or the file is being written
             problem = error_summary(error)
         time.sleep(_POLL_SECONDS)
     raise InputError(f"scheduler: expected a file that a dask scheduler writes (--scheduler-file); {file}: {problem}")
 
 
 def _check_scheduler(address: str, refusal: str) -> None:
-    """`InputError` unless what listens there says in time that it is a scheduler.
+    """Raise `InputError` unless a dask scheduler answers at the address in time.
 
-    A client of dask would wait for ever for what accepts and is silent, and leave traces where it answers otherwise.
+    A dask client would wait for ever for a silent server, and print tracebacks for one that answers something else.
     """
     answers: list[object] = []
 
@@ -171,13 +171,13 @@ def _check_scheduler(address: str, refusal: str) -> None:
     def wait() -> None:
         try:
             answers.append(asyncio.run(asyncio.wait_for(ask(), _CONNECT_SECONDS)))
-        except Exception as error:  # what answers may be anything, and so may what comes of it
+        except Exception as error:  # an unknown server may cause any error
             answers.append(error)
 
     from distributed.core import rpc
     from distributed.security import Security
 
-    thread = threading.Thread(target=wait, daemon=True)  # a loop of its own, as this thread may have one
+    thread = threading.Thread(target=wait, daemon=True)  # in a thread, as this one may have a running event loop
     thread.start()
     thread.join(2.0 * _CONNECT_SECONDS)
     answer = answers[0] if answers else TimeoutError()

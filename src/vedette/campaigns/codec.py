@@ -1,4 +1,4 @@
-"""A run as bytes, and back, bit for bit.
+"""Encoding of a run as bytes, lossless.
 
 The bytes are an uncompressed zip archive of the Arrow files of a saved run (`vedette.simulation.serialization`) and of
 `run.json`, which identifies the run. They depend only on the numbers in the run.
@@ -20,12 +20,12 @@ from vedette.simulation.tables import run_facts
 from vedette.simulation.upgrading import upgraded_files
 
 _RUN = "run.json"
-_EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip archive can say
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time in a zip archive
 _UNIX = 3
 
 
 def encode(record: RunRecord) -> bytes:
-    """Everything of a run but its timings; equal runs give equal bytes.
+    """Return a run as bytes, without its timings; equal runs give equal bytes.
 
     Raises `InputError` for a record that contradicts itself or holds an invalid plan.
     """
@@ -40,7 +40,7 @@ def encode(record: RunRecord) -> bytes:
 
 
 def decode(payload: bytes, timings: bytes | None = None) -> RunRecord:
-    """The run back from its bytes and, where they are given, those of its timings.
+    """Return the run from its bytes and, if given, those of its timings.
 
     Raises `InputError` for bytes that are not those of a run.
     """
@@ -49,25 +49,25 @@ def decode(payload: bytes, timings: bytes | None = None) -> RunRecord:
 
 
 def decode_summary(payload: bytes, timings: bytes | None = None) -> RunSummary:
-    """What is compared and reported of a run, in a third of the time; raises as `decode`."""
+    """Return the summary of a run, in a third of the time of `decode`; raises as `decode`."""
     facts, members = _members(payload, {_RUN, *serialization.SUMMARY_FILES})
     return serialization.decode_summary(facts, members, "run", timings)
 
 
 def upgraded(payload: bytes, number: int) -> bytes:
-    """The bytes of a run of a format `number` in the present one. Raises `InputError` as `decode`."""
+    """Return the bytes of a run of format `number` in the present format. Raises `InputError` as `decode`."""
     facts, members = _members(payload)
     return encode(serialization.decode_run(facts, upgraded_files(members, number), "run"))
 
 
 def _members(payload: bytes, wanted: Container[str] | None = None) -> tuple[dict[str, Any], dict[str, bytes]]:
-    """What names a run, and its files."""
+    """Return the facts that identify a run, and its files."""
     try:
         members = read_members(payload, wanted)
         facts = parse_json(members[_RUN])
         if not isinstance(facts, dict):
             raise TypeError(f"{_RUN} does not name one")
-    except Exception as error:  # bytes of no run can raise nearly anything on the way to one
+    except Exception as error:  # other bytes can raise nearly any error
         raise InputError(
             f"run: expected the bytes of a run; got others: {type(error).__name__}: {error_summary(error)}"
         ) from error

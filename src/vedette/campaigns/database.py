@@ -1,6 +1,6 @@
-"""The SQLite file of a results folder: its tables, who may write it, how it is read, what is said where SQLite raises.
+"""SQLite file of a results folder: its tables, locking, reading, and translation of SQLite errors.
 
-A rollback journal, not a write-ahead log: see docs/decisions/0004-results-store.md.
+It uses a rollback journal, not a write-ahead log: see docs/decisions/0004-results-store.md.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from vedette.internal.text import printable, shown
 
 DATABASE, LOCK = "campaign.sqlite", "campaign.lock"
 
-WAIT = 60.0  # s, for a reader or writer of the same file; each holds it for milliseconds
-_AT_ONCE = 256  # rows that are asked for together
+WAIT = 60.0  # s, for another reader or writer, which holds the file for milliseconds
+_AT_ONCE = 256  # rows per query
 TABLES = (
     "CREATE TABLE campaign (contents TEXT NOT NULL)",
     "CREATE TABLE runs (cell TEXT NOT NULL, run INTEGER NOT NULL, session INTEGER NOT NULL, "
@@ -35,7 +35,7 @@ COLUMNS = "cell, run, session, payload, payload_sha256, metrics, metrics_sha256,
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """A run that could not be finished, in which session (counted from 1), and why: where it stopped."""
+    """A run that could not be finished: its session (from 1), and the reason and place where it stopped."""
 
     cell: str
     run: int
@@ -44,7 +44,7 @@ class Failure:
 
 
 class Reader:
-    """Reads the file of one folder, also while a writer adds to it; opened anew for every question."""
+    """Reader of the SQLite file of a folder, also while a writer adds to it; reopens the file for every query."""
 
     def __init__(self, folder: Path) -> None:
         self._path = folder / DATABASE
@@ -53,15 +53,15 @@ class Reader:
         return str(self._path)
 
     def check(self, contents: str) -> None:
-        """`InputError` unless the file is whole so far and of the campaign whose manifest has that checksum."""
+        """Raise `InputError` unless the file is intact and belongs to the campaign whose manifest has that checksum."""
         check_contents(self._path, self._ask("SELECT contents FROM campaign"), contents)
 
     def finished(self) -> list[tuple[str, int]]:
-        """Cell and number of every run in the file, sorted."""
+        """Return cell and number of every run in the file, sorted."""
         return checked_keys(self._path, self._ask("SELECT cell, run FROM runs ORDER BY cell, run"))
 
     def failures(self) -> list[Failure]:
-        """The runs that were tried and could not be finished, sorted."""
+        """Return the runs that could not be finished, sorted."""
         rows = self._ask("SELECT cell, run, session, message FROM failures ORDER BY cell, run")
         checked_keys(self._path, [row[:2] for row in rows])
         for _, _, session, message in rows:
@@ -70,7 +70,7 @@ class Reader:
         return [Failure(*row) for row in rows]
 
     def rows(self) -> Iterator[tuple[Any, ...]]:
-        """Every run as it is kept, by cell and number. `InputError` at the first one that is damaged."""
+        """Yield every stored row, by cell and number. Raises `InputError` at the first damaged one."""
         with explained(self._path), closing(_opened(self._path)) as database:
             for row in database.execute(f"SELECT {COLUMNS} FROM runs ORDER BY cell, run"):
                 if verified(row) is None:
@@ -78,12 +78,12 @@ class Reader:
                 yield row
 
     def entry(self, cell: str, run: int) -> Entry:
-        """A finished run, its checksums verified. `InputError` where there is none, or its row is damaged."""
+        """Return a finished run with verified checksums. Raises `InputError` if it is missing or damaged."""
         (entry,) = self.entries(cell, [run])
         return entry
 
     def entries(self, cell: str, runs: Sequence[int]) -> Iterator[Entry]:
-        """Finished runs of a cell, a few hundred read at a time; raises as `entry`."""
+        """Yield finished runs of a cell, read a few hundred at a time; raises as `entry`."""
         for start in range(0, len(runs), _AT_ONCE):
             few = runs[start : start + _AT_ONCE]
             question = f"SELECT {COLUMNS} FROM runs WHERE cell = ? AND run IN ({', '.join('?' * len(few))})"
@@ -103,7 +103,7 @@ class Reader:
             except sqlite3.OperationalError as error:
                 if _code(error) != sqlite3.SQLITE_READONLY_ROLLBACK:
                     raise
-            # A writer was killed in the middle of a run: what it left half done is first taken back.
+            # A writer was killed while writing: opening for writing rolls its transaction back.
             _answer(self._path, question, values, mode="rw")
             return _answer(self._path, question, values)
 
@@ -116,26 +116,26 @@ def _answer(path: Path, question: str, values: Sequence[Any], mode: str = "ro") 
 
 def _opened(path: Path, mode: str = "ro") -> sqlite3.Connection:
     database = sqlite3.connect(f"{path.resolve().as_uri()}?mode={mode}", timeout=WAIT, uri=True)
-    database.text_factory = _text  # so that one damaged row does not hide behind all that are asked for with it
+    database.text_factory = _text  # so that one damaged row does not fail a query of many
     return database
 
 
 def _text(content: bytes) -> str | bytes:
     try:
         return content.decode()
-    except UnicodeDecodeError:  # refused where a text is expected
+    except UnicodeDecodeError:  # callers that expect text refuse it
         return content
 
 
 def check_tables(path: Path, database: sqlite3.Connection) -> None:
-    """`InputError` unless the tables are those of a campaign, with nothing that acts or answers in their place."""
+    """Raise `InputError` unless the file has exactly the tables of a campaign, without triggers or views."""
     rows = database.execute("SELECT sql FROM sqlite_master WHERE name NOT LIKE 'sqlite~_%' ESCAPE '~'")
     if sorted(str(sql) for (sql,) in rows) != sorted(TABLES):
         raise InputError(f"{path}: expected the tables of a campaign; the file is cut short or altered")
 
 
 def checked_keys(path: Path, rows: Sequence[tuple[Any, Any]]) -> list[tuple[str, int]]:
-    """Cells and numbers of runs, if that is what they are."""
+    """Return the cells and numbers of runs. Raises `InputError` for values of other types."""
     for cell, run in rows:
         if not isinstance(cell, str) or not isinstance(run, int):
             raise InputError(f"{path}: expected the name and number of a run; got {shown(cell)} and {shown(run)}")
@@ -143,7 +143,10 @@ def checked_keys(path: Path, rows: Sequence[tuple[Any, Any]]) -> list[tuple[str,
 
 
 def lock_of(folder: Path) -> sqlite3.Connection:
-    """An open transaction on a file beside: SQLite's own locks, which the system ends with the process."""
+    """Return the lock of a folder: an open transaction on a lock file.
+
+    The operating system ends it with the process.
+    """
     path = folder / LOCK
     lock = None
     try:
@@ -160,7 +163,7 @@ def lock_of(folder: Path) -> sqlite3.Connection:
 
 
 def check_contents(path: Path, found: Sequence[tuple[str]], contents: str) -> None:
-    """`InputError` unless what the file says of its campaign is the manifest's checksum alone."""
+    """Raise `InputError` unless the file contains only the checksum of the manifest."""
     if list(found) != [(contents,)]:
         raise InputError(
             f"{path}: expected the runs of the manifest beside it; they are another campaign's, or the manifest was "
@@ -169,16 +172,16 @@ def check_contents(path: Path, found: Sequence[tuple[str]], contents: str) -> No
 
 
 def place_of(cell: str, run: int | str) -> str:
-    """What messages about a run begin with."""
+    """Return the beginning of messages about a run."""
     return f"cell {cell}, run {run}: "
 
 
 @contextmanager
 def explained(path: Path, where: str = "") -> Iterator[None]:
-    """What SQLite raises, as errors of this library that name the file."""
+    """Context manager that turns SQLite errors into errors of this library that name the file."""
     try:
         yield
-    except (sqlite3.DatabaseError, UnicodeDecodeError) as error:  # the latter of words of the file in a message
+    except (sqlite3.DatabaseError, UnicodeDecodeError) as error:  # the latter if a message quotes the file
         raise InputError(f"{path}: {where}{_advice(path, error)} ({printable(error_summary(error))})") from error
 
 
@@ -194,5 +197,5 @@ def _advice(path: Path, error: Exception) -> str:
 
 
 def _code(error: Exception) -> int:
-    """SQLite's extended code of an error; -1 for what Python's own layer raised."""
+    """Return SQLite's extended error code; -1 for errors of Python's own layer."""
     return int(getattr(error, "sqlite_errorcode", -1))

@@ -1,4 +1,4 @@
-"""The scans of finished runs as one xarray dataset: every measure over cell, run and step."""
+"""Scans of finished runs as an xarray dataset: every metric over cell, run and step."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ if TYPE_CHECKING:
 
 
 def dataset_of_scans(campaign: Campaign, scans: pa.Table | None) -> xarray.Dataset:
-    """Every column of the table `scans` (None: no run is finished) as a float64 variable of (cell, run, step).
+    """Return every column of the table `scans` (None: no run is finished) as a float64 variable of (cell, run, step).
 
-    NaN where a run is not finished, a cell has fewer scans than another, or a measure has no value. Coordinates: `cell`
+    NaN if a run is not finished, a cell has fewer scans than another, or a metric has no value. Coordinates: `cell`
     (name), `run`, `step` (from 1), the value of each axis of the campaign by cell, and `time_s` by cell and step.
     `attrs["units"]` of a variable is its unit.
 
-    Raises `MissingPackageError` where xarray is not installed.
+    Raises `MissingPackageError` if xarray is not installed.
     """
     require_packages("a dataset", "xarray")
     import xarray
@@ -40,7 +40,7 @@ def dataset_of_scans(campaign: Campaign, scans: pa.Table | None) -> xarray.Datas
             values[name] = np.full((len(cells), campaign.num_runs, num_scans), np.nan)
             values[name][of_cells, of_runs, steps - 1] = table[name].to_numpy()
     times = np.full((len(cells), num_scans), np.nan)
-    times[of_cells, steps - 1] = table["time_s"].to_numpy()  # the same in every run of a cell
+    times[of_cells, steps - 1] = table["time_s"].to_numpy()  # equal in all runs of a cell
     del values["time_s"]
     units = {name: {"units": unit} if (unit := unit_of(name)) else {} for name in values}
     return xarray.Dataset(
@@ -57,6 +57,6 @@ def dataset_of_scans(campaign: Campaign, scans: pa.Table | None) -> xarray.Datas
 
 
 def _values(campaign: Campaign, axis: str) -> list[Any]:
-    """The axis by cell; truths as text, as NetCDF has none."""
+    """Return the values of an axis by cell; booleans as text, as NetCDF has none."""
     values = [setting_of(campaign, cell, axis) for cell in campaign.cells]
     return [str(value) if isinstance(value, bool) else value for value in values]

@@ -1,4 +1,4 @@
-"""How the work is done: by this process, or by workers to which it hands out the tasks."""
+"""Execution of tasks: in this process, or by workers."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from vedette.campaigns.tasks import FailedRun, Task, TaskOutcome, TaskQueue, Wor
 from vedette.errors import VedetteError
 
 _TRIES_ALONE = 2
-_MOST_TOGETHER, _SECONDS_TOGETHER = 20, 1.0  # that a transaction is of: what a kill may lose of one process
+_MOST_TOGETHER, _SECONDS_TOGETHER = 20, 1.0  # size and duration of a transaction: what a killed process may lose
 
 
 class Workers(Protocol):
-    """Who does tasks that are handed out. They may come and go, and die."""
+    """Workers that execute tasks. Workers may join, leave or fail at any time."""
 
     def room(self) -> int:
-        """How many tasks may be under way, so that no worker idles while results travel."""
+        """Return how many tasks may be in progress, so that no worker idles while results travel."""
         ...
 
     def submit(self, task: Task) -> None:
@@ -25,19 +25,21 @@ class Workers(Protocol):
         ...
 
     def next(self) -> list[tuple[Task, TaskOutcome | WorkerDied]]:
-        """The tasks that have ended by now with what they gave back, once there is one.
+        """Return the tasks that have ended, with their outcomes; waits for at least one.
 
-        `WorkerDied` where a worker died of it, and so did the next that it was given to; or may have died of it.
+        The outcome is `WorkerDied` if two workers in a row died, or may have died, of the task.
 
-        Raises `VedetteError` where nobody is left to do the work, or a worker cannot do that of this version.
+        Raises `VedetteError` if no worker is left, or a worker has another version.
         """
         ...
 
 
 def in_process(queue: TaskQueue) -> Iterator[TaskOutcome]:
-    """Every run, one after the other, by this process; those of a second come together.
+    """Yield the outcome of every run, executed by this process one after the other.
 
-    Raises `KeyboardInterrupt`, once those that are finished have been given back.
+    Runs of the same second are yielded together.
+
+    Raises `KeyboardInterrupt` after yielding the finished runs.
     """
     batch: TaskOutcome = ()
     since = time.monotonic()
@@ -55,9 +57,9 @@ def in_process(queue: TaskQueue) -> Iterator[TaskOutcome]:
 
 
 def on_workers(workers: Workers, queue: TaskQueue) -> Iterator[TaskOutcome]:
-    """Every run, in the order of finishing; those that have finished by the same time come together.
+    """Yield the outcome of every run in order of completion; runs that end at the same time in one batch.
 
-    The runs of a worker that died are done again by another.
+    Runs of a worker that died are repeated by another.
 
     Raises as `Workers.next`.
     """
@@ -68,7 +70,7 @@ def on_workers(workers: Workers, queue: TaskQueue) -> Iterator[TaskOutcome]:
         while under_way < (room := workers.room()) and (task := queue.take(room)) is not None:
             workers.submit(task)
             under_way += 1
-        if batch:  # while the next are being done
+        if batch:  # while the next tasks are executed
             yield batch
         if not under_way:
             break
@@ -84,9 +86,9 @@ def on_workers(workers: Workers, queue: TaskQueue) -> Iterator[TaskOutcome]:
 
 
 def _alone(workers: Workers, task: Task) -> TaskOutcome:
-    """What a task of one run gives back when no other one can bring its worker down.
+    """Return the outcome of a task of one run while no other task is in progress that could kill its worker.
 
-    A task counts as suspect too when it only waited at a worker that another one killed, or another took its memory.
+    A task also counts as suspect if it only waited at a worker that another task killed or starved of memory.
     """
     for _ in range(_TRIES_ALONE):
         workers.submit(task)

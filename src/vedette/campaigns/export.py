@@ -1,4 +1,4 @@
-"""Results in the files of other tools, of a campaign or of a single run: Parquet, CSV, NetCDF."""
+"""Export of the results of a campaign or a single run to files of other tools: Parquet, CSV, NetCDF."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ NETCDF = "scans.nc"
 
 
 def export_tables(results: CampaignResults | RunRecord, folder: Path | str) -> tuple[Path, ...]:
-    """Write each table as `<name>.parquet` into a folder; returns the files.
+    """Write each table as `<name>.parquet` into a folder; return the files.
 
-    Each file appears whole or not at all, in place of one of that name. Equal results give equal bytes under the same
-    version of pyarrow, but for `timings.parquet`, which holds what the clock said. No file where no run is finished.
+    Each file is written atomically and replaces one of that name. Equal results give equal bytes with the same version
+    of pyarrow, except for `timings.parquet`. No file is written if no run is finished.
 
-    Raises `InputError` where the files cannot be written.
+    Raises `InputError` if the files cannot be written.
     """
     return _write_tables(results, Path(folder), ".parquet", _write_parquet)
 
@@ -39,7 +39,7 @@ def _write_parquet(tables: Iterator[pa.Table], schema: pa.Schema, file: BinaryIO
 
 
 def export_csv(results: CampaignResults | RunRecord, folder: Path | str) -> tuple[Path, ...]:
-    """Write the same tables as `<name>.csv`; as `export_tables`.
+    """Write the same tables as `<name>.csv`; otherwise as `export_tables`.
 
     Text that a spreadsheet would run as a formula gets a leading apostrophe (`spreadsheet_text`).
     """
@@ -64,7 +64,7 @@ def _spreadsheet_column(column: pa.ChunkedArray) -> pa.ChunkedArray | pa.Array:
 def export_netcdf(results: CampaignResults | RunRecord, folder: Path | str) -> tuple[Path, ...]:
     """Write `CampaignResults.dataset` as `scans.nc` (NetCDF 3) into a folder.
 
-    Raises `InputError` for a single run, where xarray is not installed or the file cannot be written.
+    Raises `InputError` for a single run, if xarray is not installed, or if the file cannot be written.
     """
     if isinstance(results, RunRecord):
         raise InputError("netcdf: expected the results of a campaign, over cells and runs; got a single run")
@@ -86,8 +86,10 @@ def _write_tables(
     ending: str,
     write: Callable[[Iterator[pa.Table], pa.Schema, BinaryIO], None],
 ) -> tuple[Path, ...]:
-    """Write each table, of which no more is held than a few hundred runs: until all columns are known, parts wait in
-    files of their own."""
+    """Write each table while holding at most a few hundred runs in memory.
+
+    Until all columns are known, parts are kept in temporary files.
+    """
     parts = [tables_of_record(results)] if isinstance(results, RunRecord) else results.table_parts()
     waiting: dict[str, dict[Path, pa.Schema]] = {}
     with tempfile.TemporaryDirectory() as place:

@@ -1,4 +1,4 @@
-"""The runs of a campaign, added to the file of its folder: a row a run, each landing whole or not at all."""
+"""Writer of the runs of a campaign: one row per run in the SQLite file, each written atomically."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _INSERT = f"INSERT INTO runs ({database.COLUMNS}) VALUES ({', '.join('?' * (data
 
 
 class Writer:
-    """Adds runs to the file of one folder, alone: `InputError` if another writer has it open."""
+    """The only writer of the SQLite file of a folder: `InputError` if another writer has it open."""
 
     def __init__(self, folder: Path) -> None:
         self._path = folder / database.DATABASE
@@ -25,18 +25,18 @@ class Writer:
 
     @property
     def _database(self) -> sqlite3.Connection:
-        assert self._opened is not None  # by `open_runs`
+        assert self._opened is not None  # set by `open_runs`
         return self._opened
 
     def open_runs(self, contents: str) -> None:
-        """Make the file, or check that it is of the campaign whose manifest has the checksum `contents`."""
+        """Create the file, or check that it belongs to the campaign whose manifest has the checksum `contents`."""
         with database.explained(self._path):
             opened = sqlite3.connect(self._path, timeout=database.WAIT, isolation_level=None, check_same_thread=False)
             self._opened = opened
             opened.execute("PRAGMA journal_mode = PERSIST")
             opened.execute("PRAGMA synchronous = FULL")
             opened.execute("BEGIN IMMEDIATE")
-            if self._path.stat().st_size == 0:  # what an interrupted start left is taken back by now
+            if self._path.stat().st_size == 0:  # SQLite has rolled back an interrupted start by now
                 for statement in database.TABLES:
                     opened.execute(statement)
                 opened.execute("INSERT INTO campaign VALUES (?)", (contents,))
@@ -46,13 +46,13 @@ class Writer:
         database.check_contents(self._path, found, contents)
 
     def put(self, rows: Sequence[Row], session: int) -> None:
-        """Put runs on the disk, all or none; when this returns they stay, whatever happens to this process or machine.
+        """Store runs, all or none; when this returns they survive any failure of this process or machine.
 
         Args:
-            rows: of the runs.
-            session: that they are handed in by, counted from 1.
+            rows: the runs.
+            session: number, from 1, of the session that stores them.
 
-        Raises `InputError`, and keeps none, where a run is there already, and where the disk is full or fails.
+        Raises `InputError`, and stores none, if a run is stored already, or the disk is full or fails.
         """
         places = [database.place_of(row.cell, row.run) for row in rows]
         with database.explained(self._path, places[0] if len(places) == 1 else ""):
@@ -66,7 +66,7 @@ class Writer:
                     self._database.execute("DELETE FROM failures WHERE cell = ? AND run = ?", (row.cell, row.run))
 
     def put_failure(self, failure: database.Failure) -> None:
-        """Keep why a run could not be finished, in place of an earlier reason, until it is."""
+        """Store why a run could not be finished, replacing an earlier reason, until it is finished."""
         self._change(
             failure.cell,
             failure.run,
@@ -76,33 +76,33 @@ class Writer:
         )
 
     def finished(self) -> set[tuple[str, int]]:
-        """Cell and number of every run in the file."""
+        """Return cell and number of every run in the file."""
         return set(self._keys())
 
     def damaged(self) -> tuple[tuple[str, int], ...]:
-        """Cell and number of every run whose row is not as it was written."""
+        """Return cell and number of every run whose row has changed since it was written."""
         with database.explained(self._path):
             rows = self._database.execute(f"SELECT {database.COLUMNS} FROM runs ORDER BY cell, run")
             return tuple((row[0], row[1]) for row in rows if verified(row) is None)
 
     def metrics(self) -> Iterator[tuple[str, int, bytes]]:
-        """Cell and number of every run, with its measures."""
+        """Return cell and number of every run, with its metrics."""
         with database.explained(self._path):
             rows = self._database.execute("SELECT cell, run, metrics FROM runs ORDER BY cell, run").fetchall()
         return ((cell, run, unpack(packed)) for cell, run, packed in rows)
 
     def put_metrics(self, cell: str, run: int, metrics: bytes) -> None:
-        """Keep other measures of a run that is there."""
+        """Replace the metrics of a stored run."""
         where = "UPDATE runs SET metrics = ?, metrics_sha256 = ? WHERE cell = ? AND run = ?"
         self._change(cell, run, where, *pack(cell, run, metrics))
 
     def take_in(self, others: Iterable[tuple[database.Reader, Callable[[int], int]]]) -> int:
-        """Copy the runs of other folders that are not here yet, all in one transaction; returns their number.
+        """Copy the runs of other folders that are missing here, in one transaction; return their number.
 
         Args:
-            others: each with the session that stands here for one of its own.
+            others: readers, each with a function from its session numbers to those of this folder.
 
-        Raises `InputError`, and changes nothing, for a run that is not as it was written, or has other bytes here.
+        Raises `InputError`, and changes nothing, for a damaged run, or one that is stored here with other bytes.
         """
         with database.explained(self._path):
             self._database.execute("BEGIN IMMEDIATE")
@@ -118,7 +118,7 @@ class Writer:
             return num_taken
 
     def _take_in(self, reader: database.Reader, row: tuple[Any, ...]) -> bool:
-        """Whether a run was new."""
+        """Copy a run; return True if it was new."""
         if self._database.execute(_INSERT.replace("INSERT", "INSERT OR IGNORE", 1), row).rowcount:
             return True
         kept = "SELECT payload_sha256 FROM runs WHERE cell = ? AND run = ?"
@@ -128,9 +128,9 @@ class Writer:
         return False
 
     def rewrite(self, payload: Callable[[Entry], bytes]) -> None:
-        """Give every run another payload, all in one transaction.
+        """Replace the payload of every run, in one transaction.
 
-        Raises `InputError`, and changes nothing, for a run that is not as it was written, and as `payload` does.
+        Raises `InputError`, and changes nothing, for a damaged run; also raises as `payload`.
         """
         with database.explained(self._path):
             keys = self._keys()
@@ -153,7 +153,7 @@ class Writer:
         self._database.execute(change, (*packed, cell, run))
 
     def discard(self, cell: str, run: int) -> None:
-        """Take a run out of the file."""
+        """Delete a run from the file."""
         self._change(cell, run, "DELETE FROM runs WHERE cell = ? AND run = ?")
 
     def _keys(self) -> list[tuple[str, int]]:
@@ -162,14 +162,14 @@ class Writer:
         return database.checked_keys(self._path, rows)
 
     def _change(self, cell: str, run: int, statement: str, *values: Any) -> None:
-        """A statement about one run, which stands behind its values."""
+        """Execute a statement about one run, whose key follows the values."""
         with database.explained(self._path, database.place_of(cell, run)):
             self._database.execute(statement, (*values, cell, run))
 
     def close(self) -> None:
-        """Let other writers in."""
+        """Release the file for other writers."""
         if self._opened is not None:
-            # A reader at this very moment: the emptied journal does no harm.
+            # Fails if a reader is active; the empty journal is harmless.
             with suppress(sqlite3.Error, UnicodeDecodeError):
                 self._opened.execute("PRAGMA busy_timeout = 0")
                 self._opened.execute("PRAGMA journal_mode = DELETE")

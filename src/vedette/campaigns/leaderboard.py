@@ -1,4 +1,4 @@
-"""How entrants stand on the scenes of a benchmark beside the library's own, and tables of it."""
+"""Leaderboard of a benchmark: entrants and the library's own strategies on each scene, and tables of them."""
 
 from __future__ import annotations
 
@@ -23,28 +23,29 @@ from vedette.scenarios.dumping import dump_scenario
 from vedette.simulation.storage import versions
 
 COUNTED = ("filter_steps", "fusions", "rewards")
-# Of fewer runs an interval says nothing.
+# With fewer runs an interval is meaningless.
 _LEAST_RUNS = 5
-# Below this mean NEES, estimates said nothing of their certainty: see `vedette.tracking.ProgramFilter`.
+# Below this mean NEES, the estimates came without covariances: see `vedette.tracking.ProgramFilter`.
 _SAYS_NOTHING = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
 class LeaderboardRow:
-    """How one strategy stands on a scene, over the runs that were tried of it. A lost run counts as the cutoff.
+    """Result of one strategy on a scene, over all attempted runs. A lost run counts with the cutoff as its error.
 
     Attributes:
-        label: of it.
-        is_own: whether it is one of the library's own.
-        num_runs, num_lost: runs, and of these the ones that could not be finished.
+        label: name of the strategy.
+        is_own: whether it is one of the library's own strategies.
+        num_runs, num_lost: number of runs, and of those that could not be finished.
         ospa: mean over scans and runs, with its 95 % interval.
-        tail: of that, its median and worst run, and the share of runs that end with a lost target.
-        difference: of that to the first strategy, run by run; None: it is the first.
+        tail: median and worst run of the same, and the share of runs that end with a lost target.
+        difference: paired difference in OSPA to the first strategy; None: it is the first.
         cardinality_error: mean number of estimates minus that of targets; NaN: no run was finished.
-        nees: mean NEES of positions over 2, with its interval: 1 where covariances are right; None: it says nothing.
-        seconds: wall time of a decision, or of the filters and fusion of a scan, median, s; a program's is in it.
-        counts: of each of `COUNTED`, how many a decision took; NaN: not known.
-        reason: why runs were lost, of the first.
+        nees: mean NEES of positions over 2, with its interval: 1 if covariances are consistent; None: estimates have no
+            covariances.
+        seconds: median wall time of a decision, or of the filters and fusion of a scan, s; includes that of a program.
+        counts: mean number per decision of each of `COUNTED`; NaN: not known.
+        reason: reason why the first lost run was lost.
     """
 
     label: str
@@ -63,14 +64,14 @@ class LeaderboardRow:
 
 @dataclass(frozen=True, slots=True)
 class SceneTable:
-    """All that stand on a scene, the one to compare with first.
+    """All strategies on a scene, the reference first.
 
     Attributes:
-        scene: which.
-        unit: of OSPA.
-        digest: SHA-256 of the scenario without who is entered.
-        entrants: of each folder of an entrant, SHA-256 of its campaign: scene, command and the files that it names.
-        standings: of each.
+        scene: the scene.
+        unit: unit of OSPA.
+        digest: SHA-256 of the scenario without the entrants.
+        entrants: SHA-256 of the campaign of each entrant, by folder: scene, command and the files that it names.
+        standings: row of each strategy.
     """
 
     scene: Scene
@@ -81,7 +82,7 @@ class SceneTable:
 
 
 def scene_table(scene: Scene, folder: Path) -> SceneTable | None:
-    """Of the results in the folder of a benchmark; None where the first strategy has no run there."""
+    """Return the table of a scene from the folder of a benchmark; None if the first strategy has no run there."""
     place = folder / scene.name
     found = [each for each in sorted(place.iterdir()) if each.is_dir()] if place.is_dir() else []
     opened = [open_results(each) for each in sorted(found, key=lambda each: (each.name != OWN, each.name))]
@@ -99,7 +100,7 @@ def scene_table(scene: Scene, folder: Path) -> SceneTable | None:
 
 
 def _tried(scene: Scene, results: CampaignResults) -> Iterator[tuple[LeaderboardRow, dict[int, float]]]:
-    """The strategies that have runs, not yet compared with another; and their OSPA by run, lost ones at the cutoff."""
+    """Yield the row of each strategy with runs, without a difference; and its OSPA by run, lost runs at the cutoff."""
     for cell in results.campaign.cells:
         label = str(cell.settings["planner" if scene.role == "planner" else "variant"])
         lost = {each.run: each.message for each in results.failures() if each.cell == cell.name}
@@ -134,14 +135,14 @@ def _tried(scene: Scene, results: CampaignResults) -> Iterator[tuple[Leaderboard
 
 
 def _spent(scene: Scene, ensemble: Ensemble) -> Floats:
-    """s of wall time, of each decision, or of the filters and fusion of each scan."""
+    """Wall time of each decision, or of the filters and fusion of each scan, s."""
     if scene.role == "planner":
         return np.asarray(ensemble.seconds.get("planning", ()), np.float64)
     return np.add(ensemble.seconds["filter"], ensemble.seconds["fusion"], dtype=np.float64)
 
 
 def _difference(ospa: Mapping[int, float], first: Mapping[int, float]) -> Summary | None:
-    """Of a strategy to the first, over the runs that both have; None without any."""
+    """Return the paired difference of a strategy to the first, over their common runs; None without any."""
     common = sorted(ospa.keys() & first.keys())
     if not common:
         return None
@@ -153,7 +154,7 @@ def _mean(values: Floats) -> float:
 
 
 def header(table: SceneTable) -> tuple[str, ...]:
-    """Of the columns of `row`."""
+    """Return the column names of `row`."""
     unit, first = table.unit, table.scene.beside[0]
     spent = "ms a decision" if table.scene.role == "planner" else "ms a scan"
     ours = named_in("OSPA", unit), named_in(f"More than {first}", unit), "95 %"
@@ -163,7 +164,7 @@ def header(table: SceneTable) -> tuple[str, ...]:
 
 
 def row(table: SceneTable, own: LeaderboardRow) -> tuple[str, ...]:
-    """One row under `header`; empty where something is not known."""
+    """Return one row under `header`; empty cells where values are not known."""
     more, nees = own.difference, own.nees
     counts = [_known(own.counts[name], ",.0f") for name in COUNTED] if table.scene.role == "planner" else []
     return (
@@ -187,7 +188,7 @@ def _known(value: float, form: str) -> str:
 
 
 def _interval(summary: Summary, form: str) -> str:
-    """Empty of fewer than `_LEAST_RUNS` runs."""
+    """Return the interval in words; empty for fewer than `_LEAST_RUNS` runs."""
     return (
         ""
         if np.isnan(summary.low) or summary.num_runs < _LEAST_RUNS
@@ -196,7 +197,7 @@ def _interval(summary: Summary, form: str) -> str:
 
 
 def origin(tables: Sequence[SceneTable], seed: int) -> dict[str, str]:
-    """What the tables are of: versions, and scenarios and entrants, whenever they were entered, with their SHA-256."""
+    """Return seed, versions, and SHA-256 of the scenarios and entrants of the tables, by name."""
     found = {"seed": str(seed), **versions()}
     for table in tables:
         found[f"scene {table.scene.name}"] = table.digest
@@ -205,7 +206,7 @@ def origin(tables: Sequence[SceneTable], seed: int) -> dict[str, str]:
 
 
 def benchmark_markdown(tables: Sequence[SceneTable], facts: Mapping[str, str]) -> str:
-    """All tables as Markdown."""
+    """Return all tables as Markdown."""
     lines = ["# The benchmark of the field", ""]
     for table in tables:
         lines += [f"## {table.scene.name}", "", f"{table.scene.about}.", ""]
@@ -215,7 +216,7 @@ def benchmark_markdown(tables: Sequence[SceneTable], facts: Mapping[str, str]) -
 
 
 def benchmark_csv(tables: Sequence[SceneTable]) -> str:
-    """All standings as CSV, numbers in full, one row a scene and strategy."""
+    """Return all rows as CSV with full precision, one line per scene and strategy."""
     out = io.StringIO()
     names = [
         "ospa",

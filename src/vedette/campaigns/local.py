@@ -18,19 +18,21 @@ from vedette.errors import VedetteError
 from vedette.internal.processes import as_children, context, end_with_parent, let_go_of_results, load_ahead
 from vedette.internal.reading import error_summary
 
-_TASKS_A_WORKER = 2  # one that waits, so that none idles while results travel
-_WAIT_SECONDS = 0.2  # without an end, it could not be interrupted everywhere
+_TASKS_A_WORKER = 2  # one waits, so that no worker idles while results travel
+_WAIT_SECONDS = 0.2  # a wait without timeout cannot be interrupted on all platforms
 _START_SECONDS = 120.0
-_MOST_FAILED_STARTS = 3  # in a row
-_FILES, _FILES_A_WORKER = 40, 10  # open at once, with room to spare: 16 were with one worker, 72 with eight
+_MOST_FAILED_STARTS = 3  # consecutive failures
+_FILES, _FILES_A_WORKER = 40, 10  # open files, with a margin: measured 16 with one worker, 72 with eight
 
 
 @contextmanager
 def local_workers(num_workers: int, tell: Callable[[str], None]) -> Iterator[LocalWorkers]:
-    """As many worker processes on this machine; one that dies is replaced, and `tell` told.
+    """Context manager with `num_workers` worker processes on this machine; one that dies is replaced.
+
+    tell: receives messages about workers that died.
 
     Raises:
-        VedetteError: they cannot be started.
+        VedetteError: the processes cannot be started.
     """
     _make_room_for_files(num_workers)
     workers = LocalWorkers(tell)
@@ -42,9 +44,9 @@ def local_workers(num_workers: int, tell: Callable[[str], None]) -> Iterator[Loc
 
 
 def _make_room_for_files(num_workers: int) -> None:
-    """Raise this process's limit of open files where it is too low, as far as the system lets it.
+    """Raise this process's limit of open files if it is too low, as far as the operating system allows.
 
-    Raises `VedetteError` where that is not enough.
+    Raises `VedetteError` if that is not enough.
     """
     try:
         import resource
@@ -64,12 +66,12 @@ def _make_room_for_files(num_workers: int) -> None:
 
 @dataclass(slots=True, eq=False)
 class _Worker:
-    """One process, in a pool of its own: one that dies leaves the others alone."""
+    """A process in a pool of its own, so that its death does not affect the others."""
 
     pool: ProcessPoolExecutor
     begun: Future[int]
-    processes: set[BaseProcess]  # the one, or none where it has died by now
-    tasks: dict[Future[TaskOutcome], Task] = field(default_factory=dict)  # in the order in which it does them
+    processes: set[BaseProcess]  # one process, or none if it has died already
+    tasks: dict[Future[TaskOutcome], Task] = field(default_factory=dict)  # in order of execution
 
     @classmethod
     def start(cls) -> _Worker:
@@ -91,7 +93,7 @@ class _Worker:
         return self.begun.done() and self.begun.exception() is None
 
     def manner(self) -> str:
-        """How it died."""
+        """Return in words how the process died."""
         status = next((process.exitcode for process in self.processes), None)
         if status is None or status >= 0:
             return f"exit status {status}"
@@ -104,7 +106,7 @@ class _Worker:
 
 
 class LocalWorkers:
-    """See `vedette.campaigns.engine.Workers`."""
+    """Worker processes on this machine, see `vedette.campaigns.engine.Workers`."""
 
     def __init__(self, tell: Callable[[str], None]) -> None:
         self._tell = tell
@@ -115,7 +117,7 @@ class LocalWorkers:
         self._workers: list[_Worker] = []
 
     def start(self, num_workers: int) -> None:
-        """Start so many; `VedetteError` where the system starts no more."""
+        """Start this number of processes; raises `VedetteError` if the operating system refuses."""
         for _ in range(num_workers):
             self._workers.append(_Worker.start())
 
@@ -147,12 +149,12 @@ class LocalWorkers:
         return ended
 
     def end(self) -> None:
-        """Stop them, whatever they are doing."""
+        """Kill the processes, whatever they are doing."""
         for worker in self._workers:
             worker.end()
 
     def _collect(self, worker: _Worker) -> None:
-        """Note what a worker has finished; where it died, what it had not is left."""
+        """Collect the results of a worker; if it died, its unfinished tasks are left."""
         for future in [each for each in worker.tasks if each.done()]:
             error = future.exception()
             if error is None:
@@ -162,7 +164,7 @@ class LocalWorkers:
                 raise error
 
     def _replace(self, dead: _Worker) -> None:
-        """Start another worker in the place of one that died: it is given what that one had not done."""
+        """Replace a worker that died by another, which gets its unfinished tasks."""
         dead.end()
         self._collect(dead)
         left = list(dead.tasks.values())
@@ -185,8 +187,8 @@ class LocalWorkers:
 
 
 def _begin() -> None:
-    """What a worker does first."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server may be another's, which does not
+    """Initialise a worker process."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the fork server may not ignore it
     end_with_parent()
 
 

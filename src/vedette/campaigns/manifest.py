@@ -1,4 +1,4 @@
-"""What a results folder says of itself: the campaign as data, and the sessions that worked on it."""
+"""Manifest of a results folder: the campaign as data, and the sessions of work on it."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from vedette.simulation.storage import VersionCheck, check_version, versions
 
 MANIFEST = "manifest.json"
 FORMAT = "vedette-campaign"
-_MOST_BYTES = 2**27  # of a manifest: ten thousand cells have a fifth of it
-# What of the manifest can never change. The number of runs is not part of it: a campaign may be made longer.
+_MOST_BYTES = 2**27  # of a manifest, five times that of 10,000 cells
+# Fields that never change. The number of runs is not among them, as a campaign may be extended.
 _FIXED = ("name", "seed", "axes", "compare", "spec", "cells", "digest")
 
 
 class _Session(BaseModel):
-    """When, with what and on what machine."""
+    """Time, versions and machine of a session."""
 
     model_config = ConfigDict(strict=True)
     started: str
@@ -43,7 +43,7 @@ class _Session(BaseModel):
 
 
 class _CellEntry(BaseModel):
-    """One cell, its scenario as YAML."""
+    """One cell, with its scenario as YAML."""
 
     model_config = ConfigDict(strict=True)
     name: str
@@ -53,7 +53,7 @@ class _CellEntry(BaseModel):
 
 
 class _Manifest(BaseModel):
-    """The form of a manifest; what its parts say to one another is checked where a campaign is made of it."""
+    """Form of a manifest; `campaign_of` checks that its parts are consistent."""
 
     model_config = ConfigDict(strict=True)
     name: str
@@ -70,7 +70,7 @@ class _Manifest(BaseModel):
 
 
 def new_manifest(campaign: Campaign) -> dict[str, Any]:
-    """The manifest of a campaign that nobody has worked on yet, as plain data of JSON."""
+    """Return the manifest of a new campaign, as plain JSON data."""
     texts = campaign.texts()
     manifest = {
         "format": FORMAT,
@@ -100,15 +100,15 @@ def new_manifest(campaign: Campaign) -> dict[str, Any]:
 
 
 def new_session() -> dict[str, Any]:
-    """When, with which versions and on what machine the campaign is worked on; no names of hosts or users."""
+    """Return a session: time, versions and machine, without names of hosts or users."""
     machine = {"platform": platform.platform(), "architecture": platform.machine(), "processors": os.cpu_count()}
     return {"started": _now(), "versions": versions("llvmlite"), "machine": machine}
 
 
 def read_manifest(folder: Path, check: VersionCheck = check_version) -> dict[str, Any]:
-    """The manifest of a results folder, of a format that passes `check`.
+    """Return the manifest of a results folder, of a format that passes `check`.
 
-    Raises `InputError`, naming the file, where there is none that can be used.
+    Raises `InputError`, naming the file, if there is no valid one.
     """
     path = folder / MANIFEST
     try:
@@ -138,19 +138,19 @@ def read_manifest(folder: Path, check: VersionCheck = check_version) -> dict[str
 
 
 def write_manifest(folder: Path, manifest: Mapping[str, Any]) -> None:
-    """Put the manifest in place, whole or not at all. Raises `InputError` where it cannot be written."""
+    """Write the manifest atomically. Raises `InputError` if it cannot be written."""
     content = json.dumps(manifest, indent=1).encode() + b"\n"
     write_file(folder / MANIFEST, lambda file: file.write(content))
 
 
 def contents_checksum(manifest: Mapping[str, Any]) -> str:
-    """SHA-256 of what can never change in a manifest."""
+    """Return the SHA-256 of the fields of a manifest that never change."""
     fixed = {field: manifest[field] for field in _FIXED}
     return hashlib.sha256(json.dumps(fixed, sort_keys=True).encode()).hexdigest()
 
 
 def check_same(folder: Path, there: Mapping[str, Any], here: Mapping[str, Any]) -> None:
-    """`InputError`, naming the first field that differs, unless both manifests are of the same share of a campaign."""
+    """Raise `InputError`, naming the first difference, unless both manifests are of the same shard of a campaign."""
     for field in (*_FIXED, "shard"):
         difference = _difference(field, there.get(field), here.get(field))
         if difference and field == "digest":
@@ -162,9 +162,9 @@ def check_same(folder: Path, there: Mapping[str, Any], here: Mapping[str, Any]) 
 
 
 def campaign_of(folder: Path, manifest: Mapping[str, Any]) -> Campaign:
-    """The campaign back from its manifest. The files that its scenarios name need not be there.
+    """Return the campaign from its manifest. The files that its scenarios name need not exist.
 
-    Raises `InputError`, naming the file, for a manifest that no specification has: what is opened later relies on it.
+    Raises `InputError`, naming the file, for a manifest that no specification produces, as later steps rely on it.
     """
     try:
         spec = {**manifest["spec"], "runs": manifest["num_runs"]}
@@ -189,7 +189,7 @@ def campaign_of(folder: Path, manifest: Mapping[str, Any]) -> Campaign:
 
 
 def _check_same_as(specification: CampaignSpec, manifest: Mapping[str, Any]) -> None:
-    """`InputError` unless the cells are those of the specification, each under a name that a file may have."""
+    """Raise `InputError` unless the cells are those of the specification, each with a name that is fit for a file."""
     axes, settings = specification.axes(), specification.settings()
     for field, value, wanted in (
         ("name", manifest["name"], specification.name),
@@ -198,7 +198,7 @@ def _check_same_as(specification: CampaignSpec, manifest: Mapping[str, Any]) -> 
         ("settings", [cell["settings"] for cell in manifest["cells"]], settings),
         ("planner", [cell["planner"] for cell in manifest["cells"]], [one["planner"] for one in settings]),
     ):
-        if json.dumps(value) != json.dumps(wanted):  # texts, as to Python 1, 1.0 and true are equal
+        if json.dumps(value) != json.dumps(wanted):  # compared as text, as 1, 1.0 and True are equal in Python
             raise InputError(f"{field}: expected what the specification says; got other values")
     names = [cell["name"] for cell in manifest["cells"]]
     if len(set(names)) < len(names) or any(name != safe_name(name) or name in ("", ".", "..") for name in names):
@@ -208,7 +208,7 @@ def _check_same_as(specification: CampaignSpec, manifest: Mapping[str, Any]) -> 
 
 
 def _cell(entry: Mapping[str, Any], read: dict[str, Scenario]) -> Cell:
-    """A cell back; `read` holds the scenarios of those before it by their texts, as strategies share one."""
+    """Return a cell; `read` caches the scenarios by their texts, as strategies share them."""
     text = entry["scenario"]
     if text not in read:
         place = f"cell {entry['name']}"
@@ -220,7 +220,7 @@ def _cell(entry: Mapping[str, Any], read: dict[str, Scenario]) -> Cell:
 
 
 def _difference(place: str, there: Any, here: Any) -> str:
-    """Where two pieces of plain data first differ, in words; empty where they do not."""
+    """Return in words where two pieces of plain data first differ; empty if they do not."""
     if isinstance(there, dict) and isinstance(here, dict):
         parts = [(f"{place}.{key}", there.get(key), here.get(key)) for key in (*there, *(here.keys() - there.keys()))]
     elif isinstance(there, list) and isinstance(here, list) and len(there) == len(here):

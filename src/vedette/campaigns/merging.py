@@ -1,4 +1,4 @@
-"""Results folders of the shares of one campaign, made one."""
+"""Merges the results folders of the shards of one campaign."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ from vedette.kernels.base.types import Ints
 
 @dataclass(frozen=True, slots=True)
 class MergeResult:
-    """What became of the shares of a campaign.
+    """Result of merging the shards of a campaign.
 
     Attributes:
-        results: of the one folder.
+        results: results of the merged folder.
         num_taken: runs that this call added.
-        count: of shares that the campaign was cut into; 1 where it was not.
-        missing: numbers of the shares that have runs which no folder holds, increasing.
+        count: number of shards of the campaign; 1 if it was not split.
+        missing: numbers of the shards with runs that no folder holds, increasing.
         num_missing: number of these runs.
-        shards: where the folders of the shares are.
+        shards: folder that contains the folders of the shards.
     """
 
     results: CampaignResults
@@ -52,19 +52,20 @@ class MergeResult:
 
 
 def merge(folders: Sequence[Path | str], out: Path | str | None = None, *, tables: bool = True) -> MergeResult:
-    """Make one results folder of those of shares; its runs are those that a single process leaves, byte for byte.
+    """Merge results folders of shards; the runs equal those of a single process, byte for byte.
 
-    What several folders hold is taken once. Folders of shares that are unfinished are taken as they are: the same call
-    adds what has been done since.
+    Runs that several folders hold are taken once. Folders of unfinished shards are accepted: the same call later adds
+    the runs done since.
 
     Args:
-        folders: of shares, or folders that such folders are in. Whole results folders of the campaign do, too.
-        out: for the results; new, empty, or of the same campaign. None: named after the campaign.
-        tables: write the tables for other tools, too, where no run is missing.
+        folders: folders of shards, or folders that contain such folders. Whole results folders of the campaign are
+            accepted too.
+        out: folder for the results; new, empty, or of the same campaign. None: named after the campaign.
+        tables: also write the tables for other tools, if no run is missing.
 
     Raises:
-        InputError: no folder of results among these; one of another campaign, of other versions, or damaged; a run
-            that two folders have with different bytes. `out` is then left as it was.
+        InputError: no results folder among these; one of another campaign, of other versions, or damaged; a run that
+            two folders have with different bytes. `out` is then unchanged.
     """
     places = _places(folders)
     whole, shares = _read(places)
@@ -82,7 +83,7 @@ def merge(folders: Sequence[Path | str], out: Path | str | None = None, *, table
 
 
 def _lacking(results: CampaignResults, count: int) -> Ints:
-    """(count + 1,) runs of each share that are not there; of a million runs, so by columns and not one by one."""
+    """(count + 1,) number of missing runs of each shard; by columns, as there may be a million runs."""
     campaign, done = results.campaign, defaultdict[str, list[int]](list)
     for name, run in Reader(results.folder).finished():
         done[name].append(run)
@@ -95,7 +96,7 @@ def _lacking(results: CampaignResults, count: int) -> Ints:
 
 
 def _places(folders: Sequence[Path | str]) -> list[Path]:
-    """The results folders among these, or in them, each once."""
+    """Return the results folders among these folders, or inside them, each once."""
     found: dict[Path, Path] = {}
     for folder in map(Path, folders):
         inside = sorted(folder.glob(f"*/{MANIFEST}")) if folder.is_dir() else []
@@ -108,7 +109,7 @@ def _places(folders: Sequence[Path | str]) -> list[Path]:
 
 @dataclass(frozen=True, slots=True)
 class _Share:
-    """What is kept of a folder's manifest: of a thousand folders they may be too many to hold."""
+    """Parts of a shard's manifest; the manifests of a thousand folders may not fit in memory."""
 
     folder: Path
     shard: Shard
@@ -117,7 +118,7 @@ class _Share:
 
 
 def _read(places: Sequence[Path]) -> tuple[dict[str, Any], list[_Share]]:
-    """The manifest of all together; `InputError`, naming the folder, for one that is not of the same campaign."""
+    """Return the merged manifest; raises `InputError`, naming the folder, for one of another campaign."""
     whole: dict[str, Any] = {}
     shares: list[_Share] = []
     for place in places:
@@ -132,7 +133,7 @@ def _read(places: Sequence[Path]) -> tuple[dict[str, Any], list[_Share]]:
 
 
 def _joined(place: Path, manifest: dict[str, Any], whole: dict[str, Any]) -> dict[str, Any]:
-    """The whole with what the manifest in that place adds: runs, and sessions."""
+    """Return the merged manifest extended by the runs and sessions of the manifest in that place."""
     check_same(place, manifest, whole)
     wanted = next((session["versions"] for session in whole["sessions"]), None)
     for session in manifest["sessions"]:
@@ -149,12 +150,12 @@ def _joined(place: Path, manifest: dict[str, Any], whole: dict[str, Any]) -> dic
 
 
 def _fill(target: Path, whole: dict[str, Any], shares: Sequence[_Share]) -> int:
-    """Take the runs in; returns how many are new."""
+    """Copy the runs into the target; return how many are new."""
     make_folder(target)
     started = (target / MANIFEST).exists()
     writer = Writer(target)
     try:
-        if started:  # what is there comes first, as its runs name its sessions by their places
+        if started:  # the existing sessions come first, as the runs refer to them by position
             whole = _joined(target, whole, read_manifest(target))
             writer.open_runs(contents_checksum(whole))
         write_manifest(target, whole)
@@ -166,7 +167,7 @@ def _fill(target: Path, whole: dict[str, Any], shares: Sequence[_Share]) -> int:
         if not started:
             for name in (MANIFEST, DATABASE, LOCK):
                 (target / name).unlink(missing_ok=True)
-            with suppress(OSError):  # somebody else's files
+            with suppress(OSError):  # the folder holds other files
                 target.rmdir()
         raise
     writer.close()
@@ -174,7 +175,7 @@ def _fill(target: Path, whole: dict[str, Any], shares: Sequence[_Share]) -> int:
 
 
 def _has_begun(share: _Share) -> bool:
-    """Whether it was not killed between its manifest and its runs."""
+    """Return False if the shard was killed between writing its manifest and its runs."""
     database = share.folder / DATABASE
     return database.exists() and database.stat().st_size > 0
 
@@ -186,7 +187,7 @@ def _reader(share: _Share) -> Reader:
 
 
 def _session(share: _Share, whole: dict[str, Any]) -> Callable[[int], int]:
-    """Number in the whole of a session of the share."""
+    """Return a function from the session numbers of a shard to those of the merged manifest."""
     numbers: list[int] = [whole["sessions"].index(session) + 1 for session in share.sessions]
 
     def number(session: int) -> int:

@@ -1,4 +1,4 @@
-"""How far a campaign is: a moving line on a terminal or in a notebook, a line now and then elsewhere."""
+"""Progress of a campaign: a live line on a terminal or in a notebook, occasional lines elsewhere."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 _SHOWN_FAILURES = 3
-_LOG_SECONDS, _NOTEBOOK_SECONDS = 600.0, 15.0  # between lines
+_LOG_SECONDS, _NOTEBOOK_SECONDS = 600.0, 15.0  # between two lines
 _ROOM_FOR_BAR = 90
 
 
 class Progress(ProgressObserver):
-    """Runs done, their rate, the time left, and the running mean error of what is compared.
+    """Progress display: finished runs, rate, remaining time, and running mean error of the compared strategies.
 
-    A context manager to be given to `run_campaign` as its `watch`. In a notebook the line moves where ipywidgets is
-    installed; otherwise there is one every 15 s.
+    A context manager to pass to `run_campaign` as its `watch`. In a notebook the line is updated in place if ipywidgets
+    is installed; otherwise one is printed every 15 s.
     """
 
     def __init__(self, campaign: Campaign, console: Console | None = None) -> None:
-        """Before the first run.
+        """Create the display before the first run.
 
         Args:
-            campaign: that will be run.
-            console: of rich, to write to; None: standard error, in a notebook the cell's output.
+            campaign: the campaign to run.
+            console: rich console to write to; None: standard error, in a notebook the output of the cell.
         """
         from rich.console import Console
         from rich.progress import BarColumn, TextColumn
@@ -51,11 +51,11 @@ class Progress(ProgressObserver):
         )
         self._bars = self._bar.add_task("starting", total=None)
         self._name = campaign.name
-        # Means over several settings would say nothing.
+        # Means over several settings are meaningless.
         alone = len(campaign.groups()) == 1
         self._label = {cell.name: str(cell.settings[campaign.compare]) for cell in campaign.cells} if alone else {}
         self._unit = campaign.cells[0].scenario.model.ospa.unit
-        self._errors: dict[str, tuple[int, float]] = {}  # number of runs, sum
+        self._errors: dict[str, tuple[int, float]] = {}  # number of runs and sum of errors
         self._found = self._landed = self._total = self._failures = 0
         self._first_at = self._said_at = time.monotonic()
 
@@ -81,7 +81,7 @@ class Progress(ProgressObserver):
     def completed(self, result: CompletedRun) -> None:
         """See `vedette.campaigns.ProgressObserver`."""
         now = time.monotonic()
-        if self._landed == 0:  # the rate is of runs alone: what was loaded or compiled before them is not in it
+        if self._landed == 0:  # the rate excludes the loading and compiling before the first run
             self._first_at = now
         self._landed += 1
         if result.cell in self._label:

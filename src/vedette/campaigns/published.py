@@ -1,4 +1,4 @@
-"""The yardsticks that come with the library: campaigns on published scenes, with the figures and claims published."""
+"""Published comparisons that come with the library: campaigns on published scenes, with their figures and claims."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _PUBLISHED = Path(__file__).with_name("published.toml")
 
 
 class PublishedOrder(NamedTuple):
-    """A published claim that strategy `better` has a smaller error than strategy `than`; `text` says it in words."""
+    """Published claim that strategy `better` has a smaller error than strategy `than`; `text` states it in words."""
 
     text: str
     better: str
@@ -40,7 +40,7 @@ class PublishedDecision(NamedTuple):
 
 
 class CheckedClaim(NamedTuple):
-    """A published claim, the outcome here, and the numbers it rests on."""
+    """A published claim, its outcome in these runs, and the evidence."""
 
     claim: str
     outcome: Literal["reproduced", "not reproduced", "undecided"]
@@ -49,15 +49,15 @@ class CheckedClaim(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class PublishedComparison:
-    """A campaign on a published scene.
+    """A campaign on a published scene, with the published figures.
 
     Attributes:
-        spec: the campaign; its name is that of the reference.
-        title: what it is about, in a line.
-        source: where the published figures come from; empty where there are none.
-        remark: what sets them apart from those of the campaign.
-        published: methods as they are published, the best first.
-        claims, decisions: what else is published: orders of strategies, and actions.
+        spec: specification of the campaign, which has the name of the comparison.
+        title: topic in one line.
+        source: source of the published figures; empty if there are none.
+        remark: differences between the published figures and those of the campaign.
+        published: published methods, the best first.
+        claims, decisions: other published statements: orders of strategies, and actions.
     """
 
     spec: CampaignSpec
@@ -71,7 +71,7 @@ class PublishedComparison:
 
 @cache
 def published_comparisons() -> dict[str, PublishedComparison]:
-    """All that come with the library, by name."""
+    """Return all published comparisons that come with the library, by name."""
     published = tomllib.loads(_PUBLISHED.read_text(encoding="utf-8"))
     return {
         name: PublishedComparison(
@@ -88,13 +88,13 @@ def published_comparisons() -> dict[str, PublishedComparison]:
 
 
 def published_comparison_of(campaign: Campaign) -> PublishedComparison | None:
-    """The yardstick that a campaign is a run of; None for any other campaign."""
+    """Return the published comparison that a campaign runs; None for other campaigns."""
     found = published_comparisons().get(campaign.name)
     return found if found is not None and list(found.spec.scenarios) == list(campaign.axes["scenario"]) else None
 
 
 def checked_claims(reference: PublishedComparison, comparison: Comparison) -> tuple[CheckedClaim, ...]:
-    """The published claims on strategies that were compared, each with its outcome over the paired runs."""
+    """Return the published claims about the compared strategies, each with its outcome over the paired runs."""
     return (*_checked_orders(reference, comparison), *_checked_decisions(reference, comparison))
 
 
@@ -129,7 +129,7 @@ def _checked_decisions(reference: PublishedComparison, comparison: Comparison) -
 
 
 def _published(row: dict[str, str | float]) -> StrategyScore:
-    """A row of the file; what it does not say is not known."""
+    """Return the score in a row of the file; missing values are None."""
 
     def number(key: str) -> float | None:
         return float(row[key]) if key in row else None
@@ -148,7 +148,7 @@ def _published(row: dict[str, str | float]) -> StrategyScore:
 
 
 def published_markdown(results: CampaignResults, reference: PublishedComparison) -> str:
-    """What was reached beside what is published, a table for each setting of the campaign, as Markdown."""
+    """Return the results next to the published figures as Markdown, with a table for each setting of the campaign."""
     lines = [f"# {reference.title}", ""]
     for group in results.comparisons():
         title = results.title(group)
@@ -159,6 +159,6 @@ def published_markdown(results: CampaignResults, reference: PublishedComparison)
 
 
 def provenance(reference: PublishedComparison) -> tuple[str, ...]:
-    """Lines on where the published figures come from, and what sets them apart."""
+    """Return lines on the source of the published figures and their differences from the campaign."""
     source = f"Published: {reference.source}." if reference.source else ""
     return tuple(line for line in (source, reference.remark) if line)

@@ -1,4 +1,4 @@
-"""The results folder of a campaign, opened to read: finished, unfinished, or while it is written."""
+"""Results folder of a campaign, opened for reading: finished, unfinished, or while it is written."""
 
 from __future__ import annotations
 
@@ -31,17 +31,17 @@ if TYPE_CHECKING:
     import pyarrow
     import xarray
 
-_TOGETHER = 500  # runs in a part of the tables
+_TOGETHER = 500  # runs per part of the tables
 
 
 @dataclass(frozen=True, slots=True)
 class GroupComparison:
-    """Cells that differ in the compared axis alone, side by side.
+    """Comparison of cells that differ only in the compared axis.
 
     Attributes:
-        settings: axis and value, of the axes that all of them share.
+        settings: values of the other axes, which the cells share.
         cells: in the order of the comparison's strategies.
-        labels: values of the compared axis as text: the names of the comparison's strategies.
+        labels: values of the compared axis as text, the names of the comparison's strategies.
         comparison: over the runs that are finished in every cell, and the scans that the scenario counts.
     """
 
@@ -53,14 +53,14 @@ class GroupComparison:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class CampaignResults(SummaryRepr):
-    """What is finished of a campaign. Runs are read when they are asked for, and their checksums verified each time.
+    """Finished runs of a campaign. Runs are read on demand, and their checksums verified each time.
 
-    Every method that reads runs raises `InputError`, naming file, cell and run, for one that is damaged.
+    Every method that reads runs raises `InputError` for a damaged one; the message names file, cell and run.
 
     Attributes:
-        folder: where it is.
-        campaign: what was to be run.
-        manifest: all that the folder says of itself, as plain data: spec, scenarios, seeds, sessions with versions and
+        folder: the results folder.
+        campaign: the campaign.
+        manifest: the folder's manifest as plain data: specification, scenarios, seeds, sessions with versions and
             machines.
     """
 
@@ -80,31 +80,31 @@ class CampaignResults(SummaryRepr):
         return str(self.folder)
 
     def finished(self, cell: str) -> tuple[int, ...]:
-        """Numbers of the finished runs of a cell, increasing. Raises `InputError` for a name of no cell."""
+        """Return the increasing numbers of the finished runs of a cell. Raises `InputError` for an unknown cell."""
         self.campaign.cell(cell)
         return tuple(run for name, run in self._finished() if name == cell)
 
     def missing(self, cell: str) -> tuple[int, ...]:
-        """Numbers of the runs of a cell that are still to be done."""
+        """Return the numbers of the runs of a cell that are still missing."""
         done = set(self.finished(cell))
         place = [each.name for each in self.campaign.cells].index(cell)
         return tuple(run for run in self.campaign.runs(place) if run not in done)
 
     def failures(self) -> tuple[Failure, ...]:
-        """The runs that were tried and could not be finished, each with where and why it stopped; by cell and run.
+        """Return the runs that could not be finished, with the place and reason; by cell and run.
 
-        The same command that runs the campaign tries them again.
+        The command that runs the campaign tries them again.
         """
         places = {cell.name: place for place, cell in enumerate(self.campaign.cells)}
         return tuple(sorted(self._reader.failures(), key=lambda each: (places.get(each.cell, -1), each.run)))
 
     def run(self, cell: str, run: SupportsIndex) -> FinishedRun:
-        """A finished run. Raises `InputError` for one that is not finished, or damaged."""
+        """Return a finished run. Raises `InputError` if it is not finished, or damaged."""
         self.campaign.cell(cell)
         return self._decoded(self._reader.entry(cell, operator.index(run)))
 
     def runs(self) -> Iterator[FinishedRun]:
-        """Every finished run, cells in the order of the campaign, each with its runs in order."""
+        """Yield every finished run, cells in the order of the campaign, runs of a cell in order."""
         finished: dict[str, list[int]] = {}
         for name, run in self._finished():
             finished.setdefault(name, []).append(run)
@@ -113,62 +113,64 @@ class CampaignResults(SummaryRepr):
                 yield self._decoded(entry)
 
     def record(self, cell: str, run: SupportsIndex) -> RunRecord:
-        """The record of a finished run."""
+        """Return the record of a finished run."""
         return self.run(cell, run).record
 
     def metrics(self, cell: str, run: SupportsIndex) -> RunMetrics:
-        """The measures of a finished run: as they were kept, or where this version has others, computed anew."""
+        """Return the metrics of a finished run: the stored ones, or recomputed ones if this version has others."""
         return self.run(cell, run).metrics
 
     def ensemble(self, cell: str, runs: Sequence[SupportsIndex] | None = None) -> Ensemble:
-        """What is compared and reported of finished runs of a cell, by their increasing numbers; None: of all.
+        """Return the arrays that comparisons and reports use, from finished runs of a cell.
 
-        Raises `InputError` for no run.
+        runs: increasing numbers of the runs; None: all. Raises `InputError` for no run.
         """
         wanted = self.finished(cell) if runs is None else tuple(map(operator.index, runs))
         return read_ensemble(self, cell, wanted, 1 if self._own else self._num_workers)
 
     def summaries(self, cell: str, runs: Sequence[int]) -> Iterator[tuple[RunSummary, RunMetrics]]:
-        """What is compared of these finished runs, with their measures."""
+        """Yield summaries of these finished runs, with their metrics."""
         for entry in self._reader.entries(self.campaign.cell(cell).name, runs):
             yield self._summarised(entry)
 
     def comparisons(self) -> tuple[GroupComparison, ...]:
-        """One for each group of cells, in order, that has finished runs in common."""
+        """Return a comparison for each group of cells with common finished runs, in order."""
         return tuple(filter(None, map(self._comparison, self.campaign.groups())))
 
     def title(self, group: GroupComparison) -> str:
-        """What sets a group apart from the others, such as "fusion clmb"; empty where it is the only one."""
+        """Return the settings that distinguish a group from the others, such as "fusion clmb"; empty for a single
+        group.
+        """
         several = {axis for axis, values in self.campaign.axes.items() if len(values) > 1}
         return ", ".join(f"{axis} {value}" for axis, value in group.settings.items() if axis in several)
 
     def tables(self) -> dict[str, pyarrow.Table]:
-        """Runs, scans, decisions, actions, rewards, tracks, truth, sensors and timings as Arrow tables.
+        """Return runs, scans, decisions, actions, rewards, tracks, truth, sensors and timings as Arrow tables.
 
-        For pandas `.to_pandas()`, for polars `polars.from_arrow`; DuckDB queries them as they are. See
-        `vedette.campaigns.tables`. None where no run is finished.
+        Use `.to_pandas()` for pandas, `polars.from_arrow` for polars; DuckDB queries them directly. See
+        `vedette.campaigns.tables`. Empty if no run is finished.
         """
         return joined_tables(self.table_parts())
 
     def table_parts(self) -> Iterator[dict[str, pyarrow.Table]]:
-        """The same a few hundred runs at a time, in order, for results that no memory holds.
+        """Yield the same tables for a few hundred runs at a time, in order, for results that do not fit in memory.
 
-        Every part has the columns of its own runs: `vedette.campaigns.tables.schema_of` is of all.
+        Every part has only the columns of its own runs: `vedette.campaigns.tables.schema_of` returns all.
         """
         runs = self.runs()
         while few := list(islice(runs, _TOGETHER)):
             yield tables_of_runs(self.campaign, few)
 
     def dataset(self) -> xarray.Dataset:
-        """Measures at each scan as arrays over cell, run and step; see `vedette.campaigns.dataset`.
+        """Return the metrics at each scan as arrays over cell, run and step; see `vedette.campaigns.dataset`.
 
-        Raises `InputError` where xarray is not installed.
+        Raises `InputError` if xarray is not installed.
         """
         scans = joined_tables({"scans": part["scans"]} for part in self.table_parts())
         return dataset_of_scans(self.campaign, scans.get("scans"))
 
     def _finished(self) -> list[tuple[str, int]]:
-        """Cell and number of every finished run, sorted; `InputError` for one that the campaign does not have."""
+        """Return cell and number of every finished run, sorted; raises `InputError` for one outside the campaign."""
         finished = self._reader.finished()
         names = {cell.name for cell in self.campaign.cells}
         for cell, run in finished:
@@ -194,7 +196,7 @@ class CampaignResults(SummaryRepr):
                 summary = decode_summary(entry.payload, entry.timings)
                 self._check(entry, summary.run, summary.health.num_tracks.shape[1])
                 metrics, _ = decode_metrics(entry.metrics, len(summary.times))
-            if metrics is not None:  # otherwise another version's
+            if metrics is not None:  # otherwise they are of another version
                 return summary, metrics
         run = self._decoded(entry)
         return run.record.summary(), run.metrics
@@ -209,7 +211,7 @@ class CampaignResults(SummaryRepr):
             return FinishedRun(entry.cell, record, metrics.with_own(record, self._own), entry.session, entry.checksum)
 
     def _check(self, entry: Entry, run: int, num_sensors: int) -> None:
-        """`InputError` for a run that is not of that entry."""
+        """Raise `InputError` if a run does not belong to that entry."""
         expected = len(self.campaign.cell(entry.cell).scenario.model.sensors)
         if run != entry.run:
             raise InputError(f"run: expected the number {entry.run}; got {run}")
@@ -218,7 +220,7 @@ class CampaignResults(SummaryRepr):
 
     @contextmanager
     def _placed(self, entry: Entry) -> Iterator[None]:
-        """What is wrong with an entry, with the place where it stands."""
+        """Context manager that adds the place of an entry to errors about it."""
         try:
             yield
         except InputError as error:
@@ -229,17 +231,17 @@ class CampaignResults(SummaryRepr):
 def open_results(
     folder: Path | str, metrics: Sequence[Metric] = (), campaign: Campaign | None = None, num_workers: int = 1
 ) -> CampaignResults:
-    """Open the results folder of a campaign to read.
+    """Open the results folder of a campaign for reading.
 
     Args:
-        folder: finished, unfinished, or while it is written.
-        metrics: measures of one's own, computed of every run that is read, beside those that were kept.
-        campaign: what the folder is of, where that is known, so that its scenarios need not be read; else None.
-        num_workers: processes that read where there are thousands of runs, in a program that guards its main module as
-            `multiprocessing` demands; 0: one a processor. It changes no number.
+        folder: folder that is finished, unfinished, or being written.
+        metrics: custom metrics to compute for every run that is read, in addition to the stored ones.
+        campaign: campaign of the folder, if known, so that its scenarios need not be read; else None.
+        num_workers: number of processes that read thousands of runs, in a program that guards its main module as
+            `multiprocessing` demands; 0: one per processor. It does not change results.
 
-    Raises `InputError`, naming the file, for a folder that holds no campaign, or one whose manifest or runs are
-    missing, cut short or altered.
+    Raises `InputError`, naming the file, for a folder without a campaign, or with a manifest or runs that are missing,
+    cut short or altered.
     """
     target = Path(folder)
     if not target.is_dir():

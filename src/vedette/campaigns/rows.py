@@ -1,6 +1,6 @@
-"""A finished run as a row of the store: packed where it was done, verified whenever it is read.
+"""Finished run as a row of the store: packed where it was computed, verified whenever it is read.
 
-Every row carries checksums, over its cell and run number too, of what was packed.
+Every row carries checksums of its unpacked parts, which also cover its cell and run number.
 """
 
 from __future__ import annotations
@@ -13,28 +13,28 @@ import pyarrow as pa
 
 from vedette.internal.reading import MOST_BYTES, error_summary, inflate
 
-_ZSTD = pa.Codec("zstd", compression_level=-1)  # to a third of the size; 4 % less takes a third longer
-# Bytes of a row are packed to a third; those that unpack to more than this are no row.
+_ZSTD = pa.Codec("zstd", compression_level=-1)  # a third of the size; 4 % less would take a third longer
+# Rows are packed to a third of their size; a row cannot unpack to more than this.
 _MOST_TIMES, _SMALL = 1000, 2**20
-_MAGIC = b"\x28\xb5\x2f\xfd"  # that its frames begin with
+_MAGIC = b"\x28\xb5\x2f\xfd"  # first bytes of a zstd frame
 
 
 class Packed(NamedTuple):
-    """Some bytes of a run as they are kept: compressed, with the checksum of what they were before."""
+    """Part of a run as stored: compressed bytes, and the checksum of the uncompressed content."""
 
     content: bytes
     checksum: str
 
 
 def pack(cell: str, run: int, content: bytes) -> Packed:
-    """What is kept of some bytes of a run."""
+    """Return the packed form of a part of a run."""
     return Packed(_ZSTD.compress(content, asbytes=True), _checksum(cell, run, content))
 
 
 def unpack(packed: bytes, most: int = MOST_BYTES) -> bytes:
-    """What was packed into these bytes, by zstd or, before that, by zlib. Raises `ValueError` for others.
+    """Return the content of bytes packed by zstd or, in older files, by zlib. Raises `ValueError` for others.
 
-    A frame of zstd says what it unpacks to (RFC 8878, 3.1.1.1); it is that, or refused before it takes the memory.
+    A zstd frame states its unpacked size (RFC 8878, 3.1.1.1); larger ones are refused before memory is allocated.
     """
     most = min(most, _SMALL + _MOST_TIMES * len(packed))
     if packed[: len(_MAGIC)] != _MAGIC:
@@ -54,12 +54,12 @@ def unpack(packed: bytes, most: int = MOST_BYTES) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One finished run, to be kept.
+    """A finished run to store.
 
     Attributes:
-        cell, run: which.
-        payload, timings: the run, and what the clock said of it.
-        metrics: what was measured of it; packed of no bytes where nothing was, as it can be measured again.
+        cell, run: identify the run.
+        payload, timings: the run, and its timings.
+        metrics: metrics of the run; empty before packing if there are none, as they can be computed later.
     """
 
     cell: str
@@ -69,23 +69,23 @@ class Row:
     timings: Packed
 
     def values(self, session: int) -> tuple[Any, ...]:
-        """Of the columns of the store."""
+        """Return the values for the columns of the store."""
         return (self.cell, self.run, session, *self.payload, *self.metrics, *self.timings)
 
 
 def row_of(cell: str, run: int, payload: bytes, timings: bytes, metrics: bytes = b"") -> Row:
-    """A finished run, packed."""
+    """Return a finished run as a row, packed."""
     return Row(cell, run, *(pack(cell, run, part) for part in (payload, metrics, timings)))
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One finished run as it was kept.
+    """A finished run read from the store.
 
     Attributes:
-        cell, run: which.
-        session: that it was handed in by, counted from 1.
-        payload, metrics, timings: as of `Row`, unpacked.
+        cell, run: identify the run.
+        session: number, from 1, of the session that stored it.
+        payload, metrics, timings: as in `Row`, unpacked.
     """
 
     cell: str
@@ -102,7 +102,7 @@ class Entry:
 
 
 def verified(values: tuple[Any, ...]) -> Entry | None:
-    """The run in the columns of the store; None where it is not as it was written."""
+    """Return the run from the columns of the store; None if it is damaged."""
     cell, run, session, *packed = values
     if not isinstance(cell, str) or not isinstance(run, int) or not isinstance(session, int):
         return None

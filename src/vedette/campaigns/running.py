@@ -1,4 +1,4 @@
-"""A campaign from start to end: what is missing is run, each run lands whole, and the tables are written last."""
+"""A whole campaign: executes the missing runs, stores each atomically, and writes the tables last."""
 
 from __future__ import annotations
 
@@ -29,27 +29,27 @@ TABLES = "tables"
 
 
 class ProgressObserver(Protocol):
-    """What is told of a campaign while it runs."""
+    """Observer of a running campaign; see `Progress`."""
 
     def begin(self, num_existing: int, num_runs: int) -> None:
-        """How many runs were there already, and how many there are to be."""
+        """Receives the number of runs that exist already and the total number of runs."""
         return
 
     def note(self, text: str) -> None:
-        """Something that a person should know."""
+        """Receives a message for the user."""
         return
 
     def completed(self, result: CompletedRun) -> None:
-        """A run is in the store."""
+        """Receives a run that is stored."""
         return
 
     def failed(self, result: FailedRun) -> None:
-        """A run could not be finished."""
+        """Receives a run that could not be finished."""
         return
 
 
 class NullObserver(ProgressObserver):
-    """Tells nobody."""
+    """Observer that ignores everything."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ class CampaignOutcome:
 
     Attributes:
         num_completed: runs that this call added.
-        num_existing: runs that were there before.
+        num_existing: runs that existed before.
         failed: runs that could not be finished; the same call tries them again.
     """
 
@@ -76,26 +76,27 @@ def run_campaign(
     redo_damaged: bool = False,
     watch: ProgressObserver | None = None,
 ) -> CampaignOutcome:
-    """Run what the folder does not hold yet, and write the tables when all is done.
+    """Execute the runs that are missing in the folder, and write the tables when all are done.
 
-    May be stopped at any moment, by any means: the same call goes on from there, and what it leaves in the end is what
-    one undisturbed call would have left, byte for byte (but for the seconds that things took). Workers, their number,
-    and the order in which they finish change nothing.
+    May be stopped at any moment, by any means: the same call continues from there. The final folder equals that of one
+    uninterrupted call, byte for byte, except for timings. Workers, their number, and the order in which they finish
+    change nothing.
 
     Args:
         campaign: see `vedette.campaigns.resolve`.
-        folder: for the results; new, empty, or of the same campaign.
-        num_workers: processes on this machine; 1: this process alone. With a scheduler: workers that are waited for
+        folder: folder for the results; new, empty, or of the same campaign.
+        num_workers: processes on this machine; 1: only this process. With a scheduler: number of workers to wait for
             before the first run.
-        scheduler: address of a dask scheduler whose workers do the work instead, or the file that it writes
-            (`--scheduler-file`); each has this version installed.
-        redo_damaged: run again what was altered in the folder since it was kept, instead of refusing to go on.
-        watch: is told of the progress.
+        scheduler: address of a dask scheduler whose workers execute the runs instead, or the file that it writes
+            (`--scheduler-file`); each worker has this version installed.
+        redo_damaged: repeat runs that were altered in the folder after they were stored, instead of refusing to
+            continue.
+        watch: observer of the progress.
 
     Raises:
-        InputError: the folder holds something else, another campaign, or damaged results; nothing answers at the
-            scheduler's address.
-        VedetteError: the disk is full, or the scheduler is lost; the runs that landed are safe.
+        InputError: the folder holds something else, another campaign, or damaged results; no scheduler answers at the
+            address.
+        VedetteError: the disk is full, or the scheduler is lost; stored runs are safe.
     """
     if getattr(current_process(), "_inheriting", False):
         raise VedetteError(
@@ -128,14 +129,14 @@ def run_campaign(
                         failed.append(result)
                         store.note_failure(result.cell, result.run, result.message)
                         watch.failed(result)
-    if campaign.shard.count == 1:  # of shares they are written when these are one
-        # Each time: what was left of them by another end of this call, or altered since, is put right.
+    if campaign.shard.count == 1:  # tables of shards are written when they are merged
+        # Always, to repair tables that an interrupted call left or that were altered.
         export_tables(open_results(folder, campaign=campaign), Path(folder) / TABLES)
     return CampaignOutcome(num_completed, num_existing, tuple(failed))
 
 
 def _check_undamaged(store: Store, redo: bool, watch: ProgressObserver) -> None:
-    """`InputError` if a finished run was altered, unless it is to be done again: then it is taken out."""
+    """Raise `InputError` if a finished run was altered; with `redo` discard it instead, so that it is repeated."""
     damaged = store.damaged()
     names = ", ".join(f"{cell} {run}" for cell, run in damaged)
     if damaged and not redo:
@@ -150,7 +151,7 @@ def _check_undamaged(store: Store, redo: bool, watch: ProgressObserver) -> None:
 
 
 def _measure_anew(store: Store, campaign: Campaign, watch: ProgressObserver) -> None:
-    """Measures that the program or the scenarios have gained since runs were kept, of their records."""
+    """Compute metrics that the program or the scenarios have gained since runs were stored, from their records."""
     own = {cell.name: own_metrics(cell.scenario) for cell in campaign.cells}
     lacking = store.unmeasured({cell: [metric.name for metric in of_cell] for cell, of_cell in own.items()})
     if lacking:
@@ -163,7 +164,7 @@ def _measure_anew(store: Store, campaign: Campaign, watch: ProgressObserver) -> 
 
 def _results(queue: TaskQueue, num_workers: int, scheduler: str | None, watch: ProgressObserver) -> Generator[Done]:
     if scheduler is not None:
-        from vedette.campaigns.cluster import remote_workers  # asyncio, which nobody else needs
+        from vedette.campaigns.cluster import remote_workers  # imported here, as only this branch needs asyncio
 
         with remote_workers(scheduler, watch.note, num_workers) as workers:
             yield from on_workers(workers, queue)

@@ -1,4 +1,4 @@
-"""What deciding one way or another brought and cost: strategies of a campaign side by side."""
+"""Scores of the strategies of a campaign: error, tracked share and computation time, as a table."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ from vedette.campaigns.results import GroupComparison
 from vedette.evaluation import Summary
 from vedette.internal.text import markdown_table, named_in, with_error, with_minus
 
-TRACKED_OF_ALL = "tracked_of_all"  # as scenes and campaigns name the measure
+TRACKED_OF_ALL = "tracked_of_all"  # name of the metric in scenes and campaigns
 _UNKNOWN = ""
 _LEAST_SECONDS = 1e-4
 
 
 @dataclass(frozen=True, slots=True)
 class StrategyScore:
-    """One strategy over the paired runs of a setting, or a method as it is published.
+    """Score of one strategy over the paired runs of a setting, or of a published method.
 
     Attributes:
-        label: of the strategy.
+        label: name of the strategy.
         ospa: mean over scans and runs, in the unit of the comparison.
-        standard_error: of it over the runs; None: not known.
+        standard_error: standard error of `ospa` over the runs; None: not known.
         worst: largest mean over the scans of a run; None: not known.
-        difference: to the first strategy, run by run; None: it is the first, or not paired with it.
+        difference: paired difference to the first strategy; None: it is the first, or not paired with it.
         cardinality_error: mean number of estimates minus that of targets.
-        tracked: mean share of all targets, seen or not, that have an estimate within the cutoff; None: not measured.
-        decision_seconds: wall time of a decision of all sensors, s: the median over decisions and runs; of a published
-            method what is published. None: no decisions.
+        tracked: mean share of all targets, in view or not, with an estimate within the cutoff; None: not measured.
+        decision_seconds: wall time of a decision of all sensors, s: median over decisions and runs; for a published
+            method the published value. None: no decisions.
         num_runs: number of runs.
     """
 
@@ -44,7 +44,9 @@ class StrategyScore:
 
 
 def score_strategies(group: GroupComparison) -> tuple[StrategyScore, ...]:
-    """The strategies of a group, over the runs that it has in common, in its order; the first is the reference."""
+    """Return the scores of the strategies of a group, over its common runs, in its order; the first is the
+    reference.
+    """
     comparison, scores = group.comparison, []
     for label, ensemble in zip(group.labels, comparison.ensembles, strict=True):
         total, decisions = comparison.summary(label), ensemble.seconds.get("planning", ())
@@ -66,13 +68,13 @@ def score_strategies(group: GroupComparison) -> tuple[StrategyScore, ...]:
 
 
 def score_header(unit: str, reference: str) -> tuple[str, ...]:
-    """Of the columns of `score_row`."""
+    """Return the column names of `score_row`."""
     names = (named_in("OSPA", unit), named_in("Worst run", unit), named_in(f"More than {reference}", unit))
     return ("Strategy", *names, "N error", "Tracked", "s a decision", "Runs")
 
 
 def score_row(score: StrategyScore) -> tuple[str, ...]:
-    """One row under `score_header`; empty where something is not known."""
+    """Return one row under `score_header`; empty cells where values are not known."""
     more = score.difference
     return (
         score.label,
@@ -87,12 +89,12 @@ def score_row(score: StrategyScore) -> tuple[str, ...]:
 
 
 def score_markdown(scores: tuple[StrategyScore, ...], unit: str, reference: str) -> str:
-    """The table as Markdown."""
+    """Return the table as Markdown."""
     return markdown_table(score_header(unit, reference), map(score_row, scores))
 
 
 def _seconds(value: float) -> str:
-    """Two digits that count, without an exponent."""
+    """Return a time with two significant digits, without an exponent."""
     if value < _LEAST_SECONDS:
         return f"<{_LEAST_SECONDS:g}"
     return f"{value:.2g}" if value < 10.0 else f"{value:.0f}"

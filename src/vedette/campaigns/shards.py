@@ -1,4 +1,4 @@
-"""Shares of a campaign that know nothing of each other: which runs each has, and where it leaves them."""
+"""Shards: independent shares of the runs of a campaign, and their folders."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ _Runs = TypeVar("_Runs", int, Ints)
 
 @dataclass(frozen=True, slots=True)
 class Shard:
-    """One share of `count`; shares of equal count are disjoint and hold every run together.
+    """One shard of `count`; shards of equal count are disjoint and together contain every run.
 
-    Shares differ by at most one run, in all and in each cell. Which share a run is of does not depend on how many runs
-    there are, so that a campaign can be made longer.
+    Sizes differ by at most one run, in total and in each cell. The shard of a run does not depend on the number of
+    runs, so that a campaign can be extended.
 
     Attributes:
-        number: of the share, from 1.
-        count: number of shares.
+        number: number of the shard, from 1.
+        count: number of shards.
 
-    Raises `InputError` for numbers of no share.
+    Raises `InputError` for invalid numbers.
     """
 
     number: int = 1
@@ -43,16 +43,16 @@ class Shard:
 
     @property
     def folder(self) -> str:
-        """What its results folder is called beside those of the others."""
+        """Name of its results folder among those of the other shards."""
         return f"{self.number:0{len(str(self.count))}}-of-{self.count}"
 
     def runs(self, cell: int, num_cells: int, num_runs: int) -> Sequence[int]:
-        """Numbers of its runs of the cell at that place, increasing."""
+        """Return the increasing numbers of its runs of the cell at that place."""
         if self.count == 1:
             return range(num_runs)
-        # As `owner`, solved for the run: at most one a round, in every so many rounds one.
+        # `owner` solved for the run: at most one per round, at regular intervals of rounds.
         shared = math.gcd(num_cells, self.count)
-        length = self.count // shared  # of a round, in runs
+        length = self.count // shared  # length of a round in runs
         inverse = pow(num_cells // shared, -1, length)
         found = []
         for number in range((self.number - 1 - cell) % shared, -(-num_runs // length), shared):
@@ -65,17 +65,17 @@ WHOLE = Shard()
 
 
 def owner(run: _Runs, cell: int, num_cells: int, count: int) -> _Runs:
-    """Number of the share that has a run of the cell at that place; of many runs, that of each.
+    """Return the number of the shard that has a run of the cell at that place; elementwise for arrays.
 
-    Runs are dealt out one after the other, all cells of a run number together. Where that would come back to the same
-    cell before every cell had its turn, the next round begins one share further.
+    Runs are dealt in turn, all cells of a run number together. When the turn would return to the same cell before every
+    cell had it, the next round starts one shard later.
     """
     place = run * num_cells + cell
     return (place + place // math.lcm(num_cells, count)) % count + 1
 
 
 def parse_shard(text: str) -> Shard:
-    """A share as `17/1000`. Raises `InputError` for another text."""
+    """Return the shard written as `17/1000`. Raises `InputError` for other texts."""
     found = re.fullmatch(r"([0-9]{1,9})/([0-9]{1,9})", text.strip(), re.ASCII)
     if found is None:
         raise InputError(f"shard: expected NUMBER/COUNT, such as 17/1000; got {shown(text)}")
@@ -83,7 +83,7 @@ def parse_shard(text: str) -> Shard:
 
 
 def ranges(numbers: Collection[int]) -> str:
-    """Increasing numbers as `3,17-19`, as job arrays take them."""
+    """Return increasing numbers as `3,17-19`, the syntax of job arrays."""
     spans: list[list[int]] = []
     for number in numbers:
         if spans and spans[-1][-1] == number - 1:
@@ -94,7 +94,7 @@ def ranges(numbers: Collection[int]) -> str:
 
 
 def _minutes(text: str) -> int:
-    """Minutes of a time such as `4h`, `90m` or `1d12h`. Raises `InputError` for another text, or none at all."""
+    """Return the minutes of a time such as `4h`, `90m` or `1d12h`. Raises `InputError` for other texts or zero."""
     found = re.fullmatch(r"(?:([0-9]{1,4})d)?(?:([0-9]{1,4})h)?(?:([0-9]{1,6})m)?", text.strip(), re.ASCII)
     days, hours, minutes = (int(part or 0) for part in found.groups()) if found else (0, 0, 0)
     if not days + hours + minutes:
@@ -103,16 +103,16 @@ def _minutes(text: str) -> int:
 
 
 def slurm_script(name: str, count: int, time: str, command: str, merge: str) -> str:
-    """A job array of SLURM, one task a share.
+    """Return a SLURM job array script with one task per shard.
 
     Args:
-        name: of the job.
-        count: number of shares.
-        time: that a task may take, such as `4h`.
-        command: what runs one share, up to its number.
-        merge: what is done when all have ended.
+        name: name of the job.
+        count: number of shards.
+        time: time limit of a task, such as `4h`.
+        command: command that runs one shard, up to its number.
+        merge: command to run when all tasks have ended.
 
-    Raises `InputError` for a time that is none.
+    Raises `InputError` for an invalid time.
     """
     Shard(1, count)
     minutes = _minutes(time)

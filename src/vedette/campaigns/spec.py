@@ -1,4 +1,4 @@
-"""What a campaign is to run: its specification as data, read from TOML or made in Python."""
+"""Specification of a campaign as data, read from TOML or made in Python."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from vedette.scenarios.sections.planners import STRATEGIES
 
 BUILTIN_FOLDER = Path(__file__).parent / "builtin"
 _MOST_BYTES = 2_000_000
-# A cell is a scenario with its filters built: this many take minutes before the first run.
+# A cell is a scenario with its filters built; building this many takes minutes.
 _MOST_CELLS, _MOST_VALUES = 10_000, 1000
 
-# Of Windows, which has them in every folder, whatever stands behind a dot.
+# Device names of Windows, which are reserved in every folder and with every extension.
 _DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{number}" for port in ("com", "lpt") for number in range(1, 10))}
 
 ShortName = Annotated[Name, Field(max_length=60)]
@@ -106,13 +106,15 @@ class CampaignSpec(Section):
 
     @check
     def _comparable(self) -> Iterator[Finding]:
-        comparable = [axis for axis in self.axes() if axis != "scenario"]  # runs of two scenarios are no pairs
+        comparable = [axis for axis in self.axes() if axis != "scenario"]  # runs of two scenarios are not paired
         if self.compare is not None and self.compare not in comparable:
             why = ", as runs of two scenarios are no pairs" if self.compare == "scenario" else ""
             yield ("compare",), f"one of {', '.join(map(named, comparable))}{why}", describe(self.compare)
 
     def axes(self) -> dict[str, tuple[Any, ...]]:
-        """Every axis and its values, in the order in which cells are made; scenario and planner are always there."""
+        """Return every axis and its values, in the order in which cells are made; scenario and planner are always
+        present.
+        """
         axes: dict[str, tuple[Any, ...]] = {"scenario": self.scenarios, "planner": self.planners}
         for axis, values in (("filter", self.filters), ("fusion", self.fusions)):
             if values is not None:
@@ -122,16 +124,16 @@ class CampaignSpec(Section):
         return {**axes, **self.grid}
 
     def settings(self) -> list[dict[str, Any]]:
-        """Axis and value of every cell, in order, the last axis fastest."""
+        """Return the value of each axis for every cell, in order, the last axis fastest."""
         axes = self.axes()
         return [dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values())]
 
 
 def parse_spec(text: str, file: str = "<text>") -> CampaignSpec:
-    """Read a specification from TOML text; `file` is what messages call it.
+    """Read a specification from TOML text; messages call it `file`.
 
     Raises:
-        InputError: text that is no TOML, or every field that is faulty, one a line.
+        InputError: the text is not TOML, or fields are invalid; the message lists them, one per line.
     """
     try:
         data = tomllib.loads(text)
@@ -139,13 +141,13 @@ def parse_spec(text: str, file: str = "<text>") -> CampaignSpec:
         raise InputError(f"{file}: expected TOML; {elided(printable(str(error)), 300)}") from None
     except RecursionError:
         raise InputError(f"{file}: expected TOML; got brackets inside brackets hundreds of times over") from None
-    except ValueError:  # a date that no calendar has, a number of thousands of digits
+    except ValueError:  # an invalid date, or a number with thousands of digits
         raise InputError(f"{file}: expected TOML; got a date or number that cannot be") from None
     return spec_from_data(data, file)
 
 
 def spec_from_data(data: Any, place: str = "campaign") -> CampaignSpec:
-    """The specification in plain data. Raises `InputError` as `parse_spec`."""
+    """Return the specification from plain data. Raises `InputError` as `parse_spec`."""
     if not isinstance(data, Mapping):
         raise InputError(f"{place}: expected a mapping, got {describe(data)}")
     spec, faults = read_section(CampaignSpec, data)
@@ -155,17 +157,17 @@ def spec_from_data(data: Any, place: str = "campaign") -> CampaignSpec:
 
 
 def builtin_specs() -> dict[str, Path]:
-    """Names of the campaigns that come with the library, and their files."""
+    """Return the names of the campaigns that come with the library, and their files."""
     return {file.stem: file for file in sorted(BUILTIN_FOLDER.glob("*.toml"), key=lambda file: file.stem)}
 
 
 def load_spec(name_or_path: Path | str) -> CampaignSpec:
-    """Read a specification that comes with the library by its name, or one of your own from its TOML file.
+    """Read a specification of the library by its name, or a custom one from its TOML file.
 
-    Raises `InputError` as `parse_spec`, and where there is no such file.
+    Raises `InputError` as `parse_spec`, and if the file does not exist.
     """
     builtin = builtin_specs()
     path = builtin.get(str(name_or_path), Path(name_or_path))
-    if not os.path.exists(path):  # False, too, for what can be no path
+    if not os.path.exists(path):  # also False for an invalid path
         raise InputError(f"{path}: no such file; expected a campaign file or one of {', '.join(builtin)}")
     return parse_spec(read_text(path, "campaign file", _MOST_BYTES), str(path))

@@ -1,6 +1,6 @@
-"""The results folder of a campaign, opened to write: the one place through which finished runs reach the disk.
+"""Store of a campaign: its results folder, opened for writing.
 
-The folder holds `manifest.json` (the campaign as data, who worked on it when, with which versions) and
+The folder contains `manifest.json` (the campaign as data, and its sessions with times and versions) and
 `campaign.sqlite` (the finished runs). Read it with `vedette.campaigns.results.open_results`.
 """
 
@@ -29,7 +29,7 @@ from vedette.evaluation.metrics import has_metrics
 
 
 class Store(Writer):
-    """The one writer of a results folder; a context manager. Its calls may come from any thread, one at a time."""
+    """The only writer of a results folder; a context manager. Calls may come from any thread, one at a time."""
 
     def __init__(self, folder: Path, campaign: Campaign, fresh: dict[str, Any]) -> None:
         super().__init__(folder)
@@ -44,28 +44,31 @@ class Store(Writer):
 
     @classmethod
     def open(cls, folder: Path | str, campaign: Campaign) -> Store:
-        """Make the folder, or go on with it.
+        """Create the folder, or continue with it.
 
-        A campaign may be gone on with under a larger number of runs; a smaller number leaves the larger in place.
+        A campaign may continue with a larger number of runs; a smaller number does not reduce it.
 
-        Raises `InputError`, and changes nothing, for a folder that holds something else or another campaign, one that
-        another process is writing, a file in it that is damaged, and a place that cannot be written.
+        Raises `InputError`, and changes nothing, for a folder that holds something else or another campaign, a folder
+        that another process is writing, a damaged file in it, and a place that cannot be written.
         """
         target = Path(folder)
         fresh = new_manifest(campaign)
         make_folder(target)
-        if (target / MANIFEST).exists():  # before the lock, which is a file of its own
+        if (target / MANIFEST).exists():  # before locking, which creates a file
             check_same(target, read_manifest(target), fresh)
         return cls(target, campaign, fresh)
 
     @property
     def session(self) -> int:
-        """Number of times, this one included, that the campaign was worked on."""
+        """Number of sessions of work on the campaign, including this one."""
         return len(self._sessions)
 
     @property
     def version_changes(self) -> tuple[str, ...]:
-        """What has another version now than in an earlier session; runs of other versions may differ in their bytes."""
+        """Packages with another version than in an earlier session, in words.
+
+        Runs of other versions may differ in their bytes.
+        """
         now = self._sessions[-1]["versions"]
         changes = (
             f"{package} was {earlier['versions'].get(package, 'absent')} in session {number} and is {version} now"
@@ -76,12 +79,12 @@ class Store(Writer):
         return tuple(changes)
 
     def add(self, *runs: Row) -> None:
-        """Keep finished runs (`vedette.campaigns.codec`), packed, with their measures if there are any yet.
+        """Store finished runs (`vedette.campaigns.codec`), packed, with their metrics if they exist.
 
-        When this returns, the runs are on the disk.
+        When this returns, the runs are on disk.
 
-        Raises `InputError` for a run that is not the campaign's or is there already, and for a disk that is full or
-        fails: then none of these is kept, the earlier ones are, and adding may be tried again.
+        Raises `InputError` for a run that is not in the campaign or is stored already, and if the disk is full or
+        fails: then none of these runs is stored, earlier ones are kept, and the call may be repeated.
         """
         for row in runs:
             if row.cell not in self._num_runs:
@@ -91,15 +94,17 @@ class Store(Writer):
         self.put(runs, self.session)
 
     def unmeasured(self, own: Mapping[str, Collection[str]]) -> tuple[tuple[str, int], ...]:
-        """Cell name and number of every finished run that lacks measures: this version's, or its cell's `own`."""
+        """Return cell name and number of finished runs that lack metrics of this version, or `own` metrics of their
+        cell.
+        """
         return tuple((cell, run) for cell, run, kept in self.metrics() if not has_metrics(kept, own.get(cell, ())))
 
     def note_failure(self, cell: str, run: int, message: str) -> None:
-        """Keep why a run could not be finished, until it is."""
+        """Store why a run could not be finished, until it is finished."""
         self.put_failure(Failure(cell, int(run), self.session, message))
 
     def _begin_session(self, fresh: dict[str, Any]) -> dict[str, Any]:
-        """Write a new session into the folder's manifest, and open its runs; returns the manifest."""
+        """Add a session to the folder's manifest, and open its runs; return the manifest."""
         started = (self.folder / MANIFEST).exists()
         manifest = read_manifest(self.folder) if started else fresh
         check_same(self.folder, manifest, fresh)
@@ -107,7 +112,7 @@ class Store(Writer):
         manifest = {**manifest, "num_runs": num_runs, "sessions": [*manifest["sessions"], new_session()]}
         contents = contents_checksum(manifest)
         if started:
-            self.open_runs(contents)  # first, so that damaged runs leave the manifest as it is
+            self.open_runs(contents)  # first, so that damaged runs leave the manifest unchanged
             write_manifest(self.folder, manifest)
         else:
             write_manifest(self.folder, manifest)
@@ -124,7 +129,10 @@ class Store(Writer):
 
 
 def make_folder(folder: Path) -> None:
-    """Make a results folder, or leave one as it is. Raises `InputError` where something else is there, or no place."""
+    """Create a results folder if it does not exist.
+
+    Raises `InputError` if something else is there, or it cannot be made.
+    """
     try:
         _check_place(folder)
         folder.mkdir(parents=True, exist_ok=True)
@@ -133,7 +141,7 @@ def make_folder(folder: Path) -> None:
 
 
 def _check_place(folder: Path) -> None:
-    """`InputError` unless the folder is new, empty but for what a killed start leaves, or has a manifest."""
+    """Raise `InputError` unless the folder is new, empty except for leftovers of a killed start, or has a manifest."""
     if not folder.exists() or (folder / MANIFEST).exists():
         return
     if not folder.is_dir():

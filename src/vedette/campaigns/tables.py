@@ -1,9 +1,9 @@
-"""Finished runs as Arrow tables for other tools: those of a single run, one below another.
+"""Arrow tables of finished runs for other tools: the tables of single runs, concatenated.
 
-Every table of many runs begins with the columns `cell`, one for each axis of the campaign, and `run`; rows are in the
-order of the campaign's cells, then by run, then by time. The unit of a column is the end of its name (`_m`, `_s`,
-`_rad`) and in the metadata of its field; null stands where a measure has no value. A `step` is the number of a scan,
-from 1; that of a decision is the scan that it followed.
+Every table of many runs begins with the columns `cell`, one for each axis of the campaign, and `run`. Rows are ordered
+by cell as in the campaign, then by run, then by time. The unit of a column is the end of its name (`_m`, `_s`, `_rad`)
+and in the metadata of its field; null means that a metric has no value. A `step` is the number of a scan, from 1; for a
+decision it is the scan that it followed.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ class FinishedRun:
 
     Attributes:
         cell: name of its cell.
-        record: with the seconds that it took.
-        metrics: measures of its estimates.
-        session: number of the session, from 1, in the manifest's list, that kept it.
-        checksum: SHA-256 of all but its timings; equal for equal results.
+        record: the record, including timings.
+        metrics: metrics of its estimates.
+        session: number, from 1, of the session in the manifest's list that stored it.
+        checksum: SHA-256 of everything except timings; equal for equal results.
     """
 
     cell: str
@@ -52,14 +52,14 @@ class FinishedRun:
 
 
 def tables_of_record(record: RunRecord) -> dict[str, pa.Table]:
-    """The tables of a single run, null for what is not a number."""
+    """Return the tables of a single run, with null for NaN."""
     return {name: _arrow(columns, _layout(name)) for name, columns in _columns(record).items()}
 
 
 def tables_of_runs(campaign: Campaign, runs: Iterable[FinishedRun]) -> dict[str, pa.Table]:
-    """The tables of runs, which come in the order of `CampaignResults.runs`.
+    """Return the tables of runs, which must be in the order of `CampaignResults.runs`.
 
-    Takes twice the memory of the tables: some 300 MB for 1,000 runs of 40 scans with joint decisions.
+    Takes twice the memory of the tables: about 300 MB for 1,000 runs of 40 scans with joint decisions.
     """
     parts: dict[str, list[Columns]] = {}
     for run in runs:
@@ -82,17 +82,17 @@ def tables_of_runs(campaign: Campaign, runs: Iterable[FinishedRun]) -> dict[str,
 
 
 def schema_of(parts: Iterable[pa.Schema]) -> pa.Schema:
-    """Of tables one below another: all their columns, in the order in which they first appear."""
+    """Return the schema of concatenated tables: all columns, in the order of their first appearance."""
     return pa.unify_schemas(list(parts), promote_options="permissive")
 
 
 def in_schema(table: pa.Table, schema: pa.Schema) -> pa.Table:
-    """The table with the columns of `schema_of`, null where it has none."""
+    """Return the table with the columns of `schema_of`, null where it has none."""
     return pa.concat_tables([schema.empty_table(), table], promote_options="permissive")
 
 
 def joined_tables(parts: Iterable[dict[str, pa.Table]]) -> dict[str, pa.Table]:
-    """Tables of some runs and then others, one below another."""
+    """Concatenate the tables of several sets of runs."""
     found: dict[str, list[pa.Table]] = {}
     for part in parts:
         for name, table in part.items():
@@ -101,7 +101,7 @@ def joined_tables(parts: Iterable[dict[str, pa.Table]]) -> dict[str, pa.Table]:
 
 
 def _columns(record: RunRecord) -> dict[str, Columns]:
-    """The tables of one run."""
+    """Return the tables of one run."""
     timings = timing_table(record)
     return {**tables_of(record), "timings": {"step": timings.pop("step"), "time_s": record.times, **timings}}
 
@@ -111,7 +111,7 @@ def _layout(name: str) -> Layout:
 
 
 def _summary(run: FinishedRun) -> Columns:
-    """One row: numbers of scans and decisions, means over all scans, and the checksum of the run."""
+    """Return one row: numbers of scans and decisions, means over all scans, and the checksum of the run."""
     record = run.record
     means = zip(OSPA_COLUMNS, record.ospa.mean(axis=0), strict=True)
     return {
@@ -123,7 +123,7 @@ def _summary(run: FinishedRun) -> Columns:
 
 
 def setting_of(campaign: Campaign, cell: Cell, axis: str) -> Any:
-    """What stands in the column of an axis: text, a truth or a number where all its values are such, else JSON."""
+    """Return the value in the column of an axis: text, boolean or number if all its values are such, else JSON."""
     value, values = cell.settings[axis], campaign.axes[axis]
     if all(isinstance(one, str) for one in values) or all(isinstance(one, bool) for one in values):
         return value
@@ -133,7 +133,7 @@ def setting_of(campaign: Campaign, cell: Cell, axis: str) -> Any:
 
 
 def _arrow(columns: Columns, layout: Layout) -> pa.Table:
-    """The table, with the unit of each column in the metadata of its field."""
+    """Return the table with the unit of each column in the metadata of its field."""
     batch = to_arrow(columns, layout, nan_is_null=True)
     schema = batch.schema
     for index, schema_field in enumerate(schema):
@@ -143,5 +143,5 @@ def _arrow(columns: Columns, layout: Layout) -> pa.Table:
 
 
 def unit_of(column: str) -> str | None:
-    """Unit of a column by the end of its name; None for numbers and names."""
+    """Return the unit of a column by the end of its name; None for dimensionless columns."""
     return next((unit for end, unit in _UNITS.items() if column.endswith(end)), None)

@@ -1,4 +1,4 @@
-"""The work of a campaign in pieces: what a worker is given, what it gives back, and in which order."""
+"""Tasks of a campaign: the unit of work of a worker, its outcome, and the order of tasks."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from vedette.scenarios.sections.planners import STRATEGIES
 from vedette.simulation.serialization import encode_timings
 from vedette.simulation.storage import versions
 
-# Below this a task costs more to hand out than it is worth.
+# Shorter tasks cost more to hand out than they save.
 MIN_TASK_SECONDS = 0.1
-_HANDED_OUT_SECONDS = 0.005  # that a task takes the one who hands it out, generously
+_HANDED_OUT_SECONDS = 0.005  # upper estimate of the time to hand out a task
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,7 +31,7 @@ class Task:
 
     Attributes:
         cell, seed, runs: what to run.
-        versions: of what decides the bytes of a result; a worker with others refuses.
+        versions: versions of the packages that determine the bytes of a result; a worker with other versions refuses.
     """
 
     cell: Cell
@@ -40,7 +40,7 @@ class Task:
     versions: Mapping[str, str]
 
     def alone(self) -> Iterator[Task]:
-        """Its runs, each as a task."""
+        """Yield one task for each run."""
         return (replace(self, runs=(run,)) for run in self.runs)
 
 
@@ -49,9 +49,9 @@ class CompletedRun:
     """A finished run.
 
     Attributes:
-        row: what is kept of it: as `vedette.campaigns.codec` encodes it, with measures and timings as Arrow files.
+        row: the run as stored: encoded by `vedette.campaigns.codec`, with metrics and timings as Arrow files.
         ospa: mean over the scans, m.
-        seconds: it took, s of wall time.
+        seconds: wall time of the run, s.
     """
 
     row: Row
@@ -60,35 +60,35 @@ class CompletedRun:
 
     @property
     def cell(self) -> str:
-        """Which."""
+        """Name of the cell."""
         return self.row.cell
 
     @property
     def run(self) -> int:
-        """Which."""
+        """Number of the run."""
         return self.row.run
 
 
 @dataclass(frozen=True, slots=True)
 class FailedRun:
-    """A run that could not be finished, and why."""
+    """A run that could not be finished, and the reason."""
 
     cell: str
     run: int
     message: str
 
 
-# What a task gives back: each of its runs.
+# Outcome of a task: one entry per run.
 TaskOutcome: TypeAlias = tuple[CompletedRun | FailedRun, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class WorkerDied:
-    """In place of an outcome: the workers that were given the task died."""
+    """Replaces the outcome of a task whose workers died."""
 
 
 def perform(task: Task) -> TaskOutcome:
-    """What a worker does. An error in a run is a result of its own and leaves the other runs alone.
+    """Execute a task in a worker. An error in a run is an outcome of its own and does not affect other runs.
 
     Raises:
         VedetteError: this worker has other versions than the campaign.
@@ -110,18 +110,18 @@ def _one(cell: Cell, seed: int, run: int) -> CompletedRun | FailedRun:
         row = row_of(cell.name, run, encode(record), encode_timings(record), metrics)
     except VedetteError as error:
         return FailedRun(cell.name, run, str(error))
-    except Exception as error:  # in what surrounds a run: one bad one must not end a night's work
+    except Exception as error:  # raised around a run: one failure must not end the campaign
         return FailedRun(cell.name, run, f"{type(error).__name__}: {error}")
     mean = float(record.ospa[:, 0].mean())
     return CompletedRun(row, mean, time.perf_counter() - start)
 
 
 class TaskQueue:
-    """The runs that are still to do, handed out as tasks of a tenth of a second or more.
+    """Queue of the remaining runs, handed out as tasks of a tenth of a second or more.
 
-    Runs of equal number come together, so that strategies can be compared early. The first run of each set of kernels
-    goes before the others that need it, so that they are compiled once and not once a worker. How long a run of a cell
-    takes is learnt from the fastest that has landed; nothing that a task holds changes a result.
+    Runs with equal numbers come together, so that strategies can be compared early. The first run of each set of
+    kernels comes before the others that need it, so that kernels are compiled once and not once per worker. The
+    duration of a cell's runs is estimated by the fastest finished run; the grouping into tasks does not change results.
     """
 
     def __init__(self, campaign: Campaign, finished: Collection[tuple[str, int]]) -> None:
@@ -134,19 +134,19 @@ class TaskQueue:
             for place, cell in enumerate(campaign.cells)
         ]
         self._num_left = sum(map(len, self._todo))
-        # Cells that can be taken from, by their next run; those that wait for others to have compiled their kernels.
+        # Cells that are ready, by their next run, and cells that wait until another run has compiled their kernels.
         self._ready = [(runs[0], place) for place, runs in enumerate(self._todo) if runs]
         heapq.heapify(self._ready)
         self._kernels = {cell.name: _kernels(cell) for cell in campaign.cells}
-        self._compiled: dict[tuple[object, ...], bool] = {}  # False: by a task that is under way
+        self._compiled: dict[tuple[object, ...], bool] = {}  # False: a task in progress compiles them
         self._waiting: defaultdict[tuple[object, ...], list[int]] = defaultdict(list)
 
     def __len__(self) -> int:
-        """Runs not yet handed out."""
+        """Number of runs not yet handed out."""
         return self._num_left
 
     def learn(self, task: Task, outcome: TaskOutcome) -> TaskOutcome:
-        """Note that a task has ended, and how long its runs took; returns its outcome."""
+        """Record that a task has ended and how long its runs took; return its outcome."""
         kernels = self._kernels[task.cell.name]
         self._compiled[kernels] = True
         for place in self._waiting.pop(kernels, ()):
@@ -157,11 +157,11 @@ class TaskQueue:
         return outcome
 
     def take(self, room: int = 1) -> Task | None:
-        """The next task; None when all runs are handed out, or wait for a first one to compile their kernels.
+        """Return the next task; None if all runs are handed out, or wait for another run to compile their kernels.
 
         Args:
-            room: tasks that may be under way. The more, the longer each is, so that handing them out keeps up; and
-                none is so long that others would have nothing left.
+            room: number of tasks that may be in progress. With more room each task is longer, so that handing out keeps
+                up, but not so long that other workers have nothing left.
         """
         while self._ready:
             _, place = heapq.heappop(self._ready)
@@ -173,7 +173,7 @@ class TaskQueue:
         return None
 
     def _taken(self, place: int, room: int) -> Task:
-        """A task of some runs of the cell at that place."""
+        """Return a task of some runs of the cell at that place."""
         cell, runs = self._cells[place], self._todo[place]
         seconds = self._fastest.get(cell.name, MIN_TASK_SECONDS)
         wanted = math.ceil(max(MIN_TASK_SECONDS, room * _HANDED_OUT_SECONDS) / seconds)
@@ -184,13 +184,13 @@ class TaskQueue:
         return Task(cell, self._seed, taken, self._versions)
 
     def _put_back(self, place: int) -> None:
-        """Have runs of the cell at that place taken in their turn, while there are any."""
+        """Queue the cell at that place again if it has runs left."""
         if self._todo[place]:
             heapq.heappush(self._ready, (self._todo[place][0], place))
 
 
 def _kernels(cell: Cell) -> tuple[object, ...]:
-    """Equal where two cells need the same kernels."""
+    """Return a key that is equal for two cells if they need the same kernels."""
     model = cell.scenario.model
     kinds = {sensor.measurement.kind for sensor in model.sensors}
     strategy = STRATEGIES.get(cell.planner)

@@ -1,4 +1,4 @@
-"""Results folders of earlier formats, brought to the present one in place."""
+"""Upgrade of results folders of earlier formats, in place."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from vedette.simulation.upgrading import upgrade_run
 
 
 def upgrade_results(directory: Path | str) -> int:
-    """Bring a results folder, of a campaign or of a single run, to the present format; returns the one that it had.
+    """Upgrade a results folder, of a campaign or of a single run, to the present format; return its previous format.
 
-    The runs of a campaign are rewritten in one transaction of their file, and its manifest after them. After a kill
-    nothing is lost, and the same call ends what was begun. A folder of the present format is left alone.
+    The runs of a campaign are rewritten in one transaction of their file, and the manifest after them. A killed upgrade
+    loses nothing, and the same call completes it. A folder of the present format is left alone.
 
-    Raises `InputError`, and changes nothing, for a folder of nothing that can be upgraded: no results, another format
-    than was ever released, one of a later version, runs that are damaged, or a campaign that is being worked on.
+    Raises `InputError`, and changes nothing, for a folder that cannot be upgraded: no results, a format that was never
+    released, a later version, damaged runs, or a campaign that is running.
     """
     folder = Path(directory)
     if not folder.is_dir():
