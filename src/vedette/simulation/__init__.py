@@ -1,4 +1,4 @@
-"""The world that the program does not get to see: truth, scans; the loop, and what a run leaves behind."""
+"""Simulation: true targets, scans, the loop of a run, and its record."""
 
 from vedette.control import RequiresTruth
 from vedette.kernels.gaussian.scans import CLUTTER

@@ -1,7 +1,7 @@
-"""Tables of named columns as Arrow, and as the bytes of an Arrow file (Feather), both without loss.
+"""Tables of named columns as Arrow, and as bytes of an Arrow file (Feather), both lossless.
 
-The bytes depend on the numbers alone: uncompressed, one batch, no metadata but what is given. Read back, they are of
-unknown origin: nothing unpacks, no type but those of `Kind` is made, and every offset is checked before it is followed.
+The bytes depend only on the numbers: uncompressed, one batch, no metadata except what is given. When read, they are
+untrusted: nothing is decompressed, only types of `Kind` are created, and every offset is checked before use.
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ from vedette.kernels.base.types import Bools, Floats, Ints
 if TYPE_CHECKING:
     import pyarrow as pa
 
-# Columns of equal length by name: arrays of (num_rows,), or lists of texts.
+# Columns of equal length by name: arrays (num_rows,), or lists of texts.
 Columns: TypeAlias = dict[str, "Ints | Floats | Bools | list[str]"]
-# Columns that say which run a row is of, in tables of many runs.
+# Columns that identify the run of a row, in tables of many runs.
 RUN_COLUMNS = frozenset({"cell", "run", "scenario", "planner", "variant", "filter", "fusion"})
 
 _MAGIC, _ALIGNMENT = b"ARROW1", 8
-_MOST_TEXT = 2**31 - 1  # bytes of a column: its offsets are 32 bits wide
+_MOST_TEXT = 2**31 - 1  # bytes per column, as offsets have 32 bits
 
 
 class Kind(Enum):
-    """What a column holds."""
+    """Type of a column."""
 
     INTEGER = "whole numbers"  # (num_rows,) int64
-    NUMBER = "numbers"  # (num_rows,) float64, NaN where there is none
+    NUMBER = "numbers"  # (num_rows,) float64, NaN if missing
     COUNT = "whole numbers or nothing"  # (num_rows,) int64 from 0, null in the file for -1
     VALUE = "numbers or nothing"  # (num_rows,) float64, null in the file for NaN
     TRUTH = "truths"  # (num_rows,) bool
@@ -60,37 +60,37 @@ _ARROW_TYPES = {**{kind: _NAMES[dtype] for kind, dtype in _DTYPES.items()}, Kind
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Layout:
-    """The columns of a table.
+    """Columns of a table.
 
     Attributes:
-        fixed: those that are always there.
-        more: beginnings of the names of those of which there may be any number; the empty text: any name.
+        fixed: required columns.
+        more: prefixes of optional columns, of which there may be any number; the empty text: any name.
     """
 
     fixed: Mapping[str, Kind]
     more: Mapping[str, Kind] = field(default_factory=dict)
 
     def kind(self, name: str) -> Kind | None:
-        """What the column of that name holds; None where the table has no such column."""
+        """Return the type of the column of that name; None if the table has no such column."""
         if name in self.fixed:
             return self.fixed[name]
         return next((kind for start, kind in self.more.items() if name.startswith(start)), None)
 
     def others(self, names: Mapping[str, Any]) -> list[str]:
-        """Those of the names that are not of a fixed column, in order."""
+        """Return the names that are not fixed columns, in order."""
         return [name for name in names if name not in self.fixed]
 
 
 def stacked(
     parts: Sequence[Mapping[str, Any]], layout: Layout, names: Sequence[str] = (), num_rows: Sequence[int] = ()
 ) -> Columns:
-    """Tables one below another.
+    """Concatenate tables.
 
     Args:
-        parts: their columns; a single value stands in every row of its part.
-        layout: of the result. Where a part lacks a column there is nothing: NaN, or -1 of a count.
-        names: of all columns, in order; none: the fixed ones and then what the parts have beside them.
-        num_rows: of each part; none: as its columns have, one where all are single values.
+        parts: columns of each table; a single value is repeated in every row of its part.
+        layout: layout of the result. Columns that a part lacks are filled with NaN, or -1 for a count.
+        names: names of all columns, in order; none: the fixed ones and then the other columns of the parts.
+        num_rows: rows of each part; none: the length of its columns, one if all are single values.
 
     Raises `InputError` for a column that is not among the names.
     """
@@ -101,7 +101,7 @@ def stacked(
     joined: Columns = {}
     for name in names:
         kind = layout.kind(name)
-        assert kind is not None  # of all that is kept
+        assert kind is not None  # every stored column has a layout
         missing = -1 if kind is Kind.COUNT else np.nan
         joined[name] = _joined([part.get(name, missing) for part in parts], lengths, kind)
     return joined
@@ -120,7 +120,7 @@ def _joined(column: list[Any], lengths: Sequence[int], kind: Kind) -> Any:
 
 
 def to_arrow(columns: Columns, layout: Layout, *, nan_is_null: bool = False) -> pa.RecordBatch:
-    """The table in Arrow; with `nan_is_null` for tools that would take NaN for a number.
+    """Return the table in Arrow; with `nan_is_null` for tools that would treat NaN as a number.
 
     Raises `InputError` for a column that the layout does not have, and for columns of unequal lengths.
     """
@@ -139,7 +139,7 @@ def to_arrow(columns: Columns, layout: Layout, *, nan_is_null: bool = False) -> 
     return pa.RecordBatch.from_arrays(arrays, list(columns))
 
 
-# By their buffers, as pa.array and to_numpy would, but these load pandas if it is there, longer than a run takes.
+# Conversion by buffers: pa.array and to_numpy would import pandas if installed, which takes longer than a run.
 
 
 def _texts(texts: list[Any]) -> pa.Array:
@@ -175,7 +175,7 @@ def _bits(truths: Bools) -> NDArray[np.uint8]:
 
 
 def _values(column: pa.Array, kind: Kind) -> NDArray[Any]:
-    """The numbers of a column, in memory of their own; -1 or NaN where there is none."""
+    """Return the numbers of a column as a copy; -1 or NaN for null."""
     known, content = column.buffers()
     bits = slice(column.offset, column.offset + len(column))
     if kind is Kind.TRUTH:
@@ -191,7 +191,10 @@ def _truths(bits: Any) -> Bools:
 
 
 def write_table(columns: Columns, layout: Layout, metadata: Mapping[str, str] | None = None) -> bytes:
-    """The bytes of an Arrow file, which `pandas.read_feather` and the like read. Raises `InputError` as `to_arrow`."""
+    """Return the bytes of an Arrow file, which `pandas.read_feather` and others read.
+
+    Raises `InputError` as `to_arrow`.
+    """
     require_packages("a run on disk", "pyarrow")
     import pyarrow as pa
 
@@ -203,24 +206,24 @@ def write_table(columns: Columns, layout: Layout, metadata: Mapping[str, str] | 
 
 
 def read_table(content: bytes, layout: Layout, place: str) -> Columns:
-    """The columns back from their bytes.
+    """Return the columns from their bytes.
 
-    Raises `InputError`, naming the place, for bytes that are no such file, and a column that is missing, unknown or
-    holds something else.
+    Raises `InputError`, naming the place, for bytes that are not such a file, and for a column that is missing, unknown
+    or of another type.
     """
     try:
         described, batch = _messages(content)
         return _read_columns(*_described(described.serialize().to_pybytes(), layout), batch)
     except InputError as error:
         raise InputError(f"{place}{error}") from error
-    except Exception as error:  # damage can raise nearly anything in there
+    except Exception as error:  # damaged files can raise nearly any error
         raise InputError(
             f"{place}: expected a table as an Arrow file; it is damaged: {error_summary(error)}"
         ) from error
 
 
 def read_metadata(content: bytes) -> dict[str, str]:
-    """What was given to `write_table` beside the columns. Raises nearly anything for bytes that are no Arrow file."""
+    """Return the metadata given to `write_table`. Raises nearly any error for bytes that are not an Arrow file."""
     require_packages("a run on disk", "pyarrow")
     import pyarrow as pa
 
@@ -229,7 +232,10 @@ def read_metadata(content: bytes) -> dict[str, str]:
 
 
 def _messages(content: bytes) -> tuple[pa.Message, pa.Message]:
-    """The schema and the one batch of a file. The index at its end, made for files of many batches, is not read."""
+    """Return the schema and the single batch of a file.
+
+    The footer, which indexes files of many batches, is not read.
+    """
     require_packages("a run on disk", "pyarrow")
     import pyarrow as pa
 
@@ -246,8 +252,10 @@ def _messages(content: bytes) -> tuple[pa.Message, pa.Message]:
 
 
 def _is_compressed(metadata: bytes) -> bool:
-    """Whether a message of a batch has the field `compression` (format/Message.fbs of Arrow): it could unpack to any
-    size. pyarrow does not say so before it unpacks."""
+    """Return True if a batch message has the field `compression` (format/Message.fbs of Arrow).
+
+    Compressed batches could expand to any size, and pyarrow reports compression only after decompressing.
+    """
 
     def entry(table: int, index: int) -> int:
         (back,) = struct.unpack_from("<i", metadata, table)
@@ -263,9 +271,9 @@ def _is_compressed(metadata: bytes) -> bool:
 
 @lru_cache(maxsize=256)
 def _described(message: bytes, layout: Layout) -> tuple[pa.Schema, dict[str, Kind]]:
-    """The schema of a message, and what each column holds; `InputError` for columns that are not the layout's.
+    """Return the schema of a message, and the type of each column; raises `InputError` for columns not in the layout.
 
-    Tables of a thousand runs have a few schemas among them.
+    Cached, as tables of a thousand runs have only a few schemas.
     """
     import pyarrow as pa
 

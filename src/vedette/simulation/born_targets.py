@@ -1,4 +1,4 @@
-"""Targets that are drawn anew in every run: born, moving, dying and leaving at random."""
+"""Targets drawn anew in every run: random births, motion, deaths and exits."""
 
 from __future__ import annotations
 
@@ -15,20 +15,21 @@ from vedette.simulation.truth import Truth, moved_states, scan_times, semidefini
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoissonTargets:
-    """At each scan a Poisson number of targets is born, each at a state drawn from one Gaussian.
+    """Targets with a Poisson number of births per scan, each at a state drawn from one Gaussian.
 
-    From scan to scan a target dies or moves, with the motion's process noise; outside the region it is gone for good.
+    From scan to scan a target dies or moves, with the motion's process noise. A target that leaves the region does not
+    return.
 
     Attributes:
-        motion: how they move.
-        expected: mean number of births a scan.
-        mean: (state_dim,) of a birth's state.
-        cov: (state_dim, state_dim) covariance of a birth's state, positive semidefinite.
-        death_probability: that a target dies between two scans.
-        region: where targets are; None: everywhere.
+        motion: motion model.
+        expected: mean number of births per scan.
+        mean: (state_dim,) mean of an initial state.
+        cov: (state_dim, state_dim) covariance of an initial state, positive semidefinite.
+        death_probability: probability that a target dies between two scans.
+        region: region of the targets; None: unbounded.
 
     Raises:
-        InputError: names the field, what was expected and what came.
+        InputError: names the field, the expected and the given value.
     """
 
     motion: MotionModel
@@ -47,11 +48,11 @@ class PoissonTargets:
         semidefinite_factor(self.cov)
 
     def truth(self, times: ArrayLike, *, rng: np.random.Generator) -> Truth:
-        """All births first, scan after scan; then each target's life.
+        """Draw all births, scan by scan; then the life of each target.
 
         Raises:
             InputError: the scan times do not increase.
-            ModelError: a motion function raised, or gave a state that is not finite.
+            ModelError: a motion function raised, or returned a state that is not finite.
         """
         scans = scan_times(times)
         generator(rng)
@@ -67,7 +68,7 @@ class PoissonTargets:
         return Truth.from_arrays(scans, alive, states)
 
     def _life(self, state: Floats, times: Floats, rng: np.random.Generator) -> Floats:
-        """(num_scans of its life, state_dim) states from its first scan on."""
+        """(num_scans of its life, state_dim) states of a target from its first scan."""
         life: list[Floats] = []
         for scan in range(len(times)):
             if scan > 0:

@@ -1,4 +1,4 @@
-"""How well targets could be known after the scans of a stretch of time: the recursion of covariances at the truth."""
+"""Posterior Cramer-Rao bound over several scans: recursion of covariances at the true states."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ import numpy as np
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models import MotionModel, SensorModel
 
-# Of central differences, in units of the state.
+# Step of central differences, in units of the state.
 _STEP = 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CovarianceRecursion:
-    """The scans from one decision to the next, at the true targets.
+    """Covariance recursion over the scans from one decision to the next, at the true targets.
 
     Covariances go through P <- F P F' + Q, then P^-1 <- P^-1 + P_D H' R^-1 H of each sensor that scans, where P_D is
     the share of scans that detect the target (posterior Cramer-Rao bound, Tichavsky, Muravchik and Nehorai 1998).
 
     Attributes:
         transitions, noises: F and Q, (num_scans, num_targets, dim, dim).
-        alive: (num_scans, num_targets) 1 where the target is there, else 0.
-        sensor_information: of each sensor (num_courses, num_scans, num_targets, dim, dim) P_D H' R^-1 H of its scans.
-        powers: of each sensor, with which its information counts in the fused density.
-        one_belief: whether all scans go into one belief, to which sensors return after every scan.
-        cutoff: the error that counts as a lost target, m.
+        alive: (num_scans, num_targets) 1 if the target exists, else 0.
+        sensor_information: P_D H' R^-1 H of the scans of each sensor, (num_courses, num_scans, num_targets, dim, dim).
+        powers: weight of each sensor's information in the fused density.
+        one_belief: whether all scans update one density, which sensors share after every scan.
+        cutoff: error that counts as a lost target, m.
     """
 
     transitions: Floats
@@ -39,10 +39,10 @@ class CovarianceRecursion:
     cutoff: float
 
     def follow(self, covs: Sequence[Floats], actions: Ints) -> tuple[Floats, list[Floats]]:
-        """(num_joint,) what joint actions (num_joint, num_sensors) cost, and the covariances after the last scan.
+        """(num_joint,) cost of joint actions (num_joint, num_sensors), and the covariances after the last scan.
 
-        covs: (num_targets, dim, dim) of each belief before. After: (num_joint, num_targets, dim, dim) of each. The cost
-        is the sum over scans and targets of min(sqrt(tr P), cutoff), P that of the position in the fused density.
+        covs: (num_targets, dim, dim) of each density before. After: (num_joint, num_targets, dim, dim) of each. The
+        cost is the sum over scans and targets of min(sqrt(tr P), cutoff), with P of the position in the fused density.
         """
         costs = np.zeros(len(actions))
         beliefs: list[Floats] = [np.broadcast_to(own, (len(actions), *own.shape)) for own in covs]
@@ -61,7 +61,7 @@ class CovarianceRecursion:
         return costs, beliefs
 
     def _summed(self, informations: Sequence[Floats]) -> Floats:
-        """With the sensors' powers."""
+        """Return the sum of the informations, weighted by the sensors' powers."""
         return np.asarray(sum(power * own for power, own in zip(self.powers, informations, strict=True)))
 
 
@@ -89,6 +89,6 @@ def scan_information(sensor: SensorModel, states: Floats, pose: Floats) -> Float
 
 
 def _shifted(states: Floats) -> Floats:
-    """(2 dim num, dim) each component of each state a step further, then a step back."""
+    """(2 dim num, dim) states with each component one step further, then one step back."""
     steps = _STEP * np.eye(states.shape[1])[:, np.newaxis]
     return np.ascontiguousarray(np.concatenate([states + steps, states - steps]).reshape(-1, states.shape[1]))

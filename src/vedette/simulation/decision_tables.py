@@ -1,4 +1,4 @@
-"""The decisions of a run as tables of columns, and back: what each sensor could do, what that was expected to bring."""
+"""Decisions of a run as tables of columns, and back: the available actions and their expected rewards."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ DECISION_TABLES: dict[str, Layout] = {
         {"action_": Kind.COUNT},
     ),
 }
-# What a run of many sensors may have beside those: the rewards of one sensor's own actions, of which a row in `rewards`
-# would have a column for each of the others.
+# Additional table for runs of many sensors: rewards of the actions of a single sensor. In `rewards` each row would have
+# a column for every other sensor.
 OWN_REWARDS: dict[str, Layout] = {
     "own_rewards": Layout(
         {
@@ -51,21 +51,21 @@ OWN_REWARDS: dict[str, Layout] = {
         }
     )
 }
-_FEW_SENSORS = 16  # of up to so many all rewards stand in `rewards`
-_MOST_REWARDS = 2**26  # of a run, those that were not evaluated included: what a file leaves out takes memory, too
-# Names that tables of many runs have beside these: a platform's own number of such a name gets `action_` in front.
+_FEW_SENSORS = 16  # up to this number of sensors, all rewards are in `rewards`
+_MOST_REWARDS = 2**26  # per run, including entries that were not evaluated, as these take memory too
+# Other column names in tables of many runs; a platform's own quantity with such a name gets the prefix `action_`.
 _TAKEN = {*DECISION_TABLES["actions"].fixed, *RUN_COLUMNS}
 
 
 def decision_columns(number: int, decision: Decision) -> dict[str, Any]:
-    """The columns that say which decision a row is of."""
+    """Return the columns that identify the decision of a row."""
     return {"decision": number, "step": decision.step, "time_s": decision.time}
 
 
 def decision_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[str, Columns]:
-    """The tables of `DECISION_TABLES`, and that of `OWN_REWARDS` where there is something to stand in it.
+    """Return the tables of `DECISION_TABLES`, and that of `OWN_REWARDS` if it has rows.
 
-    Raises `InputError` for plans that no table can hold.
+    Raises `InputError` for plans that the tables cannot hold.
     """
     of_decisions = [
         {
@@ -103,7 +103,7 @@ def _counts(plan: Plan) -> dict[str, int]:
 
 
 def _evaluated(table: RewardTable, plan: Plan) -> dict[str, Any]:
-    """A row an action, or combination of actions, of which the reward is known; by sensor which of its actions."""
+    """Return one row per evaluated action, or combination of actions, with the index of each sensor's action."""
     if list(table.sensors) != sorted(table.sensors):
         raise InputError(f"plan.tables: expected sensors in increasing order; got {table.sensors}")
     index = np.argwhere(~np.isnan(table.mean))
@@ -116,9 +116,9 @@ def _evaluated(table: RewardTable, plan: Plan) -> dict[str, Any]:
 
 
 def decisions_of(tables: Mapping[str, Mapping[str, Any]], poses: Floats) -> tuple[Decision, ...]:
-    """The decisions back from their tables and the poses of the run.
+    """Return the decisions from their tables and the poses of the run.
 
-    Raises `InputError`, `KeyError`, `IndexError` or `ValueError` for tables that do not fit together.
+    Raises `InputError`, `KeyError`, `IndexError` or `ValueError` for inconsistent tables.
     """
     table = tables["decisions"]
     num = len(table["decision"])
@@ -200,7 +200,7 @@ def _table(rewards: Mapping[str, Any], rows: slice, num_actions: tuple[int, ...]
     shape = tuple(num_actions[sensor] for sensor in sensors)
     if math.prod(shape) > room:
         raise InputError(f"rewards: expected tables of at most {_MOST_REWARDS} entries in all; got more")
-    place = np.ravel_multi_index(tuple(index[:, sensors].T), shape)  # raises for an action that there is not
+    place = np.ravel_multi_index(tuple(index[:, sensors].T), shape)  # raises for an action that does not exist
     if np.any(np.diff(place) <= 0):
         raise InputError("rewards: expected each combination of actions once, in order")
     mean, error = np.full(shape, np.nan), np.full(shape, np.nan)
@@ -209,7 +209,7 @@ def _table(rewards: Mapping[str, Any], rows: slice, num_actions: tuple[int, ...]
 
 
 def _notes(plan: Plan) -> str:
-    """A line each."""
+    """Return the notes of a plan, one per line."""
     text = "\n".join(plan.notes)
     if text.splitlines() != list(plan.notes):
         raise InputError(f"plan.notes: expected notes of one line each; got {shown(text)}")
@@ -217,7 +217,7 @@ def _notes(plan: Plan) -> str:
 
 
 def _actions(decisions: Sequence[Decision]) -> Columns:
-    """One row a decision, sensor and action; null where a number is none of the sensor's."""
+    """Return one row per decision, sensor and action; null if a sensor has no such column."""
     layout = DECISION_TABLES["actions"]
     parts = [
         {
@@ -235,7 +235,7 @@ def _actions(decisions: Sequence[Decision]) -> Columns:
 
 
 def _in_one_order(orders: Sequence[Sequence[str]]) -> tuple[str, ...]:
-    """The columns of all sensors, so that those of each stand in its own order."""
+    """Return the columns of all sensors in an order that keeps the order of each sensor."""
     sorter: TopologicalSorter[str] = TopologicalSorter()
     for own in dict.fromkeys(map(tuple, orders)):
         for place, name in enumerate(own):
@@ -248,12 +248,12 @@ def _in_one_order(orders: Sequence[Sequence[str]]) -> tuple[str, ...]:
 
 
 def _column_of(name: str) -> str:
-    """Of a platform's own number."""
+    """Return the column name of a platform's own quantity."""
     return f"action_{name}" if name in _TAKEN or name.startswith("action_") else name
 
 
 def _rows_of(rewards: Mapping[str, Any]) -> Iterator[tuple[int, slice]]:
-    """Each number of `reward_table`, and its rows, which stand in order."""
+    """Yield each number of `reward_table` with its rows, which must be in order."""
     numbers: Ints = rewards["reward_table"]
     if np.any(np.diff(numbers) < 0) or np.any(numbers < 0):
         raise InputError("column reward_table: expected rows in order, of numbers from 0")
@@ -263,7 +263,7 @@ def _rows_of(rewards: Mapping[str, Any]) -> Iterator[tuple[int, slice]]:
 
 
 def parts_of(table: Mapping[str, Any], name: str, num: int | None = None) -> list[Columns]:
-    """The rows of each number from 0 to `num` - 1, which stand in order; without it of every number up to the last."""
+    """Return the rows of each number from 0 to `num` - 1, in order; without `num`, of every number up to the last."""
     numbers: Ints = table[name]
     if num is None and len(numbers) and (numbers[0] != 0 or np.any(np.diff(numbers) > 1)):
         raise InputError(f"column {name}: expected rows of every number from 0")

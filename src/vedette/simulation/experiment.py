@@ -1,4 +1,4 @@
-"""A simulated world with a tracker in it: everything a run needs but a planner and a seed."""
+"""Experiment: everything a run needs except a planner and a seed."""
 
 from __future__ import annotations
 
@@ -22,21 +22,20 @@ class Experiment(SummaryRepr):
     """The parts of a run.
 
     Attributes:
-        name: of the scenario, for records.
-        times: (num_scans,) s of the scans.
-        targets: where the true targets come from.
-        tracker: follows them.
-        platforms: what carries each of its sensors.
-        poses: (num_sensors, 3 or more) poses at the first scan, all as long as the longest; components that are not a
-            sensor's own are 0.
-        first_actions: for each sensor, the row of the action that it is under from the start; None: it lies still until
-            the first decision.
-        estimate: reads the targets off the fused belief, given the number of the scan (from 1).
-        decision_steps: scans (counted from 1) after which the planner is asked.
-        true_sensors: the ones that scan; (): they are what the tracker takes them for.
-        scans_at: (num_sensors, num_scans or more) whether each scans then; None: at every step.
-        drop_out: of each sensor the probability that a scan does not take place; (): none.
-        explain: whether decisions are kept with their explanations, see `vedette.control.Plan.explain`.
+        name: name of the scenario, for records.
+        times: (num_scans,) times of the scans, s.
+        targets: source of the true targets.
+        tracker: the tracker.
+        platforms: platform of each sensor.
+        poses: (num_sensors, 3 or more) poses at the first scan, all as long as the longest; components that a sensor
+            does not have are 0.
+        first_actions: per sensor, the row of its initial action; None: it does not move until the first decision.
+        estimate: extracts the targets from the fused density, given the number of the scan (from 1).
+        decision_steps: scans (counted from 1) that are followed by a decision.
+        true_sensors: the sensors that scan; (): they equal the sensor models of the tracker.
+        scans_at: (num_sensors, num_scans or more) whether each sensor scans; None: at every step.
+        drop_out: probability of each sensor that a scan is lost; (): none.
+        explain: whether decisions are stored with their explanations, see `vedette.control.Plan.explain`.
 
     Raises:
         InputError: parts that do not fit together.
@@ -94,14 +93,14 @@ class Experiment(SummaryRepr):
         return len(self.tracker.sensors)
 
     def sensors_at(self, step: int, scans_at: Bools | None = None) -> tuple[TrueSensor | None, ...]:
-        """The sensors as they are at a step (from 1); None for one that does not scan then.
+        """Return the true sensors at a step (from 1); None for one that does not scan then.
 
-        scans_at: of a run, see `vedette.simulation.loop.scans_of_run`; None: without drop-outs.
+        scans_at: scans of the run, see `vedette.simulation.loop.scans_of_run`; None: without lost scans.
         """
         times = self.scans_at if scans_at is None else scans_at
         return scanning(self._scanning, times, step)
 
     def fleet(self, *, moving: bool = True) -> Fleet:
-        """The platforms at the first scan; those that are not under way, or not `moving` at all, lie still."""
+        """Return the platforms at the first scan; without an initial action, or if not `moving`, they do not move."""
         actions = self.first_actions if moving else (None,) * self.num_sensors
         return Fleet(self.platforms, self.poses, actions, float(self.times[0]))

@@ -1,7 +1,7 @@
-"""Why the decisions of a run are what they are, as tables of columns, and back.
+"""Explanations of the decisions of a run as tables of columns, and back.
 
-A run has these tables or, where its decisions were not explained, none of them: runs of before they were there read as
-such runs.
+A run has all of these tables or, if its decisions were not explained, none. Runs of versions without explanations have
+none.
 """
 
 from __future__ import annotations
@@ -51,9 +51,9 @@ EXPLANATION_TABLES: dict[str, Layout] = {
 
 
 def explanation_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[str, Columns]:
-    """The tables of `EXPLANATION_TABLES`, without rows where no decision was explained.
+    """Return the tables of `EXPLANATION_TABLES`, without rows if no decision was explained.
 
-    Raises `InputError` for explanations of other sensors.
+    Raises `InputError` for explanations with another number of sensors.
     """
     found = [(number, each, each.plan.explanation) for number, each in enumerate(decisions)]
     kept = [(number, each, why) for number, each, why in found if why is not None]
@@ -62,7 +62,7 @@ def explanation_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[
             values = getattr(why, name)
             if values is not None and np.shape(values) != (num_sensors,):
                 raise InputError(f"plan.explanation.{name}: expected {num_sensors} numbers; got {np.shape(values)}")
-    priced = ("price",) if any(why.price for _, _, why in kept) else ()  # a column of runs whose actions have prices
+    priced = ("price",) if any(why.price for _, _, why in kept) else ()  # only in runs whose actions have prices
     names = [*EXPLANATION_TABLES["explanations"].fixed, *priced, *(f"action_{sensor}" for sensor in range(num_sensors))]
     parts: dict[str, list[dict[str, Any]]] = {name: [] for name in EXPLANATION_TABLES}
     for number, each, why in kept:
@@ -84,7 +84,7 @@ def explanation_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[
 
 
 def _explanation_columns(why: Explanation) -> dict[str, Any]:
-    """What an explanation says in one row."""
+    """Return the row of an explanation."""
     bound, second = why.bound, why.runner_up
     return {
         "reward": _or_nan(why.reward),
@@ -104,9 +104,9 @@ def _explanation_columns(why: Explanation) -> dict[str, Any]:
 
 
 def with_explanations(decisions: Sequence[Decision], tables: Mapping[str, Mapping[str, Any]]) -> tuple[Decision, ...]:
-    """The decisions with their explanations back from their tables, and with their bounds.
+    """Return the decisions with their explanations and bounds from the tables.
 
-    Raises `InputError`, `KeyError`, `IndexError` or `ValueError` for tables that do not fit together.
+    Raises `InputError`, `KeyError`, `IndexError` or `ValueError` for inconsistent tables.
     """
     table, targets, sensors = (tables[name] for name in EXPLANATION_TABLES)
     found = list(decisions)

@@ -1,4 +1,4 @@
-"""What the filters and the fusion of a run reported beside their densities: what was cut off, raised, missing."""
+"""Reports of the filters and the fusion of a run: truncation errors, clutter floors, missing labels."""
 
 from __future__ import annotations
 
@@ -17,36 +17,36 @@ from vedette.internal.text import pluralise
 from vedette.kernels.base.types import Floats, Ints
 from vedette.simulation.arrow import Kind
 
-_FUSION = "fusion_"  # in front of the names that are of the fusion as a whole
+_FUSION = "fusion_"  # prefix of the names for the fusion as a whole
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Health(SummaryRepr):
-    """The reports of all filters and fusions of a run; names and meaning as in `FilterInfo` and `FusionInfo`.
+    """Reports of all filters and fusions of a run; names and meaning as in `FilterInfo` and `FusionInfo`.
 
-    Arrays are (num_scans, num_sensors), those of the fusion as a whole (`fusion_...`) (num_scans,). Truths are 0 or 1.
-    Where there is no fusion, or one of your own that reports no `FusionInfo`, its numbers are 0. What one filter of all
-    sensors reports stands at every sensor, its numbers of measurements at the first alone.
+    Arrays have the shape (num_scans, num_sensors), those of the fusion as a whole (`fusion_...`) (num_scans,). Booleans
+    are 0 or 1. Without a fusion, or with a custom one that reports no `FusionInfo`, its numbers are 0. The report of
+    one filter for all sensors is repeated for every sensor, its numbers of measurements only for the first.
 
     Attributes:
-        log_likelihood: of the scan, given the prior.
+        log_likelihood: log likelihood of the scan, given the prior.
         num_hypotheses, num_tracks: size of the posterior.
-        discarded_weight_bound: upper bound on the share of posterior weight that was cut off; NaN where it is unknown.
+        discarded_weight_bound: upper bound on the truncated share of posterior weight; NaN if unknown.
         dropped_existence: expected number of targets in dropped labels.
         num_clutter_raised: measurements whose clutter intensity was raised to its floor.
         num_duplicates: measurements left out because they repeat another.
         num_inexact_clusters: clusters of an LMB not summed exactly.
         search_cut: whether the ranking search stopped early.
-        cap_met: whether the posterior was as large as it may be.
-        factoring_error: upper bound on the L1 error of taking labels as independent, of factored densities.
+        cap_met: whether the posterior reached its maximum size.
+        factoring_error: upper bound on the L1 error of treating labels as independent, for factored densities.
         num_missing_sets: label sets that another sensor has and this one does not (for CLMB, labels).
         num_missing_labels: labels that this sensor does not know at all.
-        bytes_sent: that this sensor sent over its radio, or to where beliefs are fused; 0 where it is not counted.
+        bytes_sent: bytes that this sensor sent by radio, or to the fusion centre; 0 if not counted.
         fusion_num_sets: label sets that were fused (for CLMB, labels).
-        fusion_num_lost_labels: labels that a sensor is sure of and the fused density is not.
+        fusion_num_lost_labels: labels that are certain at a sensor and not in the fused density.
         fusion_empty_intersection: whether no label set is held by every sensor.
         fusion_log_normaliser: log of the set integral of the product of the powers.
-        fusion_discarded_weight: probability of the fused label sets that were cut off.
+        fusion_discarded_weight: probability of the fused label sets that were truncated.
     """
 
     log_likelihood: Floats
@@ -75,19 +75,19 @@ class Health(SummaryRepr):
 
     @classmethod
     def unreported(cls, num_scans: int, num_sensors: int) -> Health:
-        """All zero, to be filled in scan by scan."""
+        """Return reports that are all zero, to be filled scan by scan."""
         shapes = {name: (num_scans,) if name in FUSION_COLUMNS else (num_scans, num_sensors) for name in _DTYPES}
         arrays: dict[str, Any] = {name: np.zeros(shape, _DTYPES[name]) for name, shape in shapes.items()}
         return cls(**arrays)
 
     def first(self, num_scans: int) -> Health:
-        """Of the first scans alone."""
+        """Return the reports of the first scans."""
         return Health(**{name: getattr(self, name)[:num_scans] for name in _DTYPES})
 
     def note_filters(self, scan: int, infos: Sequence[FilterInfo]) -> None:
-        """Write down what the filters reported, one a sensor or one for all; scans are counted from 0.
+        """Record the reports of the filters, one per sensor or one for all; scans are counted from 0.
 
-        Raises `InputError` for another number of reports, or what is none.
+        Raises `InputError` for another number of reports, or another type.
         """
         num = self.num_tracks.shape[1]
         if len(infos) not in (1, num) or [info for info in infos if not isinstance(info, FilterInfo)]:
@@ -102,7 +102,7 @@ class Health(SummaryRepr):
                 array[scan, 1:] = 0
 
     def note_fusion(self, scan: int, info: Any) -> None:
-        """Write down what a fusion reported, if it is a `FusionInfo`."""
+        """Record the report of a fusion, if it is a `FusionInfo`."""
         if isinstance(info, FusionInfo):
             self.num_missing_sets[scan] = info.missing_sets
             self.num_missing_labels[scan] = info.missing_labels
@@ -110,9 +110,9 @@ class Health(SummaryRepr):
                 getattr(self, name)[scan] = getattr(info, name.removeprefix(_FUSION))
 
     def note_sent(self, scan: int, bytes_sent: Sequence[int]) -> None:
-        """Write down what each sensor sent; nothing is counted where `bytes_sent` is empty.
+        """Record the bytes sent by each sensor; nothing is counted if `bytes_sent` is empty.
 
-        Raises `InputError` for another number than of sensors.
+        Raises `InputError` unless there is one number per sensor.
         """
         num = self.bytes_sent.shape[1]
         if len(bytes_sent) not in (0, num):
@@ -130,7 +130,7 @@ class Health(SummaryRepr):
 
 _DTYPES = {field.name: np.dtype(np.float64 if field.type == "Floats" else np.int64) for field in fields(Health)}
 _KINDS = {name: Kind.NUMBER if dtype == np.float64 else Kind.INTEGER for name, dtype in _DTYPES.items()}
-_OF_SCANS = ("num_clutter_raised", "num_duplicates")  # which are added up over the sensors
+_OF_SCANS = ("num_clutter_raised", "num_duplicates")  # summed over the sensors
 _OF_FILTER = tuple(field.name for field in fields(FilterInfo) if field.name in _DTYPES)
 _reported = attrgetter(*_OF_FILTER)
 

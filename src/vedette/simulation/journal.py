@@ -1,4 +1,4 @@
-"""What a run has brought so far, and where it is; so that a run that stops leaves what was finished."""
+"""Journal of a run in progress, so that a run that stops leaves a record of the finished scans."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from vedette.tracking import Stages, TrackerInfo, stage_of
 
 Score: TypeAlias = Callable[[Truth, Sequence[Estimate]], Floats]
 
-# What the time of a run is spent on. A tracker's own time is the filters', but for what it says was the fusion's.
+# Stages of a run. The time of the tracker counts as filter time, except what it reports as fusion time.
 STAGES = ("scans", "filter", "fusion", "estimate", "planning")
 _LIBRARIES = (str(Path(__file__).parents[1]), *(sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")))
 
@@ -37,13 +37,13 @@ def cause_of(error: Exception) -> str:
 
 
 class RunStopped(VedetteError):
-    """A filter, a fusion, an estimate or a planner raised in the middle of a run; chained from that error.
+    """A filter, a fusion, an estimator or a planner raised during a run; chained from that error.
 
     Attributes:
-        step: the scan at which it happened, counted from 1.
-        time: of that scan, s.
-        stage: what was under way, in words: "the filter of sensor 2".
-        record: of the scans that were finished, its field `stopped` the message; None where not one was.
+        step: scan at which it happened, counted from 1.
+        time: time of that scan, s.
+        stage: stage that failed, in words: "the filter of sensor 2".
+        record: record of the finished scans, with the message in its field `stopped`; None if there are none.
     """
 
     def __init__(self, message: str, step: int, time: float, stage: str, record: RunRecord | None) -> None:
@@ -58,10 +58,10 @@ class RunStopped(VedetteError):
 
 
 class RunInterrupted(KeyboardInterrupt):
-    """Ctrl-C in the middle of a run.
+    """Ctrl-C during a run.
 
     Attributes:
-        record: of the scans that were finished, its field `stopped` the message; None where not one was.
+        record: record of the finished scans, with the message in its field `stopped`; None if there are none.
     """
 
     def __init__(self, message: str, record: RunRecord | None) -> None:
@@ -70,7 +70,7 @@ class RunInterrupted(KeyboardInterrupt):
 
 
 class Journal:
-    """The scans of a run that have an estimate; `step` is the scan at hand, counted from 1."""
+    """Scans of a run that have an estimate; `step` is the present scan, counted from 1."""
 
     def __init__(
         self,
@@ -82,7 +82,7 @@ class Journal:
         num_sensors: int,
         file: ScansFile | None = None,
     ) -> None:
-        """An empty journal. file: of recorded scans; None: they are simulated."""
+        """Create an empty journal. file: file of recorded scans; None: scans are simulated."""
         self.scenario, self.planner, self.seed, self.run = scenario, planner, seed, run
         self.truth, self.file = truth, file
         self.step = 1
@@ -96,22 +96,22 @@ class Journal:
 
     @property
     def time(self) -> float:
-        """Of the scan at hand, s."""
+        """Time of the present scan, s."""
         return float(self.truth.times[self.step - 1])
 
     def begin(self, step: int) -> Stages:
-        """Turn to a scan; its stopwatch."""
+        """Start a scan; return its stage timer."""
         self.step = step
         if step > 1:
             self._clocks.append(Stages())
         return self._clocks[-1]
 
     def timing(self, stage: str) -> AbstractContextManager[None]:
-        """Take the time of a stage of the scan at hand."""
+        """Context manager that times a stage of the present scan."""
         return self._clocks[-1].timing(stage)
 
     def note(self, poses: Floats, off: Bools, info: TrackerInfo, estimate: Estimate) -> None:
-        """Write down the scan at hand."""
+        """Record the present scan."""
         with self.timing("report of the tracker"):
             self.health.note_filters(self.step - 1, info.filters)
             self.health.note_fusion(self.step - 1, info.fusion)
@@ -128,17 +128,17 @@ class Journal:
         self._decisions.append(Decision(self.step, self.time, self._poses[-1], kept, found))
 
     def stage(self, error: BaseException) -> str:
-        """What was under way, in words."""
+        """Return the stage that failed, in words."""
         return stage_of(error) or "the movement of the sensors"
 
     def place(self, error: BaseException) -> str:
-        """Which run, where in it."""
+        """Return the run and the place in it where an error occurred, in words."""
         whose = f"{self.planner}, seed {self.seed}, run {self.run}" if self.file is None else self.file.name
         place = f"step {self.step} of {self.truth.num_scans} ({self.time:g} s), in {self.stage(error)}"
         return f"{self.scenario}, {whose}: stopped at {place}"
 
     def record(self, ospa: Floats, stopped: str | None = None) -> RunRecord:
-        """Of the scans that have an estimate."""
+        """Return the record of the scans that have an estimate."""
         num = len(self.estimates)
         return RunRecord(
             scenario=self.scenario,
@@ -164,7 +164,10 @@ class Journal:
         return spent | {"filter": np.maximum(spent["filter"] - fusion, 0.0), "fusion": fusion}
 
     def _partial(self, score: Score | None, stopped: str) -> RunRecord | None:
-        """The record of a run that stopped; None where no scan was finished. OSPA is NaN where it cannot be had."""
+        """Return the record of a run that stopped; None if no scan is finished.
+
+        OSPA is NaN if it cannot be computed.
+        """
         if not self.estimates:
             return None
         try:

@@ -1,4 +1,4 @@
-"""The simulation: scans, a step of the tracker, an estimate, and at decision times a plan (paper, Algorithm 1)."""
+"""Simulation loop: scans, a step of the tracker, an estimate, and at decision times a plan (paper, Algorithm 1)."""
 
 from __future__ import annotations
 
@@ -20,27 +20,27 @@ from vedette.simulation.scans import Scan, kept_scans, simulate_scans
 from vedette.simulation.truth import Truth
 from vedette.tracking import Central, Stages, State, Tracker, TrackerInfo
 
-# Streams of one run: strategies meet the same truth and the same luck in the scans, whatever else they draw.
+# Streams of one run, so that truth and scans do not depend on what a strategy draws.
 TRUTH, SCANS, FILTER, PLANNER, RANDOM_CONTROL, DROP_OUTS, SCENES = range(7)
 
 
 def run_stream(seed: int, run: int, *stream: int) -> np.random.Generator:
-    """The random numbers of one purpose in one run."""
+    """Return the random number generator of one purpose in one run."""
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(run, *stream)))
 
 
 def sensor_streams(seed: int, run: int, stream: int, num_sensors: int) -> tuple[np.random.Generator, ...]:
-    """The random numbers of one purpose in one run, for each sensor its own."""
+    """Return the random number generators of one purpose in one run, one per sensor."""
     return tuple(run_stream(seed, run, stream, sensor) for sensor in range(num_sensors))
 
 
 def scans_of_run(
     scans_at: Bools | None, drop_out: Sequence[float], num_scans: int, seed: int, run: int
 ) -> Bools | None:
-    """(num_sensors, num_scans or more) whether each sensor scans in a run, drop-outs taken out; None: always.
+    """(num_sensors, num_scans or more) whether each sensor scans in a run, without lost scans; None: always.
 
-    scans_at, drop_out: as of an `Experiment`. Each sensor drops out by random numbers of its own, so that its other
-    scans are those of a run without drop-outs but for what it drew meanwhile.
+    scans_at, drop_out: see `Experiment`. Each sensor loses scans by random numbers of its own. Its other scans are
+    therefore those of a run without losses, except for the numbers drawn meanwhile.
     """
     if not drop_out:
         return scans_at
@@ -71,41 +71,41 @@ class RunningTracker:
 
 
 class ScanOutcome(NamedTuple):
-    """What one scan of all sensors has brought."""
+    """Result of one scan of all sensors."""
 
     step: int  # number of the scan, from 1
     time: float  # s
-    poses: Floats  # (num_sensors, 3 or more) where the sensors scanned
-    measurements: tuple[Floats | None, ...]  # of each sensor (num, meas_dim); None of one that did not scan
-    scans: tuple[Scan | None, ...]  # the same with the targets behind them, for evaluation
-    off: Bools  # (num_sensors,) whether its action kept each sensor from scanning
-    state: State  # what the tracker believes now
-    info: TrackerInfo  # what it reports
-    estimate: Estimate  # read off the fused belief
+    poses: Floats  # (num_sensors, 3 or more) poses of the sensors at the scan
+    measurements: tuple[Floats | None, ...]  # (num, meas_dim) per sensor; None if it did not scan
+    scans: tuple[Scan | None, ...]  # the same with their true origins, for evaluation
+    off: Bools  # (num_sensors,) whether the action of a sensor switched it off
+    state: State  # state of the tracker after the scan
+    info: TrackerInfo  # report of the tracker
+    estimate: Estimate  # estimate from the fused density
 
 
 class SimulationRun:
-    """A run of an experiment, a scan at a time; who steps it sends the sensors where they please.
+    """Simulation of one run that the caller advances scan by scan, choosing the sensor actions.
 
     Attributes:
         experiment: the parts of the run.
-        seed, run: fix every random number: the targets and scans are those of that run of a campaign.
-        truth: the targets at all scans, which are for scoring.
-        fleet: the sensors on their ways.
-        outcome: what the last scan has brought; None before the first.
+        seed, run: determine every random number: the targets and scans equal those of that run of a campaign.
+        truth: the targets at all scans, for scoring.
+        fleet: the sensor platforms and their motion.
+        outcome: result of the last scan; None before the first.
     """
 
     def __init__(
         self, experiment: Experiment, *, seed: int, run: int = 0, moving: bool = True, truth: Truth | None = None
     ) -> None:
-        """Before the first scan; a run once more is another world.
+        """Start before the first scan; to repeat a run, create another object.
 
         Args:
             experiment, seed, run: as above.
-            moving: whether the sensors are under way at all.
-            truth: the targets, where they are had already (`truth_of_run`); None: they are drawn.
+            moving: whether the sensors move at all.
+            truth: the targets, if known already (`truth_of_run`); None: they are drawn.
 
-        Raises `VedetteError` where the true targets cannot be had.
+        Raises `VedetteError` if the true targets cannot be drawn.
         """
         self.experiment, self.seed, self.run = experiment, seed, run
         self.truth = truth_of_run(experiment, seed, run) if truth is None else truth
@@ -122,23 +122,23 @@ class SimulationRun:
         return self.outcome is not None and self.outcome.step == len(self.experiment.times)
 
     def follow(self, actions: Sequence[Floats | None]) -> None:
-        """Send the sensors on their ways from where they are, one row of `Platform.actions` each; None: lie still.
+        """Start actions of the sensors at their present poses, one row of `Platform.actions` each; None: stay.
 
-        Raises `InputError` for actions that are none, or before the first scan.
+        Raises `InputError` for invalid actions, or before the first scan.
         """
         if self.outcome is None:
             raise InputError("world: expected a scan before the sensors are sent anywhere; got none yet")
         self.fleet = self.fleet.follow(actions, self.outcome.time)
 
     def step(self, actions: Sequence[Floats | None] | None = None, *, stages: Stages | None = None) -> ScanOutcome:
-        """One scan of every sensor, the tracker's step on it, and the estimate.
+        """Simulate one scan of every sensor, process it in the tracker, and estimate the targets.
 
         Args:
-            actions: the sensors are sent there first, see `follow`; None: all go on as they are.
-            stages: a stopwatch for "scans", "filter" and "estimate".
+            actions: actions to start first, see `follow`; None: the sensors continue as they are.
+            stages: stage timer for "scans", "filter" and "estimate".
 
         Raises:
-            InputError: the last scan is done, or as of `follow`.
+            InputError: the last scan is done, or as `follow`.
             VedetteError: as the models, the tracker and the estimator.
         """
         if self.is_over:
@@ -160,14 +160,14 @@ class SimulationRun:
 
 
 def truth_of_run(experiment: Experiment, seed: int, run: int) -> Truth:
-    """The targets of a run at all scans. Raises `VedetteError` where they cannot be had."""
+    """Return the targets of a run at all scans. Raises `VedetteError` if they cannot be drawn."""
     return experiment.targets.truth(experiment.times, rng=run_stream(seed, run, TRUTH))
 
 
 def advance(world: SimulationRun, journal: Journal, watch: Callable[[int], None] | None = None) -> list[ScanOutcome]:
-    """The scans up to the next decision, or else to the end, each written down in the journal of the run.
+    """Simulate the scans up to the next decision or the end, note each in the journal, and return their outcomes.
 
-    watch: told the number of every scan that is done. Raises as `SimulationRun.step`.
+    watch: called with the number of every finished scan. Raises as `SimulationRun.step`.
     """
     first, steps = 1 if world.outcome is None else world.outcome.step + 1, world.experiment.decision_steps
     moments: list[ScanOutcome] = []
@@ -190,17 +190,17 @@ def simulate(
     score: Score | None,
     watch: Callable[[int], None] | None = None,
 ) -> RunRecord:
-    """One run of a strategy.
+    """Return the record of one run of a strategy.
 
     Args:
         experiment: the parts of the run.
         planner: decides at the experiment's decision steps; None: the sensors never move, and no decision is made.
-        seed, run: fix every random number; runs with equal seed and number are paired across planners.
+        seed, run: determine every random number; runs with equal seed and number are paired across planners.
         score: (num_scans, 3) OSPA of the estimates against the truth, see `vedette.evaluation.ospa_of_run`; None: NaN.
-        watch: told the number of every scan that is done.
+        watch: called with the number of every finished scan.
 
     Raises:
-        VedetteError: the true targets cannot be had.
+        VedetteError: the true targets cannot be drawn.
         RunStopped, RunInterrupted: models, tracker, estimate, planner or score raised, see `Journal.filled`.
     """
     name = "still" if planner is None else planner.name
@@ -211,7 +211,7 @@ def simulate(
 
 
 def _with_truth(planner: Any, truth: Truth) -> Planner | None:
-    """The planner of this run, where it is one that knows the targets."""
+    """Return the planner of this run; a planner that requires the true targets receives them."""
     told: Planner | None = planner.with_truth(truth) if isinstance(planner, RequiresTruth) else planner
     return told
 
@@ -219,7 +219,7 @@ def _with_truth(planner: Any, truth: Truth) -> Planner | None:
 def _run_scans(
     experiment: Experiment, planner: Planner | None, journal: Journal, watch: Callable[[int], None] | None
 ) -> None:
-    """Every scan of a run, one after the other, written down in the journal."""
+    """Simulate every scan of a run, one after the other, and note each in the journal."""
     planner = _with_truth(planner, journal.truth)
     stream = RANDOM_CONTROL if isinstance(planner, RandomPlanner) else PLANNER
     planner_rng = run_stream(journal.seed, journal.run, stream)

@@ -1,4 +1,4 @@
-"""An oracle that knows where the targets are: the floor of what control can reach, beside which plans are put."""
+"""Oracle planner that knows the true targets: a lower bound for control, to compare plans with."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ from vedette.tracking import State
 
 
 class Schedule(NamedTuple):
-    """When sensors scan and decide, and how what they say becomes one.
+    """Schedule of scans and decisions, and the fusion weights.
 
-    times: (num_scans,) s. decision_steps: scans, from 1, after which they decide. powers: of each sensor, with which
-    what it says counts in the fused density. one_belief: whether all scans go into one belief, to which sensors return
-    after every scan; otherwise each keeps its own. rebirths: whether a target that was lost may be found again.
-    scans_at: (num_sensors, num_scans or more) whether each scans then; None: always.
+    times: (num_scans,) s. decision_steps: scans, from 1, followed by a decision. powers: weight of each sensor in the
+    fused density. one_belief: whether all scans update one density, which sensors share after every scan; otherwise
+    each has its own. rebirths: whether a lost target can be found again. scans_at: (num_sensors, num_scans or more)
+    whether each sensor scans; None: always.
     """
 
     times: Floats
@@ -51,37 +51,37 @@ class Schedule(NamedTuple):
 
 
 class _DecisionState(NamedTuple):
-    """Where a decision begins."""
+    """State at a decision."""
 
     step: int
     poses: Floats
-    covs: tuple[Floats, ...]  # (num_targets, dim, dim) of each belief
+    covs: tuple[Floats, ...]  # (num_targets, dim, dim) per density
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OraclePlanner:
-    """The joint action of least Cramer-Rao error at the true targets, over all scans up to the next decision.
+    """Planner that minimises the Cramer-Rao error at the true targets, over all scans up to the next decision.
 
     It starts from the filters' covariances of the targets that they track, and propagates them through all scans
     (`vedette.simulation.cramer_rao.CovarianceRecursion`). Scans may miss targets and filters may err, so the result
-    does not bound a single run; it is a lower bound on the localisation error that control can reach on average.
-    Targets that appear later are not foreseen. State components of the motion model that recorded targets lack, such as
-    a turn rate, are taken as 0.
+    does not bound a single run; for localisation it is the lower bound of what control can reach. Targets that appear
+    later are not foreseen. State components of the motion model that recorded targets lack, such as a turn rate, are
+    taken as 0.
 
     Attributes:
         sensors: the sensors.
-        schedule: when they scan and decide.
-        cutoff: the error that counts as a lost target, m.
-        depth: decisions in a row that it looks at.
-        beam_width: joint actions, those best for one decision, that it follows to the next.
-        settings: the horizon, over which courses are told apart.
-        search: which joint actions are looked at.
-        constraints: what the sensors must not do, tested at the decision at hand.
-        estimate: reads the tracks off a belief.
-        truth: the targets; None: `with_truth` sets them.
+        schedule: scans and decisions.
+        cutoff: error that counts as a lost target, m.
+        depth: number of consecutive decisions to consider.
+        beam_width: number of joint actions, the best for one decision, to continue with the next decision.
+        settings: the horizon over which courses are distinguished.
+        search: search over joint actions.
+        constraints: constraints of the sensors, tested at the present decision only.
+        estimate: extracts the tracks from a density.
+        truth: the targets; None: set by `with_truth`.
 
     Raises:
-        InputError: parts of another kind, or targets with more components than the motion's states.
+        InputError: parts of another type, or targets with more components than the motion's states.
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -107,15 +107,15 @@ class OraclePlanner:
 
     @property
     def _motion(self) -> MotionModel:
-        """How the filters take the targets to move."""
+        """Motion model of the targets in the filters."""
         return common_target_model([sensor.filter for sensor in self.sensors]).motion
 
     def with_truth(self, truth: Truth) -> OraclePlanner:
-        """The same for the targets of a run."""
+        """Return the planner for the targets of a run."""
         return replace(self, truth=truth)
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
-        """The joint action of least cost; `rng` is for the search. Raises `InputError` for inputs that do not fit."""
+        """Return the joint action of least cost; `rng` is for the search. Raises `InputError` for invalid inputs."""
         generator(rng)
         instance("state", state, State)
         if self.truth is None:
@@ -131,7 +131,7 @@ class OraclePlanner:
         return Plan(self.name, tuple(own.actions for own in options), chosen, (), {}, notes)
 
     def _tracked(self, state: State, ids: Ints, states: Floats) -> tuple[Ints, tuple[Floats, ...]]:
-        """The targets that can be helped, and their covariances in each belief."""
+        """Return the targets that the sensors can still affect, and their covariances in each density."""
         table = self.schedule
         held = [
             match_tracks(self.estimate, belief, state.step, states, self.cutoff)
@@ -143,7 +143,7 @@ class OraclePlanner:
     def _decide(
         self, moment: _DecisionState, truth: Truth, ids: Ints, depth: int, mask: Mask | None, rng: np.random.Generator
     ) -> tuple[tuple[int, ...], float]:
-        """The best joint action, and what it costs together with the decisions after it."""
+        """Return the best joint action, and its cost together with the decisions after it."""
         last = next((own for own in self.schedule.decision_steps if own > moment.step), len(self.schedule.times))
         options = options_of(self.sensors, moment.poses, self.settings)
         courses, scans = self._courses(moment, options, last)
@@ -173,8 +173,10 @@ class OraclePlanner:
     def _courses(
         self, moment: _DecisionState, options: tuple[Options, ...], last: int
     ) -> tuple[tuple[Floats, ...], tuple[Bools, ...]]:
-        """Of each sensor (num_courses, num_scans, pose_dim) where it is at the times of scans up to the next decision,
-        and (num_courses, num_scans) whether it scans then."""
+        """Return poses and activity of each sensor at the scans up to the next decision, per course.
+
+        Per sensor: (num_courses, num_scans, pose_dim) poses, and (num_courses, num_scans) whether it scans.
+        """
         times, table = self.schedule.times, self.schedule.scans_at
         waits, found, scans = times[moment.step : last] - times[moment.step - 1], [], []
         for s, (sensor, own) in enumerate(zip(self.sensors, options, strict=True)):
@@ -193,7 +195,10 @@ class OraclePlanner:
         truth: Truth,
         ids: Ints,
     ) -> CovarianceRecursion:
-        """The scans after scan `first`, when all of `ids` are there, to scan `last`; who ends stays where it was."""
+        """Return the recursion over the scans after scan `first`, with all of `ids` alive, to scan `last`.
+
+        Targets that end keep their last state.
+        """
         table, times = self.schedule, self.schedule.times
         motion = self._motion
         dim, num = motion.state_dim, len(ids)

@@ -1,4 +1,4 @@
-"""What a run leaves behind."""
+"""Records of runs."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ OSPA_COLUMNS = ("ospa_m", "localisation_m", "cardinality_m")
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Decision(SummaryRepr):
-    """A plan and the moment it was made.
+    """A plan with its time.
 
     Attributes:
         step: number of the scan, from 1, after which the plan was made.
-        time: of that scan, s.
+        time: time of that scan, s.
         poses: (num_sensors, 3 or more) poses [px, py, heading_rad, ...] of the sensors at that scan.
-        plan: the choice and its evidence.
-        undetected: where undetected targets were expected, of planners that search; None: not known, or not kept.
+        plan: the chosen actions and their rewards.
+        undetected: intensity of undetected targets, for search planners; None: not known, or not stored.
     """
 
     step: int
@@ -61,10 +61,10 @@ class Decision(SummaryRepr):
 
 @dataclass(frozen=True, slots=True)
 class RunSummary:
-    """What is compared and reported of a run: its record without the targets and tracks.
+    """Part of a record that comparisons and reports use: no targets or tracks.
 
     Attributes:
-        scenario, seed, run, times, decisions, ospa, health, timings: as of the record; decisions without explanations.
+        scenario, seed, run, times, decisions, ospa, health, timings: as in the record; decisions without explanations.
         num_targets: (num_scans,) number of true targets.
     """
 
@@ -80,7 +80,7 @@ class RunSummary:
 
 
 class ScansFile(NamedTuple):
-    """The file that scans were read from: its name without folders, and its SHA-256, "" of columns in memory."""
+    """File of recorded scans: its name without folders, and its SHA-256, "" for columns in memory."""
 
     name: str = "recorded scans"
     sha256: str = ""
@@ -88,26 +88,26 @@ class ScansFile(NamedTuple):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class RunRecord(TabularRepr):
-    """One run of one strategy on one scenario.
+    """Record of one run of one strategy on one scenario.
 
     Attributes:
         scenario: name of the scenario.
         planner: name of the strategy.
-        seed: seed of the campaign; with `run` it fixes every random number; of recorded scans those of filters that
-            draw.
+        seed: seed of the campaign; with `run` it determines every random number; for recorded scans only those of
+            filters that draw.
         run: index of the run within the campaign.
         times: (num_scans,) s.
         truth: the targets, scan by scan.
         poses: (num_scans, num_sensors, 3 or more) sensor poses [px, py, heading_rad, ...] at each scan.
-        off: (num_scans, num_sensors) whether its action kept each sensor from scanning.
-        estimates: one a scan.
+        off: (num_scans, num_sensors) whether the action of a sensor switched it off.
+        estimates: one per scan.
         decisions: in order of time.
-        ospa: (num_scans, 3) total, localisation and cardinality parts, m; where whole states are compared, in no unit.
-        health: what the filters and the fusion reported.
-        timings: for each stage (`scans`, `filter`, `fusion`, `estimate`, `planning`), (num_scans,) seconds of wall time
-            that it took at each scan; of all that is here the only thing that the seed does not fix.
+        ospa: (num_scans, 3) total, localisation and cardinality parts, m; without unit if whole states are compared.
+        health: reports of the filters and the fusion.
+        timings: for each stage (`scans`, `filter`, `fusion`, `estimate`, `planning`), (num_scans,) wall time at each
+            scan, s; the only content that the seed does not determine.
         stopped: where and why the run ended before its last scan; None: it did not.
-        recording: where its scans come from; None: they were simulated.
+        recording: file of recorded scans; None: the scans were simulated.
     """
 
     scenario: str
@@ -128,7 +128,7 @@ class RunRecord(TabularRepr):
 
     @property
     def source(self) -> str:
-        """What its scans come from, in words: `run 3`, or the name of the file of a recording."""
+        """Source of the scans in words: `run 3`, or the file name of a recording."""
         return f"run {self.run}" if self.recording is None else self.recording.name
 
     @property
@@ -142,12 +142,12 @@ class RunRecord(TabularRepr):
         return int(self.poses.shape[1])
 
     def summary(self) -> RunSummary:
-        """What is compared and reported of the run."""
+        """Return the part of the record that comparisons and reports use."""
         whose = (self.scenario, self.seed, self.run, self.times, self.decisions)
         return RunSummary(*whose, self.ospa, np.diff(self.truth.offsets), self.health, self.timings)
 
     def scan_columns(self) -> Columns:
-        """A row a scan, as the table `scans` of a run that is kept has them; see docs/results.md."""
+        """Return the table `scans` of a saved run, one row per scan; see docs/results.md."""
         return {
             "step": np.arange(1, self.num_scans + 1),
             "time_s": self.times,
@@ -158,7 +158,7 @@ class RunRecord(TabularRepr):
         }
 
     def to_table(self) -> dict[str, list[Any]]:
-        """The same as lists."""
+        """Return the table `scans` as lists."""
         return {name: np.asarray(column).tolist() for name, column in self.scan_columns().items()}
 
     def _summary(self) -> str:
@@ -174,8 +174,8 @@ class RunRecord(TabularRepr):
 
 
 class Measure(Protocol):
-    """A measure of a run."""
+    """Metric of a run."""
 
     def __call__(self, record: RunRecord) -> Any:
-        """(num_scans,) numbers; NaN where it has no value."""
+        """(num_scans,) numbers; NaN where undefined."""
         ...

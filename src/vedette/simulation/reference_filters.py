@@ -1,4 +1,4 @@
-"""Trackers that others are put beside: one that knows the targets, and one that only looks at the last scan."""
+"""Reference trackers for comparison: one that knows the true targets, and one that only uses the last scan."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from vedette.simulation.truth import Truth
 from vedette.tracking.program import UNKNOWN_VARIANCE, untold
 
 _SURE = 0.999
-_LOST = 1000.0  # m and m/s: of a target before its first scan
+_LOST = 1000.0  # m and m/s: standard deviation of a target before its first scan
 
 
 @dataclass(slots=True, eq=False)
 class _Reference:
-    """What both share: a `vedette.tracking.CentralFilter` whose belief is an LMB.
+    """Common part of both: a `vedette.tracking.CentralFilter` whose density is an LMB.
 
     Attributes:
-        targets: as the filters know them.
-        sensors: all of them.
+        targets: target model of the filters.
+        sensors: all sensors.
     """
 
     targets: TargetModel
     sensors: tuple[SensorModel, ...]
 
     def initial(self) -> LMB:
-        """No target."""
+        """Return a density without targets."""
         return LMB.empty(self.targets.state_dim)
 
     def _believed(self, labels: Any, means: Floats, covs: Floats) -> tuple[LMB, FilterInfo]:
@@ -45,22 +45,22 @@ class _Reference:
 
 @dataclass(slots=True, eq=False)
 class OracleFilter(_Reference):
-    """Knows which targets there are; where each is, as well as the Cramer-Rao bound allows.
+    """Tracker that knows which targets exist, and estimates their states as well as the Cramer-Rao bound allows.
 
-    Its estimates are the true states plus Gaussian errors whose covariances follow the posterior Cramer-Rao recursion
-    at the truth, with every scan detecting by its probability (`vedette.simulation.cramer_rao`). Where targets move
-    with less noise than the models allow for, filters may do better.
+    Its estimates are the true states plus Gaussian errors. Their covariances follow the posterior Cramer-Rao recursion
+    at the truth, with the information of every scan weighted by its detection probability
+    (`vedette.simulation.cramer_rao`). If targets move with less noise than the models assume, filters may do better.
 
     Attributes:
-        targets, sensors: as of all.
-        truth: the targets of the run; None: `with_truth` sets them.
+        targets, sensors: as in the other reference filter.
+        truth: the targets of the run; None: set by `with_truth`.
     """
 
     truth: Truth | None = None
     _covs: dict[int, Floats] = field(init=False, default_factory=dict, repr=False)
 
     def with_truth(self, truth: Truth) -> OracleFilter:
-        """The same for the targets of a run."""
+        """Return the filter for the targets of a run."""
         return replace(self, truth=truth)
 
     def step(
@@ -74,7 +74,7 @@ class OracleFilter(_Reference):
         rng: np.random.Generator,
         births: LMB | None = None,
     ) -> tuple[LMB, FilterInfo]:
-        """The targets at that step. Raises `InputError` where it was not told of them."""
+        """Return the estimates at that step. Raises `InputError` without a truth."""
         if self.truth is None:
             raise InputError("truth: expected the targets of the run, as of with_truth(); got None")
         ids, states = self.truth.at(step - 1)
@@ -97,7 +97,7 @@ class OracleFilter(_Reference):
 
 @dataclass(slots=True, eq=False)
 class LastScanFilter(_Reference):
-    """Takes every measurement of the scan that has most of them for a target: what no memory and no model gives."""
+    """Tracker that takes every measurement of the largest scan for a target: the result without memory and models."""
 
     def step(
         self,
@@ -110,7 +110,7 @@ class LastScanFilter(_Reference):
         rng: np.random.Generator,
         births: LMB | None = None,
     ) -> tuple[LMB, FilterInfo]:
-        """Where that scan says that something is."""
+        """Return a target at every measurement of the largest scan."""
         there = [(scan, s) for s, scan in enumerate(scans) if scan is not None]
         scan, s = max(there, key=lambda each: len(each[0]), default=(np.empty((0, 2)), 0))
         means = np.zeros((len(scan), self.targets.state_dim))

@@ -1,4 +1,4 @@
-"""The scans of a run that is over, drawn once more: a record keeps what was estimated, not what was measured."""
+"""Scans of a finished run, drawn again, as a record contains estimates but no measurements."""
 
 from __future__ import annotations
 
@@ -14,22 +14,21 @@ from vedette.simulation.true_sensors import TrueSensor
 
 
 def scans_of(record: RunRecord, experiment: Experiment) -> tuple[tuple[Scan | None, ...], ...]:
-    """Every scan of every sensor of a run, exactly as the loop simulated it, with the ids of the targets behind it.
+    """Return every scan of every sensor of a run, exactly as simulated, with the ids of the targets behind it.
 
-    Seed, run number, truth and poses fix all measurements: each sensor has its own stream of random numbers, and draws
-    from it scan after scan.
+    Seed, run number, truth and poses determine all measurements: each sensor draws from its own stream, scan by scan.
 
     Args:
-        record: of a run of this experiment, whatever the planner.
-        experiment: gives the sensors as they are, and the steps at which they scan.
+        record: record of a run of this experiment, with any planner.
+        experiment: gives the true sensors, and the steps at which they scan.
 
     Returns:
-        For each scan, one `Scan` a sensor, or None where it did not scan; its origins are ids of `record.truth`, or
+        For each scan one `Scan` per sensor, or None if it did not scan; its origins are ids of `record.truth`, or
         `CLUTTER`.
 
     Raises:
-        InputError: another number of sensors in the record than in the experiment.
-        VedetteError: what the models raise.
+        InputError: the record and the experiment have different numbers of sensors.
+        VedetteError: as the models.
     """
     scans_at = scans_of_run(experiment.scans_at, experiment.drop_out, len(experiment.times), record.seed, record.run)
     return scans_of_sensors(record, experiment.num_sensors, partial(experiment.sensors_at, scans_at=scans_at))
@@ -38,7 +37,7 @@ def scans_of(record: RunRecord, experiment: Experiment) -> tuple[tuple[Scan | No
 def scans_of_sensors(
     record: RunRecord, num_sensors: int, sensors_at: Callable[[int], tuple[TrueSensor | None, ...]]
 ) -> tuple[tuple[Scan | None, ...], ...]:
-    """As `scans_of`, by the sensors as they are at a step alone."""
+    """Do the same as `scans_of`, given only the true sensors at each step."""
     if record.num_sensors != num_sensors:
         raise InputError(f"record: expected {num_sensors} sensors; got {record.num_sensors}")
     streams = sensor_streams(record.seed, record.run, SCANS, num_sensors)

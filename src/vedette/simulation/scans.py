@@ -1,4 +1,4 @@
-"""What a sensor reports of the truth in one scan."""
+"""Simulated scans: detections with noise and bias, and clutter."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Scan(SummaryRepr):
     """One scan, in random order.
 
     Attributes:
-        measurements: (num_measurements, meas_dim) all that a filter may see.
+        measurements: (num_measurements, meas_dim) the input of the filters.
         origins: (num_measurements,) id of the target behind each measurement, or `CLUTTER`; for evaluation only.
     """
 
@@ -42,28 +42,28 @@ def simulate_scan(
     ids: ArrayLike | None = None,
     rng: np.random.Generator,
 ) -> Scan:
-    """Detections of the targets, each with additive Gaussian noise at its true state, and clutter (paper section IV).
+    """Return detections of the targets, each with additive Gaussian noise, and clutter (paper section IV).
 
-    The numbers drawn from `rng` depend on the number of targets and on the clutter, never on the pose: sensors that go
-    different ways see the same luck.
+    The number of draws from `rng` depends on the number of targets and on the clutter, never on the pose. Sensors on
+    different courses therefore use the same random numbers.
 
     Args:
         truth_states: (num_targets, state_dim).
         pose: (3 or more,) px, py, heading_rad, ... of the sensor.
-        sensor: the functions that the filter uses too, or the sensor as it is where it differs from them.
-        ids: (num_targets,) ids for `Scan.origins`; None: the place in `truth_states`.
-        rng: every number drawn comes from it.
+        sensor: the sensor model of the filter, or a true sensor that differs from it.
+        ids: (num_targets,) ids for `Scan.origins`; None: the row in `truth_states`.
+        rng: generator of all random numbers.
 
     Raises:
-        InputError: states, pose or ids that cannot be used.
-        ModelError: a model function raised or gave no valid value at a target's state.
+        InputError: invalid states, pose or ids.
+        ModelError: a model function raised or returned an invalid value at a target's state.
     """
     states, pose = float_array("truth_states", truth_states, (None, None)), pose_vector("pose", pose)
     return _drawn(states, _named(ids, len(states)), pose, sensor, generator(rng))
 
 
 def _named(ids: ArrayLike | None, num: int) -> Ints:
-    """(num,) ids of the targets; None: their places."""
+    """(num,) ids of the targets; None: their row numbers."""
     names = np.arange(num) if ids is None else np.array(ids)
     if names.shape != (num,):
         raise reject("ids", f"{num} ids, one a target", names.tolist())
@@ -73,7 +73,7 @@ def _named(ids: ArrayLike | None, num: int) -> Ints:
 def _drawn(
     states: Floats, names: Ints, pose: Floats, sensor: SensorModel | TrueSensor, rng: np.random.Generator
 ) -> Scan:
-    """One scan of arguments that are checked."""
+    """Return one scan from checked arguments."""
     true = sensor if isinstance(sensor, TrueSensor) else TrueSensor(sensor)
     num, model = len(states), true.model
     luck = rng.random(num)
@@ -96,7 +96,7 @@ def simulate_scans(
     ids: ArrayLike | None = None,
     rngs: Sequence[np.random.Generator],
 ) -> tuple[Scan, ...]:
-    """One scan a sensor, where all scan."""
+    """Return one scan per sensor if all scan."""
 
 
 @overload
@@ -108,7 +108,7 @@ def simulate_scans(
     ids: ArrayLike | None = None,
     rngs: Sequence[np.random.Generator],
 ) -> tuple[Scan | None, ...]:
-    """One scan a sensor, where some do not."""
+    """Return one scan per sensor, None for those that do not scan."""
 
 
 def simulate_scans(
@@ -119,9 +119,9 @@ def simulate_scans(
     ids: ArrayLike | None = None,
     rngs: Sequence[np.random.Generator],
 ) -> tuple[Scan | None, ...]:
-    """One scan a sensor, each with its own pose and random numbers; see `simulate_scan`.
+    """Return one scan per sensor, each with its own pose and random numbers; see `simulate_scan`.
 
-    None for a sensor that is None: it does not scan, and draws nothing.
+    A sensor that is None does not scan and draws nothing; its entry is None.
     """
     states, stages, scans = float_array("truth_states", truth_states, (None, None)), Stages(), list[Scan | None]()
     names = _named(ids, len(states))
@@ -135,15 +135,15 @@ def simulate_scans(
 
 
 def kept_scans(scans: Sequence[Scan | None], off: Bools) -> tuple[Scan | None, ...]:
-    """The scans of a time without those of sensors that are off (num_sensors,).
+    """Return the scans of one time, with None for sensors that are off (num_sensors,).
 
-    All are drawn first, so that a sensor meets the same luck whether or not it was off before.
+    All scans are drawn first, so that random numbers do not depend on whether a sensor was off before.
     """
     return tuple([None if is_off else scan for scan, is_off in zip(scans, off.tolist(), strict=True)])
 
 
 def _shown(sensor: TrueSensor, states: Floats, pose: Floats) -> tuple[Floats, Floats]:
-    """The targets' states at the time by the world's clock, and where the sensor is in truth."""
+    """Return the targets' states at the true time of the scan, and the true pose of the sensor."""
     bias = sensor.bias
     if bias.clock and states.shape[1] >= 4:
         states = states.copy()
@@ -155,14 +155,14 @@ def _shown(sensor: TrueSensor, states: Floats, pose: Floats) -> tuple[Floats, Fl
 
 
 def _biased(sensor: TrueSensor, measured: Floats) -> Floats:
-    """What the sensor says of what it has measured."""
+    """Return the measurements with the bias of the sensor."""
     names = sensor.model.measurement.components
     offsets = np.array([getattr(sensor.bias, name) for name in names])
     return with_offsets(measured, offsets, names) if offsets.any() else measured
 
 
 def _detected_at(sensor: TrueSensor, states: Floats, pose: Floats, measured: Floats) -> Floats:
-    """The states at which detection is decided: the true ones, or with the positions that were measured."""
+    """Return the states for the detection probability: the true ones, or with the measured positions."""
     if sensor.detection_of == "state":
         return states
     moved = states.copy()

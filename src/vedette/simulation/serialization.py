@@ -1,4 +1,4 @@
-"""A run as files, an Arrow file a table: those of a saved run's folder, and what a campaign keeps of a run."""
+"""Runs as Arrow files, one per table: the files of a saved run, and of a run stored in a campaign."""
 
 from __future__ import annotations
 
@@ -27,19 +27,19 @@ from vedette.simulation.tables import (
     timings_of,
 )
 
-# Of saved runs and of campaigns; another wherever a table gains, loses or renames a column. A table that may be missing
-# needs none: programs of before it was there pass it over, and what they wrote reads as it did.
+# Version of saved runs and campaigns; it changes whenever a table gains, loses or renames a column. A new optional
+# table needs no new version: earlier programs ignore it, and their files stay readable.
 FORMAT_VERSION = 6
-# What the tables of a format lack of those of the next, and what stands there in runs of that format, NaN where it is
-# not known: by it they are upgraded (`vedette.simulation.upgrading`). What was released once stays here.
+# Columns that the tables of a format lack compared with the next, and the values to fill in, NaN if unknown. Used by
+# `vedette.simulation.upgrading`. Entries of released formats are never removed.
 LACKING: dict[int, dict[str, dict[str, float]]] = {5: {"sensors": {"factoring_error": math.nan}}}
 ENDING = ".arrow"
 _FILES = frozenset(f"{name}{ENDING}" for name in (*LAYOUTS, *OPTIONAL))
-SUMMARY_FILES = frozenset(f"{name}{ENDING}" for name in SUMMARY_TABLES)  # that `decode_summary` reads
+SUMMARY_FILES = frozenset(f"{name}{ENDING}" for name in SUMMARY_TABLES)  # read by `decode_summary`
 
 
 def encode_run(record: RunRecord) -> dict[str, bytes]:
-    """File names and contents: all of a run but `run_facts` and its timings. Equal runs give equal bytes.
+    """Return file names and contents of a run, without `run_facts` and timings. Equal runs give equal bytes.
 
     Raises `InputError` for a record that contradicts itself or holds an invalid plan.
     """
@@ -51,9 +51,9 @@ def encode_run(record: RunRecord) -> dict[str, bytes]:
 def decode_run(
     facts: Mapping[str, Any], files: Mapping[str, bytes], place: str, timings: bytes | None = None
 ) -> RunRecord:
-    """The record back from its files; without `timings`, as `encode_timings` gives them, it has none.
+    """Return the record from its files; without `timings` (from `encode_timings`) it has none.
 
-    Raises `InputError`, naming `place` and the file, for files that are missing, damaged or do not fit together.
+    Raises `InputError`, naming `place` and the file, for files that are missing, damaged or inconsistent.
     """
     tables, spent = _tables(facts, files, place, timings)
     with _errors_naming(place):
@@ -65,9 +65,9 @@ def decode_run(
 def decode_summary(
     facts: Mapping[str, Any], files: Mapping[str, bytes], place: str, timings: bytes | None = None
 ) -> RunSummary:
-    """What is compared and reported of a run, from its files, in a third of the time; raises as `decode_run`.
+    """Return the summary of a run from its files, in a third of the time of `decode_run`; raises as `decode_run`.
 
-    Tables of targets and tracks are not looked at.
+    Tables of targets and tracks are not read.
     """
     tables, spent = _tables(facts, files, place, timings, SUMMARY_FILES)
     with _errors_naming(place):
@@ -81,7 +81,7 @@ def _tables(
     timings: bytes | None,
     wanted: Collection[str] = _FILES,
 ) -> tuple[dict[str, Columns], dict[str, Floats]]:
-    """The tables of the wanted files that there are, and the timings."""
+    """Return the wanted tables that exist, and the timings."""
     tables = {}
     for name, layout in {**LAYOUTS, **OPTIONAL}.items():
         file = f"{name}{ENDING}"
@@ -96,22 +96,22 @@ def _tables(
 
 @contextmanager
 def _errors_naming(place: str) -> Iterator[None]:
-    """What files of no run raise, as errors that name the place."""
+    """Context manager that turns errors about inconsistent files into `InputError` with the place."""
     try:
         yield
     except InputError as error:
         raise InputError(f"{place}: {error}") from error
-    except Exception as error:  # they can raise nearly anything on the way to a run
+    except Exception as error:  # inconsistent files can raise nearly any error
         raise InputError(
             f"{place}: expected the files of a run; they do not fit together: {error_summary(error)}"
         ) from error
 
 
 def encode_timings(record: RunRecord) -> bytes:
-    """The seconds of every stage and scan: the one thing of a run that its seed does not fix."""
+    """Return the wall times of every stage and scan, the only content of a run that its seed does not determine."""
     return write_table(timing_table(record), TIMINGS)
 
 
 def decode_timings(content: bytes, place: str) -> dict[str, Floats]:
-    """The timings back from their bytes. Raises `InputError`, naming the place, for other bytes."""
+    """Return the timings from their bytes. Raises `InputError`, naming the place, for other bytes."""
     return timings_of(read_table(content, TIMINGS, place))

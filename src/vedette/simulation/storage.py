@@ -1,8 +1,8 @@
 """Runs on disk, in open formats.
 
-A run is a folder: `manifest.json` (what ran, on which versions, and a checksum of every other file), an Arrow file for
-each table of `vedette.simulation.tables`, `timings.arrow` and, where it was given, `scenario.yaml`. A run that stopped
-early says so in the manifest (`stopped`). A folder appears whole or not at all.
+A run is a folder: `manifest.json` (the run, the versions, and a checksum of every other file), an Arrow file for each
+table of `vedette.simulation.tables`, `timings.arrow` and, if given, `scenario.yaml`. If a run stopped early, the
+manifest states it (`stopped`). A folder is written atomically.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ _PACKAGES = ("vedette", "numpy", "scipy", "numba")
 def save_run(
     record: RunRecord, directory: Path | str, *, scenario_text: str | None = None, overwrite: bool = False
 ) -> Path:
-    """Write a run as a folder of its own.
+    """Write a run as a new folder.
 
     Args:
         record: the run.
-        directory: the folder to make; its parents are made too.
-        scenario_text: the scenario as it was read, kept beside the results.
+        directory: the folder to make; missing parents are made too.
+        scenario_text: text of the scenario, stored with the results.
         overwrite: replace a folder that holds a run; a folder that holds anything else is never replaced.
 
     Returns the folder. Raises `InputError` if it exists already, cannot be written, or the record contradicts itself.
@@ -66,7 +66,7 @@ def save_run(
 
 
 def load_run(directory: Path | str) -> RunRecord:
-    """Read a run back, bit for bit.
+    """Read a saved run, lossless.
 
     Raises `InputError`, naming the file, if the folder holds no run, one of another format, or one with a file that is
     missing, cut short or altered since it was written.
@@ -82,7 +82,7 @@ def load_run(directory: Path | str) -> RunRecord:
 
 
 def read_files(folder: Path, manifest: Mapping[str, Any]) -> dict[str, bytes]:
-    """The files of a saved run by name, as they were written. Raises `InputError` as `load_run`."""
+    """Return the verified files of a saved run by name. Raises `InputError` as `load_run`."""
     files = {}
     for name, checksum in manifest["files"].items():
         if Path(name).name != name:
@@ -94,13 +94,13 @@ def read_files(folder: Path, manifest: Mapping[str, Any]) -> dict[str, bytes]:
     return files
 
 
-# Raises `InputError` for a manifest of a format that is not wanted: the manifest, what has the versions that wrote it,
-# and where it is.
+# Raises `InputError` for a manifest of another format. Arguments: the manifest, the session with the versions that
+# wrote it, and its path.
 VersionCheck: TypeAlias = Callable[[Mapping[str, Any], Any, Path], None]
 
 
 def check_version(manifest: Mapping[str, Any], session: Any, place: Path) -> None:
-    """`InputError` unless a saved run or a campaign is of this format; it says what to do with another."""
+    """Raise `InputError` unless a saved run or a campaign has this format; the message says what to do with another."""
     number = _number(manifest)
     if number == FORMAT_VERSION:
         return
@@ -124,21 +124,21 @@ def check_version(manifest: Mapping[str, Any], session: Any, place: Path) -> Non
 
 
 def check_upgradable(manifest: Mapping[str, Any], session: Any, place: Path) -> None:
-    """`InputError` unless a saved run or a campaign is of this format, or of one that can be brought to it."""
+    """Raise `InputError` unless a saved run or a campaign has this format, or one that can be upgraded."""
     if _number(manifest) not in LACKING:
         check_version(manifest, session, place)
 
 
 def _number(manifest: Mapping[str, Any]) -> int | None:
-    """Of the format; None for what no format has."""
+    """Return the number of the format; None for an invalid one."""
     number = manifest.get("format_version")
     return number if isinstance(number, int) and not isinstance(number, bool) and number > 0 else None
 
 
 def read_manifest(directory: Path | str, check: VersionCheck = check_version) -> dict[str, Any]:
-    """The manifest of a saved run of a format that passes `check`: format, versions, run, checksums of its files.
+    """Return the manifest of a saved run: format, versions, run, checksums of its files.
 
-    Raises `InputError` as `load_run`.
+    check: test of the format. Raises `InputError` as `load_run`.
     """
     path = Path(directory) / MANIFEST
     try:
@@ -156,7 +156,7 @@ def read_manifest(directory: Path | str, check: VersionCheck = check_version) ->
 
 
 def holds_run(directory: Path | str) -> bool:
-    """Whether a folder says of itself that it holds a saved run, of whatever format."""
+    """Return True if the manifest of a folder is that of a saved run, of any format."""
     try:
         manifest = parse_json(read_file(Path(directory) / MANIFEST))
     except (OSError, ValueError):
@@ -175,11 +175,11 @@ def _manifest(record: RunRecord, files: Mapping[str, bytes]) -> dict[str, Any]:
 
 
 def versions(*more: str) -> dict[str, str]:
-    """Versions of Python, of the packages that results depend on, and of `more` packages."""
+    """Return the versions of Python, of the packages that results depend on, and of `more` packages."""
     return {"python": platform.python_version(), **{name: _version(name) for name in (*_PACKAGES, *more)}}
 
 
-@cache  # asked for every task of a campaign; the answer is read from disk
+@cache  # called for every task of a campaign, and read from disk
 def _version(package: str) -> str:
     try:
         return version(package)
@@ -197,8 +197,9 @@ def _read(path: Path) -> bytes:
 
 
 def check_free(target: Path, overwrite: bool) -> None:
-    """`InputError` unless a run may be saved there: nothing is there, or a run that may be overwritten; and the folder
-    around it may be written to.
+    """Raise `InputError` unless a run may be saved there.
+
+    The place must be new, empty, or a run that may be overwritten, and its parent folder must be writable.
     """
     reason = f"{target} is no folder" if target.exists() and not target.is_dir() else unwritable(target)
     if reason:

@@ -1,9 +1,9 @@
-"""A run as tables of columns, and back: the one mapping behind every form in which runs are kept.
+"""Runs as tables of columns, and back: the one mapping behind all stored forms of runs.
 
-`step` counts scans from 1 in every table; a row of `tracks` is one estimate at one scan, a row of `actions` one action
-that a sensor could choose at a decision, and a row of `rewards` one that was evaluated, `action_0` that of the first
-sensor; of many sensors those of one's own actions stand apart. Decisions stand in `planned`, and why they were taken in
-`explained`.
+`step` counts scans from 1 in every table. A row of `tracks` is one estimate at one scan, a row of `actions` one
+available action of a sensor at a decision, and a row of `rewards` one evaluated combination, with `action_0` the action
+of the first sensor; for many sensors, rewards of a single sensor's actions are in a table of their own. See
+`decision_tables` for decisions and `explanation_tables` for their explanations.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from vedette.simulation.undetected_tables import UNDETECTED, undetected_tables, 
 Tables: TypeAlias = dict[str, Columns]
 
 POSE_COLUMNS = ("x_m", "y_m", "heading_rad")
-OFF = "off"  # a column of runs in which an action kept a sensor from scanning: 1 where it did
+OFF = "off"  # column of runs in which an action switched a sensor off: 1 where it did
 
 _TIME = {"step": Kind.INTEGER, "time_s": Kind.NUMBER}
 _LABEL = {"birth_step": Kind.INTEGER, "birth_site": Kind.INTEGER}
 _COUNTS = {"num_targets": Kind.INTEGER, "num_estimates": Kind.INTEGER}
 
-# All of a run but what names it and how long it took; runs of recorded scans have none of `DECISION_TABLES`.
+# All of a run except the facts that identify it and its timings. Runs of recorded scans have no `DECISION_TABLES`.
 LAYOUTS: dict[str, Layout] = {
     "scans": Layout({**_TIME, **_COUNTS, **dict.fromkeys(OSPA_COLUMNS, Kind.NUMBER), **FUSION_COLUMNS}),
     "truth": Layout({**_TIME, "target": Kind.INTEGER}, {"state_": Kind.NUMBER}),
@@ -45,7 +45,7 @@ LAYOUTS: dict[str, Layout] = {
     ),
     **DECISION_TABLES,
 }
-# What a run may have beside those; of `EXPLANATION_TABLES` all or none.
+# Optional tables of a run; of `EXPLANATION_TABLES` all or none.
 OPTIONAL: dict[str, Layout] = {**OWN_REWARDS, **EXPLANATION_TABLES, **UNDETECTED}
 TIMINGS = Layout({"step": Kind.INTEGER}, {"": Kind.NUMBER})
 
@@ -75,7 +75,7 @@ def check_record(record: RunRecord) -> None:
 
 
 def tables_of(record: RunRecord) -> Tables:
-    """The tables of `LAYOUTS` that a run of its kind has, and those of `OPTIONAL` that the run has."""
+    """Return the tables of `LAYOUTS` for runs of this kind, and those of `OPTIONAL` that the run has."""
     of_scans = {
         "scans": record.scan_columns(),
         "truth": _truth(record),
@@ -91,19 +91,20 @@ def tables_of(record: RunRecord) -> Tables:
 
 
 def timing_table(record: RunRecord) -> Columns:
-    """Step and seconds by stage, `<stage>_s`."""
+    """Return the columns step and, per stage, `<stage>_s`."""
     seconds = {f"{stage}_s": spent for stage, spent in record.timings.items()}
     return {"step": np.arange(1, record.num_scans + 1), **seconds}
 
 
 def timings_of(table: Mapping[str, Any]) -> dict[str, Floats]:
-    """The timings back from their table."""
+    """Return the timings from their table."""
     return {name.removesuffix("_s"): seconds for name, seconds in table.items() if name != "step"}
 
 
 def run_facts(record: RunRecord) -> dict[str, Any]:
-    """What names a run: scenario, planner, seed and number; where recorded scans come from; and why it stopped early,
-    null where it did not.
+    """Return the facts that identify a run: scenario, planner, seed and number.
+
+    Also the file of recorded scans, and why the run stopped early, None if it did not.
     """
     names = {"scenario": record.scenario, "planner": record.planner, "seed": record.seed, "run": record.run}
     recorded = {} if record.recording is None else {"recording": record.recording._asdict()}
@@ -113,9 +114,9 @@ def run_facts(record: RunRecord) -> dict[str, Any]:
 def record_of(
     facts: Mapping[str, Any], tables: Mapping[str, Mapping[str, Any]], timings: dict[str, Floats]
 ) -> RunRecord:
-    """The record back from `run_facts`, `tables_of` and its timings; not yet checked.
+    """Return the record from `run_facts`, `tables_of` and its timings, not yet checked.
 
-    Raises `InputError`, `KeyError`, `TypeError` or `ValueError` for tables that do not fit together.
+    Raises `InputError`, `KeyError`, `TypeError` or `ValueError` for inconsistent tables.
     """
     summary, poses = summary_of(facts, tables, timings), _poses_of(tables)
     times, decisions = summary.times, summary.decisions
@@ -148,18 +149,18 @@ def _recording_of(fact: Any) -> ScansFile | None:
     return None if fact is None else ScansFile(str(fact["name"]), str(fact["sha256"]))
 
 
-# What `summary_of` needs, of all the tables that a run may have.
+# Tables that `summary_of` needs.
 SUMMARY_TABLES = frozenset({"scans", "sensors", *DECISION_TABLES, *OWN_REWARDS})
 
 
 def summary_of(
     facts: Mapping[str, Any], tables: Mapping[str, Mapping[str, Any]], timings: dict[str, Floats]
 ) -> RunSummary:
-    """What is compared and reported of a run, from those of its tables that are in `SUMMARY_TABLES`.
+    """Return the summary of a run from its tables in `SUMMARY_TABLES`.
 
     Raises as `record_of`.
 
-    Its numbers of targets are those that the run wrote down, which no table of targets is held against.
+    The numbers of targets are those in the table `scans`; they are not checked against the table of targets.
     """
     scans, sensors, num_scans = tables["scans"], tables["sensors"], len(tables["scans"]["step"])
     poses = _poses_of(tables)
@@ -249,7 +250,7 @@ def _columns(start: str, matrix: Floats) -> Columns:
 
 
 def _matrix(table: Mapping[str, Any], start: str) -> Floats:
-    """(num_rows, n) from `_columns`."""
+    """(num_rows, n) matrix from the columns of `_columns`."""
     width = sum(name.startswith(start) for name in table)
     if not all(f"{start}{index}" in table for index in range(max(width, 1))):
         raise InputError(f"expected columns {start}0 to {start}{max(width, 1) - 1}; got {', '.join(table)}")
@@ -257,7 +258,7 @@ def _matrix(table: Mapping[str, Any], start: str) -> Floats:
 
 
 def _offsets(table: Mapping[str, Any], num_scans: int) -> Ints:
-    """CSR offsets of rows that are in order of step."""
+    """Return the CSR offsets of rows that are ordered by step."""
     steps = table["step"]
     if len(steps) and (np.any(np.diff(steps) < 0) or steps[0] < 1 or steps[-1] > num_scans):
         raise InputError(f"step: expected rows in order, of steps 1 to {num_scans}")

@@ -1,4 +1,4 @@
-"""The sensors that are simulated, which need not be what the filters take them for."""
+"""True sensors of the simulation, which may differ from the sensor models of the filters."""
 
 from __future__ import annotations
 
@@ -15,19 +15,20 @@ from vedette.models.bias import NO_BIAS
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrueSensor:
-    """A sensor as it is.
+    """True sensor of the simulation.
 
     Attributes:
-        model: what it measures, with what noise, detection and clutter.
-        first_detection: its detection at its first scan alone; None: as at the others.
-        detection_of: where its probability of detection is taken: at the target's true "state", or at the position that
-            the "measurement" gives (`MeasurementModel.places`), noise included (the rest of the state stays).
-        bias: what its scans say too much. What a clock ahead says of now is of a little earlier: where targets were by
-            their velocities.
+        model: measurements, noise, detection and clutter.
+        first_detection: detection at its first scan only; None: as at the others.
+        detection_of: state at which the detection probability is evaluated: the target's true "state", or with the
+            position that the "measurement" gives (`MeasurementModel.places`), noise included; the rest of the state
+            stays.
+        bias: bias of its scans, measured minus true. With a positive clock bias, measurements are of slightly earlier
+            positions, by the targets' velocities.
 
     Raises:
-        InputError: a part of another type; detection of the measurement where that gives no position; a bias of what is
-            not measured.
+        InputError: a part of another type; detection of the measurement if that gives no position; a bias in a
+            component that is not measured.
     """
 
     model: SensorModel
@@ -51,17 +52,17 @@ class TrueSensor:
                 raise reject(f"TrueSensor.bias.{name}", f"0, as no {name} is measured", getattr(self.bias, name))
 
     def at_first_scan(self) -> TrueSensor:
-        """The sensor as it is at its first scan."""
+        """Return the sensor at its first scan."""
         if self.first_detection is None:
             return self
         return replace(self, model=replace(self.model, detection=self.first_detection), first_detection=None)
 
 
 def true_sensors_of(given: Sequence[TrueSensor], known: Sequence[SensorModel]) -> tuple[TrueSensor, ...]:
-    """Those that are given, or the ones that the filters know.
+    """Return the given true sensors, or without any the sensor models of the filters.
 
     Raises:
-        InputError: another number of them, something else, or one that does not measure what the filter expects.
+        InputError: another number of sensors, another type, or other measurement components than in the filter.
     """
     if not given:
         return tuple(TrueSensor(model) for model in known)
@@ -78,12 +79,12 @@ def true_sensors_of(given: Sequence[TrueSensor], known: Sequence[SensorModel]) -
 
 
 def scanning(sensors: Sequence[TrueSensor], scans_at: Bools | None, step: int) -> tuple[TrueSensor | None, ...]:
-    """The sensors as they are at a step; None for one that does not scan then.
+    """Return the true sensors at a step; None for one that does not scan then.
 
     Args:
-        sensors: all of them.
+        sensors: all sensors.
         scans_at: (num_sensors, num_scans) whether each scans; None: at every step.
-        step: of the run, from 1.
+        step: step of the run, from 1.
     """
     if scans_at is None:
         return tuple(sensors) if step > 1 else tuple([sensor.at_first_scan() for sensor in sensors])

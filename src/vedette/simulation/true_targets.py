@@ -1,4 +1,4 @@
-"""Beliefs about the true targets: which labels the filters hold of them, and planners that decide on such beliefs."""
+"""Densities of the true targets: the filters' labels of them, and a planner that decides on such densities."""
 
 from __future__ import annotations
 
@@ -17,38 +17,37 @@ from vedette.models.arguments import instance, positive, reject
 from vedette.simulation.truth import Truth
 from vedette.tracking import State
 
-# Of a target without a label, the standard deviation of components beyond the position, relative to the cutoff.
+# Standard deviation of the components after the position for a target without a label, relative to the cutoff.
 _LOST = 0.1
 
 
 class TrackedTargets(NamedTuple):
-    """What a belief holds of given targets."""
+    """Labels of given targets in a density."""
 
-    covs: Floats  # (num, dim, dim) of the label of each; of the size of the cutoff where it has none
-    found: Bools  # (num,) whether it has one
-    false_means: Floats  # (num_false, dim) of estimates that are none of these targets
+    covs: Floats  # (num, dim, dim) covariance of each target's label; of the size of the cutoff without one
+    found: Bools  # (num,) whether a target has a label
+    false_means: Floats  # (num_false, dim) means of false estimates
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrueTargetsPlanner:
-    """The decisions of another planner with beliefs about the true targets in place of those of the filters.
+    """Planner that lets another planner decide on densities of the true targets instead of those of the filters.
 
-    Each true target that a label of a belief is assigned to, within the cutoff, is a label at its true state, with the
-    covariance that the belief has of it. A target without a label is one too where it may still start a track, with an
-    error of the size of the cutoff. Estimates that are no target stay as labels: they count as errors until a scan
-    shows that nothing is there. Other labels and the intensity of undetected targets are left out. Targets that appear
-    later are not foreseen. Components of the motion's states that recorded targets lack, such as a turn rate, are taken
-    as 0.
+    Each true target that a label is assigned to, within the cutoff, becomes a label at its true state, with the
+    covariance of that label. So does a target without a label if it may still start a track, with an error of the size
+    of the cutoff. False estimates stay as labels: they count as errors until a scan shows that nothing is there. Other
+    labels and the intensity of undetected targets are left out. Targets that appear later are not foreseen. State
+    components of the motion model that recorded targets lack, such as a turn rate, are taken as 0.
 
     Attributes:
-        planner: decides.
-        sensors: that it steers.
-        cutoff: the error that counts as a lost target, m.
-        estimate: reads the tracks off a belief.
-        truth: the targets; None: `with_truth` sets them.
+        planner: the planner that decides.
+        sensors: the sensors that it controls.
+        cutoff: error that counts as a lost target, m.
+        estimate: extracts the tracks from a density.
+        truth: the targets; None: set by `with_truth`.
 
     Raises:
-        InputError: parts of another kind, or targets with more components than the motion's states.
+        InputError: parts of another type, or targets with more components than the motion's states.
     """
 
     planner: Planner
@@ -66,11 +65,11 @@ class TrueTargetsPlanner:
             object.__setattr__(self, "truth", truth)
 
     def with_truth(self, truth: Truth) -> TrueTargetsPlanner:
-        """The same for the targets of a run."""
+        """Return the planner for the targets of a run."""
         return replace(self, truth=truth)
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
-        """What the planner decides on the true targets; raises what it raises, and `InputError` without a truth."""
+        """Return the decision on the true targets; raises as the planner, and `InputError` without a truth."""
         instance("state", state, State)
         if self.truth is None:
             raise InputError("truth: expected the targets of the run, as of with_truth(); got None")
@@ -78,7 +77,10 @@ class TrueTargetsPlanner:
         return replace(plan, planner=self.name)
 
     def _on_truth(self, state: State, truth: Truth) -> State:
-        """The state with beliefs about targets that have a label or may start a track, and about false estimates."""
+        """Return the state with densities of the trackable true targets and of the false estimates.
+
+        Trackable targets have a label or may start a track.
+        """
         instance("state.fused", state.fused, LabelledDensity)
         birth, step = check_sensors(self.sensors).birth, state.step
         ids, states = truth.at(max(step, 1) - 1)
@@ -97,10 +99,10 @@ class TrueTargetsPlanner:
 
 
 def match_tracks(estimate: Estimator, belief: Any, step: int, states: Floats, cutoff: float) -> TrackedTargets:
-    """What a belief holds of targets at (num, dim) states.
+    """Match a density with targets at (num, dim) states.
 
-    Estimates are assigned first; targets that are left go by the labels that the belief holds besides, however
-    improbable: the next scans may confirm them. cutoff: m, of the distance of a target and its label.
+    Estimates are assigned first. The remaining targets are matched with the other labels of the density, however
+    improbable, as the next scans may confirm them. cutoff: largest distance of a target and its label, m.
     """
     estimated = estimate(belief, step)
     stds = np.full(states.shape[1], _LOST * cutoff)
@@ -118,7 +120,7 @@ def match_tracks(estimate: Estimator, belief: Any, step: int, states: Floats, cu
 
 
 def with_components(truth: Truth, dim: int) -> Truth:
-    """The same targets with states of `dim` components, of which those that are missing are 0."""
+    """Return the targets with states of `dim` components; missing ones are 0."""
     missing = dim - truth.states.shape[1]
     if missing < 0:
         raise reject("truth", f"states of at most {dim} components, as the motion's", truth.states.shape[1])
@@ -126,8 +128,8 @@ def with_components(truth: Truth, dim: int) -> Truth:
 
 
 def _assign(means: Floats, covs: Floats, states: Floats, cutoff: float, out: Floats, found: Bools) -> list[int]:
-    """Give targets that have none yet the covariance of a track within the cutoff; the tracks that were assigned."""
-    from scipy.optimize import linear_sum_assignment  # here, as it takes a third of a second to load
+    """Assign tracks within the cutoff to targets without one, set their covariances, and return the assigned tracks."""
+    from scipy.optimize import linear_sum_assignment  # imported here, as it takes a third of a second
 
     open_, assigned = np.flatnonzero(~found), []
     offsets = states[open_, np.newaxis, :2] - means[:, :2]
@@ -140,12 +142,12 @@ def _assign(means: Floats, covs: Floats, states: Floats, cutoff: float, out: Flo
 
 
 def _may_be_born(birth: BirthModel, step: int) -> bool:
-    """Whether targets without a label may still start a track after a scan."""
+    """Return True if targets without a label may still start a track after a scan."""
     return birth.from_measurements is not None or (birth.num_sites > 0 and max(birth.steps or {step + 1}) > step)
 
 
 def _certain(of_kind: LabelledDensity, labels: list[tuple[int, int]], means: Floats, covs: Floats) -> LabelledDensity:
-    """The belief, of the kind of another, that is certain of these targets."""
+    """Return a density, of the type of another, that is certain of these targets."""
     lmb = LMB.from_bernoullis(labels, np.ones(len(labels)), means, covs) if labels else LMB.empty(means.shape[1])
     if of_kind.is_product:
         return FactoredGLMB.of(lmb)

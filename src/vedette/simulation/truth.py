@@ -1,4 +1,4 @@
-"""What the targets really do: the truth of a run, and targets that follow a motion model."""
+"""True targets: the truth of a run, and targets that follow a motion model."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models import MotionModel
 from vedette.models.arguments import float_array, generator, reject
 
-# Start times and scan times come from different sums; they count as equal within this share of a second.
+# s. Start times and scan times come from different sums; they count as equal within this tolerance.
 TIME_TOLERANCE = 1e-9
-# A pivot below this share of its variance is rounding: that direction carries no noise of its own.
+# A pivot below this share of its variance is rounding: that direction has no noise of its own.
 _PIVOT_TOLERANCE = 1e-12
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Truth(SummaryRepr):
-    """The targets alive at each scan, scan after scan.
+    """The targets alive at each scan, scan by scan.
 
     Attributes:
         times: (num_scans,) s, increasing.
         offsets: (num_scans + 1,) targets of scan `k` are the rows `offsets[k]:offsets[k + 1]`.
-        ids: (total,) which target; each at most once a scan, none negative.
-        states: (total, state_dim) its state; position first.
+        ids: (total,) id of the target, at least 0; at most once per scan.
+        states: (total, state_dim) state of the target; position first.
     """
 
     times: Floats
@@ -44,7 +44,7 @@ class Truth(SummaryRepr):
 
     @property
     def scans(self) -> Ints:
-        """(total,) the scan of each row, counted from 0."""
+        """(total,) scan of each row, counted from 0."""
         return np.repeat(np.arange(self.num_scans), np.diff(self.offsets))
 
     def at(self, scan: int) -> tuple[Ints, Floats]:
@@ -55,11 +55,11 @@ class Truth(SummaryRepr):
         return self.ids[rows], self.states[rows]
 
     def first(self, num_scans: int) -> Truth:
-        """The first scans alone."""
+        """Return the truth of the first scans."""
         return self.between(0, num_scans)
 
     def between(self, first: int, end: int) -> Truth:
-        """The scans from `first`, counted from 0, to the one before `end`."""
+        """Return the truth of the scans from `first`, counted from 0, to the one before `end`."""
         rows = slice(self.offsets[first], self.offsets[end])
         offsets = self.offsets[first : end + 1] - self.offsets[first]
         return Truth(self.times[first:end], offsets, self.ids[rows], self.states[rows])
@@ -82,22 +82,25 @@ class Truth(SummaryRepr):
 
     @classmethod
     def from_arrays(cls, times: Floats, alive: Bools, states: Floats) -> Truth:
-        """Of (num_targets, num_scans) flags and (num_targets, num_scans, state_dim) states; row i is target i."""
+        """Return the truth for (num_targets, num_scans) flags and (num_targets, num_scans, state_dim) states.
+
+        Row i is target i.
+        """
         scans, targets = np.nonzero(alive.T)
         offsets = np.concatenate([[0], np.cumsum(alive.sum(axis=0))]).astype(np.int64)
         return cls(times, offsets, targets.astype(np.int64), np.ascontiguousarray(states[targets, scans]))
 
 
 class TargetSource(Protocol):
-    """Where the targets of a simulated run come from."""
+    """Source of the targets of a simulated run."""
 
     def truth(self, times: ArrayLike, *, rng: np.random.Generator) -> Truth:
-        """The targets at each of (num_scans,) increasing scan times in seconds."""
+        """Return the targets at each of (num_scans,) increasing scan times in seconds."""
         ...
 
 
 def scan_times(times: ArrayLike) -> Floats:
-    """(num_scans,) scan times, at least one, increasing."""
+    """(num_scans,) checked scan times, at least one, increasing."""
     values = float_array("times", times, (None,))
     if len(values) == 0 or (np.diff(values) <= 0.0).any():
         raise reject("times", "one or more increasing times", values.tolist())
@@ -109,16 +112,16 @@ class ScriptedTargets:
     """Targets that start from given states and follow a motion model.
 
     Attributes:
-        motion: how they move.
+        motion: motion model.
         initial_states: (num_targets, state_dim) state of each at its start time.
         start_times: (num_targets,) s; None: the first scan.
-        end_times: (num_targets,) s, the last moment of each, included; infinite or None: to the end.
-        process_noise: whether the motion's process noise disturbs them; one flag, or one a target.
-        initial_stds: (num_targets, state_dim) standard deviations of the first states, which each run draws anew around
-            `initial_states`, components independent; None: all zero.
+        end_times: (num_targets,) last time of each, included, s; infinite or None: to the end.
+        process_noise: whether the motion's process noise is applied; one flag, or one per target.
+        initial_stds: (num_targets, state_dim) standard deviations of the initial states, which each run draws anew
+            around `initial_states`, components independent; None: all zero.
 
     Raises:
-        InputError: names the field, what was expected and what came.
+        InputError: names the field, the expected and the given value.
     """
 
     motion: MotionModel
@@ -150,11 +153,12 @@ class ScriptedTargets:
             object.__setattr__(self, "initial_stds", stds)
 
     def truth(self, times: ArrayLike, *, rng: np.random.Generator) -> Truth:
-        """Each target stepped from its start time through the scans, drawn and with process noise where it is so.
+        """Propagate each target through the scans from its start time, with initial deviations and process noise if
+        set.
 
         Raises:
             InputError: the scan times do not increase.
-            ModelError: a motion function raised, or gave a state that is not finite.
+            ModelError: a motion function raised, or returned a state that is not finite.
         """
         scans = scan_times(times)
         generator(rng)
@@ -169,7 +173,7 @@ class ScriptedTargets:
             first = first + self.initial_stds * rng.standard_normal(first.shape)
         elapsed = _elapsed(scans, np.asarray(starts), alive)
         normals = np.zeros_like(states)
-        # One target after the other, each of its moves in turn, so that its luck does not depend on the others' lives.
+        # Ordered by target and then by time, so that the noise of a target does not depend on the lives of the others.
         moves = (elapsed > 0.0) & noisy[:, None]
         normals[moves] = rng.standard_normal((np.count_nonzero(moves), self.motion.state_dim))
         state = np.array(first)
@@ -182,7 +186,10 @@ class ScriptedTargets:
 
 
 def _elapsed(scans: Floats, starts: Floats, alive: Bools) -> Floats:
-    """(num_targets, num_scans) s since its scan before (or its start) that a target is moved by; 0 where it is not."""
+    """(num_targets, num_scans) time by which a target moves before a scan, s; 0 if it does not.
+
+    It is the time since its previous scan or its start.
+    """
     elapsed, since = np.zeros(alive.shape), starts.copy()
     for scan, time in enumerate(scans.tolist()):
         moved = alive[:, scan] & (time - since > TIME_TOLERANCE)
@@ -192,7 +199,7 @@ def _elapsed(scans: Floats, starts: Floats, alive: Bools) -> Floats:
 
 
 def moved_states(motion: MotionModel, states: Floats, dt: float, normals: Floats, noisy: Bools) -> Floats:
-    """(num, state_dim) states `dt` seconds later, disturbed by process noise where `noisy`; raises `ModelError`.
+    """(num, state_dim) states `dt` seconds later, with process noise where `noisy`; raises `ModelError`.
 
     normals: (num, state_dim) standard normal deviates, read where `noisy`.
     """
@@ -200,7 +207,7 @@ def moved_states(motion: MotionModel, states: Floats, dt: float, normals: Floats
     if len(disturbed):
         factors: dict[bytes, Floats] = {}
         for i, cov in zip(disturbed.tolist(), motion.noise_covs(states[disturbed], dt), strict=True):
-            key = cov.tobytes()  # of most motions the same for all
+            key = cov.tobytes()  # most motion models: equal for all states
             if key not in factors:
                 factors[key] = semidefinite_factor(cov)
             moved[i] += factors[key] @ normals[i]
@@ -209,7 +216,7 @@ def moved_states(motion: MotionModel, states: Floats, dt: float, normals: Floats
 
 
 def check_moved(states: Floats, moved: Floats, dt: float) -> None:
-    """`ModelError` unless all states (num, state_dim) that others have moved to are finite."""
+    """Raise `ModelError` unless all propagated states (num, state_dim) are finite."""
     if not np.isfinite(moved).all():
         bad = np.isfinite(moved).all(axis=1).argmin()
         place, got = states[bad], moved[bad]
@@ -217,7 +224,7 @@ def check_moved(states: Floats, moved: Floats, dt: float) -> None:
 
 
 def semidefinite_factor(cov: Floats) -> Floats:
-    """Lower L with L L' = cov for a positive semidefinite covariance, such as one of fewer noises than states."""
+    """Return lower L with L L' = cov for a positive semidefinite covariance, which may be singular."""
     factor = np.zeros_like(cov)
     for j in range(len(cov)):
         column = cov[j:, j] - factor[j:, :j] @ factor[j, :j]

@@ -1,4 +1,4 @@
-"""Where undetected targets were expected at the decisions of a run, as a table of columns, and back."""
+"""Intensity of undetected targets at the decisions of a run as a table of columns, and back."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from vedette.simulation.records import Decision
 
 _SIDES = ("x_min_m", "x_max_m", "y_min_m", "y_max_m")
 
-# A row a decision: the region, its cells, and the expected number of undetected targets in each, from the south-west
-# corner, row after row to the north.
+# One row per decision: the region, its cells, and the expected number of undetected targets in each cell, from the
+# south-west corner, row by row to the north.
 UNDETECTED: dict[str, Layout] = {
     "undetected": Layout(
         {**DECISION, **dict.fromkeys(_SIDES, Kind.NUMBER), "columns": Kind.INTEGER, "rows": Kind.INTEGER},
@@ -28,7 +28,7 @@ UNDETECTED: dict[str, Layout] = {
 
 
 def undetected_tables(decisions: Sequence[Decision]) -> dict[str, Columns]:
-    """The table of `UNDETECTED`, or none where no decision has an intensity of undetected targets."""
+    """Return the table of `UNDETECTED`, or none if no decision has an intensity of undetected targets."""
     parts = [
         {**decision_columns(number, each), **_row(each.undetected)}
         for number, each in enumerate(decisions)
@@ -38,9 +38,9 @@ def undetected_tables(decisions: Sequence[Decision]) -> dict[str, Columns]:
 
 
 def with_undetected(decisions: Sequence[Decision], table: Mapping[str, Any]) -> tuple[Decision, ...]:
-    """The decisions with their intensities back from the table.
+    """Return the decisions with their intensities from the table.
 
-    Raises `InputError` for decisions that there are not, cells that are missing, or what is no intensity.
+    Raises `InputError` for decisions that do not exist, missing cells, or an invalid intensity.
     """
     found = list(decisions)
     for row, number in enumerate(table["decision"].tolist()):

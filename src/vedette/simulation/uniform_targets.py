@@ -1,4 +1,4 @@
-"""Crowds: as many targets as one likes, spread evenly over the region at all times while each comes and goes."""
+"""Steady number of targets, uniform over the region at all times while individual targets come and go."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from vedette.simulation.truth import Truth, check_moved, scan_times, semidefinit
 
 @dataclass(frozen=True, slots=True, eq=False)
 class UniformTargets:
-    """A steady crowd: `number` targets at the first scan, and on average ever after, uniform over the region.
+    """A steady crowd: `number` targets at the first scan, and on average afterwards, uniform over the region.
 
-    From scan to scan a target dies or moves, with the motion's process noise; a Poisson number is born, of the mean
-    number of deaths. Where one leaves the region another enters at the opposite edge, as fast: without that a crowd
-    would thin out towards the edges, the more the smaller it is.
+    From scan to scan a target dies or moves with the motion's process noise. The number of births is Poisson with the
+    mean number of deaths. A target that leaves the region is replaced by one that enters at the opposite edge with the
+    same velocity; otherwise the density would decrease towards the edges, the more the smaller the region.
 
     Attributes:
-        motion: how they move.
-        number: of targets at the first scan.
-        region: where they are.
-        std: (state_dim - 2,) standard deviation of the components of a first state but the position, around 0.
-        death_probability: that a target dies between two scans.
+        motion: motion model.
+        number: number of targets at the first scan.
+        region: region of the targets.
+        std: (state_dim - 2,) standard deviations of the components of an initial state after the position, with mean 0.
+        death_probability: probability that a target dies between two scans.
 
     Raises:
-        InputError: names the field, what was expected and what came.
+        InputError: names the field, the expected and the given value.
     """
 
     motion: MotionModel
@@ -49,11 +49,11 @@ class UniformTargets:
         probability("UniformTargets.death_probability", self.death_probability)
 
     def truth(self, times: ArrayLike, *, rng: np.random.Generator) -> Truth:
-        """Scan after scan: who dies, how the others move, who is born.
+        """Draw deaths, motion and births, scan by scan.
 
         Raises:
             InputError: the scan times do not increase.
-            ModelError: a motion function raised, or gave a state that is not finite.
+            ModelError: a motion function raised, or returned a state that is not finite.
         """
         scans = scan_times(times)
         generator(rng)
@@ -64,7 +64,7 @@ class UniformTargets:
             alive = rng.random(len(ids)) >= self.death_probability
             moved, stays = self._moved(states[alive], dt, rng)
             born = self._born(int(rng.poisson(self.number * self.death_probability)), rng)
-            # Who stays keeps the name; who enters stands after, so that names increase.
+            # Targets that stay keep their ids; those that enter follow with new ones, so that ids increase.
             states = np.concatenate([moved[stays], moved[~stays], born])
             num_new = len(states) - int(stays.sum())
             ids = np.concatenate([ids[alive][stays], num_ids + np.arange(num_new)])
@@ -75,11 +75,11 @@ class UniformTargets:
         return Truth(scans, offsets, np.concatenate(all_ids), np.concatenate(all_states))
 
     def _born(self, num: int, rng: np.random.Generator) -> Floats:
-        """(num, state_dim) first states."""
+        """(num, state_dim) initial states."""
         return np.hstack([self.region.sample(num, rng=rng), self.std * rng.standard_normal((num, len(self.std)))])
 
     def _moved(self, states: Floats, dt: float, rng: np.random.Generator) -> tuple[Floats, Bools]:
-        """(num, state_dim) states `dt` seconds later, taken round the edges; (num,) who did not cross one."""
+        """(num, state_dim) states `dt` seconds later, wrapped at the edges; (num,) whether a target crossed no edge."""
         moved = self.motion.propagate(states, dt) + self._noise(states, dt, rng)
         check_moved(states, moved, dt)
         stays = self.region.contains(moved[:, :2])
@@ -91,7 +91,7 @@ class UniformTargets:
         """(num, state_dim) process noise."""
         normals = rng.standard_normal(states.shape)
         covs = self.motion.noise_covs(states, dt)
-        if (covs == covs[:1]).all():  # of most motions: the same everywhere
+        if (covs == covs[:1]).all():  # most motion models: equal for all states
             return normals @ semidefinite_factor(covs[0]).T if len(covs) else normals
         factors = np.array([semidefinite_factor(cov) for cov in covs])
         return np.asarray((factors @ normals[:, :, np.newaxis])[:, :, 0])

@@ -1,4 +1,4 @@
-"""Runs of earlier formats in the present one: what they lack is filled with what was true of them."""
+"""Upgrade of runs of earlier formats: missing columns are filled with the values that applied to them."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ _STAGED, _PARTIAL = ".upgraded", ".upgraded.part"
 
 
 def upgraded_files(files: Mapping[str, bytes], number: int) -> dict[str, bytes]:
-    """The files of a run of a format `number` with the columns of the present one; of the present one as they are.
+    """Return the files of a run of format `number` with the columns of the present format.
 
-    Raises `InputError`, naming the file, for one that is damaged.
+    Raises `InputError`, naming the file, for a damaged one.
     """
     lacking: dict[str, dict[str, float]] = {}
     for earlier in range(number, FORMAT_VERSION):
@@ -40,7 +40,7 @@ def upgraded_files(files: Mapping[str, bytes], number: int) -> dict[str, bytes]:
 
 
 def _filled(content: bytes, table: str, lacking: Mapping[str, float]) -> bytes:
-    """A table with the columns that it lacks; one that has them already, as after an interruption, as it is."""
+    """Return a table with its missing columns; unchanged if it has them already, as after an interruption."""
     layout = LAYOUTS[table]
     fixed = {name: kind for name, kind in layout.fixed.items() if name not in lacking}
     had = Layout(fixed, {**layout.more, **{name: layout.fixed[name] for name in lacking}})
@@ -51,13 +51,13 @@ def _filled(content: bytes, table: str, lacking: Mapping[str, float]) -> bytes:
 
 
 def upgrade_run(directory: Path | str) -> int:
-    """Bring the folder of a saved run to the present format, in place; returns the format that it had.
+    """Upgrade the folder of a saved run to the present format, in place; return its previous format.
 
-    New files are written beside the old ones and then moved over them, the manifest last. After a kill nothing is lost,
-    and the same call ends what was begun. Other files of the folder stay as they are.
+    New files are written next to the old ones and then moved over them, the manifest last. A killed upgrade loses
+    nothing, and the same call completes it. Other files of the folder stay unchanged.
 
-    Raises `InputError`, and changes nothing, for a folder that holds no run, a format that is newer or is not upgraded,
-    a file that is damaged, and a folder that cannot be written.
+    Raises `InputError`, and changes nothing, for a folder that holds no run, a format that is newer or cannot be
+    upgraded, a damaged file, and a folder that cannot be written.
     """
     folder = Path(directory)
     manifest = read_manifest(folder, check_upgradable)
@@ -77,7 +77,7 @@ def upgrade_run(directory: Path | str) -> int:
 
 
 def _upgraded(folder: Path, manifest: Mapping[str, Any], number: int) -> dict[str, bytes]:
-    """The files that change, the manifest among them."""
+    """Return the files that change, including the manifest."""
     before = read_files(folder, manifest)
     after = upgraded_files(before, number)
     record = decode_run(manifest["run"], after, str(folder), after.get(TIMINGS))
@@ -89,7 +89,7 @@ def _upgraded(folder: Path, manifest: Mapping[str, Any], number: int) -> dict[st
 
 
 def _stage(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write files into a folder of their own, which has its name only when it is complete."""
+    """Write files into a staging folder, which gets its final name only when it is complete."""
     partial = folder / _PARTIAL
     if partial.exists():
         shutil.rmtree(partial)
