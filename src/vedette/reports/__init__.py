@@ -1,4 +1,4 @@
-"""The results of a campaign or a single run as one page that opens anywhere, and as figures for a paper."""
+"""Reports of a campaign or a single run: a self-contained HTML page, and figures for papers."""
 
 from vedette.internal.extras import require_packages
 

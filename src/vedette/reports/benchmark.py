@@ -13,7 +13,10 @@ _NOTE = "All on the same runs; 95 %: interval, of skewed differences by bootstra
 
 
 def write_benchmark(tables: Sequence[SceneTable], facts: Mapping[str, str], path: Path) -> None:
-    """Write the page of a benchmark. facts: of what it is, by name. Raises `InputError` for a place that is none."""
+    """Write the page of a benchmark. Raises `InputError` if it cannot be written.
+
+    facts: versions and checksums by name.
+    """
     make_room(path)
     named = [
         (table, Table(_NOTE, header(table), tuple(row(table, own) for own in table.standings))) for table in tables

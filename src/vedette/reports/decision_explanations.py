@@ -1,4 +1,4 @@
-"""Why a decision was taken, as the plain data that the page shows."""
+"""Explanation of a decision as the plain data that the page shows."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ _WORDS = {"of_targets": "gain by target", "of_sensors": "shares of the sensors",
 
 
 def explanation_data(plan: Plan, names: Sequence[str] = ()) -> dict[str, Any] | None:
-    """What is shown, with the sensors' names; None for a decision that was kept without explanation.
+    """Return the data that the page shows, with the sensors' names; None for a decision stored without explanation.
 
-    Facts as pairs of texts; of the ten targets that matter most label and gains, of the others their number and sums;
-    what is gained by targets not found before; what the actions cost; of each sensor number, action, share and the
-    reward without it.
+    Facts as pairs of texts; label and gains of the ten targets with the largest gains, and number and sums of the
+    others; the gain from targets not detected before; the cost of the actions; and for each sensor its number, action,
+    share, and the reward without it.
     """
     why = plan.explanation
     if why is None or why.reward is None:
@@ -72,7 +72,7 @@ def _others(plan: Plan, runner_up: RunnerUp, names: Sequence[str]) -> str:
 def _targets(gains: TargetGains) -> dict[str, Any]:
     order = np.argsort(-np.abs(gains.total), kind="stable")
     most, rest = order[:_MOST_TARGETS].tolist(), order[_MOST_TARGETS:].tolist()
-    least = _SAME * float(np.abs(gains.total).max(initial=0.0))  # below, it is rounding
+    least = _SAME * float(np.abs(gains.total).max(initial=0.0))  # smaller gains are rounding
 
     def gained(which: list[int]) -> tuple[float, float]:
         existence, localisation = float(gains.existence[which].sum()), float(gains.localisation[which].sum())
@@ -94,5 +94,5 @@ def _sensors(plan: Plan, why: Explanation) -> list[tuple[int, str, float, float]
 
 
 def _number(value: float, least: float = 0.0) -> float:
-    """Four digits of what is finite and not below the least that counts, else 0."""
+    """Return a number with four significant digits; 0 if it is not finite or smaller than `least`."""
     return float(f"{value:.4g}") if math.isfinite(value) and abs(value) >= least else 0.0

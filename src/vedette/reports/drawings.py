@@ -1,4 +1,4 @@
-"""The figures of a report: the same ones on the page and in files."""
+"""Figures of a report, for the page and for files."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ from vedette.simulation.records import RunRecord
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """A figure with its words.
+    """A figure with its texts.
 
     Attributes:
         name: fit for a file name.
         title: heading.
-        caption: what is drawn, and what the bands and marks are.
-        figure: of Matplotlib.
+        caption: description of the figure, its bands and marks.
+        figure: Matplotlib figure.
     """
 
     name: str
@@ -52,12 +52,12 @@ class Drawing:
 
     @property
     def is_wide(self) -> bool:
-        """Whether it wants the width of a page rather than of a column."""
+        """Whether it takes the width of a page rather than of a column."""
         return bool(self.figure.get_figwidth() > 5.1)
 
 
 def group_drawings(group: Group) -> Iterator[Drawing]:
-    """Every figure that the runs of a group give."""
+    """Yield every figure of the runs of a group."""
     yield from error_drawings(group)
     yield from _decision_drawings(group)
     yield from _reward_drawings(group)
@@ -82,7 +82,7 @@ def _tracks_drawings(group: Group) -> Iterator[Drawing]:
 
 
 def error_drawings(group: Group) -> Iterator[Drawing]:
-    """The figures of the error alone; none without a comparison."""
+    """Yield only the figures of the error; none without a comparison."""
     if group.comparison is None:
         return
     comparison = group.comparison
@@ -128,7 +128,7 @@ def _decision_drawings(group: Group) -> Iterator[Drawing]:
         return
     try:
         figure = roses_figure(group.comparison, group.strategies[0].scene)
-    except InputError:  # none was made, or there was nothing to choose
+    except InputError:  # no decisions, or no sensor with a choice
         return
     yield Drawing(
         "decisions",
@@ -154,7 +154,10 @@ def _reward_drawings(group: Group) -> Iterator[Drawing]:
 
 
 def _rewards(strategy: Strategy) -> Figure | None:
-    """None for strategies that weigh no actions or have but one, or whose runs had different ones to weigh."""
+    """Return the figure of the mean rewards.
+
+    None for strategies that evaluate no actions or have only one, and if actions differ between runs.
+    """
     try:
         decisions = shown_decisions(len(strategy.ensemble.rewards))
         return mean_rewards_figure([strategy.ensemble.rewards[each].mean() for each in decisions], strategy.scene)
@@ -163,7 +166,7 @@ def _rewards(strategy: Strategy) -> Figure | None:
 
 
 def typical_records(group: Group) -> tuple[tuple[Strategy, RunRecord], ...]:
-    """Of each strategy, the run whose mean OSPA is the median; without a comparison, its first run."""
+    """Return for each strategy the run with the median of the mean OSPA; without a comparison its first run."""
     found = []
     for strategy in group.strategies:
         place = 0 if group.comparison is None else typical_run(group.comparison, strategy.label)
@@ -182,7 +185,7 @@ def paired_records(group: Group) -> tuple[tuple[Strategy, RunRecord], ...]:
 
 
 def _consistency_drawings(strategies: Sequence[Strategy]) -> Iterator[Drawing]:
-    """One of all strategies; where they have not the same scan times, one of each."""
+    """Yield one figure for all strategies, or one for each if their scan times differ."""
     times = strategies[0].ensemble.times
     caption = (
         "Normalised squared error of the estimated positions, averaged over the runs; 1 where covariances are right. "
@@ -198,11 +201,11 @@ def _consistency_drawings(strategies: Sequence[Strategy]) -> Iterator[Drawing]:
 
 
 def sweep_drawings(campaign: Campaign, errors: Mapping[str, Floats]) -> Iterator[Drawing]:
-    """Mean OSPA against every axis that is a number with several values.
+    """Yield figures of the mean OSPA against every numeric axis with several values.
 
     Args:
-        campaign: whose axes they are.
-        errors: for each cell by its name, the mean OSPA of its paired runs; cells without are left out.
+        campaign: the campaign.
+        errors: mean OSPA of the paired runs, by cell name; cells without are left out.
     """
     cells = [cell for cell in campaign.cells if cell.name in errors]
     for axis, values in campaign.axes.items():
@@ -226,7 +229,7 @@ def sweep_drawings(campaign: Campaign, errors: Mapping[str, Floats]) -> Iterator
 
 
 def _panels(campaign: Campaign, cells: Sequence[Cell], axis: str) -> dict[str, dict[str, list[Cell]]]:
-    """For each setting of the other axes, for each strategy, its cells along the axis."""
+    """Return for each setting of the other axes, and each strategy, its cells along the axis."""
     others = [name for name, values in campaign.axes.items() if len(values) > 1 and name != axis]
     lines = campaign.compare if campaign.compare in others else ("planner" if "planner" in others else "")
     panels: dict[str, dict[str, list[Cell]]] = {}

@@ -1,4 +1,4 @@
-"""Strategies as a forest plot: the error of each, and its paired difference to the first on a shared axis."""
+"""Forest plot of strategies: the error of each, and its paired difference to the first on a shared axis."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from vedette.internal.text import named_in, with_error, with_minus
 from vedette.reports.groups import Group
 from vedette.reports.pairwise import compare_with_first
 
-_ROOM = 0.06  # of the axis, left free at each side
-# Verdicts are of the first strategy against another; the page shows that of the other.
+_ROOM = 0.06  # share of the axis that is left free at each side
+# Verdicts state the first strategy against another; the page shows that of the other.
 _WORDS = {"better": "larger error", "worse": "smaller error", "unclear": "not significant", "unknown": "one run"}
 
 
 @dataclass(frozen=True, slots=True)
 class ForestRow:
-    """One strategy.
+    """One strategy of a forest plot.
 
     Attributes:
-        name, words: of the strategy, and its description.
-        colour: place of the strategy among all, which gives its colour.
+        name, words: name and description of the strategy.
+        colour: index of the strategy, which determines its colour.
         error: mean OSPA with its standard error.
-        mean, low, high: places on the axis of the difference and of the ends of its interval, in percent of the width;
-            None for the first strategy, and for the interval of one run.
+        mean, low, high: positions of the difference and of the ends of its interval on the axis, in percent of the
+            width; None for the first strategy, and for the interval of one run.
         difference: the same as text.
         verdict: class of the verdict on the difference; `reference` for the first strategy.
-        verdict_words: the verdict for readers.
+        verdict_words: the verdict in words.
         sentence: the finding.
     """
 
@@ -48,14 +48,14 @@ class ForestRow:
 
 @dataclass(frozen=True, slots=True)
 class Forest:
-    """Rows with their axis.
+    """Rows of a forest plot with their axis.
 
     Attributes:
         title: scenario, runs and time window.
         error, difference: column headings, with units.
         rows: one per strategy, the reference first.
-        ticks: place on the axis in percent of the width, and text.
-        note: which differences are significant.
+        ticks: position on the axis in percent of the width, and text.
+        note: statement of the significant differences.
     """
 
     title: str

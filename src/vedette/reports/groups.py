@@ -1,4 +1,4 @@
-"""The runs of a campaign, gathered by what is compared; and a single run, compared with nothing."""
+"""Runs of a campaign grouped for comparison; a single run as a group of its own."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ class Strategy:
 
     Attributes:
         cell: strategy and setting.
-        label: its value of the compared axis, as text.
-        num_finished: runs that there are.
-        ensemble: of the runs that the group has in common; of all finished runs where it has none in common.
+        label: value of the compared axis, as text.
+        num_finished: number of finished runs.
+        ensemble: the common runs of the group; all finished runs if there are no common ones.
         counted: (num_scans,) whether a scan counts in means over time; all of them without a comparison.
-        record: gives the record of a run of these by its number.
+        record: function from the number of one of these runs to its record.
     """
 
     cell: Cell
@@ -49,17 +49,17 @@ class Strategy:
 
     @property
     def name(self) -> str:
-        """The label as a reader should see it."""
+        """Label for display."""
         return strategy_label(self.label)
 
     @property
     def words(self) -> str:
-        """Description of the planner; empty where another axis than the planner is compared."""
+        """Description of the planner; empty if another axis than the planner is compared."""
         return self.cell.words if self.label == self.cell.planner else ""
 
     @property
     def scene(self) -> Scene:
-        """What figures of its runs say of its scenario."""
+        """Scenario data for figures of its runs."""
         return scene_of(self.cell.scenario, self.cell.planner)
 
     @property
@@ -70,15 +70,15 @@ class Strategy:
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Strategies that differ in the compared axis alone.
+    """Strategies that differ only in the compared axis.
 
     Attributes:
         name: fit for a file name and an anchor; unique in the campaign.
-        title: what sets the group apart from the others.
-        strategies: in the order of the specification, those without a finished run left out.
-        missing: names of those left out.
-        comparison: over the runs in common, its strategies named by their labels; None where there are none.
-        reason: why there is no comparison, or nothing.
+        title: settings that distinguish the group from the others.
+        strategies: in the order of the specification, without those that have no finished run.
+        missing: names of strategies without a finished run.
+        comparison: over the common runs, with the labels as names of its strategies; None if there are none.
+        reason: why there is no comparison; empty if there is one.
     """
 
     name: str
@@ -90,7 +90,7 @@ class Group:
 
 
 def gather(results: CampaignResults) -> Iterator[Group]:
-    """Every group in the order of the specification, its runs read when it is asked for."""
+    """Yield every group in the order of the specification, reading its runs when it is reached."""
     campaign = results.campaign
     taken: set[str] = set()
     for cells in campaign.groups():
@@ -111,7 +111,7 @@ def _group(results: CampaignResults, cells: tuple[Cell, ...], name: str, title: 
     if common:
         try:
             comparison, reason = scored(cells[0].scenario, ensembles), ""
-        except InputError as error:  # such as scans of other times
+        except InputError as error:  # for example different scan times
             reason = str(error)
     strategies = []
     for cell in present:
@@ -126,10 +126,10 @@ def _counted(ensemble: Ensemble, comparison: Comparison | None) -> Bools:
 
 
 def group_of_run(record: RunRecord, scenario: Scenario) -> Group:
-    """A run as a group of its own; compared with nothing, and measured where somebody knows the targets.
+    """Return a run as a group of its own, without comparison partners; measured if the true targets are known.
 
     Raises:
-        InputError: a run of other sensors than the scenario has.
+        InputError: the run has other sensors than the scenario.
     """
     if record.num_sensors != (number := len(scenario.model.sensors)):
         raise InputError(f"run: expected the {number} sensors of its scenario; got {record.num_sensors}")
@@ -141,19 +141,19 @@ def group_of_run(record: RunRecord, scenario: Scenario) -> Group:
     if is_known:
         try:
             comparison = scored(scenario, {record.planner: ensemble})
-        except InputError as error:  # such as a run that stopped before the scans that count
+        except InputError as error:  # for example a run that stopped before the counted scans
             reason = str(error)
     strategy = Strategy(cell, record.planner, 1, ensemble, _counted(ensemble, comparison), lambda _: record)
     return Group("run", record.scenario, (strategy,), (), comparison, "" if comparison is not None else reason)
 
 
 def varying_axes(campaign: Campaign) -> tuple[str, ...]:
-    """Axes with several values, the compared one left out."""
+    """Return the axes with several values, without the compared one."""
     return tuple(axis for axis, values in campaign.axes.items() if len(values) > 1 and axis != campaign.compare)
 
 
 def describe_settings(cell: Cell, axes: Iterable[str]) -> str:
-    """Value of each axis of a cell, in words: `paper-a, fusion clmb, clutter rate 20`."""
+    """Return the values of axes of a cell in words: `paper-a, fusion clmb, clutter rate 20`."""
     return ", ".join(_describe(cell, axis) for axis in axes)
 
 
@@ -165,7 +165,7 @@ def _describe(cell: Cell, axis: str) -> str:
 
 
 def _label(axis: str, value: Any) -> str:
-    """A value of the compared axis as text; a bare number says nothing without its axis."""
+    """Return a value of the compared axis as text; numbers with the name of the axis."""
     return f"{axis_label(axis)} {_short(value)}" if isinstance(value, bool | int | float) else str(value)
 
 
@@ -174,13 +174,13 @@ def _short(value: Any) -> str:
 
 
 def axis_label(axis: str) -> str:
-    """The last two parts of a field's path, or the name of an axis, in words: `clutter rate`."""
+    """Return the last two parts of a field's path, or the name of an axis, in words: `clutter rate`."""
     parts = [part for part in axis.split(".") if part != "*" and not part.isdigit()]
     return " ".join(parts[-2:]).replace("_", " ")
 
 
 def axis_unit(cell: Cell, axis: str) -> str:
-    """Unit of the scenario field that an axis varies, as its description gives it; nothing where it has none."""
+    """Return the unit of the scenario field that an axis varies, from its description; empty if it has none."""
     section: Any = cell.scenario.model
     *path, name = axis.split(".")
     for part in path:

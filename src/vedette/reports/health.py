@@ -1,4 +1,4 @@
-"""The diagnostics of a group as a table: a check in each row, a strategy in each column."""
+"""Diagnostics of a group as a table: one check per row, one strategy per column."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from vedette.evaluation.health import percent, summarise_health
 from vedette.reports.groups import Group, Strategy
 from vedette.reports.tables import nees_over_runs, nees_spread
 
-_TRIFLE = 0.01  # share of the targets without an estimate, up to which it is not shown
-_OFTEN = 0.2  # share of the scans with inconsistent covariances, above which they are to be checked
+_TRIFLE = 0.01  # share of the targets without an estimate below which the check is `ok`
+_OFTEN = 0.2  # share of the scans with inconsistent covariances above which the check fails
 _NONE = "\N{EN DASH}"
 
 
 @dataclass(frozen=True, slots=True)
 class DiagnosticsTable:
-    """Checks of several strategies; those that are `ok` for every strategy are left out.
+    """Checks of several strategies, without those that are `ok` for every strategy.
 
     Attributes:
         strategies: names, one per column.
@@ -31,7 +31,7 @@ class DiagnosticsTable:
 
 
 def diagnostics_table(group: Group) -> DiagnosticsTable | None:
-    """Return the diagnostics of a group; None where every check of every strategy is `ok`."""
+    """Return the diagnostics of a group; None if every check of every strategy is `ok`."""
     columns = [tuple(strategy_diagnostics(each)) for each in group.strategies]
     rows = tuple(row for row in zip(*columns, strict=True) if any(each.level != "ok" for each in row))
     return DiagnosticsTable(tuple(each.name for each in group.strategies), rows) if rows else None
@@ -55,7 +55,7 @@ def _missed(strategy: Strategy) -> Diagnostic:
     meaning = "Share of the targets, over the scans, that have no estimate within the cutoff; and the worst run."
     ensemble, counted = strategy.ensemble, strategy.counted
     alive = ensemble.num_targets[:, counted].sum(axis=1, dtype=np.float64)
-    if not ensemble.measures or not alive.any():  # the targets are not known, or there are none
+    if not ensemble.measures or not alive.any():  # the targets are unknown, or there are none
         return Diagnostic(name, meaning, _NONE, "ok")
     missed = ensemble.values("num_missed")[:, counted].sum(axis=1)
     share = float(missed.sum() / alive.sum())

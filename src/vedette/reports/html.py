@@ -35,9 +35,10 @@ from vedette.reports.saving import run_errors
 from vedette.reports.svg import inline_png, inline_svg
 from vedette.reports.tables import Table, cost_table, decision_table, error_table, measure_table
 
-# A page that a mail can carry: beyond these, groups show their errors alone, and typical runs are left out.
+# Limits that keep the page small enough for e-mail: beyond them, groups show only their errors, and typical runs are
+# left out.
 MAX_FIGURE_BYTES, MAX_REPLAY_BYTES = 6_000_000, 4_000_000
-# A figure of more lines than this takes is drawn in dots.
+# A larger SVG figure is replaced by a PNG image.
 MAX_DRAWING_BYTES = 1_000_000
 _IN_DOTS = "Drawn in dots to keep the page small; vedette report --figures draws it in lines."
 _FILES = resources.files("vedette.reports") / "page"
@@ -45,12 +46,12 @@ _FILES = resources.files("vedette.reports") / "page"
 
 @dataclass(frozen=True, slots=True)
 class _Section:
-    """What the page shows of one group; `is_brief` where all figures but those of the error are left out."""
+    """Part of the page about one group; `is_brief` if it shows only the figures of the error."""
 
     title: str
-    finished: tuple[tuple[str, int], ...]  # strategies, with how many runs
+    finished: tuple[tuple[str, int], ...]  # strategies and their numbers of runs
     missing: tuple[str, ...]
-    reason: str  # why there is no comparison, or nothing
+    reason: str  # why there is no comparison, or empty
     difference: str  # heading of the paired differences
     is_brief: bool
     forest: Forest | None
@@ -61,7 +62,7 @@ class _Section:
 
     @property
     def blocks(self) -> list[tuple[bool, list[tuple[Drawing, Markup]]]]:
-        """The figures in order, those in a row that are as wide (True) or as narrow as one another together."""
+        """The figures in order, grouped into runs of wide (True) and narrow ones."""
         return [(wide, list(each)) for wide, each in itertools.groupby(self.figures, lambda pair: pair[0].is_wide)]
 
     @property
@@ -73,20 +74,20 @@ class _Section:
 def write_report(
     results: CampaignResults, path: str | Path, *, replays: Sequence[tuple[str, int]] | None = None, trust: bool = False
 ) -> None:
-    """Write a campaign's report as one HTML file that needs nothing else; the same results give the same bytes.
+    """Write a campaign's report as one self-contained HTML file; equal results give equal bytes.
 
-    Without `trust` nothing that the results name is imported or run: where drawing the measurements of a replay would
-    need a sensor model of somebody's own, they are left out, and the page says so.
+    Without `trust` no code that the results name is imported or run. If drawing the measurements of a replay requires a
+    custom sensor model, they are then left out, and the page states it.
 
     Args:
-        results: of a finished campaign.
-        path: of the file; its folder is made.
-        replays: cell and number of the runs that can be replayed; None: the run that is typical of the first strategy,
-            under every strategy, as many as keep the page small.
+        results: results of a finished campaign.
+        path: path of the file; missing folders are made.
+        replays: cell and number of the runs to replay; None: the typical run of the first strategy, under every
+            strategy, as many as keep the page small.
         trust: run the code that the scenarios of the results name (`replay_code`).
 
     Raises:
-        InputError: a run that is not there, or a file that cannot be written.
+        InputError: a run that does not exist, or a file that cannot be written.
     """
     _check_replays(results, replays or ())
     target = Path(path)
@@ -133,17 +134,17 @@ def write_report(
 
 
 def write_demo(results: CampaignResults, path: str | Path, *, trust: bool = False) -> Path:
-    """Write a page that shows the first run of the strategies of a campaign side by side; returns where it is.
+    """Write a page that shows the first run of the strategies of a campaign side by side; return its path.
 
-    It needs nothing else, and the same results give the same bytes.
+    The page is self-contained, and equal results give equal bytes.
 
     Args:
-        results: of a campaign on one scenario, of which a run of each strategy is finished.
-        path: of the file; its folder is made.
+        results: results of a campaign on one scenario, with a finished run of each strategy.
+        path: path of the file; missing folders are made.
         trust: run the code that the scenario names, to draw measurements (see `write_report`).
 
     Raises:
-        InputError: no such run, or a file that cannot be written.
+        InputError: a run that does not exist, or a file that cannot be written.
     """
     target = Path(path)
     make_room(target)
@@ -162,7 +163,7 @@ def write_demo(results: CampaignResults, path: str | Path, *, trust: bool = Fals
 
 
 def replay_code(results: CampaignResults) -> tuple[str, ...]:
-    """Code that the replays of a report would run if it is trusted: sensor models that are not the library's."""
+    """Return the names of custom sensor models that a trusted report would run to draw its replays."""
     return tuple(dict.fromkeys(name for cell in results.campaign.cells for name in code_of_sensors(cell.scenario)))
 
 
@@ -174,7 +175,7 @@ def _check_replays(results: CampaignResults, replays: Sequence[tuple[str, int]])
 
 
 def _spans(runs: Sequence[int]) -> str:
-    """Numbers that follow one another as a span: `0 to 4, 7`."""
+    """Return consecutive numbers as spans: `0 to 4, 7`."""
     spans: list[list[int]] = []
     for run in runs:
         if spans and spans[-1][-1] == run - 1:
@@ -185,7 +186,7 @@ def _spans(runs: Sequence[int]) -> str:
 
 
 def make_room(path: Path) -> None:
-    """Make the folders above the page, before the work that a bad place would waste."""
+    """Create the folders of the page before the work that an invalid path would waste."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -199,7 +200,7 @@ def _misplaced(path: Path, error: OSError) -> InputError:
 
 
 def section_of(group: Group, prefix: str, is_brief: bool = False) -> _Section:
-    """What a page shows of a group; `prefix` is unique on the page."""
+    """Return the part of a page about a group; `prefix` must be unique on the page."""
     named = {
         "Errors": error_table(group),
         "Other measures": measure_table(group),
@@ -261,7 +262,7 @@ def _replays(
 
 
 def _within(runs: Sequence[dict[str, Any]], most: int) -> list[dict[str, Any]]:
-    """The runs that fit within a number of bytes, the first ones first."""
+    """Return the runs that fit within a number of bytes, in order."""
     kept, size = [], 0
     for run in runs:
         size += len(_json(run))
@@ -271,7 +272,7 @@ def _within(runs: Sequence[dict[str, Any]], most: int) -> list[dict[str, Any]]:
 
 
 def _json(data: Any) -> str:
-    """JSON that may stand inside an element of a page."""
+    """Return JSON that is safe inside an HTML element."""
     text = json.dumps(data, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
@@ -279,7 +280,7 @@ def _json(data: Any) -> str:
 def render(
     template: str, replays: Sequence[dict[str, Any]], *, scripts: Sequence[str] = ("scripts",), **told: Any
 ) -> str:
-    """A page of `template`, with runs that can be replayed, folders of scripts, and what else the template tells."""
+    """Return a page of `template` with runs to replay, folders of scripts, and the other variables of the template."""
     script = _script(scripts)
     environment = Environment(
         loader=PackageLoader("vedette.reports", "page"),
@@ -304,7 +305,7 @@ def _script(folders: Sequence[str]) -> str:
 
 
 def write_page(path: Path, page: str) -> None:
-    """Write a page, whole or not at all."""
+    """Write a page atomically."""
     try:
         write_whole(path, lambda file: file.write(page.encode()))
     except OSError as error:

@@ -1,4 +1,4 @@
-"""The page of a loop that goes on: the replay, given what is believed now in place of a run."""
+"""Page of a live loop: the replay view with the present state instead of a run."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ from vedette.simulation.records import Decision
 from vedette.simulation.scans import Scan
 from vedette.tracking import State, Timeline
 
-_HEALTH_OF = 100  # of the latest scans
+_HEALTH_OF = 100  # number of latest scans
 _STEPS_OF_EXTENT = 10.0
 
 
 @dataclass(slots=True)
 class LastPlanCache:
-    """A planner that remembers its last plan, and says what the planner says that it asks."""
+    """Planner that stores its last plan; plans are those of the wrapped planner."""
 
     planner: Planner
     last: Plan | None = None
@@ -48,27 +48,27 @@ class LastPlanCache:
 
     @property
     def name(self) -> str:
-        """Of the planner."""
+        """Name of the planner."""
         return self.planner.name
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
-        """The planner's."""
+        """Return the plan of the wrapped planner."""
         self.last = self.planner.plan(state, poses, rng=rng)
         self.num_plans += 1
         return self.last
 
 
 class LiveScreen:
-    """What the pages of a loop show.
+    """Content of the pages of a live loop.
 
     Args:
-        scenario: of the loop.
-        live: the loop; its planner is asked by way of `live` of this screen, so that plans are seen.
-        state: says how far the loop is.
+        scenario: scenario of the loop.
+        live: the loop; use `live` of this screen instead, which makes its plans visible here.
+        state: returns the state of the loop.
 
     Attributes:
-        live: the loop to be run.
-        page: the HTML, with the sensors and the zones, but no scan.
+        live: the loop to run.
+        page: the HTML page, with sensors and zones but no scan.
     """
 
     def __init__(self, scenario: Scenario, live: Live, state: Callable[[], LiveState]) -> None:
@@ -104,12 +104,12 @@ class LiveScreen:
         self.page = render("live.html", [run], scripts=("scripts", "live"), name=model.name, untrusted=()).encode()
 
     def note(self, answers: Iterable[Answer]) -> None:
-        """The last line that was not taken is told."""
+        """Store the error of the last line that was refused, for display."""
         for answer in answers:
             self._fault = answer.get("error", self._fault)
 
     def frame(self) -> bytes:
-        """What is believed now, as JSON."""
+        """Return the present state as JSON."""
         state = self._state()
         timeline = state.timeline
         belief, poses = timeline.state, timeline.poses
@@ -143,7 +143,7 @@ class LiveScreen:
         return json.dumps(frame, allow_nan=False, separators=(",", ":")).encode()
 
     def _extent(self, *places: Floats) -> tuple[float, float, float, float]:
-        """x_min, x_max, y_min, y_max, m, of the region and what lies beyond, in steps that leave the view at rest."""
+        """Return x_min, x_max, y_min, y_max, m, of the region and points beyond, in steps that keep the view stable."""
         region = self._scenario.model.region
         low, high = np.array([region.x_min, region.y_min]), np.array([region.x_max, region.y_max])
         points = np.concatenate([low[np.newaxis], high[np.newaxis], *places])
@@ -154,7 +154,7 @@ class LiveScreen:
         return float(x_min), float(x_max), float(y_min), float(y_max)
 
     def _scans(self, timeline: Timeline, places: int) -> list[list[list[float]]]:
-        """The measurements of the latest instant."""
+        """Return the measurements at the latest scan time."""
         if not timeline.instants:
             return [[] for _ in self._sections]
         latest = timeline.instants[-1]
@@ -179,7 +179,7 @@ class LiveScreen:
         return self._decided[1]
 
     def _health(self, timeline: Timeline) -> str:
-        """What the filters and the fusion had to leave out of late."""
+        """Return the diagnostics of the latest scans in one line."""
         latest = timeline.instants[-_HEALTH_OF:]
         if not latest:
             return ""
@@ -190,6 +190,6 @@ class LiveScreen:
         return diagnostics_line(run_diagnostics(health, self._names))
 
     def _silence(self, state: LiveState) -> list[float | None]:
-        """s of each sensor since its latest scan, by the clock of the scans; None before its first."""
+        """Return the time since the latest scan of each sensor, s, by the clock of the scans; None before its first."""
         newest = state.timeline.newest or 0.0
         return [None if math.isinf(last) else round(newest - last, 3) for last in state.latest]

@@ -19,7 +19,7 @@ Verdict = Literal["better", "worse", "unclear", "unknown"]
 
 @dataclass(frozen=True, slots=True)
 class PairwiseComparison:
-    """One strategy against another.
+    """Comparison of one strategy with another.
 
     Attributes:
         verdict: of `first` against `second`: better, worse, unclear (no significant difference), or unknown (one run).
@@ -28,7 +28,7 @@ class PairwiseComparison:
         sentence: the finding with its numbers.
         mean, low, high: paired difference in mean OSPA, second minus first, with its 95 % interval; NaN for one run.
         difference: the same as text: "+1.20 (+0.80 to +1.60)".
-        share_won: of the runs, by `first`: "93 %"; "unknown" for want of runs.
+        share_won: share of the runs in which `first` is better: "93 %"; "unknown" for one run.
     """
 
     verdict: Verdict
@@ -43,23 +43,23 @@ class PairwiseComparison:
 
 
 def compare_with_first(comparison: Comparison) -> tuple[PairwiseComparison, ...]:
-    """The first strategy against each of the others."""
+    """Compare the first strategy with each of the others."""
     return _compare_pairs(comparison, [(comparison.strategies[0], other) for other in comparison.strategies[1:]])
 
 
 def all_pairs(comparison: Comparison) -> tuple[PairwiseComparison, ...]:
-    """Every strategy against every later one."""
+    """Compare every strategy with every later one."""
     names = comparison.strategies
     return _compare_pairs(comparison, [(first, second) for i, first in enumerate(names) for second in names[i + 1 :]])
 
 
 def compare_pair(comparison: Comparison, first: str, second: str) -> PairwiseComparison:
-    """One strategy against another, run by run, in mean OSPA over the counted scans; by itself."""
+    """Compare two strategies in mean OSPA over the counted scans of paired runs, without correction for other pairs."""
     return _compare_pairs(comparison, [(first, second)])[0]
 
 
 def _compare_pairs(comparison: Comparison, pairs: Sequence[tuple[str, str]]) -> tuple[PairwiseComparison, ...]:
-    """What holds of all pairs at once, by Holm's method."""
+    """Compare pairs of strategies, corrected for their number by Holm's method."""
     differences = [comparison.difference(second, first) for first, second in pairs]
     p_values = holm(np.array([paired.p_value for paired in differences]))
     return tuple(

@@ -1,4 +1,4 @@
-"""What a campaign was run with: a table of its sessions, and its specification as the TOML that would run it again."""
+"""Provenance of a campaign: a table of its sessions, its specification as TOML, and the citation."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from vedette.reports.tables import Table
 
 
 def spec_toml(spec: Mapping[str, Any]) -> str:
-    """TOML text of plain data, tables after values; reading it back gives the same data less what was None or empty."""
+    """Return plain data as TOML text, tables after values; entries that are None or empty are left out."""
     return "\n".join(_lines(spec, ())).strip() + "\n"
 
 
@@ -51,17 +51,17 @@ def _value(value: Any) -> str:
 
 
 def _text(value: str) -> str:
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")  # a JSON string is a TOML basic string
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")  # JSON strings are valid TOML
 
 
 def made_with(manifest: Mapping[str, Any]) -> tuple[str, str]:
-    """Version of this program, and the day, of the last session that worked on a campaign."""
+    """Return the version of this program and the date of the last session of a campaign."""
     last = manifest["sessions"][-1]
     return str(last["versions"]["vedette"]), str(last["started"])[:10]
 
 
 def citation(version: str, year: str = "") -> str:
-    """BibTeX of this program, by version and year, and of the paper whose methods it implements."""
+    """Return BibTeX entries of this program, with version and year, and of the paper whose methods it implements."""
     dated = f"  year = {{{year}}},\n" if year else ""
     return f"""@software{{vedette,
   title = {{Vedette}},
@@ -77,9 +77,9 @@ def citation(version: str, year: str = "") -> str:
 
 
 def versions_table(manifest: Mapping[str, Any]) -> Table:
-    """Start, versions and machine of each session that ran a part of the campaign, a column a session.
+    """Return start, versions and machine of each session of a campaign, one column per session.
 
-    Sessions in a row that differ in nothing but their start share a column.
+    Consecutive sessions that differ only in their start share a column.
     """
     columns: list[tuple[list[str], dict[str, str]]] = []
     for session in manifest.get("sessions", ()):

@@ -1,4 +1,4 @@
-"""A run as the plain data that the page draws it from, scan by scan."""
+"""A run as the plain data for the replay on the page, scan by scan."""
 
 from __future__ import annotations
 
@@ -26,19 +26,19 @@ from vedette.scenarios.sections.sensors import Sensor as SensorSection
 from vedette.simulation.records import Decision, RunRecord
 from vedette.simulation.scans import Scan
 
-_DIGITS = 4  # of an extent that positions are kept to: well under a pixel
+_DIGITS = 4  # significant digits of positions relative to the extent: well under a pixel
 _ANGLE_DIGITS = 4
 _SIGMAS = 2.0
-_ROOM = 0.08  # of the extent, around what is shown
+_ROOM = 0.08  # margin around the scene, relative to the extent
 _LEAST_EXTENT = 1.0  # m
 
 
 def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: bool) -> dict[str, Any]:
-    """Everything that the page shows of a run, as data for JSON; positions rounded to what can be seen.
+    """Return the data of a run for the page, as plain JSON types; positions are rounded to what is visible.
 
-    Measurements are those of the recording, or drawn again by the sensors' models; where a sensor gives no place in the
-    plane, or they cannot be had, they are left out. Without `trust` they are left out too where drawing them would run
-    code that the scenario names. Where nobody knows the targets there are no errors.
+    Measurements are those of the recording, or drawn again by the sensor models. They are left out if a sensor gives no
+    position in the plane, or if they cannot be drawn; without `trust` also if drawing them would run code that the
+    scenario names. Without known targets there are no errors.
     """
     scenario = strategy.cell.scenario
     extent = _extent(record, scenario)
@@ -84,25 +84,25 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
 
 
 def _mean_error(strategy: Strategy, record: RunRecord) -> float | None:
-    """Mean OSPA of a run over the scans that count."""
+    """Return the mean OSPA of a run over the counted scans."""
     counted = strategy.counted[: record.num_scans]
     return round(float(record.ospa[counted, 0].mean()), 2) if counted.any() else None
 
 
 def rounded_to(values: Any, places: int) -> list[float]:
-    """Numbers as a page has them."""
+    """Return rounded numbers as a list."""
     return [round(float(value), places) for value in values]
 
 
 def places_of(extent: Sequence[float]) -> int:
-    """Digits behind the point that a pixel can show."""
+    """Return the number of decimals that a pixel can show."""
     return max(0, _DIGITS - math.floor(math.log10(max(extent[1] - extent[0], extent[3] - extent[2]))))
 
 
 def _extent(record: RunRecord, scenario: Scenario) -> tuple[float, float, float, float]:
-    """x_min, x_max, y_min, y_max of sensors and targets with some room, m; of estimates where targets are not known.
+    """Return x_min, x_max, y_min, y_max of sensors and targets with a margin, m; of estimates if targets are unknown.
 
-    A scene without extent, such as one sensor that has seen nothing, is as large as the region.
+    A scene without extent, such as one sensor without measurements, gets that of the region.
     """
     means = [estimate.means[:, :2] for estimate in record.estimates]
     targets = record.truth.states[:, :2] if len(record.truth.states) else np.concatenate([np.empty((0, 2)), *means])
@@ -117,9 +117,9 @@ def _extent(record: RunRecord, scenario: Scenario) -> tuple[float, float, float,
 
 
 def drawn_sensor(name: str, section: SensorSection) -> dict[str, Any]:
-    """What a sensor sees, for drawing: how a measurement lies in the plane, and its field where that has an edge.
+    """Return drawing data of a sensor: the shape of its measurements in the plane, and its field of view if bounded.
 
-    `unturned` is the heading (rad) that has no meaning: of a sensor that stands and sees alike all round.
+    `unturned` is the heading (rad) of a stationary sensor with a uniform view, which has no meaning.
     """
     found: dict[str, Any] = {"name": name, "kind": LIE.get(section.measurement.kind, "none")}
     if section.platform.kind == "still" and section.detection.kind in ("constant", "gaussian", "limited_range"):
@@ -132,7 +132,7 @@ def drawn_sensor(name: str, section: SensorSection) -> dict[str, Any]:
 
 
 def drawn_pose(pose: Floats, section: SensorSection, places: int) -> list[float]:
-    """Place and heading; of a camera its field of view, too: middle and half width in rad, reach in m."""
+    """Return position and heading; for a camera also its field of view: middle and half width in rad, reach in m."""
     found = [*rounded_to(pose[:2], places), round(float(pose[2]), 4)]
     if section.detection.kind == "camera":
         field = field_of_view(section, pose.tolist())
@@ -141,7 +141,7 @@ def drawn_pose(pose: Floats, section: SensorSection, places: int) -> list[float]
 
 
 def _targets(record: RunRecord, scan: int, places: int, has_velocity: bool) -> list[list[float]]:
-    """For each target its number from 1, its position, and its velocity where that is what the state goes on with."""
+    """Return number (from 1) and position of each target, and its velocity unless the motion model is custom."""
     ids, states = record.truth.at(scan)
     return [
         [target + 1, *rounded_to(state[:2], places), *(rounded_to(state[2:4], 2) if has_velocity else [])]
@@ -150,9 +150,10 @@ def _targets(record: RunRecord, scan: int, places: int, has_velocity: bool) -> l
 
 
 def _estimates(record: RunRecord, scenario: Scenario, places: int) -> list[list[list[Any]]]:
-    """For each estimate: label, position, existence, ellipse (semi-axes in m, angle in rad), matched target, error.
+    """Return the estimates of each scan with the matched targets.
 
-    Target and error are those of the assignment that OSPA is made of; 0 and 0 for an estimate without a partner.
+    Each has label, position, existence, ellipse (semi-axes in m, angle in rad), matched target, and error. Target and
+    error are those of the assignment in OSPA; 0 and 0 for an unmatched estimate.
     """
     score = scenario.model.ospa
     matching = match_run(record.truth, record.estimates, cutoff=score.cutoff, order=score.order)
@@ -178,7 +179,7 @@ def _estimates(record: RunRecord, scenario: Scenario, places: int) -> list[list[
 
 
 def drawn_estimate(estimate: Estimate, place: int, places: int) -> list[Any]:
-    """Label, position, existence and ellipse (semi-axes in m, angle in rad) of one of the targets of an estimate."""
+    """Return label, position, existence and ellipse (semi-axes in m, angle in rad) of one target of an estimate."""
     born, number = estimate.labels[place].tolist()
     position, existence = rounded_to(estimate.means[place, :2], places), round(float(estimate.existence[place]), 4)
     return [f"{born}.{number}", *position, existence, *_ellipse(estimate.covs[place, :2, :2], places)]
@@ -191,9 +192,9 @@ def _ellipse(cov: Floats, places: int) -> list[float]:
 
 
 def _scans(record: RunRecord, scenario: Scenario, places: int, trust: bool) -> list[list[list[list[float]]]]:
-    """For each scan, for each sensor, its measurements: the target behind it (0: clutter, -1: unknown), where it lies.
+    """Return for each scan and sensor its measurements, see `drawn_measurements`.
 
-    Empty where the models of the scenario, or its recording, cannot be had.
+    Empty if the models of the scenario, or its recording, are not available.
     """
     kinds = [sensor.measurement.kind for sensor in scenario.model.sensors]
     if not LIE.keys() & set(kinds) or (code_of_sensors(scenario) and not trust):
@@ -209,7 +210,7 @@ def _scans(record: RunRecord, scenario: Scenario, places: int, trust: bool) -> l
 
 
 def drawn_measurements(scan: Scan | None, kind: str, pose: Floats, places: int) -> list[list[float]]:
-    """The target behind each measurement of a scan (0: clutter, -1: unknown), and where it lies in the plane."""
+    """Return for each measurement of a scan its target (0: clutter, -1: unknown), and its position in the plane."""
     if scan is None or kind not in LIE:
         return []
     digits = _ANGLE_DIGITS if LIE[kind] == "ray" else places
@@ -218,7 +219,7 @@ def drawn_measurements(scan: Scan | None, kind: str, pose: Floats, places: int) 
 
 
 def drawn_decision(decision: Decision, axes: dict[str, dict[str, Any]], names: Sequence[str]) -> dict[str, Any]:
-    """A decision with its rewards, whose axes are put into `axes`, and why it was taken."""
+    """Return a decision with its rewards, whose axes are added to `axes`, and its explanation."""
     plan = decision.plan
     return {
         "scan": decision.step - 1,
@@ -232,7 +233,7 @@ def drawn_decision(decision: Decision, axes: dict[str, dict[str, Any]], names: S
 
 
 def _shades(intensity: UndetectedIntensity) -> dict[str, Any]:
-    """Cells of a map as shares of the largest, in percent, and the expected number of undetected targets."""
+    """Return the cells of a map as percent of the largest, and the expected number of undetected targets."""
     grid, largest = intensity.grid, float(intensity.expected.max())
     shares = np.zeros(grid.num_cells) if largest <= 0.0 else np.rint(100.0 * intensity.expected / largest)
     region = grid.region
@@ -246,9 +247,10 @@ def _shades(intensity: UndetectedIntensity) -> dict[str, Any]:
 
 
 def _curves(plan: Plan, axes: dict[str, dict[str, Any]]) -> list[dict[str, Any]]:
-    """Reward against action, one curve a sensor with a choice; of a joint table the largest over the others' actions.
+    """Return the reward per action, one curve per sensor with a choice.
 
-    What the actions are called and where they lie is `along` an axis, of which `axes` has each once.
+    A joint table gives the maximum over the other sensors' actions. Names and positions of the actions are in `axes`,
+    each once, with the index `along`.
     """
     curves = []
     for table in plan.tables:
@@ -280,7 +282,7 @@ def _curves(plan: Plan, axes: dict[str, dict[str, Any]]) -> list[dict[str, Any]]
 
 
 def _map(plan: Plan) -> dict[str, Any] | None:
-    """The joint rewards of the first two sensors with a choice, the largest over the others."""
+    """Return the joint rewards of the first two sensors with a choice, maximised over the other sensors."""
     joint = next((table for table in plan.tables if len(table.sensors) > 1), None)
     pair = first_pair(plan.tables, plan.actions)
     if joint is None or pair is None:

@@ -1,4 +1,4 @@
-"""The report of a single run: the page of a campaign's report, of one strategy in one setting."""
+"""Report of a single run: the page of a campaign's report, for one strategy in one setting."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ def write_run_report(
     manifest: Mapping[str, Any] | None = None,
     trust: bool = False,
 ) -> None:
-    """Write the report of one run as one HTML file that needs nothing else; the same run gives the same bytes.
+    """Write the report of one run as one self-contained HTML file; equal runs give equal bytes.
 
-    Of recorded scans the replay has those of the recording. Where nobody knows the targets there are no errors.
+    The replay of recorded scans shows those of the recording. Without known targets there are no errors.
 
     Args:
         record: the run.
-        scenario: that it is of.
-        path: of the file; its folder is made.
-        manifest: of the run's folder, which has the versions that it was made with; None: they are not told.
+        scenario: the scenario of the run.
+        path: path of the file; missing folders are made.
+        manifest: manifest of the run's folder, with the versions of the program; None: no versions are shown.
         trust: run the code that the scenario names, to draw measurements (see `write_report`).
 
     Raises:
-        InputError: a run of other sensors than the scenario has, or a file that cannot be written.
+        InputError: the run has other sensors than the scenario, or the file cannot be written.
     """
     target = Path(path)
     make_room(target)

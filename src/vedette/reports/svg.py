@@ -1,4 +1,4 @@
-"""Matplotlib's figures as parts of a page: they follow its colours, light or dark, and share no names."""
+"""Matplotlib figures as inline elements of a page, with its light and dark colours and unique ids."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from vedette.evaluation.figures import png_bytes, svg_text
 from vedette.evaluation.figures.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SENSOR_COLOURS, SKY, VERMILION
 
-# What the page's style sheet gives another shade in the dark.
+# Colours that the page's style sheet changes in dark mode.
 _VARIABLES = {
     "#000000": "ink",
     INK: "ink",
@@ -39,13 +39,13 @@ _DOTS_PER_INCH = 200
 
 
 def inline_svg(figure: Figure, prefix: str, description: str, names: Mapping[str, str] | None = None) -> Markup:
-    """An `svg` element that is as wide as its place, at most as wide as reads well.
+    """Return an `svg` element as wide as its container, up to a readable maximum width.
 
     Args:
-        figure: what to draw.
-        prefix: unique on the page; put before every id in the figure.
-        description: for readers who do not see it.
-        names: elided names and the full ones, which show where a reader points at a text that holds the elided one.
+        figure: the figure.
+        prefix: prefix of every id in the figure; unique on the page.
+        description: description for screen readers.
+        names: elided names and the full ones, shown as tooltips of texts that contain the elided ones.
     """
     text = svg_text(figure)
     body = text[text.index(">", text.index("<svg")) + 1 :]
@@ -57,11 +57,11 @@ def inline_svg(figure: Figure, prefix: str, description: str, names: Mapping[str
     opening = Markup('<svg viewBox="0 0 {:g} {:g}" role="img" aria-label="{}" style="max-width: {:.0f}px">').format(
         round(width, 2), round(height, 2), description, _POINTS_TO_PIXELS * width
     )
-    return opening + Markup(body)  # what Matplotlib wrote: it escapes the texts in a figure itself
+    return opening + Markup(body)  # safe: Matplotlib escapes the texts in a figure
 
 
 def inline_png(figure: Figure, description: str) -> Markup:
-    """As `inline_svg`, an `img` of dots: as large whatever is drawn, and in the colours of paper."""
+    """Return an `img` element with the figure as pixels: bounded in size, and in the colours of paper."""
     content = base64.b64encode(png_bytes(figure, dots_per_inch=_DOTS_PER_INCH)).decode()
     width = _POINTS_TO_PIXELS * 72.0 * float(figure.get_size_inches()[0])
     return Markup('<img src="data:image/png;base64,{}" alt="{}" style="max-width: {:.0f}px">').format(
@@ -70,7 +70,7 @@ def inline_png(figure: Figure, description: str) -> Markup:
 
 
 def _adapted(tag: str, prefix: str) -> str:
-    """A tag with its names made unique, the page's colours, and numbers to a hundredth of a point; texts stay."""
+    """Return a tag with unique ids, the page's colours, and numbers rounded to a hundredth of a point."""
     tag = re.sub(r'\bid="', f'id="{prefix}-', tag)
     tag = re.sub(r'(href="#|url\(#)', rf"\g<1>{prefix}-", tag)
     tag = _COLOUR.sub(lambda found: _NAMES[found.group().lower()], tag)

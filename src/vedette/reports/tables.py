@@ -1,4 +1,4 @@
-"""The tables of a report: errors and other measures a strategy, what they cost, how often what was decided."""
+"""Tables of a report: errors and other metrics per strategy, computation time, and the most frequent decisions."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from vedette.internal.text import elided_apart, with_error, with_minus
 from vedette.kernels.base.types import Bools, Floats
 from vedette.reports.groups import Group, Strategy
 
-_BY_CHANCE = 1e-3  # chance below which a largest value says that the filter is not consistent
+_BY_CHANCE = 1e-3  # probability of the largest value below which the filter counts as inconsistent
 _DIFFERENCES = range(4, 7)  # columns of `strategy_rows` that compare with the first strategy
-_LONGEST_NAME = 32  # letters, beyond which the page gives the full name as a title
+_LONGEST_NAME = 32  # characters; the page shows the full name of longer ones as a tooltip
 
-# (num_runs,) of an ensemble over the counted scans, NaN where a run has no value.
+# (num_runs,) value of each run of an ensemble over the counted scans; NaN if it has none.
 Measure = Callable[[Ensemble, Bools], Floats]
 
 
@@ -34,10 +34,10 @@ class Table:
     """Cells of text under a header; the first column names the rows.
 
     Attributes:
-        caption: what the numbers are.
-        header: one entry a column.
+        caption: description of the numbers.
+        header: one entry per column.
         rows: as long as the header.
-        notes: what a row is, where its name does not say; may be empty.
+        notes: descriptions of the rows where the names do not suffice; may be empty.
         is_words: whether the cells are words rather than numbers.
     """
 
@@ -54,7 +54,7 @@ class Table:
 
     @property
     def short_names(self) -> tuple[str, ...]:
-        """What the rows are called, long names elided where the same one names several rows."""
+        """Names of the rows; long ones are elided if a name occurs in several rows."""
         names = [row[0] for row in self.rows]
         distinct = list(dict.fromkeys(names))
         if len(distinct) == len(names):
@@ -81,7 +81,7 @@ def _mean_of_known(name: str) -> Measure:
 
 @dataclass(frozen=True, slots=True)
 class _Kind:
-    """One measure of a run: what it is called, what it is, its value, and whether it says something only of labels."""
+    """One metric of a run: name, description, value, and whether it requires labels."""
 
     name: str
     note: str
@@ -90,7 +90,7 @@ class _Kind:
 
 
 def _kinds(order: float) -> tuple[_Kind, ...]:
-    """The measures of a run; `order` is that of OSPA, whose power GOSPA's parts have."""
+    """Return the metrics of a run; `order` is that of OSPA, and the parts of GOSPA have that power."""
     power = "m" if order == 1.0 else f"m^{order:g}"
     bias = "estimated minus true number of targets, mean over the scans"
     return (
@@ -107,14 +107,14 @@ def _kinds(order: float) -> tuple[_Kind, ...]:
 
 
 def _own_kinds(strategies: Sequence[Strategy]) -> Iterator[_Kind]:
-    """The user's own measures that every run has."""
+    """Yield the custom metrics that every run has."""
     for name in strategies[0].ensemble.measures:
         if name not in COLUMNS and all(name in each.ensemble.measures for each in strategies):
             yield _Kind(name, "a measure of one's own, mean over the scans", _mean_of_known(name))
 
 
 def error_table(group: Group) -> Table | None:
-    """OSPA and its parts, and the paired differences; None without runs in common."""
+    """Return OSPA and its parts, and the paired differences; None without common runs."""
     if group.comparison is None:
         return None
     several = group.comparison.num_runs > 1
@@ -141,14 +141,14 @@ def error_table(group: Group) -> Table | None:
         caption += " A target is lost at the end where it has no estimate within the cutoff at the last of these scans."
     more = tail_header(group.comparison.unit) if several else ()
     names = (*header(group.comparison), *more)
-    if len(rows) == 1:  # without differences
+    if len(rows) == 1:  # drop the differences
         places = [place for place in range(len(names)) if place not in _DIFFERENCES]
         names, rows = tuple(names[place] for place in places), (tuple(rows[0][place] for place in places),)
     return Table(caption, names, rows)
 
 
 def measure_table(group: Group) -> Table | None:
-    """Measures beside OSPA, a column a strategy; None where nothing has run."""
+    """Return the metrics other than OSPA, one column per strategy; None if there are none."""
     strategies = [each for each in group.strategies if each.ensemble.measures]
     if not strategies:
         return None
@@ -182,7 +182,7 @@ def _consistency_kinds(strategies: Sequence[Strategy]) -> list[tuple[str, str, i
 
 
 def nees_over_runs(strategy: Strategy, dim: int) -> AverageNees:
-    """NEES averaged over the runs at each scan: of the position for `dim` 2, or else of the full state."""
+    """Return the NEES averaged over the runs at each scan: of the position for `dim` 2, otherwise of the full state."""
     ensemble = strategy.ensemble
     if dim == 2:
         return average_nees(ensemble.values("position_nees_mean"), ensemble.num_pairs(), dim=dim)
@@ -200,13 +200,13 @@ def _consistency(strategy: Strategy, dim: int) -> str:
 
 @dataclass(frozen=True, slots=True)
 class NeesSpread:
-    """How the position NEES of a strategy spreads, over its dimension, which is 2.
+    """Spread of the position NEES of a strategy, divided by its dimension 2.
 
     Attributes:
-        median: of the means at the scans of all runs.
-        largest: of a single estimate.
-        run, time: where that is; time in s.
-        is_by_chance: whether a consistent filter has so large a one in more than one of a thousand such comparisons.
+        median: median of the means at the scans of all runs.
+        largest: largest value of a single estimate.
+        run, time: run and time of that estimate; time in s.
+        is_by_chance: whether a consistent filter exceeds it in more than one of a thousand such comparisons.
     """
 
     median: float
@@ -217,7 +217,7 @@ class NeesSpread:
 
 
 def nees_spread(strategy: Strategy) -> NeesSpread | None:
-    """Over the counted scans; None where no estimate is matched."""
+    """Return the spread over the counted scans; None if no estimate is matched."""
     ensemble, counted = strategy.ensemble, strategy.counted
     means, largest = (ensemble.values(f"position_nees_{name}")[:, counted] / 2.0 for name in ("mean", "max"))
     if np.isnan(largest).all():
@@ -229,7 +229,7 @@ def nees_spread(strategy: Strategy) -> NeesSpread | None:
         largest=float(largest[run, scan]),
         run=int(ensemble.runs[run]),
         time=float(ensemble.times[counted][scan]),
-        is_by_chance=bool(pairs * np.exp(-largest[run, scan]) > _BY_CHANCE),  # half of chi-square of 2 is exponential
+        is_by_chance=bool(pairs * np.exp(-largest[run, scan]) > _BY_CHANCE),  # half of chi-squared(2) is exponential
     )
 
 
@@ -258,7 +258,7 @@ def _over_runs(kind: _Kind, strategy: Strategy) -> str:
 
 
 def stage_seconds(strategy: Strategy) -> dict[str, NDArray[np.float32]]:
-    """Seconds of each stage, at all scans of all runs: planning at the decisions alone, other stages at every scan."""
+    """Return the seconds of each stage over all runs: planning at decisions, other stages at every scan."""
     named = {
         f"{stage}, a {'decision' if stage == 'planning' else 'scan'}": seconds
         for stage, seconds in strategy.ensemble.seconds.items()
@@ -267,7 +267,7 @@ def stage_seconds(strategy: Strategy) -> dict[str, NDArray[np.float32]]:
 
 
 def cost_table(group: Group) -> Table | None:
-    """Time of each stage: median and 95th percentile, a column a strategy; None where nothing was timed."""
+    """Return the time of each stage: median and 95th percentile, one column per strategy; None if nothing was timed."""
     spent = {each.name: stage_seconds(each) for each in group.strategies}
     stages = list(dict.fromkeys(stage for seconds in spent.values() for stage in seconds))
     if not stages:
@@ -289,12 +289,12 @@ def _milliseconds(seconds: NDArray[np.float32] | None) -> str:
 
 
 def _three_digits(value: float) -> str:
-    """At least three significant digits, and no power of ten."""
+    """Return a number with at least three significant digits, without exponent."""
     return f"{value:.0f}" if value >= 1000.0 else f"{value:.3g}"
 
 
 def decision_table(group: Group) -> Table | None:
-    """The most frequent choices at each decision; None where none was made."""
+    """Return the most frequent choices at each decision; None if no decision was made."""
     if group.comparison is None:
         return None
     rows = [

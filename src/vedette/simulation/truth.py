@@ -153,8 +153,9 @@ class ScriptedTargets:
             object.__setattr__(self, "initial_stds", stds)
 
     def truth(self, times: ArrayLike, *, rng: np.random.Generator) -> Truth:
-        """Propagate each target through the scans from its start time, with initial deviations and process noise if
-        set.
+        """Propagate each target from its start time through the scans.
+
+        Initial states are drawn if `initial_stds` is given, and process noise is added where `process_noise` is set.
 
         Raises:
             InputError: the scan times do not increase.
