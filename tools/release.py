@@ -21,7 +21,7 @@ from pathlib import Path
 from numba.core.codegen import get_host_cpu_features
 
 from vedette import __version__
-from vedette.kernels.base.places import LEVELS, serves
+from vedette.kernels.base.cache_paths import LEVELS, supports_level
 
 ROOT = Path(__file__).resolve().parents[1]
 DIST, KERNELS = ROOT / "dist", ROOT / "build" / "compiled-kernels"
@@ -62,7 +62,7 @@ def build(kind: str, source: Path, scratch: Path, environment: Mapping[str, obje
 def compile_kernels(scenarios: list[str]) -> list[str]:
     """Compile into `KERNELS` for every level that this processor can run, as it has to; returns the levels."""
     shutil.rmtree(KERNELS, ignore_errors=True)
-    levels = [level for level in LEVELS if serves(level, get_host_cpu_features())]
+    levels = [level for level in LEVELS if supports_level(level, get_host_cpu_features())]
     for level in levels:
         print(f"compiling for {level} ...", flush=True)
         # No features but those of the level: Numba would add this processor's own.

@@ -14,8 +14,8 @@ import pytest
 from numba.core.codegen import get_host_cpu_features
 
 import vedette
+from vedette.kernels.base.cache_paths import LEVELS, supports_level
 from vedette.kernels.base.compile import JIT_ENABLED
-from vedette.kernels.base.places import LEVELS, serves
 from waiting import PATIENCE
 
 pytestmark = pytest.mark.skipif(not JIT_ENABLED, reason="nothing is compiled")
@@ -51,13 +51,13 @@ def test_a_processor_is_given_the_best_level_that_it_has_all_features_of(tmp_pat
     site, installed, own = tmp_path / "site", tmp_path / "site/vedette/compiled-kernels", tmp_path / "own"
     shutil.copytree(Path(vedette.__file__).parent, site / "vedette", ignore=shutil.ignore_patterns("__pycache__"))
     level = LEVELS["x86-64-v3"]
-    if not serves("x86-64-v3", get_host_cpu_features()):
+    if not supports_level("x86-64-v3", get_host_cpu_features()):
         pytest.skip("this processor has no AVX2")
     assert counts(site, installed, **compiling_for("x86-64-v3")) == "0 1"
     assert counts(site, own, **features(level)) == "1 0"
     assert counts(site, own) == "1 0"
     for missing in level:  # each alone: none of such processors may ever run this code
-        assert not serves("x86-64-v3", features(level - {missing})["NUMBA_CPU_FEATURES"])
+        assert not supports_level("x86-64-v3", features(level - {missing})["NUMBA_CPU_FEATURES"])
     assert counts(site, tmp_path / "older", **features(level - {"avx2"})) == "0 1"
     assert counts(site, installed, **compiling_for("generic")) == "0 1"
     assert len(list(installed.rglob("*.nbc"))) == 2  # both levels side by side

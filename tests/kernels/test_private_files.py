@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from vedette.kernels.base.compile import JIT_ENABLED
-from vedette.kernels.base.private_files import fault_of_folder, make_private_folder, read_private, write_private
+from vedette.kernels.base.private_files import folder_fault, make_private_folder, read_private, write_private
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="files have no owners and modes")
 
@@ -86,21 +86,21 @@ def test_what_belongs_to_another_is_not_read(tmp_path: Path) -> None:
     assert read_private(file, SOURCE) is None
     folder = tmp_path / "theirs" / "below"
     make_private_folder(folder)
-    assert fault_of_folder(folder, SOURCE) is None
+    assert folder_fault(folder, SOURCE) is None
     os.chown(folder.parent, STRANGER, STRANGER)
-    assert fault_of_folder(folder, SOURCE) == f"{folder.parent} belongs to another user"
+    assert folder_fault(folder, SOURCE) == f"{folder.parent} belongs to another user"
 
 
 def test_a_folder_is_as_private_as_those_above_it(tmp_path: Path) -> None:
     folder = tmp_path / "shared" / "mine"
     make_private_folder(folder)
-    assert fault_of_folder(folder, SOURCE) is None
+    assert folder_fault(folder, SOURCE) is None
     folder.parent.chmod(0o777)
-    assert fault_of_folder(folder, SOURCE) == f"others can write to {folder.parent}"
+    assert folder_fault(folder, SOURCE) == f"others can write to {folder.parent}"
     folder.parent.chmod(0o1777)  # sticky, like /tmp
-    assert fault_of_folder(folder, SOURCE) is None
+    assert folder_fault(folder, SOURCE) is None
     folder.chmod(0o1777)
-    assert fault_of_folder(folder, SOURCE) == f"others can write to {folder}"
+    assert folder_fault(folder, SOURCE) == f"others can write to {folder}"
     file = folder / "entry"
     write_private(file, b"code")
     with pytest.raises(FileExistsError):

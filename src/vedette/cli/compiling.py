@@ -11,13 +11,13 @@ from vedette.cli.output import console
 from vedette.internal.text import pluralise
 
 if TYPE_CHECKING:
-    from vedette.kernels.base.watching import Compiling
+    from vedette.kernels.base.compile_progress import CompileProgress
 
 
 @contextmanager
 def compiling() -> Iterator[None]:
     """Say what is compiled meanwhile, how far it is and for how long; nothing, where all is there."""
-    from vedette.kernels.base.watching import watched
+    from vedette.kernels.base.compile_progress import watched
 
     shown = _CompileProgress()
     try:
@@ -33,10 +33,10 @@ class _CompileProgress:
     def __init__(self) -> None:
         self._began: float | None = None
         self._kernels = self._functions = 0
-        self._now: Compiling | None = None
+        self._now: CompileProgress | None = None
 
-    def __call__(self, state: Compiling | None) -> None:
-        """See `vedette.kernels.base.watching.watched`."""
+    def __call__(self, state: CompileProgress | None) -> None:
+        """See `vedette.kernels.base.compile_progress.watched`."""
         if self._began is None:
             self._begin()
         if state is None:
@@ -56,7 +56,7 @@ class _CompileProgress:
     def _begin(self) -> None:
         from rich.progress import Progress, TextColumn, TimeElapsedColumn
 
-        from vedette.kernels.base.places import cache_directory
+        from vedette.kernels.base.cache_paths import cache_directory
 
         self._began = time.monotonic()
         self._console = console(stderr=True)

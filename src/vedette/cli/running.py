@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 def compile_if_cold(scenario: Scenario, planners: Sequence[str] = ("jdm",)) -> None:
     """Compile the kernels of a simulation and its planners in two processes, if no kernel is compiled yet."""
-    from vedette.kernels.base.places import is_cold
+    from vedette.kernels.base.cache_paths import is_cold
 
     if scenario.model.recording is None and is_cold():
         from vedette.evaluation.precompile import precompile

@@ -21,10 +21,10 @@ from numba.core.registry import cpu_target
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
-from vedette.kernels.base import watching
+from vedette.kernels.base import compile_progress
+from vedette.kernels.base.cache_paths import INSTALLED, LEVELS, cache_directory, compiler, folder_name, supports_level
 from vedette.kernels.base.interrupts import interrupts_wait
-from vedette.kernels.base.places import INSTALLED, LEVELS, cache_directory, compiler, folder_name, serves
-from vedette.kernels.base.private_files import fault_of_folder, make_private_folder, read_private, write_private
+from vedette.kernels.base.private_files import folder_fault, make_private_folder, read_private, write_private
 from vedette.kernels.base.sources import package_file
 
 _MARK_LENGTH = hashlib.sha256().digest_size
@@ -68,7 +68,7 @@ class _Place:
     def serves(self, key: Any) -> bool:
         """Whether the machine that this key is of can run what is here."""
         _, (_, _, features), _ = key
-        return self._level is None or serves(self._level, features)
+        return self._level is None or supports_level(self._level, features)
 
     def key(self, key: Any) -> Any:
         """The key here of what has this key on this machine."""
@@ -183,7 +183,7 @@ class _Cache(FunctionCache):  # type: ignore[misc]
             return self._load_overload(sig, target_context)
 
 
-class OnDemand:
+class LazyCache:
     """What a dispatcher keeps its code in, set up when it first looks there: most kernels are only called by others.
 
     Nothing is kept where that is impossible or not safe: a function typed at a prompt has no file. Warns once of a
@@ -210,7 +210,7 @@ class OnDemand:
         """What was compiled for these types, or None: then it is compiled now."""
         found = self.own.load_overload(signature, target_context)
         if found is None:
-            watching.begins(self._function)
+            compile_progress.compilation_begins(self._function)
             with interrupts_wait():  # what Numba compiles with, which would stay half there
                 cpu_target.typing_context.refresh()
                 target_context.refresh()
@@ -218,12 +218,12 @@ class OnDemand:
 
     def save_overload(self, signature: Any, data: Any) -> None:
         """Keep what was compiled."""
-        watching.ends()
+        compile_progress.compilation_ends()
         self.own.save_overload(signature, data)
 
 
 # A process finds out once a file, not once a function.
-_fault_of = cache(fault_of_folder)
+_fault_of = cache(folder_fault)
 
 
 @cache  # once a process, not once a function

@@ -21,9 +21,9 @@ from numba.extending import NativeValue, register_model, typeof_impl, unbox
 
 from vedette.kernels.base.bundle_types import HELD, TYPED_BY_FIELDS, type_of_bundle, when_typed
 from vedette.kernels.base.compile import SIGNATURES, ModelFunction
-from vedette.kernels.base.disk_cache import OnDemand
+from vedette.kernels.base.disk_cache import LazyCache
 from vedette.kernels.base.libraries import PartLibrary, WholeLibrary, made_as
-from vedette.kernels.base.returned import NAMED, returned_without_python
+from vedette.kernels.base.nopython_return import NAMED, returned_without_python
 
 # What is returned: None for anything without names inside it, else its class and those of its fields.
 Shape = tuple[type, tuple[Any, ...]] | None
@@ -84,7 +84,7 @@ class WholeKernel(CPUDispatcher):  # type: ignore[misc]
     def of(cls, function: Callable[..., Any], options: dict[str, Any]) -> WholeKernel:
         """The whole of a function."""
         whole = cls(function, targetoptions=options)
-        whole._cache = OnDemand(function)
+        whole._cache = LazyCache(function)
         return whole
 
     def compile(self, sig: Any) -> Any:

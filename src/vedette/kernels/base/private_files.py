@@ -22,7 +22,7 @@ def make_private_folder(folder: Path) -> None:
             part.mkdir(mode=0o700, exist_ok=True)
 
 
-def fault_of_folder(folder: Path, source: Path) -> str | None:
+def folder_fault(folder: Path, source: Path) -> str | None:
     """What lets others write into the folder, or swap it, from the top; None where nothing does.
 
     folder: resolved, without links. source: the file whose owner is trusted. Raises `OSError` where one is not there.

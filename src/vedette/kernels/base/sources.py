@@ -65,10 +65,10 @@ _APART = frozenset(
         "bundle_types.py",
         "disk_cache.py",
         "interrupts.py",
-        "places.py",
+        "cache_paths.py",
         "private_files.py",
         "sources.py",
-        "watching.py",
+        "compile_progress.py",
     )
 )
 

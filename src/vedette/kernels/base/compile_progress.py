@@ -11,7 +11,7 @@ from vedette.kernels.base.compile import Kernel
 
 
 @dataclass(frozen=True, slots=True)
-class Compiling:
+class CompileProgress:
     """A kernel that is being compiled with all that it calls."""
 
     name: str
@@ -19,7 +19,7 @@ class Compiling:
     num_functions: int
 
 
-Listener = Callable[[Compiling | None], None]
+Listener = Callable[[CompileProgress | None], None]
 
 
 class _Watch:
@@ -28,7 +28,7 @@ class _Watch:
     def __init__(self, listener: Listener) -> None:
         self._tell = listener
         self._compiled: set[int] = set()
-        self._state = Compiling("", 0, 0)
+        self._state = CompileProgress("", 0, 0)
         self._following = ExitStack()
         self._follows = False
 
@@ -36,8 +36,8 @@ class _Watch:
         """A kernel is compiled now."""
         if not self._follows:
             self._follows = True
-            self._following.enter_context(_told_of_compiled(self._compiled_one))
-        self._state = Compiling(function.__name__, 0, len(_reached(function) - self._compiled))
+            self._following.enter_context(_compile_listener(self._compiled_one))
+        self._state = CompileProgress(function.__name__, 0, len(_reached(function) - self._compiled))
         self._tell(self._state)
 
     def end(self) -> None:
@@ -57,7 +57,7 @@ class _Watch:
 
 
 @contextmanager
-def _told_of_compiled(tell: Callable[[Callable[..., Any]], None]) -> Iterator[None]:
+def _compile_listener(tell: Callable[[Callable[..., Any]], None]) -> Iterator[None]:
     """Numba says of every function when it has compiled it."""
     from numba.core import event
 
@@ -100,13 +100,13 @@ def watched(listener: Listener) -> Iterator[None]:
         _watch = before
 
 
-def begins(function: Callable[..., Any]) -> None:
+def compilation_begins(function: Callable[..., Any]) -> None:
     """A kernel was not on disk."""
     if _watch is not None:
         _watch.begin(function)
 
 
-def ends() -> None:
+def compilation_ends() -> None:
     """It is compiled."""
     if _watch is not None:
         _watch.end()

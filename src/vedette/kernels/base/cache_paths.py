@@ -9,7 +9,7 @@ from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
-from vedette.kernels.base.private_files import fault_of_folder
+from vedette.kernels.base.private_files import folder_fault
 from vedette.kernels.base.sources import PACKAGE_ROOT, kernel_files, source_stamp
 
 # Made by `python dev.py release`; the name is that of no module.
@@ -28,7 +28,7 @@ LEVELS = {
 }
 
 
-def serves(level: str, features: str) -> bool:
+def supports_level(level: str, features: str) -> bool:
     """Whether a processor can run what was compiled for a level of `LEVELS`; features in LLVM's words, `+avx,-fma`."""
     return LEVELS[level] <= {feature[1:] for feature in features.split(",") if feature.startswith("+")}
 
@@ -69,4 +69,4 @@ def is_cold() -> bool:
         for folder in (own / folder_name(file), INSTALLED / folder_name(file)):
             if any(suffix in entry.name for entry in folder.glob("*.nbc")):
                 return False
-    return not own.is_dir() or fault_of_folder(own.resolve(), PACKAGE_ROOT / "__init__.py") is None
+    return not own.is_dir() or folder_fault(own.resolve(), PACKAGE_ROOT / "__init__.py") is None
