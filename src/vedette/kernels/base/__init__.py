@@ -1,1 +1,1 @@
-"""What every kernel stands on: types, compiling, the cache on disk, arrays."""
+"""Foundation of all kernels: types, compilation, the disk cache, array helpers."""

@@ -1,7 +1,7 @@
-"""How a kernel that is called learns the types of bundles of models.
+"""Numba types of bundles of models, for the arguments of a kernel call.
 
-At every call Numba works out the types of the arguments. Its quick way does not know model functions, and the slow way
-through all fields took longer than a whole LMB scan (of 177 microseconds a call, 120).
+At every call Numba determines the types of the arguments. Its fast path does not support model functions, and the slow
+path through all fields took longer than a whole LMB scan (120 of 177 microseconds per call).
 """
 
 from __future__ import annotations
@@ -13,22 +13,22 @@ import numpy as np
 
 from vedette.kernels.base.types import Motion, Sensor
 
-# The kinds of bundles that hold model functions.
+# Bundle types that contain model functions.
 TYPED_BY_FIELDS: set[type] = {Motion, Sensor}
 
 _TOLD: list[Callable[[type], object]] = []
 
-# By all that the type of a bundle depends on.
+# Cache of types, by `_key`.
 _FOUND: dict[Any, Any] = {}
 
-# Bundles with their types by identity, held so that no other comes to the same place: those that models make once.
+# Bundles that models make once, with their types, by identity; held so that no other object gets the same identity.
 _HELD_KINDS = {Motion, Sensor}
 HELD: dict[int, tuple[Any, Any]] = {}
 _MOST_HELD = 1000
 
 
 def _key(bundle: tuple[Any, ...]) -> tuple[Any, ...]:
-    """All that the type of a bundle depends on; what is found by it is kept, so that a type stands for itself."""
+    """Return everything that the type of a bundle depends on. Results are cached by it, so a type stands for itself."""
     found: list[Any] = [type(bundle)]
     for value in bundle:
         if isinstance(value, np.ndarray):
@@ -37,7 +37,7 @@ def _key(bundle: tuple[Any, ...]) -> tuple[Any, ...]:
             found.append(id(type_of_bundle(value)))  # Numba would hash all of its fields
         elif isinstance(value, tuple):
             found.append(_key(value))
-        elif hasattr(value, "numba_type"):  # asking for it compiles the function, where that is still to do
+        elif hasattr(value, "numba_type"):  # reading the attribute compiles the function if necessary
             found.append(value.kind)
         else:
             found.append(type(value))
@@ -45,7 +45,7 @@ def _key(bundle: tuple[Any, ...]) -> tuple[Any, ...]:
 
 
 def type_of_bundle(value: tuple[Any, ...], context: Any = None) -> Any:
-    """The Numba type of a bundle."""
+    """Return the Numba type of a bundle."""
     held = HELD.get(id(value))
     if held is not None:
         return held[1]
@@ -63,7 +63,7 @@ def type_of_bundle(value: tuple[Any, ...], context: Any = None) -> Any:
 
 
 def typed_by_fields(bundle: Any) -> Any:
-    """Have a bundle that holds model functions typed quickly; for use as a decorator."""
+    """Decorator that registers a bundle type with model functions for fast typing."""
     TYPED_BY_FIELDS.add(bundle)
     for tell in _TOLD:
         tell(bundle)
@@ -71,7 +71,7 @@ def typed_by_fields(bundle: Any) -> Any:
 
 
 def when_typed(tell: Callable[[type], object]) -> None:
-    """Call `tell` with every bundle that is typed quickly: those there are, and each that comes."""
+    """Call `tell` with every registered bundle type: the present ones, and each later one."""
     _TOLD.append(tell)
     for bundle in TYPED_BY_FIELDS:
         tell(bundle)

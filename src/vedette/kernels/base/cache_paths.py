@@ -1,4 +1,4 @@
-"""Where compiled kernels lie: in the user's cache, and beside the package where they were installed with it."""
+"""Folders of compiled kernels: in the user's cache, and next to the package if installed with it."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from pathlib import Path
 from vedette.kernels.base.private_files import folder_fault
 from vedette.kernels.base.sources import PACKAGE_ROOT, kernel_files, source_stamp
 
-# Made by `python dev.py release`; the name is that of no module.
+# Created by `python dev.py release`; not the name of a module.
 INSTALLED = PACKAGE_ROOT / "compiled-kernels"
 
-# The processors that what is installed was compiled for, best first: LLVM's name, and the features that code for it may
-# use, all of which a processor must have that runs it. The third level of the x86-64 psABI, and any of a kind.
+# Processor levels of installed kernels, best first: LLVM's name, and the features that the code may use and the
+# processor must have. The third level of the x86-64 psABI, and any processor of the architecture.
 LEVELS = {
     "x86-64-v3": frozenset(
         (
@@ -29,12 +29,12 @@ LEVELS = {
 
 
 def supports_level(level: str, features: str) -> bool:
-    """Whether a processor can run what was compiled for a level of `LEVELS`; features in LLVM's words, `+avx,-fma`."""
+    """Return True if a processor can run code for a level of `LEVELS`; features in LLVM's notation, `+avx,-fma`."""
     return LEVELS[level] <= {feature[1:] for feature in features.split(",") if feature.startswith("+")}
 
 
 def cache_directory() -> Path:
-    """Directory of the compiled kernels: `$VEDETTE_CACHE_DIR`, or `vedette` in the user's cache directory."""
+    """Return the folder of compiled kernels: `$VEDETTE_CACHE_DIR`, or `vedette` in the user's cache directory."""
     override = os.environ.get("VEDETTE_CACHE_DIR")
     if override:
         return Path(override)
@@ -44,16 +44,16 @@ def cache_directory() -> Path:
 
 @cache
 def compiler() -> str:
-    """What compiles: code of another version of it is not taken."""
+    """Return the version of the compiler; code of other versions is not used."""
     checks = os.environ.get("NUMBA_BOUNDSCHECK", "0") not in ("", "0")
     return f"{version('numba')} {version('llvmlite')} {checks}"
 
 
 @cache
 def folder_name(path: Path) -> str:
-    """Of the folder of a kernel module's code: those of other sources, or compilers, lie beside it.
+    """Return the folder name for a kernel module's code; code of other sources or compilers is in other folders.
 
-    Nothing in it says where the sources lie, so that all environments of a user share what is compiled.
+    It does not depend on the location of the sources, so that all environments of a user share compiled kernels.
     """
     parts = path.relative_to(PACKAGE_ROOT).with_suffix("").parts
     digest = hashlib.sha256(f"{compiler()} {source_stamp(path)}".encode()).hexdigest()
@@ -61,7 +61,7 @@ def folder_name(path: Path) -> str:
 
 
 def is_cold() -> bool:
-    """Whether no kernel at all has been compiled from these sources, so that it will be now, and kept."""
+    """Return True if no kernel has been compiled from these sources, and compiled kernels can be cached."""
     if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
         return False
     own, suffix = cache_directory(), f".py{sys.version_info[0]}{sys.version_info[1]}."

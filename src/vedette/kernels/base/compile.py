@@ -1,7 +1,7 @@
-"""The one place that says how kernels and model functions are compiled.
+"""Compilation options and wrappers of kernels and model functions, in one place.
 
-They are compiled when first called and kept on disk, see `vedette.kernels.base.disk_cache`. Numba is loaded only then
-(`vedette.kernels.base.dispatchers`): who imports the library waits for neither.
+They are compiled at their first call and cached on disk, see `vedette.kernels.base.disk_cache`. Numba is imported only
+then (`vedette.kernels.base.dispatchers`), so importing the library is fast.
 """
 
 from __future__ import annotations
@@ -33,14 +33,17 @@ _AS_PART: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True
 
 
 def kernel(function: _F) -> _F:
-    """Compile a kernel lazily, without the interpreter lock, cached under a stamp of all the sources it reaches."""
+    """Compile a kernel lazily, without the interpreter lock.
+
+    It is cached under a stamp of all the sources that it reaches.
+    """
     return _compiled(function, _OPTIONS)
 
 
 def borrowing(function: _F) -> _F:
-    """Compile a kernel that makes no array and only borrows those of its caller, so that no references are counted.
+    """Compile a kernel that allocates no array and only borrows those of its caller, so that no references are counted.
 
-    Counting costs two atomic operations for every array of a bundle and every slice: more than the arithmetic of small
+    Counting costs two atomic operations for every array of a bundle and every slice, more than the arithmetic of small
     matrices. Such a kernel may return arrays (views of its arguments) only to another such kernel, and may call only
     such kernels and model functions.
     """
@@ -48,7 +51,7 @@ def borrowing(function: _F) -> _F:
 
 
 def inlined(function: _F) -> _F:
-    """As `borrowing`, and always inlined into its caller.
+    """Compile like `borrowing`, and always inline into the caller.
 
     A bundle of arrays is passed as dozens of words, which costs more than a small kernel's own work.
     """
@@ -59,19 +62,19 @@ def _compiled(function: _F, options: dict[str, Any]) -> _F:
     return cast(_F, Kernel(function, options)) if JIT_ENABLED else function
 
 
-# What is made of a function when it is first asked for is made once, whatever threads ask.
+# Lock, so that concurrent threads compile a function once.
 _MAKING = threading.RLock()
 
 
 @cache
 def _dispatchers() -> ModuleType:
-    """What needs Numba, loaded when it is first asked for."""
+    """Import and return the module that needs Numba."""
     with interrupts_wait():
         return importlib.import_module("vedette.kernels.base.dispatchers")
 
 
 class Kernel:
-    """A function of kernels: part of those that call it, and compiled as a whole where Python calls it."""
+    """Kernel function: compiled as a part of kernels that call it, and as a whole if Python calls it."""
 
     _whole: WholeKernel | None = None
 
@@ -88,7 +91,7 @@ class Kernel:
 
     @property
     def whole(self) -> WholeKernel:
-        """What Python calls."""
+        """The compiled function that Python calls."""
         with _MAKING:
             if self._whole is None:
                 self._whole = _dispatchers().WholeKernel.of(self.py_func, self._options)
@@ -96,18 +99,18 @@ class Kernel:
 
     @cached_property
     def part(self) -> PartKernel:
-        """What other kernels call; asked for by one that is being compiled."""
+        """The compiled function that other kernels call; requested during their compilation."""
         return _dispatchers().PartKernel(self.py_func, targetoptions=self._options | _AS_PART)
 
     @property
     def _numba_type_(self) -> Any:
-        """As what Numba takes it where compiled code names it."""
+        """Numba type for compiled code that refers to it by name."""
         return self.part._numba_type_
 
 
 _VECTOR, _MATRIX, _INTEGERS = "float64[::1]", "float64[:,::1]", "int64[::1]"
 
-# kind -> (argument names that a user's function is checked against, compiled signature)
+# kind -> (argument names, for checking a user's function; compiled signature)
 SIGNATURES: dict[str, tuple[tuple[str, ...], str]] = {
     "transition": (("state", "dt", "params", "out"), f"void({_VECTOR}, float64, {_VECTOR}, {_VECTOR})"),
     "transition_jacobian": (("state", "dt", "params", "out"), f"void({_VECTOR}, float64, {_VECTOR}, {_MATRIX})"),
@@ -134,13 +137,13 @@ SIGNATURES: dict[str, tuple[tuple[str, ...], str]] = {
 
 
 class ModelFunction:
-    """A user's or built-in model function, compiled to the one signature of its kind.
+    """Model function, built-in or of a user, compiled to the signature of its kind.
 
-    Kernels receive it as a first-class function, so one compiled kernel serves every model, and an exception that the
-    function raises reaches the caller.
+    Kernels receive it as a first-class function, so one compiled kernel serves every model, and an exception in the
+    function reaches the caller.
     """
 
-    # Where its machine code lies, once it is bound; unboxing reads them.
+    # Addresses of its machine code after `bind`; read by unboxing.
     c_address: int
     jit_address: int
     _numba_type: Any = None
@@ -152,19 +155,19 @@ class ModelFunction:
         note_source(function)
 
     def __call__(self, *args: Any) -> Any:
-        """From Python, where an argument may be a read-only array of a density's."""
+        """Call the function from Python; read-only arrays, such as those of densities, are copied."""
         if self._numba_type is None:
             self.bind()
         return self.dispatcher(*map(_writeable, args))
 
     @cached_property
     def dispatcher(self) -> ModelDispatcher:
-        """What compiles it and calls it from Python."""
+        """Numba dispatcher that compiles it and calls it from Python."""
         return _dispatchers().ModelDispatcher.of_model(self, dict(_OPTIONS))
 
     @property
     def numba_type(self) -> Any:
-        """The type by which kernels know it; asking for it compiles the function."""
+        """Numba type in kernels; reading it compiles the function."""
         if self._numba_type is None:
             self.bind()
         return self._numba_type
@@ -172,14 +175,14 @@ class ModelFunction:
     _numba_type_ = numba_type
 
     def bind(self) -> None:
-        """Compile to the signature of the kind and note where the machine code lies; any number of threads may ask."""
+        """Compile to the signature of the kind, and store the addresses of the machine code; thread-safe."""
         with _MAKING:
             dispatcher = self.dispatcher
         self.c_address, self.jit_address, found = _dispatchers().addresses_of(dispatcher)
         self._numba_type = found  # last, as it is read without a lock
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A built-in one by its name; a user's with its code."""
+        """Pickle a built-in function by its name, and a user's with its code."""
         named = self.py_func.__module__, self.py_func.__qualname__
         if named[0].startswith("vedette.") and _found(*named) is self:
             return _found, named
@@ -199,7 +202,7 @@ def _model_of(dispatcher: ModelDispatcher) -> ModelFunction:
 
 
 def check_arguments(function: Callable[..., Any], kind: str) -> None:
-    """Raise `TypeError` unless `function` takes the number of arguments that its kind demands."""
+    """Raise `TypeError` unless `function` has the number of arguments that its kind requires."""
     if kind not in SIGNATURES:
         raise TypeError(f"model function kind: expected one of {', '.join(SIGNATURES)}; got {kind!r}")
     expected = SIGNATURES[kind][0]
@@ -214,8 +217,8 @@ def check_arguments(function: Callable[..., Any], kind: str) -> None:
 def compile_model_function(function: Callable[..., Any], kind: str) -> Any:
     """Compile `function` as a model function of `kind`.
 
-    The library's own functions are known to compile and wait until a model uses them, which saves seconds at the first
-    start; a user's is compiled here, where its faults can be told.
+    The library's own functions are known to compile and are compiled at first use, which saves seconds at the first
+    start. A user's function is compiled here, where its errors can be reported.
 
     Raises `TypeError` for a wrong kind, a wrong number of arguments, or a body that Numba cannot compile.
     """

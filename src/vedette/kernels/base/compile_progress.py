@@ -1,4 +1,4 @@
-"""Says what is being compiled, to whoever asked: a start that compiles takes minutes, and should not look stuck."""
+"""Progress of compilation for a listener, as a start that compiles takes minutes and should not look stuck."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from vedette.kernels.base.compile import Kernel
 
 @dataclass(frozen=True, slots=True)
 class CompileProgress:
-    """A kernel that is being compiled with all that it calls."""
+    """A kernel that is being compiled with everything that it calls."""
 
     name: str
-    num_done: int  # functions, of those that were not compiled before
+    num_done: int  # functions compiled so far, of those that had to be compiled
     num_functions: int
 
 
@@ -23,7 +23,7 @@ Listener = Callable[[CompileProgress | None], None]
 
 
 class _Watch:
-    """Counts the functions of one kernel after another, and tells the listener; None where one is done."""
+    """Counts the functions of the kernel that is compiled, and notifies the listener; None when a kernel is done."""
 
     def __init__(self, listener: Listener) -> None:
         self._tell = listener
@@ -33,7 +33,7 @@ class _Watch:
         self._follows = False
 
     def begin(self, function: Callable[..., Any]) -> None:
-        """A kernel is compiled now."""
+        """Start counting for a kernel that is compiled now."""
         if not self._follows:
             self._follows = True
             self._following.enter_context(_compile_listener(self._compiled_one))
@@ -41,11 +41,11 @@ class _Watch:
         self._tell(self._state)
 
     def end(self) -> None:
-        """It is done."""
+        """Notify the listener that the kernel is compiled."""
         self._tell(None)
 
     def close(self) -> None:
-        """Hear of no more."""
+        """Stop listening to Numba."""
         self._following.close()
 
     def _compiled_one(self, function: Callable[..., Any]) -> None:
@@ -58,7 +58,7 @@ class _Watch:
 
 @contextmanager
 def _compile_listener(tell: Callable[[Callable[..., Any]], None]) -> Iterator[None]:
-    """Numba says of every function when it has compiled it."""
+    """Context manager that calls `tell` with every function that Numba has compiled."""
     from numba.core import event
 
     class Follower(event.Listener):  # type: ignore[misc]
@@ -73,7 +73,7 @@ def _compile_listener(tell: Callable[[Callable[..., Any]], None]) -> Iterator[No
 
 
 def _reached(function: Callable[..., Any]) -> set[int]:
-    """The function and all kernels that it calls, as far as their names tell."""
+    """Return the ids of the function and of all kernels that it calls, resolved by their names."""
     found, pending = {id(function)}, [function]
     while pending:
         code, names = pending[-1].__code__, pending.pop().__globals__
@@ -90,7 +90,9 @@ _watch: _Watch | None = None
 
 @contextmanager
 def watched(listener: Listener) -> Iterator[None]:
-    """Tell `listener` of every kernel that is compiled meanwhile: of each function done, and None at its end."""
+    """Context manager that notifies `listener` of compilation: of each function done, and None at the end of a
+    kernel.
+    """
     global _watch
     before, _watch = _watch, _Watch(listener)
     try:
@@ -101,12 +103,12 @@ def watched(listener: Listener) -> Iterator[None]:
 
 
 def compilation_begins(function: Callable[..., Any]) -> None:
-    """A kernel was not on disk."""
+    """Report that a kernel was not in the cache and is compiled now."""
     if _watch is not None:
         _watch.begin(function)
 
 
 def compilation_ends() -> None:
-    """It is compiled."""
+    """Report that a kernel is compiled."""
     if _watch is not None:
         _watch.end()

@@ -1,7 +1,7 @@
-"""Compiled kernels and model functions on disk, safe for any number of processes at once.
+"""Disk cache of compiled kernels and model functions, safe for any number of processes at once.
 
-What is kept is found by the sources it was compiled of (`vedette.kernels.base.sources`). An entry is a pickle, so it is
-read only where nobody else can have written it, see `vedette.kernels.base.private_files`.
+Entries are found by the sources they were compiled from (`vedette.kernels.base.sources`). An entry is a pickle, so it
+is read only if no other user can have written it, see `vedette.kernels.base.private_files`.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ _MARK_LENGTH = hashlib.sha256().digest_size
 
 
 class _PackageLocator:
-    """Numba cache locator for functions defined inside this package (the protocol of `numba.core.caching`)."""
+    """Numba cache locator for functions inside this package (the protocol of `numba.core.caching`)."""
 
     def __init__(self, function: Callable[..., Any], path: Path) -> None:
         self._path = path
-        self._py_file = str(path)  # Numba's warnings about code that cannot be cached name it
+        self._py_file = str(path)  # named in Numba's warnings about code that cannot be cached
         self._line = function.__code__.co_firstlineno
 
     def ensure_cache_path(self) -> None:
-        """Where none can be made, what is installed can still be read."""
+        """Create the folder if possible; otherwise installed kernels can still be read."""
         with contextlib.suppress(OSError):
             make_private_folder(Path(self.get_cache_path()))
 
@@ -59,26 +59,26 @@ class _PackageLocator:
 
 
 class _Place:
-    """A folder that holds entries of one function, for this machine or for all of a level of `LEVELS`."""
+    """Folder with entries of one function, for this machine or for all machines of a level of `LEVELS`."""
 
     def __init__(self, folder: Path, level: str | None = None) -> None:
         self.folder = folder
         self._level = level
 
     def serves(self, key: Any) -> bool:
-        """Whether the machine that this key is of can run what is here."""
+        """Return True if this machine can run the cached code stored under `key`."""
         _, (_, _, features), _ = key
         return self._level is None or supports_level(self._level, features)
 
     def key(self, key: Any) -> Any:
-        """The key here of what has this key on this machine."""
+        """Return the key in this folder for a key of this machine."""
         if self._level is None:
             return key
         signature, (triple, _, _), code = key
         return signature, (triple, self._level, ""), code
 
     def is_safe(self, source: Path) -> bool:
-        """Whether it is there and nobody else can write to it; warns once of one that others can write."""
+        """Return True if the folder exists and no other user can write to it; warn once if others can."""
         try:
             fault = _fault_of(self.folder.resolve(), source)
         except (OSError, RuntimeError):
@@ -89,10 +89,10 @@ class _Place:
 
 
 class _EntryFile:
-    """The entries of one function, each in a file of its own that is named by its key.
+    """Entries of one function, each in a file of its own that is named by its key.
 
-    Numba's own keeps an index of numbered files: of two processes that compile at once, one entry is lost or comes to
-    stand under the other's key. Here every file is whole and says what it is; the last of equal writers wins.
+    Numba's own class keeps an index of numbered files: if two processes compile at once, an entry is lost or stored
+    under the other's key. Here every file is complete and identifies itself; the last of equal writers wins.
     """
 
     def __init__(self, places: list[_Place], filename_base: str, source_stamp: str, source: Path) -> None:
@@ -102,7 +102,7 @@ class _EntryFile:
         self._stamp = source_stamp
 
     def save(self, key: Any, data: Any) -> None:
-        """Keep an entry. A disk that is full or not ours to write leaves it compiled in memory alone."""
+        """Store an entry. If the disk is full or not writable, the code stays in memory only."""
         own = self._places[0]
         if not own.is_safe(self._source):
             return
@@ -117,7 +117,7 @@ class _EntryFile:
                 partial.unlink(missing_ok=True)
 
     def load(self, key: Any) -> Any:
-        """The entry; None where there is none, one of other sources, a damaged one, or one that others can write."""
+        """Return the entry; None if it is missing, damaged, of other sources, or writable by other users."""
         for place in self._places:
             if place.serves(key) and place.is_safe(self._source):
                 found = self._load(self._path(place, key), place.key(key))
@@ -134,7 +134,7 @@ class _EntryFile:
             return None
         try:
             return pickle.loads(content)
-        except ImportError:  # compiled when its file was a module of another name
+        except ImportError:  # compiled when its module had another name
             return None
 
     def flush(self) -> None:
@@ -169,25 +169,25 @@ class _Cache(FunctionCache):  # type: ignore[misc]
         self._cache_file = _EntryFile(places, self._impl.filename_base, stamp, source)
 
     def _index_key(self, sig: Any, codegen: Any) -> Any:
-        """As Numba's, without the bytecode of this package's functions: their sources are in the stamp.
+        """Return Numba's key, without the bytecode of this package's functions, as their sources are in the stamp.
 
-        Python's bytecode is another one without docstrings (`PYTHONOPTIMIZE=2`), the compiled code is the same.
+        Python's bytecode differs without docstrings (`PYTHONOPTIMIZE=2`), but the compiled code is the same.
         """
         signature, target, (code, closure) = super()._index_key(sig, codegen)
         return signature, target, ("" if isinstance(self._impl.locator, _PackageLocator) else code, closure)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """As Numba's, but all of its own functions are loaded only where one is compiled: half a second."""
+        """Load like Numba, but without importing all of Numba's own functions, which takes half a second."""
         rtsys.initialize(target_context)
         with self._guard_against_spurious_io_errors():
             return self._load_overload(sig, target_context)
 
 
 class LazyCache:
-    """What a dispatcher keeps its code in, set up when it first looks there: most kernels are only called by others.
+    """Cache of a dispatcher, created at first use, as most kernels are only called by others.
 
-    Nothing is kept where that is impossible or not safe: a function typed at a prompt has no file. Warns once of a
-    folder that others can write.
+    Nothing is cached if that is impossible or unsafe: a function typed at a prompt has no file. Warns once about a
+    folder that other users can write.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
@@ -195,7 +195,7 @@ class LazyCache:
 
     @cached_property
     def own(self) -> Any:
-        """The cache of the function."""
+        """Cache of the function."""
         try:
             return _Cache(self._function)
         except (RuntimeError, OSError):
@@ -203,30 +203,30 @@ class LazyCache:
 
     @property
     def cache_path(self) -> Any:
-        """Where it keeps things."""
+        """Folder of the cache."""
         return self.own.cache_path
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
-        """What was compiled for these types, or None: then it is compiled now."""
+        """Return the cached code for these types, or None: then it is compiled now."""
         found = self.own.load_overload(signature, target_context)
         if found is None:
             compile_progress.compilation_begins(self._function)
-            with interrupts_wait():  # what Numba compiles with, which would stay half there
+            with interrupts_wait():  # an interrupted import would leave Numba's compiler incomplete
                 cpu_target.typing_context.refresh()
                 target_context.refresh()
         return found
 
     def save_overload(self, signature: Any, data: Any) -> None:
-        """Keep what was compiled."""
+        """Store compiled code."""
         compile_progress.compilation_ends()
         self.own.save_overload(signature, data)
 
 
-# A process finds out once a file, not once a function.
+# Cached, as the check is needed once per file and not once per function.
 _fault_of = cache(folder_fault)
 
 
-@cache  # once a process, not once a function
+@cache  # once per process, not once per function
 def _warn_of(fault: str) -> None:
     warnings.warn(
         f"compiled kernels on disk are not used: {fault}, and they are code; all are compiled anew, for minutes. "

@@ -1,6 +1,6 @@
-"""What compiles kernels and model functions, and calls them from Python: all that needs Numba.
+"""Dispatchers that compile kernels and model functions, and call them from Python; the only module that needs Numba.
 
-Loaded when the first of them is called, compiled or read from disk.
+Imported when the first of them is called, compiled or read from disk.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from vedette.kernels.base.disk_cache import LazyCache
 from vedette.kernels.base.libraries import PartLibrary, WholeLibrary, made_as
 from vedette.kernels.base.nopython_return import NAMED, returned_without_python
 
-# What is returned: None for anything without names inside it, else its class and those of its fields.
+# Shape of a return value: None without named tuples in it, else its class and the shapes of its fields.
 Shape = tuple[type, tuple[Any, ...]] | None
 
 when_typed(lambda bundle: typeof_impl.register(bundle)(type_of_bundle))
 
 
 def shape_of(kind: Any) -> Shape:
-    """The names in a return type."""
+    """Return the named tuples in a return type."""
     if not isinstance(kind, types.BaseTuple):
         return None
     fields = tuple(shape_of(field) for field in kind.types)
@@ -42,7 +42,7 @@ def shape_of(kind: Any) -> Shape:
 
 
 def naming(shape: Shape) -> Callable[[tuple[Any, ...]], Any]:
-    """What gives the plain tuples of a shape their names."""
+    """Return a function that turns the plain tuples of a shape into its named tuples."""
     assert shape is not None
     bundle, fields = shape
     if not any(fields):
@@ -59,10 +59,10 @@ def naming(shape: Shape) -> Callable[[tuple[Any, ...]], Any]:
 
 
 class PartKernel(CPUDispatcher):  # type: ignore[misc]
-    """A function as other kernels call it."""
+    """Kernel function as other kernels call it."""
 
     def compile(self, sig: Any) -> Any:
-        """As a part."""
+        """Compile as a part of other kernels."""
         with made_as(PartLibrary, self.targetctx.codegen()):
             return super().compile(sig)
 
@@ -74,21 +74,24 @@ def _is_read_only(kind: Any) -> bool:
 
 
 class WholeKernel(CPUDispatcher):  # type: ignore[misc]
-    """A function with all that it reaches, as Python calls it; kept on disk."""
+    """Kernel function with everything that it reaches, as Python calls it; cached on disk."""
 
-    # What gives names to the plain tuples that it returns; None where they are to have none.
+    # Function that names the plain tuples that it returns; None if there are none to name.
     name: Callable[[Any], Any] | None = None
     _shape: Shape = None
 
     @classmethod
     def of(cls, function: Callable[..., Any], options: dict[str, Any]) -> WholeKernel:
-        """The whole of a function."""
+        """Return the whole kernel of a function."""
         whole = cls(function, targetoptions=options)
         whole._cache = LazyCache(function)
         return whole
 
     def compile(self, sig: Any) -> Any:
-        """As a whole; raises `TypeError` for a read-only array, for which all would be compiled anew, for minutes."""
+        """Compile as a whole.
+
+        Raises `TypeError` for a read-only array, as compiling everything again for it would take minutes.
+        """
         arguments, _ = normalize_signature(sig)
         if any(map(_is_read_only, arguments)):
             raise TypeError(f"kernel {self.py_func.__qualname__}: expected writeable arrays; got a read-only one")
@@ -96,8 +99,8 @@ class WholeKernel(CPUDispatcher):  # type: ignore[misc]
             return super().compile(sig)
 
     def add_overload(self, cres: Any) -> None:
-        """Take what was compiled or read from disk; all that a call needs stands before it can be called."""
-        for environment in cres._find_referenced_environments():  # those of the parts, too
+        """Add code that was compiled or read from disk; everything that a call needs is set before it can be called."""
+        for environment in cres._find_referenced_environments():  # includes those of the parts
             self.targetctx.codegen().set_env(environment.env_name, environment)
         shape = shape_of(cres.signature.return_type)
         if self.overloads and shape != self._shape:
@@ -106,9 +109,9 @@ class WholeKernel(CPUDispatcher):  # type: ignore[misc]
         super().add_overload(cres)
 
     def typeof_pyval(self, value: Any) -> Any:
-        """The type of an argument that Numba's quick way does not know; asked for by its dispatcher.
+        """Return the type of an argument that Numba's fast path does not support; called by its dispatcher.
 
-        Numba's own way notes a bundle's type as in use, for which the types of all its fields are hashed.
+        Numba's own method registers a bundle's type as in use, which hashes the types of all its fields.
         """
         if type(value) in TYPED_BY_FIELDS:
             held = HELD.get(id(value))
@@ -117,13 +120,13 @@ class WholeKernel(CPUDispatcher):  # type: ignore[misc]
 
 
 class ModelDispatcher(WholeKernel):
-    """A model function's machine code, of the one signature of its kind."""
+    """Dispatcher of a model function, for the single signature of its kind."""
 
     model: ModelFunction
 
     @classmethod
     def of_model(cls, model: ModelFunction, options: dict[str, Any]) -> ModelDispatcher:
-        """What compiles a model function."""
+        """Return the dispatcher of a model function."""
         dispatcher: ModelDispatcher = cls.of(model.py_func, options)
         dispatcher.model = model
         return dispatcher
@@ -133,7 +136,7 @@ class ModelDispatcher(WholeKernel):
 
     @classmethod
     def _rebuild(cls, kind: str, **states: Any) -> ModelDispatcher:
-        """What unpickling in another process calls; another thread must not meet it half built."""
+        """Restore from a pickle in another process; locked, so that no other thread sees it incomplete."""
         with global_compiler_lock:
             dispatcher: ModelDispatcher = super()._rebuild(**states)
             if not hasattr(dispatcher, "model"):
@@ -143,18 +146,18 @@ class ModelDispatcher(WholeKernel):
 
 
 def addresses_of(dispatcher: ModelDispatcher) -> tuple[int, int, Any]:
-    """Where a model function's code lies, for C and for kernels, and the type by which kernels know it; compiles it."""
-    # Numba's own lock: a thread that compiles a kernel holds it when it asks for the types of functions.
+    """Compile a model function; return its addresses for C and for kernels, and its Numba type."""
+    # Numba's own lock: a thread that compiles a kernel holds it while it asks for the types of functions.
     with global_compiler_lock:
         args, result = normalize_signature(SIGNATURES[dispatcher.model.kind][1])
         signature = result(*args)
-        if not dispatcher.overloads:  # an unpickled one comes compiled
+        if not dispatcher.overloads:  # an unpickled one is compiled already
             dispatcher.compile(signature)
             dispatcher.disable_compile()
         compiled = dispatcher.get_compile_result(signature)
         names = compiled.fndesc.llvm_cfunc_wrapper_name, compiled.fndesc.llvm_func_name
         c_address, jit_address = map(compiled.library.get_pointer_to_function, names)
-        if not (c_address and jit_address):  # a kernel that calls it would wait for ever
+        if not (c_address and jit_address):  # a kernel that calls address 0 would never return
             raise RuntimeError(f"the machine code of {dispatcher.py_func.__qualname__} was not found")
         return c_address, jit_address, _ModelFunctionType(compiled.signature)
 
@@ -162,7 +165,7 @@ def addresses_of(dispatcher: ModelDispatcher) -> tuple[int, int, Any]:
 class _ModelFunctionType(types.FunctionType):  # type: ignore[misc]
     """Numba's first-class function type, unboxed from two stored addresses.
 
-    Numba's own unboxing looks both addresses up by name at every call of a kernel: 50 microseconds a function.
+    Numba's own unboxing looks up both addresses by name at every call of a kernel: 50 microseconds per function.
     """
 
 
@@ -182,7 +185,7 @@ def _unbox_model_function(kind: Any, value: Any, context: Any) -> Any:
 
 @lower_constant(_ModelFunctionType)  # type: ignore[untyped-decorator]
 def _named_model_function(context: Any, builder: Any, kind: Any, value: ModelFunction) -> Any:
-    """One that compiled code names."""
+    """Return the constant for a model function that compiled code refers to by name."""
     struct = cgutils.create_struct_proxy(kind)(context, builder)
     for field, address in (("c_addr", value.c_address), ("jit_addr", value.jit_address), ("py_addr", id(value))):
         setattr(struct, field, context.add_dynamic_addr(builder, address, info=str(kind)))

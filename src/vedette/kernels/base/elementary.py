@@ -1,7 +1,7 @@
-"""Exponentials, logarithms and angles of many numbers at once: polynomials in loops that the compiler vectorises.
+"""Vectorised exponentials, logarithms and angles: polynomials in loops that the compiler vectorises.
 
-Within two units in the last place of the exact values. A call of the system's function for each number would keep the
-whole loop from wide registers.
+Within two units in the last place of the exact values. Calling the system's function for each number would prevent
+vectorisation of the whole loop.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints
 
-# Added to a number below 2^51 it leaves the nearest integer in the last bits.
+# Adding it to a number below 2^51 leaves the nearest integer in the last bits.
 _ROUNDER = 1.5 * 2.0**52
 _ROUNDER_BITS = int(np.float64(_ROUNDER).view(np.int64))
 _ONE_BITS = int(np.float64(1.0).view(np.int64))
@@ -22,17 +22,17 @@ _ROOT_HALF_BITS = int(np.float64(math.sqrt(0.5)).view(np.int64))
 _MANTISSA_BITS = 52
 
 _PER_LOG_2 = 1.0 / math.log(2.0)
-# log 2 in two parts, of which products of the first with exponents are exact.
+# log 2 in two parts; products of the first with exponents are exact.
 _LOG_2_HIGH = 6.93147180369123816490e-01
 _LOG_2_LOW = 1.90821492927058770002e-10
 
-# Of factorials.
+# Inverse factorials.
 _INVERSE_9, _INVERSE_10, _INVERSE_11 = 1.0 / 362880.0, 1.0 / 3628800.0, 1.0 / 39916800.0
 _INVERSE_12, _INVERSE_13 = 1.0 / 479001600.0, 1.0 / 6227020800.0
 
 LARGEST_EXPONENT = 700.0
 
-# Angles in two parts, the second what the first lacks.
+# Angles in two parts; the second is the rounding error of the first.
 _HALF_PI_HIGH, _HALF_PI_LOW = 1.57079632679489655800e00, 6.12323399573676603587e-17
 _ATAN_HALF_HIGH, _ATAN_HALF_LOW = 4.63647609000806093515e-01, 2.26987774529616870924e-17
 
@@ -52,7 +52,7 @@ def make_bits(num: int) -> Bits:
 
 @borrowing
 def exponentials(values: Floats, work: Bits) -> None:
-    """values = exp(values), which are at most `LARGEST_EXPONENT` from zero, or NaN."""
+    """Set values = exp(values), for values within `LARGEST_EXPONENT` of zero, or NaN."""
     numbers, bits, num = work.numbers, work.bits, values.shape[0]
     # exp x = 2^k exp r with the integer k nearest to x / log 2, and |r| <= log(2) / 2.
     for s in range(num):
@@ -75,7 +75,7 @@ def exponentials(values: Floats, work: Bits) -> None:
 
 @inlined
 def _split(bits: Ints, more: Ints, num: int) -> None:
-    """Of numbers 2^k m with m between sqrt(1/2) and sqrt(2), bits become those of m, and more those of k + _ROUNDER."""
+    """Split numbers 2^k m, m between sqrt(1/2) and sqrt(2): bits become those of m, and more those of k + _ROUNDER."""
     for s in range(num):
         k = (bits[s] - _ROOT_HALF_BITS) >> _MANTISSA_BITS
         more[s] = k + _ROUNDER_BITS
@@ -84,7 +84,7 @@ def _split(bits: Ints, more: Ints, num: int) -> None:
 
 @inlined
 def _log_near_one(f: float) -> float:
-    """log(1 + f) = 2 artanh(f / (2 + f)), its series with the coefficients of fdlibm (e_log.c)."""
+    """Return log(1 + f) = 2 artanh(f / (2 + f)), by its series with the coefficients of fdlibm (e_log.c)."""
     root = f / (2.0 + f)
     z = root * root
     w = z * z
@@ -99,7 +99,7 @@ def _log_near_one(f: float) -> float:
 
 @borrowing
 def logs_of_one_and(values: Floats, work: Bits, more: Bits) -> None:
-    """values = log(1 + values), which are finite and not below zero, or NaN."""
+    """Set values = log(1 + values), for finite values of at least zero, or NaN."""
     numbers, num = work.numbers, values.shape[0]
     for s in range(num):
         numbers[s] = 1.0 + values[s]
@@ -107,13 +107,13 @@ def logs_of_one_and(values: Floats, work: Bits, more: Bits) -> None:
     for s in range(num):
         x, k = values[s], more.numbers[s] - _ROUNDER
         whole = 1.0 + x
-        lost = (x - (whole - 1.0)) / whole  # what the sum 1 + x has lost, in the logarithm
+        lost = (x - (whole - 1.0)) / whole  # correction of the rounding error of 1 + x
         values[s] = k * _LOG_2_HIGH + (_log_near_one(numbers[s] - 1.0) + (k * _LOG_2_LOW + lost))
 
 
 @borrowing
 def logs(values: Floats, work: Bits, more: Bits) -> None:
-    """values = log(values), which are above 1e-300 and finite; NaN of others that are no such numbers."""
+    """Set values = log(values), for finite values above 1e-300; NaN for values that are not positive."""
     numbers, num = work.numbers, values.shape[0]
     for s in range(num):
         numbers[s] = values[s]
@@ -126,10 +126,10 @@ def logs(values: Floats, work: Bits, more: Bits) -> None:
 
 @borrowing
 def directions(y: Floats, x: Floats, out: Floats) -> None:
-    """out = atan2(y, x) of finite numbers, in [-pi, pi]; 0 where both are 0.
+    """Set out = atan2(y, x) for finite numbers, in [-pi, pi]; 0 if both are 0.
 
     With the coefficients of fdlibm (s_atan.c). The arc tangent of the quotient t of the smaller by the larger is
-    atan(c) + atan((t - c) / (1 + c t)), with c of 0, 1/2 and 1 the one that leaves the least.
+    atan(c) + atan((t - c) / (1 + c t)), with c the one of 0, 1/2 and 1 that leaves the smallest remainder.
     """
     for s in range(out.shape[0]):
         across, along = abs(y[s]), abs(x[s])

@@ -1,4 +1,4 @@
-"""Work that Ctrl-C must not cut in two."""
+"""Deferral of Ctrl-C during work that must not be interrupted."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from typing import Any
 
 @contextmanager
 def interrupts_wait() -> Iterator[None]:
-    """Have SIGINT wait until the work inside is done, for a second or less.
+    """Context manager that defers SIGINT until the work inside is done, for a second or less.
 
-    Numba that is interrupted while it is imported stays half there, and every later call of a kernel fails. Only the
-    main thread is ever interrupted, and only it may say how.
+    If the import of Numba is interrupted, it stays incomplete, and every later call of a kernel fails. Only the main
+    thread receives interrupts, and only it may install handlers.
     """
     before = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or not callable(before):

@@ -1,8 +1,8 @@
-"""How the code of kernels that call each other comes together: each is optimised once, in what Python calls.
+"""Linking of the code of kernels that call each other: each is optimised once, in the kernel that Python calls.
 
-Numba optimises a function and makes machine code of it, then takes it into every function that calls it and does so
-again, level by level. Here what only kernels call stays a *part*, unoptimised and without machine code, and what Python
-calls is made a *whole* of all the parts that it reaches.
+Numba optimises a function and makes machine code from it, then includes it in every function that calls it and repeats
+this, level by level. Here code that only kernels call stays a *part*, unoptimised and without machine code, and a
+kernel that Python calls is a *whole* of all the parts that it reaches.
 """
 
 from __future__ import annotations
@@ -16,38 +16,41 @@ from numba.core.compiler_lock import global_compiler_lock
 
 
 class PartLibrary(JITCodeLibrary):  # type: ignore[misc]
-    """Code that is only ever run as part of other code."""
+    """Code that only runs as part of other code."""
 
     @property
     def codegen(self) -> Any:
-        """Asked for one thing: to tell the code where its environment lies, which is the whole's affair."""
+        """Used for one purpose: to set the environment of the code, which the whole does."""
         return _NoEnvironment
 
     @property
     def called(self) -> list[Any]:
-        """The libraries of what it calls."""
+        """Libraries of the functions that it calls."""
         return list(self._linking_libraries)
 
     def finalize(self) -> None:
-        """Nothing more may be added."""
+        """Freeze the library."""
         self._raise_if_finalized()
         for library in self._linking_libraries:
             self._reload_init.update(library._reload_init)
         self._finalized = True
 
     def own_module(self) -> Any:
-        """Its code without what it calls."""
+        """Return its code without the functions that it calls."""
         return super()._get_module_for_linking()
 
     def _get_module_for_linking(self) -> Any:
-        """With all that it calls, for functions that are not compiled here: a user's own."""
+        """Return its code with all functions that it calls.
+
+        Used by functions that are not compiled here, such as a user's.
+        """
         module = self.own_module().clone()
         for library in _all_of(self.called):
             module.link_in(_code_of(library)._get_module_for_linking(), preserve=True)
         return module
 
     def get_pointer_to_function(self, name: str) -> int:
-        """None: there is no machine code."""
+        """Return 0, as there is no machine code."""
         return 0
 
 
@@ -55,14 +58,14 @@ class WholeLibrary(JITCodeLibrary):  # type: ignore[misc]
     """Code with all the parts that it reaches, each once."""
 
     def finalize(self) -> None:
-        """Take in the parts, optimise, and make machine code."""
+        """Link the parts, optimise, and make machine code."""
         self._linking_libraries: list[Any] = [_code_of(library) for library in _all_of(self._linking_libraries)]
         super().finalize()
 
     def _optimize_final_module(self) -> None:
-        """Once all is linked: what nothing asked for at its turn was left out by LLVM, and is linked again.
+        """Link again the parts that LLVM left out because nothing linked before used them, then optimise.
 
-        To link all that call a part before it would leave nothing out, but what LLVM then makes of it is 7 to 13 %
+        Linking every caller before its parts would leave nothing out, but the code that LLVM then makes is 7 to 13 %
         slower in decisions on GLMBs.
         """
         missing = _names(self._final_module, declared=True)
@@ -76,7 +79,7 @@ class WholeLibrary(JITCodeLibrary):  # type: ignore[misc]
         super()._optimize_final_module()
 
     def serialize_using_object_code(self) -> tuple[str, str, Any]:
-        """Machine code and the names that it defines: nothing takes a whole in, so that nobody needs its source."""
+        """Return machine code and the names that it defines; the source is not needed, as nothing links a whole."""
         self._ensure_finalized()
         module = self._final_module
         items = (*module.functions, *module.global_variables)
@@ -98,7 +101,7 @@ class WholeLibrary(JITCodeLibrary):  # type: ignore[misc]
 
 
 def _all_of(libraries: list[Any]) -> list[Any]:
-    """These, and all the libraries that parts among them reach, each once."""
+    """Return these libraries and all that parts among them reach, each once."""
     found: dict[Any, None] = {}
     pending = list(reversed(libraries))
     while pending:
@@ -110,7 +113,7 @@ def _all_of(libraries: list[Any]) -> list[Any]:
 
 
 def _names(module: Any, *, declared: bool) -> set[str]:
-    """The compiled functions that a module only declares, or those that it defines."""
+    """Return the compiled functions that a module only declares, or those that it defines."""
     return {item.name for item in module.functions if item.is_declaration == declared and item.name.startswith("_ZN")}
 
 
@@ -119,7 +122,7 @@ def _code_of(library: Any) -> Any:
 
 
 class _OwnCode:
-    """A part's own code, as what takes it in asks for it."""
+    """Adapter that links only a part's own code."""
 
     def __init__(self, part: PartLibrary) -> None:
         self._part = part
@@ -132,12 +135,15 @@ class _OwnCode:
 class _NoEnvironment:
     @staticmethod
     def set_env(name: str, environment: Any) -> None:
-        """Not here."""
+        """Do nothing: the whole sets environments."""
 
 
 @contextmanager
 def made_as(kind: type, codegen: Any) -> Iterator[None]:
-    """Have what is compiled meanwhile made as libraries of this kind; what it calls first may be made as another."""
+    """Context manager in which code is compiled into libraries of this class.
+
+    Functions that it calls may use another class.
+    """
     with global_compiler_lock:
         before = codegen._library_class
         codegen._library_class = kind

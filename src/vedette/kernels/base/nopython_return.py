@@ -1,9 +1,9 @@
-"""How what a kernel returns comes to Python: arrays and plain tuples, which get their names there.
+"""Return values of kernels without running Python code in them: arrays and plain tuples, which are named afterwards.
 
 Numba runs Python inside machine code to return an array (it unpickles the array's class) and a named tuple (it calls
-it). Python may run a signal's handler there, and the machine code goes on with the nothing that an interrupted call
-returns: a Ctrl-C ended the process with a segmentation fault. What is made here runs no Python, so that an interrupt
-comes before or after it, and takes less time.
+it). Python may run a signal handler there, and the machine code continues with the null result of an interrupted call:
+Ctrl-C then crashed the process with a segmentation fault. The boxing here runs no Python, so that an interrupt comes
+before or after it, and is faster.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from numba.core.boxing import box_tuple
 from numba.core.pythonapi import _boxers
 from numba.np.numpy_support import as_dtype
 
-# What a named tuple is to Numba.
+# Numba types of named tuples.
 NAMED = (types.NamedTuple, types.NamedUniTuple)
 
 
 def _box_array(kind: Any, value: Any, c: Any) -> Any:
-    """As Numba's, with the class of arrays among the constants of the code."""
+    """Box an array like Numba, but with the array class among the constants of the code."""
     array_class, dtype = (
         c.env_manager.read_const(c.env_manager.add_const(constant))
         for constant in (kind.box_type, as_dtype(kind.dtype))
@@ -43,7 +43,7 @@ _BOXERS = {types.Array: _box_array, **dict.fromkeys(NAMED, box_tuple)}
 
 @contextmanager
 def returned_without_python() -> Iterator[None]:
-    """Have what is compiled meanwhile return so; for a caller who holds the compiler's lock."""
+    """Context manager in which code is compiled with this boxing; the caller must hold the compiler's lock."""
     before = {kind: _boxers.functions[kind] for kind in _BOXERS}
     _boxers.functions.update(_BOXERS)
     try:

@@ -1,6 +1,6 @@
-"""Files that nobody else can have written: what is unpickled is run.
+"""Files that no other user can have written, as unpickling runs code.
 
-A place is private where no one but this user, root and whoever owns the source (whose code runs anyway) can write. On
+A place is private if only this user, root and the owner of the source (whose code runs anyway) can write there. On
 systems without owners and modes every place counts as private.
 """
 
@@ -12,20 +12,20 @@ from functools import cache
 from pathlib import Path
 
 _OWNED = os.name == "posix"
-_OUTSIDE_NAMESPACE = 65534  # how the owners of the folders above show inside a user namespace (a container)
+_OUTSIDE_NAMESPACE = 65534  # owner of outer folders as seen inside a user namespace (a container)
 
 
 def make_private_folder(folder: Path) -> None:
-    """Make the folder, and what is missing above it, for this user alone. Raises `OSError` where that is impossible."""
+    """Create a folder and missing parents for this user only. Raises `OSError` if that is impossible."""
     for part in (*reversed(folder.parents), folder):
         if not part.exists():
             part.mkdir(mode=0o700, exist_ok=True)
 
 
 def folder_fault(folder: Path, source: Path) -> str | None:
-    """What lets others write into the folder, or swap it, from the top; None where nothing does.
+    """Return why other users can write into the folder or replace it, checking from the top; None if they cannot.
 
-    folder: resolved, without links. source: the file whose owner is trusted. Raises `OSError` where one is not there.
+    folder: resolved, without links. source: file whose owner is trusted. Raises `OSError` if one does not exist.
     """
     if not _OWNED:
         return None
@@ -35,14 +35,14 @@ def folder_fault(folder: Path, source: Path) -> str | None:
         above = part != folder
         if status.st_uid not in owners and not (above and status.st_uid == _OUTSIDE_NAMESPACE):
             return f"{part} belongs to another user"
-        # In a sticky folder such as /tmp others cannot rename what is ours.
+        # In a sticky folder such as /tmp other users cannot rename our files.
         if _others_can_write(status) and not (above and status.st_mode & stat.S_ISVTX):
             return f"others can write to {part}"
     return None
 
 
 def read_private(path: Path, source: Path) -> bytes | None:
-    """The content of a file; None where there is none or others can have written it."""
+    """Return the content of a file; None if it does not exist or other users can have written it."""
     try:
         with path.open("rb") as file:
             if _OWNED:
@@ -55,7 +55,7 @@ def read_private(path: Path, source: Path) -> bytes | None:
 
 
 def write_private(path: Path, content: bytes) -> None:
-    """Write a new file that only this user can read or write. Raises `OSError`, also where there is one."""
+    """Write a new file that only this user can read or write. Raises `OSError`, also if it exists."""
     with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o600), "wb") as to:
         to.write(content)
 
@@ -64,7 +64,7 @@ def write_private(path: Path, content: bytes) -> None:
 def _trusted_owners(source: Path) -> frozenset[int]:
     try:
         return frozenset({0, os.getuid(), source.stat().st_uid})
-    except OSError:  # typed in a notebook
+    except OSError:  # the source was typed in a notebook
         return frozenset({0, os.getuid()})
 
 
@@ -75,7 +75,7 @@ def _others_can_write(status: os.stat_result) -> bool:
 
 @cache
 def _is_own_group(group_id: int) -> bool:
-    """Whether the group is the one that many systems give each user, with no one else in it."""
+    """Return True if the group is the private group of this user, without other members."""
     import grp
     import pwd
 

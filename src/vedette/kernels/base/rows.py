@@ -1,4 +1,4 @@
-"""A model function at many states in one call: a call from Python costs more than most of them compute."""
+"""A model function at many states in one call, as a call from Python costs more than most functions compute."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from vedette.kernels.base.types import Floats
 
 @kernel
 def fill_rows(function: Any, states: Floats, at: Any, params: Floats, out: Floats) -> None:
-    """Let a function that writes its result do so at each of (n, state_dim) states, each into a row of `out`.
+    """Call a function that writes its result at each of (n, state_dim) states, each into a row of `out`.
 
     at: a pose, or a period in seconds.
     """

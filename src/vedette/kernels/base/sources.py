@@ -1,6 +1,6 @@
-"""Of what sources a kernel is compiled: the file it stands in and every kernel module that this one reaches by imports.
+"""Sources of a compiled kernel: its file and every kernel module that this reaches by imports.
 
-Numba stamps what it keeps with the source file of the function itself and so misses an edit in a file it imports.
+Numba stamps cache entries only with the source file of the function itself, and so misses edits in imported files.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ PACKAGE_ROOT = Path(__file__).parents[2].resolve()
 
 @cache
 def _modules() -> dict[str, Path]:
-    """The files of all kernel modules, by the names that imports give them."""
+    """Return the files of all kernel modules, by their import names."""
     files = (PACKAGE_ROOT / "kernels").rglob("*.py")
     return {".".join(("vedette", *file.relative_to(PACKAGE_ROOT).with_suffix("").parts)): file for file in files}
 
 
-# Found by a pattern: to parse all kernels took longer than all else that a start does.
+# Found by a pattern, as parsing all kernels took longer than the rest of a start.
 _IMPORT = re.compile(r"^[ \t]*from (vedette\.kernels[\w.]*) import (\([^)]*\)|.*)$", re.MULTILINE)
 
 
@@ -33,13 +33,13 @@ def _content(path: Path) -> bytes:
 
 @cache
 def package_file(name: str) -> Path | None:
-    """The file of this package that a code object names; None for one from elsewhere."""
+    """Return the file of this package that a code object names; None for one from elsewhere."""
     path = Path(name).resolve()
     return path if path.is_relative_to(PACKAGE_ROOT) else None
 
 
 def note_source(function: Callable[..., Any]) -> None:
-    """Read the file of a kernel when it is imported: it may be edited before anything is compiled."""
+    """Read the file of a kernel at import, as it may be edited before it is compiled."""
     path = package_file(function.__code__.co_filename)
     if path is not None:
         _content(path)
@@ -47,7 +47,7 @@ def note_source(function: Callable[..., Any]) -> None:
 
 @cache
 def _kernel_imports(path: Path) -> frozenset[Path]:
-    """Kernel modules that a file names in its imports; one too many would do no harm."""
+    """Return the kernel modules that a file imports; extra ones would be harmless."""
     found: set[Path] = set()
     for module, names in _IMPORT.findall(_content(path).decode()):
         named = (module, *(f"{module}.{name}" for name in re.findall(r"\w+", names)))
@@ -55,10 +55,10 @@ def _kernel_imports(path: Path) -> frozenset[Path]:
     return frozenset(found)
 
 
-# They decide what becomes of every function, also of those that import no kernel.
+# They affect the code of every function, also in modules that import no kernel.
 _ALL = frozenset(PACKAGE_ROOT / "kernels/base" / name for name in ("compile.py", "dispatchers.py", "libraries.py"))
 
-# They decide how code is kept and called, not what is compiled.
+# They affect caching and calls, not the compiled code.
 _APART = frozenset(
     PACKAGE_ROOT / "kernels/base" / name
     for name in (
@@ -75,7 +75,7 @@ _APART = frozenset(
 
 @cache
 def source_closure(path: Path) -> frozenset[Path]:
-    """The file and every kernel module that it reaches by imports, as far as they decide what is compiled."""
+    """Return the file and every kernel module that it reaches by imports and that affects the compiled code."""
     pending = [path, *_ALL]
     found = set(pending)
     while pending:
@@ -87,7 +87,7 @@ def source_closure(path: Path) -> frozenset[Path]:
 
 @cache
 def source_stamp(path: Path) -> str:
-    """A digest of all that `source_closure` names."""
+    """Return a digest of the files of `source_closure`."""
     digest = hashlib.sha256()
     for file in sorted(source_closure(path)):
         digest.update(_content(file))
@@ -95,5 +95,5 @@ def source_stamp(path: Path) -> str:
 
 
 def kernel_files() -> tuple[Path, ...]:
-    """All kernel modules."""
+    """Return the files of all kernel modules."""
     return tuple(_modules().values())

@@ -1,4 +1,4 @@
-"""What kernels take and give: bundles of arrays and model functions. They hold no behaviour and check nothing.
+"""Inputs and outputs of kernels: bundles of arrays and model functions, without behaviour or checks.
 
 Ragged data is flat with offsets (CSR): the entries of item `i` are `offsets[i]:offsets[i + 1]`.
 """
@@ -21,10 +21,10 @@ HEIGHT = 4  # index in a state [px, py, vx, vy, pz, vz] of the height, m, where 
 
 
 class Mixture(NamedTuple):
-    """Gaussian components: one mixture of any total weight, or several that offsets tell apart.
+    """Gaussian components: one mixture of any total weight, or several that offsets separate.
 
-    All that makes, copies, takes, joins or merges components is in `vedette.kernels.gaussian.components`, so that a
-    column is added here and there.
+    All functions that make, copy, take, join or merge components are in `vedette.kernels.gaussian.components`, so that
+    a new column is added only here and there.
     """
 
     log_weights: Floats  # (num,)
@@ -50,7 +50,7 @@ class Glmb(NamedTuple):
 
 
 class Lmb(NamedTuple):
-    """LMB density: one track a label, in label order."""
+    """LMB density: one track per label, in label order."""
 
     tracks: Tracks
     existence_logit: Floats  # (num_tracks,) log r - log (1 - r)
@@ -59,7 +59,7 @@ class Lmb(NamedTuple):
 class FactoredGlmb(NamedTuple):
     """Product of independent GLMBs over disjoint labels (factors), one after the other in shared arrays."""
 
-    tracks: Tracks  # those of a factor together
+    tracks: Tracks  # tracks of a factor are adjacent
     track_offsets: Ints  # (num_factors + 1,) into `tracks`
     hyp_offsets: Ints  # (num_hyps + 1,) into hyp_tracks; hypotheses of a factor together
     hyp_tracks: Ints  # indices into `tracks`; those of one hypothesis in label order
@@ -87,22 +87,22 @@ class Sensor(NamedTuple):
     measurement_jacobian: Any
     measurement_noise_cov: Any
     prob_detection: Any
-    mean_prob_detection: Any  # of a Gaussian; asked where `detection_rule` says so
+    mean_prob_detection: Any  # mean over a Gaussian; used depending on `detection_rule`
     log_clutter_intensity: Any
     measurement_params: Floats
     noise_params: Floats
     detection_params: Floats
     clutter_params: Floats
     angular: Bools  # (meas_dim,) true of angles in radians, whose residuals are wrapped to (-pi, pi]
-    method: int  # as of `Motion`, or SWITCHED
+    method: int  # as in `Motion`, or SWITCHED
     detection_rule: int  # AT_CENTRE, CLOSED_FORM, BY_NODES or AT_EDGES of `vedette.kernels.gaussian.detection`
-    detection_nodes: Floats  # (num, 3) weight and two standard deviates of a node; none AT_CENTRE
+    detection_nodes: Floats  # (num, 3) weight and two standard deviates per node; empty for AT_CENTRE
 
 
 class ScanInput(NamedTuple):
-    """One scan of a sensor, and what may have come since the one before."""
+    """One scan of a sensor, and the births since the previous scan."""
 
-    birth: Lmb  # who may have been born since then
+    birth: Lmb  # births since the previous scan
     measurements: Floats  # (num_measurements, meas_dim)
     pose: Floats  # (pose_dim,) of the sensor
     dt: float  # seconds since the previous scan
