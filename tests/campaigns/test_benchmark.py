@@ -13,8 +13,15 @@ import pytest
 from typer.testing import CliRunner
 
 from vedette.campaigns import benchmark, leaderboard, run_campaign
-from vedette.campaigns.benchmark import OWN, Scene, campaign_of, entrant, make_way, scenes
-from vedette.campaigns.leaderboard import benchmark_csv, benchmark_markdown, header, origin, row, scene_table
+from vedette.campaigns.benchmark import OWN, Scene, campaign_of, clear_stale_results, entrant, scenes
+from vedette.campaigns.leaderboard import (
+    benchmark_csv,
+    benchmark_markdown,
+    benchmark_provenance,
+    header,
+    row,
+    scene_table,
+)
 from vedette.campaigns.manifest import read_manifest
 from vedette.cli import app
 from vedette.errors import InputError
@@ -36,7 +43,7 @@ def run_all(scene: Scene, out: Path, *entrants: benchmark.Entrant, runs: int = 2
     for own in (None, *entrants):
         folder = out / scene.name / (OWN if own is None else own.name)
         campaign = campaign_of(scene, own, runs, 0, out)
-        make_way(campaign, folder)
+        clear_stale_results(campaign, folder)
         run_campaign(campaign, folder)
 
 
@@ -68,7 +75,7 @@ def test_an_entrant_is_paired_with_the_first_and_its_counts_are_told(tmp_path: P
     assert mine.counts["rewards"] == 3.0
     assert np.isnan(mine.counts["fusions"])
     assert len(header(table)) == len(row(table, mine))
-    facts = origin([table], 0)
+    facts = benchmark_provenance([table], 0)
     digest = read_manifest(tmp_path / "out" / STEERED.name / "mine")["digest"]
     assert facts["planner mine, paper-a"] == digest
     assert facts["scene paper-a"] == table.digest

@@ -137,7 +137,7 @@ def half_said(once: Path, task: Task) -> Any:
 
 
 def test_workers_that_end_while_they_start_are_told_of(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(local, "_begin", partial(os._exit, 3))
+    monkeypatch.setattr(local, "_initialise_worker", partial(os._exit, 3))
     with pytest.raises(VedetteError, match="the worker processes ended while they started"):
         list(on_local_workers())
 

@@ -14,7 +14,7 @@ from campaigns.filled import NUM_RUNS, fill, make_campaign, make_run
 from vedette.campaigns import results as reading
 from vedette.campaigns.export import FORMATS, export_csv, export_netcdf, export_tables
 from vedette.campaigns.results import open_results
-from vedette.campaigns.tables import in_schema, joined_tables, schema_of, tables_of_runs
+from vedette.campaigns.tables import concatenated_tables, in_schema, schema_of, tables_of_runs
 from vedette.errors import InputError
 from vedette.internal.text import spreadsheet_text
 
@@ -181,7 +181,7 @@ def test_what_a_part_lacks_is_null(results):
     decisions = (replace(second.record.decisions[0], plan=counts), *second.record.decisions[1:])
     runs = [first, replace(second, record=replace(second.record, decisions=decisions))]
     whole = tables_of_runs(results.campaign, runs)
-    parts = joined_tables(tables_of_runs(results.campaign, [run]) for run in runs)
+    parts = concatenated_tables(tables_of_runs(results.campaign, [run]) for run in runs)
     schema = schema_of(tables_of_runs(results.campaign, [run])["decisions"].schema for run in runs)
     assert schema.names == whole["decisions"].column_names
     for name, table in whole.items():

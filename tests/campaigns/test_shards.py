@@ -85,14 +85,14 @@ def test_shares_of_real_runs_make_the_folder_of_a_single_process(tmp_path: Path)
     run_campaign(campaign, tmp_path / "alone")
     shares = in_shards(campaign, tmp_path / "shards", 3)
     merged = merge([tmp_path / "shards"], tmp_path / "merged")
-    assert (merged.num_taken, merged.missing, merged.count) == (8, (), 3)
+    assert (merged.num_added, merged.missing, merged.count) == (8, (), 3)
     assert rows(tmp_path / "merged") == rows(tmp_path / "alone")
     assert tables(tmp_path / "merged") == tables(tmp_path / "alone")
     one, other = (open_results(tmp_path / name) for name in ("merged", "alone"))
     assert [run.checksum for run in one.runs()] == [run.checksum for run in other.runs()]
     assert {run.session for run in one.runs()} <= set(range(1, len(one.manifest["sessions"]) + 1))
     again = merge(shares[::-1], tmp_path / "merged")
-    assert (again.num_taken, again.missing) == (0, ())
+    assert (again.num_added, again.missing) == (0, ())
     assert rows(tmp_path / "merged") == rows(tmp_path / "alone")
     assert run_campaign(campaign, tmp_path / "merged").num_existing == 8
 
@@ -116,11 +116,11 @@ def test_missing_shares_are_named_and_added_later(tmp_path: Path, stub: None) ->
     campaign = stub_campaign(runs=10)
     shares = in_shards(campaign, tmp_path / "shards", 5)
     merged = merge([shares[0], shares[3]], tmp_path / "merged")
-    assert (merged.num_taken, merged.missing, merged.num_missing) == (8, (2, 3, 5), 12)
+    assert (merged.num_added, merged.missing, merged.num_missing) == (8, (2, 3, 5), 12)
     assert ranges(merged.missing) == "2-3,5"
     assert not (tmp_path / "merged" / "tables").exists()
     merged = merge(shares[1:], tmp_path / "merged")
-    assert (merged.num_taken, merged.missing) == (12, ())
+    assert (merged.num_added, merged.missing) == (12, ())
     run_campaign(campaign, tmp_path / "alone")
     assert rows(tmp_path / "merged") == rows(tmp_path / "alone")
     assert tables(tmp_path / "merged") == tables(tmp_path / "alone")
@@ -129,7 +129,7 @@ def test_missing_shares_are_named_and_added_later(tmp_path: Path, stub: None) ->
 def test_shares_of_another_cut_overlap_and_are_taken_once(tmp_path: Path, stub: None) -> None:
     campaign = stub_campaign(runs=6)
     shares = [*in_shards(campaign, tmp_path / "two", 2), *in_shards(campaign, tmp_path / "three", 3)]
-    assert merge(shares, tmp_path / "merged").num_taken == 12
+    assert merge(shares, tmp_path / "merged").num_added == 12
     run_campaign(campaign, tmp_path / "alone")
     assert rows(tmp_path / "merged") == rows(tmp_path / "alone")
 
@@ -208,7 +208,7 @@ def test_shares_killed_at_every_tenth_row_go_on_to_the_same_rows(
     assert [kills.count(done) for done in (10, 20)] == [3, 3]
     assert set(kills) <= {10, 20, 30}
     merged = merge([tmp_path / "shards"], tmp_path / "merged")
-    assert (merged.num_taken, merged.missing) == (90, ())
+    assert (merged.num_added, merged.missing) == (90, ())
     assert rows(tmp_path / "merged") == rows(tmp_path / "alone")
     assert tables(tmp_path / "merged") == tables(tmp_path / "alone")
 

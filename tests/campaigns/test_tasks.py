@@ -27,7 +27,7 @@ def drain(queue: TaskQueue) -> list[tuple[str, tuple[int, ...]]]:
     taken = []
     while (task := queue.take()) is not None:
         taken.append((task.cell.name, task.runs))
-        queue.learn(task, ())
+        queue.note_outcome(task, ())
     return taken
 
 
@@ -41,7 +41,7 @@ def learnt(queue: TaskQueue, *results: CompletedRun) -> None:
     for result in results:
         task = queue.take()
         assert task is not None
-        queue.learn(task, (result,))
+        queue.note_outcome(task, (result,))
 
 
 def test_runs_of_equal_number_come_together() -> None:
@@ -91,7 +91,7 @@ def test_the_first_run_of_each_set_of_kernels_goes_before_the_others() -> None:
     ]
     assert len(queue) == 16 - 2 - len(first)
     for task in first:  # however it ends
-        queue.learn(task, ())
+        queue.note_outcome(task, ())
     assert sum(len(runs) for _, runs in drain(queue)) == 16 - 2 - len(first)
 
 

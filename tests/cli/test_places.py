@@ -15,7 +15,7 @@ from vedette.cli import app
 from vedette.cli.output import trouble_of_system
 from vedette.errors import InputError
 from vedette.internal.files import unwritable, write_file, write_whole
-from vedette.simulation.storage import check_free
+from vedette.simulation.storage import check_target
 
 posix = pytest.mark.skipif(os.name == "nt", reason="of POSIX systems")
 
@@ -56,7 +56,7 @@ def test_a_run_replaces_no_campaign(tmp_path: Path) -> None:
     campaign.mkdir()
     (campaign / "manifest.json").write_text('{"format": "vedette-campaign", "format_version": 6}')
     with pytest.raises(InputError, match=r"expected a folder that holds a run; .*results holds something else"):
-        check_free(campaign, overwrite=True)
+        check_target(campaign, overwrite=True)
 
 
 def test_a_lock_that_is_a_folder_is_a_line(tmp_path: Path) -> None:
@@ -92,7 +92,7 @@ def test_a_folder_that_cannot_be_written_is_told_before_the_work(place: Path, mo
     assert unwritable(place / "shut" / "new" / "run") == f"{place / 'shut'} may not be written to"
     assert unwritable(place / "run") == ""
     with pytest.raises(InputError, match=r"got .*run: .*shut may not be written to"):
-        check_free(place / "shut" / "run", overwrite=False)
+        check_target(place / "shut" / "run", overwrite=False)
 
 
 def test_a_folder_is_no_recording(place: Path) -> None:

@@ -25,7 +25,7 @@ from vedette.campaigns.store import Store
 from vedette.errors import InputError, VedetteError
 from vedette.evaluation.metrics import Metric, decode_metrics, encode_metrics, kept, measure
 from vedette.reports import write_report
-from vedette.reports.groups import gather
+from vedette.reports.groups import comparison_groups
 from vedette.reports.saving import write_summary
 from vedette.reports.tables import measure_table
 from vedette.scenarios import load_scenario
@@ -140,7 +140,7 @@ def test_tables_comparisons_and_reports_have_its_column(tmp_path: Path) -> None:
         InputError, match=r"part: expected one of total, localisation, cardinality, gospa_m, .*; got 'x'"
     ):
         compared.curve("jdm", "x")
-    (gathered,) = gather(results)
+    (gathered,) = comparison_groups(results)
     table = measure_table(gathered)
     assert table is not None
     assert [row[0] for row in table.rows if row[0] in ("farthest_m", "estimates")] == ["farthest_m", "estimates"]

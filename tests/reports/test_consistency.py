@@ -12,7 +12,7 @@ from reports.examples import campaign_of, results_of
 from vedette.evaluation import RunMetrics
 from vedette.evaluation.ensembles import ensemble_of
 from vedette.evaluation.runs import measure_run
-from vedette.reports.groups import Group, Strategy, gather
+from vedette.reports.groups import Group, Strategy, comparison_groups
 from vedette.reports.health import failed_checks, strategy_diagnostics
 from vedette.reports.tables import measure_table, nees_spread
 from vedette.simulation.records import RunRecord
@@ -24,7 +24,7 @@ TIMES = 25.0  # how much longer an error becomes
 def group(tmp_path_factory: pytest.TempPathFactory) -> Group:
     settings = {"time.num_steps": 30, "ospa.from_step": 12, "ospa.to_step": 30}
     campaign = campaign_of(planners=["still", "random"], seed=4, set=settings)
-    (found,) = gather(results_of(tmp_path_factory.mktemp("consistency") / "results", campaign))
+    (found,) = comparison_groups(results_of(tmp_path_factory.mktemp("consistency") / "results", campaign))
     return found
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from reports.examples import campaign_of, results_of
 from vedette.reports.drawings import group_drawings, sweep_drawings
-from vedette.reports.groups import axis_label, axis_unit, gather
+from vedette.reports.groups import axis_label, axis_unit, comparison_groups
 from vedette.reports.saving import run_errors
 from vedette.reports.tables import error_table
 
@@ -30,7 +30,7 @@ def test_axes_have_words_and_units(axis: str, label: str, unit: str) -> None:
 
 def test_runs_that_not_every_strategy_has_are_left_out_of_a_comparison(tmp_path: Path) -> None:
     campaign = campaign_of(planners=["fixed", "still"], runs=3)
-    (group,) = gather(results_of(tmp_path / "results", campaign, skipped={("still", 1)}))
+    (group,) = comparison_groups(results_of(tmp_path / "results", campaign, skipped={("still", 1)}))
     assert group.comparison is not None
     assert (group.comparison.strategies, group.comparison.num_runs) == (("fixed", "still"), 2)
     assert [each.ensemble.runs.tolist() for each in group.strategies] == [[0, 2], [0, 2]]
@@ -41,7 +41,7 @@ def test_runs_that_not_every_strategy_has_are_left_out_of_a_comparison(tmp_path:
 
 
 def test_errors_have_their_tails_beside_them(tmp_path: Path) -> None:
-    (group,) = gather(results_of(tmp_path / "results", campaign_of(planners=["still", "random"], runs=3)))
+    (group,) = comparison_groups(results_of(tmp_path / "results", campaign_of(planners=["still", "random"], runs=3)))
     table = error_table(group)
     assert table is not None
     assert group.comparison is not None
@@ -55,7 +55,7 @@ def test_errors_have_their_tails_beside_them(tmp_path: Path) -> None:
 def test_groups_are_named_by_what_sets_them_apart(tmp_path: Path) -> None:
     grid = {"sensors.*.clutter.rate": [5.0, 40.0], "sensors.*.noise.sigma_range": [10.0, 20.0]}
     campaign = campaign_of(planners=["still"], grid=grid, runs=1)
-    groups = list(gather(results_of(tmp_path / "results", campaign)))
+    groups = list(comparison_groups(results_of(tmp_path / "results", campaign)))
     titles = ["paper-a, noise sigma range 10", "paper-a, noise sigma range 20"]
     assert [group.title for group in groups] == titles
     assert len({group.name for group in groups}) == len(groups) == 2
@@ -80,7 +80,7 @@ def test_strategies_with_other_scan_times_are_not_compared_and_drawn_each_over_i
     few = {"time.num_steps": 4, "control.decision_steps": [2], "ospa.from_step": 3, "ospa.to_step": 4}
     few.pop(axis, None)
     spec = {"planners": ["still"], "compare": axis, "grid": {axis: values}, "set": few, "runs": 1}
-    (group,) = gather(results_of(tmp_path / "results", campaign_of(**spec)))
+    (group,) = comparison_groups(results_of(tmp_path / "results", campaign_of(**spec)))
     assert group.comparison is None
     assert "its runs have others" in group.reason
     drawn = [each for each in group_drawings(group) if each.name.startswith("consistency")]

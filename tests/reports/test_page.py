@@ -12,7 +12,7 @@ import pytest
 from reports.examples import campaign_of, results_of
 from vedette.campaigns.results import CampaignResults
 from vedette.errors import InputError
-from vedette.reports import write_figures, write_report, writing
+from vedette.reports import html, write_figures, write_report
 from vedette.reports.provenance import spec_toml, versions_table
 from vedette.scenarios import load_scenario
 from vedette.scenarios.dumping import dump_scenario
@@ -152,8 +152,8 @@ def test_measures_of_labels_are_left_out_for_filters_that_have_none(tmp_path: Pa
 def test_a_page_that_grows_too_large_leaves_figures_and_runs_out_and_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(writing, "MAX_FIGURE_BYTES", 1000)
-    monkeypatch.setattr(writing, "MAX_REPLAY_BYTES", 100_000)
+    monkeypatch.setattr(html, "MAX_FIGURE_BYTES", 1000)
+    monkeypatch.setattr(html, "MAX_REPLAY_BYTES", 100_000)
     campaign = campaign_of(planners=["fixed"], variants=[{"name": "one"}, {"name": "two"}], compare="planner")
     words = Words(page_of(results_of(tmp_path / "results", campaign), tmp_path)).words
     assert words.count("not drawn for this group") == 1
@@ -167,7 +167,7 @@ def test_figures_of_very_many_lines_are_drawn_in_dots_and_say_so(
 ) -> None:
     small = page_of(results, tmp_path)
     assert "<img" not in small
-    monkeypatch.setattr(writing, "MAX_DRAWING_BYTES", 60_000)
+    monkeypatch.setattr(html, "MAX_DRAWING_BYTES", 60_000)
     page = page_of(results, tmp_path)
     images = re.findall(r'<img src="data:image/png;base64,([^"]+)"', page)
     assert images

@@ -17,7 +17,7 @@ from simulation.test_explanation_tables import explanation_of
 from vedette.control import TargetGains
 from vedette.errors import InputError
 from vedette.reports.decision_explanations import explanation_data
-from vedette.reports.groups import Strategy, gather
+from vedette.reports.groups import Strategy, comparison_groups
 from vedette.reports.replay import replay_data
 from vedette.scenarios.build import build_experiment
 from vedette.scenarios.sections.sensors import Sensor
@@ -25,7 +25,7 @@ from vedette.simulation.replay import scans_of
 
 
 def strategies_of(folder: Path, **fields: Any) -> dict[str, Strategy]:
-    (group,) = gather(results_of(folder, campaign_of(runs=1, **fields)))
+    (group,) = comparison_groups(results_of(folder, campaign_of(runs=1, **fields)))
     return {each.label: each for each in group.strategies}
 
 

@@ -12,7 +12,7 @@ from vedette.evaluation.runs import run_scenario
 from vedette.scenarios import load_scenario
 from vedette.scenarios.build import build_experiment, build_scan_times
 from vedette.scenarios.overrides import with_fields
-from vedette.simulation.loop import scans_of_run
+from vedette.simulation.loop import scan_flags_of_run
 from vedette.simulation.replay import scans_of
 
 
@@ -35,7 +35,7 @@ def test_periods_in_seconds_are_those_in_steps() -> None:
 
 def test_scans_drop_out_as_often_as_is_said_and_the_same_for_every_strategy() -> None:
     shares = (0.0, 0.3)
-    tables = [scans_of_run(None, shares, 100, 5, run) for run in range(40)]
+    tables = [scan_flags_of_run(None, shares, 100, 5, run) for run in range(40)]
     there = np.array(tables)
     assert there[:, 0].all()
     assert there[:, 1].mean() == pytest.approx(0.7, abs=4.0 * np.sqrt(0.21 / 4000.0))

@@ -41,7 +41,7 @@ def _by_processes(
         raise VedetteError('a script that reads with workers needs `if __name__ == "__main__":` around the call')
     load_ahead()
     others = set(active_children())
-    pool = ProcessPoolExecutor(number, context(), initializer=_begin, initargs=(results, cell))
+    pool = ProcessPoolExecutor(number, context(), initializer=_initialise_reader, initargs=(results, cell))
     try:
         with as_children(of_server=True):
             found = pool.map(_read, parts)
@@ -64,14 +64,14 @@ def _part(results: CampaignResults, cell: str, runs: Sequence[int]) -> Ensemble:
     return ensemble_of(results.summaries(cell, runs))
 
 
-_whose: list[tuple[CampaignResults, str]] = []  # results and cell of this process, if it is a reader
+_own_source: list[tuple[CampaignResults, str]] = []  # results and cell of this process, if it is a reader
 
 
-def _begin(results: CampaignResults, cell: str) -> None:
+def _initialise_reader(results: CampaignResults, cell: str) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the fork server may not ignore it
     end_with_parent()
-    _whose.append((results, cell))
+    _own_source.append((results, cell))
 
 
 def _read(runs: Sequence[int]) -> Ensemble:
-    return _part(*_whose[0], runs)
+    return _part(*_own_source[0], runs)

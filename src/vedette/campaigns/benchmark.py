@@ -153,7 +153,7 @@ def campaign_of(scene: Scene, entrant: Entrant | None, runs: int, seed: int, fol
     return resolve(spec, **how)
 
 
-def try_entrant(own: Entrant, campaign: Campaign) -> None:
+def check_entrant(own: Entrant, campaign: Campaign) -> None:
     """Create an entrant on the scene of a campaign, and start it once if it is a program.
 
     Raises `InputError` if this fails: typos in a command are reported here and not as lost runs.
@@ -172,7 +172,7 @@ def try_entrant(own: Entrant, campaign: Campaign) -> None:
         raise InputError(f"{own.role} {own.name}: expected one that can be started; {error}") from None
 
 
-def make_way(campaign: Campaign, folder: Path) -> None:
+def clear_stale_results(campaign: Campaign, folder: Path) -> None:
     """Delete the folder of an entrant that has changed and has finished no run there.
 
     Raises `InputError` if it has finished some, as they must not be mixed with new ones.

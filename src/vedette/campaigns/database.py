@@ -71,7 +71,7 @@ class Reader:
 
     def rows(self) -> Iterator[tuple[Any, ...]]:
         """Yield every stored row, by cell and number. Raises `InputError` at the first damaged one."""
-        with explained(self._path), closing(_opened(self._path)) as database:
+        with translated_errors(self._path), closing(_opened(self._path)) as database:
             for row in database.execute(f"SELECT {COLUMNS} FROM runs ORDER BY cell, run"):
                 if verified(row) is None:
                     raise InputError(f"{self._path}: {place_of(*map(printable, map(str, row[:2])))}{ALTERED}")
@@ -97,7 +97,7 @@ class Reader:
                 yield entry
 
     def _ask(self, question: str, values: Sequence[Any] = (), where: str = "") -> list[Any]:
-        with explained(self._path, where):
+        with translated_errors(self._path, where):
             try:
                 return _answer(self._path, question, values)
             except sqlite3.OperationalError as error:
@@ -177,7 +177,7 @@ def place_of(cell: str, run: int | str) -> str:
 
 
 @contextmanager
-def explained(path: Path, where: str = "") -> Iterator[None]:
+def translated_errors(path: Path, where: str = "") -> Iterator[None]:
     """Context manager that turns SQLite errors into errors of this library that name the file."""
     try:
         yield

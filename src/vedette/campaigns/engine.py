@@ -45,7 +45,7 @@ def in_process(queue: TaskQueue) -> Iterator[TaskOutcome]:
     since = time.monotonic()
     try:
         while (task := queue.take()) is not None:
-            batch += queue.learn(task, perform(task))
+            batch += queue.note_outcome(task, perform(task))
             if len(batch) >= _MOST_TOGETHER or time.monotonic() - since > _SECONDS_TOGETHER:
                 yield batch
                 batch, since = (), time.monotonic()
@@ -80,9 +80,9 @@ def on_workers(workers: Workers, queue: TaskQueue) -> Iterator[TaskOutcome]:
             if isinstance(outcome, WorkerDied):
                 suspects += ended.alone()
                 outcome = ()
-            batch += queue.learn(ended, outcome)
+            batch += queue.note_outcome(ended, outcome)
     for task in suspects:
-        yield queue.learn(task, _alone(workers, task))
+        yield queue.note_outcome(task, _alone(workers, task))
 
 
 def _alone(workers: Workers, task: Task) -> TaskOutcome:

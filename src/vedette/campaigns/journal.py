@@ -30,7 +30,7 @@ class Writer:
 
     def open_runs(self, contents: str) -> None:
         """Create the file, or check that it belongs to the campaign whose manifest has the checksum `contents`."""
-        with database.explained(self._path):
+        with database.translated_errors(self._path):
             opened = sqlite3.connect(self._path, timeout=database.WAIT, isolation_level=None, check_same_thread=False)
             self._opened = opened
             opened.execute("PRAGMA journal_mode = PERSIST")
@@ -55,7 +55,7 @@ class Writer:
         Raises `InputError`, and stores none, if a run is stored already, or the disk is full or fails.
         """
         places = [database.place_of(row.cell, row.run) for row in rows]
-        with database.explained(self._path, places[0] if len(places) == 1 else ""):
+        with database.translated_errors(self._path, places[0] if len(places) == 1 else ""):
             self._database.execute("BEGIN IMMEDIATE")
             with self._database:
                 for row, place in zip(rows, places, strict=True):
@@ -81,13 +81,13 @@ class Writer:
 
     def damaged(self) -> tuple[tuple[str, int], ...]:
         """Return cell and number of every run whose row has changed since it was written."""
-        with database.explained(self._path):
+        with database.translated_errors(self._path):
             rows = self._database.execute(f"SELECT {database.COLUMNS} FROM runs ORDER BY cell, run")
             return tuple((row[0], row[1]) for row in rows if verified(row) is None)
 
     def metrics(self) -> Iterator[tuple[str, int, bytes]]:
         """Return cell and number of every run, with its metrics."""
-        with database.explained(self._path):
+        with database.translated_errors(self._path):
             rows = self._database.execute("SELECT cell, run, metrics FROM runs ORDER BY cell, run").fetchall()
         return ((cell, run, unpack(packed)) for cell, run, packed in rows)
 
@@ -96,7 +96,7 @@ class Writer:
         where = "UPDATE runs SET metrics = ?, metrics_sha256 = ? WHERE cell = ? AND run = ?"
         self._change(cell, run, where, *pack(cell, run, metrics))
 
-    def take_in(self, others: Iterable[tuple[database.Reader, Callable[[int], int]]]) -> int:
+    def copy_missing(self, others: Iterable[tuple[database.Reader, Callable[[int], int]]]) -> int:
         """Copy the runs of other folders that are missing here, in one transaction; return their number.
 
         Args:
@@ -104,20 +104,20 @@ class Writer:
 
         Raises `InputError`, and changes nothing, for a damaged run, or one that is stored here with other bytes.
         """
-        with database.explained(self._path):
+        with database.translated_errors(self._path):
             self._database.execute("BEGIN IMMEDIATE")
             with self._database:
                 num_taken = 0
                 for reader, session in others:
                     for row in reader.rows():
-                        num_taken += self._take_in(reader, (*row[:2], session(row[2]), *row[3:]))
+                        num_taken += self._copy_missing(reader, (*row[:2], session(row[2]), *row[3:]))
                     for each in reader.failures():
                         failure = (each.cell, each.run, session(each.session), each.message)
                         self._database.execute("INSERT OR REPLACE INTO failures VALUES (?, ?, ?, ?)", failure)
                 self._database.execute("DELETE FROM failures WHERE (cell, run) IN (SELECT cell, run FROM runs)")
             return num_taken
 
-    def _take_in(self, reader: database.Reader, row: tuple[Any, ...]) -> bool:
+    def _copy_missing(self, reader: database.Reader, row: tuple[Any, ...]) -> bool:
         """Copy a run; return True if it was new."""
         if self._database.execute(_INSERT.replace("INSERT", "INSERT OR IGNORE", 1), row).rowcount:
             return True
@@ -132,7 +132,7 @@ class Writer:
 
         Raises `InputError`, and changes nothing, for a damaged run; also raises as `payload`.
         """
-        with database.explained(self._path):
+        with database.translated_errors(self._path):
             keys = self._keys()
             self._database.execute("BEGIN IMMEDIATE")
             with self._database:
@@ -157,13 +157,13 @@ class Writer:
         self._change(cell, run, "DELETE FROM runs WHERE cell = ? AND run = ?")
 
     def _keys(self) -> list[tuple[str, int]]:
-        with database.explained(self._path):
+        with database.translated_errors(self._path):
             rows = self._database.execute("SELECT cell, run FROM runs ORDER BY cell, run").fetchall()
         return database.checked_keys(self._path, rows)
 
     def _change(self, cell: str, run: int, statement: str, *values: Any) -> None:
         """Execute a statement about one run, whose key follows the values."""
-        with database.explained(self._path, database.place_of(cell, run)):
+        with database.translated_errors(self._path, database.place_of(cell, run)):
             self._database.execute(statement, (*values, cell, run))
 
     def close(self) -> None:

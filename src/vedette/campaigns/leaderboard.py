@@ -196,7 +196,7 @@ def _interval(summary: Summary, form: str) -> str:
     )
 
 
-def origin(tables: Sequence[SceneTable], seed: int) -> dict[str, str]:
+def benchmark_provenance(tables: Sequence[SceneTable], seed: int) -> dict[str, str]:
     """Return seed, versions, and SHA-256 of the scenarios and entrants of the tables, by name."""
     found = {"seed": str(seed), **versions()}
     for table in tables:

@@ -34,7 +34,7 @@ def local_workers(num_workers: int, tell: Callable[[str], None]) -> Iterator[Loc
     Raises:
         VedetteError: the processes cannot be started.
     """
-    _make_room_for_files(num_workers)
+    _raise_file_limit(num_workers)
     workers = LocalWorkers(tell)
     try:
         workers.start(num_workers)
@@ -43,7 +43,7 @@ def local_workers(num_workers: int, tell: Callable[[str], None]) -> Iterator[Loc
         workers.end()
 
 
-def _make_room_for_files(num_workers: int) -> None:
+def _raise_file_limit(num_workers: int) -> None:
     """Raise this process's limit of open files if it is too low, as far as the operating system allows.
 
     Raises `VedetteError` if that is not enough.
@@ -75,7 +75,7 @@ class _Worker:
 
     @classmethod
     def start(cls) -> _Worker:
-        pool = ProcessPoolExecutor(1, context(), initializer=_begin)
+        pool = ProcessPoolExecutor(1, context(), initializer=_initialise_worker)
         others = set(active_children())
         try:
             load_ahead()
@@ -92,7 +92,7 @@ class _Worker:
     def has_begun(self) -> bool:
         return self.begun.done() and self.begun.exception() is None
 
-    def manner(self) -> str:
+    def death_reason(self) -> str:
         """Return in words how the process died."""
         status = next((process.exitcode for process in self.processes), None)
         if status is None or status >= 0:
@@ -175,7 +175,7 @@ class LocalWorkers:
                 self._ended.append((left.pop(0), WorkerDied()))
             else:
                 self._killers.update(left[:1])
-            self._tell(f"a worker has died ({dead.manner()}): another takes its place, and what it had not done")
+            self._tell(f"a worker has died ({dead.death_reason()}): another takes its place, and what it had not done")
         else:
             self._failed_starts += 1
             if self._failed_starts >= _MOST_FAILED_STARTS:
@@ -186,7 +186,7 @@ class LocalWorkers:
             self.submit(task)
 
 
-def _begin() -> None:
+def _initialise_worker() -> None:
     """Initialise a worker process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the fork server may not ignore it
     end_with_parent()

@@ -149,7 +149,7 @@ def contents_checksum(manifest: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(fixed, sort_keys=True).encode()).hexdigest()
 
 
-def check_same(folder: Path, there: Mapping[str, Any], here: Mapping[str, Any]) -> None:
+def check_same_campaign(folder: Path, there: Mapping[str, Any], here: Mapping[str, Any]) -> None:
     """Raise `InputError`, naming the first difference, unless both manifests are of the same shard of a campaign."""
     for field in (*_FIXED, "shard"):
         difference = _difference(field, there.get(field), here.get(field))

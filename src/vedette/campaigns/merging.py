@@ -17,7 +17,7 @@ from vedette.campaigns.export import export_tables
 from vedette.campaigns.journal import Writer
 from vedette.campaigns.manifest import (
     MANIFEST,
-    check_same,
+    check_same_campaign,
     contents_checksum,
     read_manifest,
     write_manifest,
@@ -36,7 +36,7 @@ class MergeResult:
 
     Attributes:
         results: results of the merged folder.
-        num_taken: runs that this call added.
+        num_added: runs that this call added.
         count: number of shards of the campaign; 1 if it was not split.
         missing: numbers of the shards with runs that no folder holds, increasing.
         num_missing: number of these runs.
@@ -44,7 +44,7 @@ class MergeResult:
     """
 
     results: CampaignResults
-    num_taken: int
+    num_added: int
     count: int
     missing: tuple[int, ...]
     num_missing: int
@@ -72,14 +72,14 @@ def merge(folders: Sequence[Path | str], out: Path | str | None = None, *, table
     target = Path(results_folder(whole["name"]) if out is None else out)
     if any(target.resolve() == place.resolve() for place in places):
         raise InputError(f"{target}: expected a folder for the results beside those that are merged; it is one of them")
-    num_taken = _fill(target, whole, shares)
+    num_added = _fill(target, whole, shares)
     results = open_results(target)
     count = max(share.shard.count for share in shares)
     lacking = _lacking(results, count)
     if tables and not lacking.any():
         export_tables(results, target / TABLES)
     missing = tuple(np.flatnonzero(lacking).tolist())
-    return MergeResult(results, num_taken, count, missing, int(lacking.sum()), places[0].parent)
+    return MergeResult(results, num_added, count, missing, int(lacking.sum()), places[0].parent)
 
 
 def _lacking(results: CampaignResults, count: int) -> Ints:
@@ -134,7 +134,7 @@ def _read(places: Sequence[Path]) -> tuple[dict[str, Any], list[_Share]]:
 
 def _joined(place: Path, manifest: dict[str, Any], whole: dict[str, Any]) -> dict[str, Any]:
     """Return the merged manifest extended by the runs and sessions of the manifest in that place."""
-    check_same(place, manifest, whole)
+    check_same_campaign(place, manifest, whole)
     wanted = next((session["versions"] for session in whole["sessions"]), None)
     for session in manifest["sessions"]:
         for name, version in (wanted or session["versions"]).items():
@@ -161,7 +161,9 @@ def _fill(target: Path, whole: dict[str, Any], shares: Sequence[_Share]) -> int:
         write_manifest(target, whole)
         if not started:
             writer.open_runs(contents_checksum(whole))
-        num_taken = writer.take_in((_reader(share), _session(share, whole)) for share in shares if _has_begun(share))
+        num_added = writer.copy_missing(
+            (_reader(share), _session(share, whole)) for share in shares if _has_begun(share)
+        )
     except BaseException:
         writer.close()
         if not started:
@@ -171,7 +173,7 @@ def _fill(target: Path, whole: dict[str, Any], shares: Sequence[_Share]) -> int:
                 target.rmdir()
         raise
     writer.close()
-    return num_taken
+    return num_added
 
 
 def _has_begun(share: _Share) -> bool:

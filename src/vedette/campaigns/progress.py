@@ -56,8 +56,8 @@ class Progress(ProgressObserver):
         self._label = {cell.name: str(cell.settings[campaign.compare]) for cell in campaign.cells} if alone else {}
         self._unit = campaign.cells[0].scenario.model.ospa.unit
         self._errors: dict[str, tuple[int, float]] = {}  # number of runs and sum of errors
-        self._found = self._landed = self._total = self._failures = 0
-        self._first_at = self._said_at = time.monotonic()
+        self._existing = self._completed = self._total = self._failures = 0
+        self._first_at = self._last_line_at = time.monotonic()
 
     def __enter__(self) -> Progress:
         self._bar.start()
@@ -68,7 +68,7 @@ class Progress(ProgressObserver):
 
     def begin(self, num_existing: int, num_runs: int) -> None:
         """See `vedette.campaigns.ProgressObserver`."""
-        self._found, self._total = num_existing, num_runs
+        self._existing, self._total = num_existing, num_runs
         there = f", {num_existing} are there already" if num_existing else ""
         if num_existing < num_runs and (num_existing or not self._terminal):
             self.note(f"{self._name}: {num_runs} runs{there}")
@@ -81,16 +81,16 @@ class Progress(ProgressObserver):
     def completed(self, result: CompletedRun) -> None:
         """See `vedette.campaigns.ProgressObserver`."""
         now = time.monotonic()
-        if self._landed == 0:  # the rate excludes the loading and compiling before the first run
+        if self._completed == 0:  # the rate excludes the loading and compiling before the first run
             self._first_at = now
-        self._landed += 1
+        self._completed += 1
         if result.cell in self._label:
             number, total = self._errors.get(self._label[result.cell], (0, 0.0))
             self._errors[self._label[result.cell]] = number + 1, total + result.ospa
         if self._terminal:
             self._bar.update(self._bars, advance=1, description=self._description(now))
-        elif now - self._said_at > self._line_seconds:
-            self._said_at = now
+        elif now - self._last_line_at > self._line_seconds:
+            self._last_line_at = now
             self.note(self._description(now))
 
     def failed(self, result: FailedRun) -> None:
@@ -100,9 +100,9 @@ class Progress(ProgressObserver):
             self.note(f"cell {result.cell}, run {result.run} failed: {result.message}")
 
     def _description(self, now: float) -> str:
-        done = self._found + self._landed
+        done = self._existing + self._completed
         parts = [f"{done}/{self._total}"]
-        rate = (self._landed - 1) / (now - self._first_at) if self._landed > 1 and now > self._first_at else 0.0
+        rate = (self._completed - 1) / (now - self._first_at) if self._completed > 1 and now > self._first_at else 0.0
         if rate:
             seconds = round((self._total - done) / rate)
             parts += [f"{rate:.1f}/s", f"{seconds // 60}:{seconds % 60:02d} left"]

@@ -17,7 +17,7 @@ from vedette.campaigns.database import DATABASE, Failure, Reader
 from vedette.campaigns.dataset import dataset_of_scans
 from vedette.campaigns.manifest import campaign_of, contents_checksum, read_manifest
 from vedette.campaigns.rows import Entry
-from vedette.campaigns.tables import FinishedRun, joined_tables, tables_of_runs
+from vedette.campaigns.tables import FinishedRun, concatenated_tables, tables_of_runs
 from vedette.errors import InputError
 from vedette.evaluation.comparison import Comparison, scored
 from vedette.evaluation.ensembles import Ensemble
@@ -150,7 +150,7 @@ class CampaignResults(SummaryRepr):
         Use `.to_pandas()` for pandas, `polars.from_arrow` for polars; DuckDB queries them directly. See
         `vedette.campaigns.tables`. Empty if no run is finished.
         """
-        return joined_tables(self.table_parts())
+        return concatenated_tables(self.table_parts())
 
     def table_parts(self) -> Iterator[dict[str, pyarrow.Table]]:
         """Yield the same tables for a few hundred runs at a time, in order, for results that do not fit in memory.
@@ -166,7 +166,7 @@ class CampaignResults(SummaryRepr):
 
         Raises `InputError` if xarray is not installed.
         """
-        scans = joined_tables({"scans": part["scans"]} for part in self.table_parts())
+        scans = concatenated_tables({"scans": part["scans"]} for part in self.table_parts())
         return dataset_of_scans(self.campaign, scans.get("scans"))
 
     def _finished(self) -> list[tuple[str, int]]:

@@ -112,7 +112,7 @@ def run_campaign(
         if lost:
             watch.note(f"{database} was not there, or empty: every run is done again")
         _check_undamaged(store, redo_damaged, watch)
-        _measure_anew(store, campaign, watch)
+        _add_missing_metrics(store, campaign, watch)
         queue = TaskQueue(campaign, store.finished())
         num_existing = campaign.total - len(queue)
         watch.begin(num_existing, campaign.total)
@@ -150,7 +150,7 @@ def _check_undamaged(store: Store, redo: bool, watch: ProgressObserver) -> None:
         watch.note(f"damaged, and done again: {names}")
 
 
-def _measure_anew(store: Store, campaign: Campaign, watch: ProgressObserver) -> None:
+def _add_missing_metrics(store: Store, campaign: Campaign, watch: ProgressObserver) -> None:
     """Compute metrics that the program or the scenarios have gained since runs were stored, from their records."""
     own = {cell.name: own_metrics(cell.scenario) for cell in campaign.cells}
     lacking = store.unmeasured({cell: [metric.name for metric in of_cell] for cell, of_cell in own.items()})

@@ -16,7 +16,7 @@ from vedette.campaigns.database import DATABASE, LOCK, Failure
 from vedette.campaigns.journal import Writer
 from vedette.campaigns.manifest import (
     MANIFEST,
-    check_same,
+    check_same_campaign,
     contents_checksum,
     new_manifest,
     new_session,
@@ -55,7 +55,7 @@ class Store(Writer):
         fresh = new_manifest(campaign)
         make_folder(target)
         if (target / MANIFEST).exists():  # before locking, which creates a file
-            check_same(target, read_manifest(target), fresh)
+            check_same_campaign(target, read_manifest(target), fresh)
         return cls(target, campaign, fresh)
 
     @property
@@ -107,7 +107,7 @@ class Store(Writer):
         """Add a session to the folder's manifest, and open its runs; return the manifest."""
         started = (self.folder / MANIFEST).exists()
         manifest = read_manifest(self.folder) if started else fresh
-        check_same(self.folder, manifest, fresh)
+        check_same_campaign(self.folder, manifest, fresh)
         num_runs = max(manifest["num_runs"], fresh["num_runs"])
         manifest = {**manifest, "num_runs": num_runs, "sessions": [*manifest["sessions"], new_session()]}
         contents = contents_checksum(manifest)

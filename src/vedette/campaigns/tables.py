@@ -91,7 +91,7 @@ def in_schema(table: pa.Table, schema: pa.Schema) -> pa.Table:
     return pa.concat_tables([schema.empty_table(), table], promote_options="permissive")
 
 
-def joined_tables(parts: Iterable[dict[str, pa.Table]]) -> dict[str, pa.Table]:
+def concatenated_tables(parts: Iterable[dict[str, pa.Table]]) -> dict[str, pa.Table]:
     """Concatenate the tables of several sets of runs."""
     found: dict[str, list[pa.Table]] = {}
     for part in parts:

@@ -145,7 +145,7 @@ class TaskQueue:
         """Number of runs not yet handed out."""
         return self._num_left
 
-    def learn(self, task: Task, outcome: TaskOutcome) -> TaskOutcome:
+    def note_outcome(self, task: Task, outcome: TaskOutcome) -> TaskOutcome:
         """Record that a task has ended and how long its runs took; return its outcome."""
         kernels = self._kernels[task.cell.name]
         self._compiled[kernels] = True

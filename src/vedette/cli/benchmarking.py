@@ -59,7 +59,7 @@ def benchmark(
     require_packages("vedette benchmark", "jinja2", "matplotlib", "pyarrow")
     if not list_:
         load_workers(workers)
-    from vedette.campaigns.benchmark import OWN, campaign_of, entrant, make_way, scenes, try_entrant
+    from vedette.campaigns.benchmark import OWN, campaign_of, check_entrant, clear_stale_results, entrant, scenes
     from vedette.campaigns.leaderboard import scene_table
 
     if list_:
@@ -76,13 +76,13 @@ def benchmark(
         if first is None:
             got = ", ".join(scene.name for scene in chosen)
             raise usage_error(f"expected a scene of {each.role}s for {each.name}, see --list; got {got}", "--scenes")
-        try_entrant(each, campaign_of(first, each, num_runs, seed, out, approve=approve))
+        check_entrant(each, campaign_of(first, each, num_runs, seed, out, approve=approve))
     for scene in chosen:
         for own in (*(each for each in entered if each.role == scene.role), None):  # who may fail comes first
             folder = out / scene.name / (OWN if own is None else own.name)
             note(f"{scene.name}: {folder.name}")
             campaign = campaign_of(scene, own, num_runs, seed, out, approve=approve)
-            make_way(campaign, folder)
+            clear_stale_results(campaign, folder)
             carry_out(campaign, folder, workers)
     tables = [table for scene in scenes().values() if (table := scene_table(scene, out)) is not None]
     page = _write(tables, seed, out)
@@ -109,11 +109,11 @@ def _chosen(names: str | None, quick: bool, entered: list[Entrant]) -> list[Scen
 
 
 def _write(tables: list[SceneTable], seed: int, out: Path) -> Path:
-    from vedette.campaigns.leaderboard import benchmark_csv, benchmark_markdown, origin
+    from vedette.campaigns.leaderboard import benchmark_csv, benchmark_markdown, benchmark_provenance
     from vedette.reports.benchmark import write_benchmark
 
     with interruptible(f"{out} keeps every run; the same command writes the tables"):
-        facts = origin(tables, seed)
+        facts = benchmark_provenance(tables, seed)
         write_text(out / "benchmark.md", benchmark_markdown(tables, facts))
         write_text(out / "benchmark.csv", benchmark_csv(tables))
         write_benchmark(tables, facts, page := out / "benchmark.html")

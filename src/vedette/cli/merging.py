@@ -40,7 +40,7 @@ def merge(
     results = merged.results
     campaign = results.campaign
     finished = campaign.total - merged.num_missing
-    say(f"{results.folder}: {finished} of {campaign.total} runs, {merged.num_taken} of them new")
+    say(f"{results.folder}: {finished} of {campaign.total} runs, {merged.num_added} of them new")
     commands = _commands(merged)
     publish(
         {

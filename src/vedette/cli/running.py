@@ -111,7 +111,7 @@ def run(
     from vedette.scenarios import load_scenario
     from vedette.scenarios.dumping import dump_kept
     from vedette.simulation.journal import RunInterrupted, RunStopped
-    from vedette.simulation.storage import check_free, save_run
+    from vedette.simulation.storage import check_target, save_run
 
     loaded = load_scenario(scenario)
     check_planner(loaded, planner, "--planner")
@@ -120,7 +120,7 @@ def run(
     if out is not None:
         require_packages("vedette run --out", "matplotlib", "pyarrow")
         with named_options({"directory": "--out"}):
-            check_free(out, overwrite)
+            check_target(out, overwrite)
     stop: RunStopped | RunInterrupted | None = None
     with interruptible("nothing was written"):
         compile_if_cold(loaded)

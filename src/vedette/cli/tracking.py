@@ -74,12 +74,12 @@ def track(
     figures.
     """
     from vedette.evaluation.joining import joins_of_run, with_joined_tracks
-    from vedette.simulation.storage import check_free
+    from vedette.simulation.storage import check_target
 
     _check_formats(formats or (), out)
     if out is not None:
         with named_options({"directory": "--out"}):
-            check_free(out, overwrite)
+            check_target(out, overwrite)
     found, cautions = read_recording(sensors, scans, truth, speed=speed, bad_rows=bad_rows, trust=trust)
     scenario, recording, assumed = found
     if "clutter" in assumed:

@@ -20,11 +20,11 @@ from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_scan_times, build_true_sensors, drop_outs
 from vedette.scenarios.sections.recording import RecordingSection, sites_of
 from vedette.scenarios.trust import code_of
-from vedette.simulation.loop import scans_of_run
+from vedette.simulation.loop import scan_flags_of_run
 from vedette.simulation.records import RunRecord
 from vedette.simulation.replay import scans_of_sensors
 from vedette.simulation.scans import Scan
-from vedette.simulation.true_sensors import scanning
+from vedette.simulation.true_sensors import sensors_at_step
 
 UNKNOWN = -2  # origin of a measurement that was recorded
 # How the measurements of a kind lie in the plane; of other kinds they do not.
@@ -69,8 +69,8 @@ def scans_of_record(record: RunRecord, scenario: Scenario) -> Scans:
     region, method = model.region.build(), model.filter.gaussian_method
     sensors = [section.build(region, method, scenario.folder) for section in model.sensors]
     true, times = build_true_sensors(scenario, sensors), build_scan_times(scenario)
-    scans_at = scans_of_run(times, drop_outs(scenario), record.num_scans, record.seed, record.run)
-    return scans_of_sensors(record, len(true), partial(scanning, true, scans_at))
+    scans_at = scan_flags_of_run(times, drop_outs(scenario), record.num_scans, record.seed, record.run)
+    return scans_of_sensors(record, len(true), partial(sensors_at_step, true, scans_at))
 
 
 def _recorded(record: RunRecord, section: RecordingSection, scenario: Scenario) -> Scans:

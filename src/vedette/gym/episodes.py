@@ -128,7 +128,7 @@ class Episodes:
         chosen, self.num_moved = self.built.encoder.resolve_actions(self.context, actions)
         with suppress_unit_warnings():
             plan = policy_plan("policy", self.context, chosen)
-            self._journal.decide(plan, explain=self.built.experiment.explain)
+            self._journal.note_decision(plan, explain=self.built.experiment.explain)
             self.world.follow(plan.chosen_actions)
             self._advance()
 

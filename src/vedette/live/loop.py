@@ -21,7 +21,7 @@ from vedette.models.arguments import reject
 from vedette.platforms.compass import Compass, PlaneCompass, courses_of
 from vedette.recorded import Conventions, Origin, Site
 from vedette.recorded.extents import beyond_reach, is_within, places_of
-from vedette.simulation.journal import cause_of
+from vedette.simulation.journal import error_cause
 from vedette.simulation.loop import PLANNER
 from vedette.tracking import LateScans, SensorScan, Timeline
 
@@ -129,7 +129,7 @@ class Live:
             taken = replace(checked, timeline=timeline, latest=tuple(latest))
             answer = self._estimates(taken) | ({"beyond": num_beyond} if num_beyond else {})
         except Exception as error:  # of whatever code of the user's own it comes, the next line is another
-            text = str(error) if isinstance(error, VedetteError) else cause_of(error)
+            text = str(error) if isinstance(error, VedetteError) else error_cause(error)
             return _failed(state, text if text.startswith(place) else f"{place}: {text}")
         if self._is_due(taken):
             taken, plan = self._decided(taken)
@@ -229,7 +229,10 @@ class Live:
             told |= {"expected_rewards": rewards, "notes": plan.notes}
             return after, {"line": state.num_lines, "plan": {**told, "why": _why(plan)}}
         except Exception as error:  # as above; the scan was taken
-            told = {"line": state.num_lines, "error": f"line {state.num_lines}, plan at {now:g} s: {cause_of(error)}"}
+            told = {
+                "line": state.num_lines,
+                "error": f"line {state.num_lines}, plan at {now:g} s: {error_cause(error)}",
+            }
             return replace(after, num_errors=after.num_errors + 1), told
 
 

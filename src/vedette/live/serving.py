@@ -19,7 +19,7 @@ from vedette.live.lines import CHUNK, LineSplitter
 from vedette.live.loop import Answer, encoded
 from vedette.live.messages import MOST_BYTES
 from vedette.live.remarks import Remarks
-from vedette.simulation.journal import cause_of
+from vedette.simulation.journal import error_cause
 
 MOST_CLIENTS = 128  # pages, too
 MOST_OF_ADDRESS = 64  # of these
@@ -221,7 +221,7 @@ class TcpServer:
         except (ConnectionError, asyncio.CancelledError):  # it is gone, or the server is
             pass
         except Exception as error:  # such as a record that cannot be written
-            self._exchange.remark(client, "was put out", f": {cause_of(error)}")
+            self._exchange.remark(client, "was put out", f": {error_cause(error)}")
         finally:
             self._exchange.leave(client)
             writer.close()

@@ -22,7 +22,7 @@ from websockets.http11 import Request, Response
 from vedette.live.lines import LineSplitter
 from vedette.live.messages import MOST_BYTES
 from vedette.live.serving import BACKLOG, ENTER_WITHIN, Exchange, is_loopback, name_of, taken
-from vedette.simulation.journal import cause_of
+from vedette.simulation.journal import error_cause
 
 FRAMES_PER_SECOND = 10.0
 _LOG = logging.getLogger("vedette.live.web")
@@ -162,7 +162,7 @@ class WebServer:
             if error.sent is not None and error.sent.code == 1009:
                 exchange.remark(client, f"sent a message of more than {MOST_BYTES} bytes, and was put out")
         except Exception as error:  # such as a record that cannot be written
-            exchange.remark(client, "was put out", f": {cause_of(error)}")
+            exchange.remark(client, "was put out", f": {error_cause(error)}")
 
     async def _serve(self, socket: ServerConnection, client: _WebClient) -> None:
         async for message in socket:
@@ -201,7 +201,7 @@ class WebServer:
             try:
                 self._frame = self._screen.frame()
             except Exception as error:
-                self._exchange.tell(f"no frame for the pages: {cause_of(error)}")
+                self._exchange.tell(f"no frame for the pages: {error_cause(error)}")
             async with self._drawn:
                 self._num_drawn, self._num_lines = self._num_drawn + 1, self._exchange.num_taken
                 self._drawn.notify_all()

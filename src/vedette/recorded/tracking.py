@@ -71,4 +71,4 @@ class Tracking:
                 if watch is not None:
                     watch(step)
 
-        return journal.filled(go, score)
+        return journal.run_of(go, score)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from vedette.campaigns.leaderboard import SceneTable, header, row
-from vedette.reports.html import make_room, render, write_page
+from vedette.reports.html import prepare_folder, render, write_page
 from vedette.reports.tables import Table
 
 _NOTE = "All on the same runs; 95 %: interval, of skewed differences by bootstrap. A lost run counts as the cutoff."
@@ -17,7 +17,7 @@ def write_benchmark(tables: Sequence[SceneTable], facts: Mapping[str, str], path
 
     facts: versions and checksums by name.
     """
-    make_room(path)
+    prepare_folder(path)
     named = [
         (table, Table(_NOTE, header(table), tuple(row(table, own) for own in table.standings))) for table in tables
     ]

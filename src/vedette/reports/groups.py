@@ -89,7 +89,7 @@ class Group:
     reason: str
 
 
-def gather(results: CampaignResults) -> Iterator[Group]:
+def comparison_groups(results: CampaignResults) -> Iterator[Group]:
     """Yield every group in the order of the specification, reading its runs when it is reached."""
     campaign = results.campaign
     taken: set[str] = set()

@@ -26,10 +26,10 @@ from vedette.internal.text import named_in
 from vedette.kernels.base.types import Floats
 from vedette.reports.drawings import Drawing, error_drawings, group_drawings, paired_records, sweep_drawings
 from vedette.reports.forest import Forest, forest_of
-from vedette.reports.groups import Group, axis_label, gather
+from vedette.reports.groups import Group, axis_label, comparison_groups
 from vedette.reports.health import DiagnosticsTable, diagnostics_table
 from vedette.reports.pairwise import PairwiseComparison, all_pairs
-from vedette.reports.provenance import citation, made_with, spec_toml, versions_table
+from vedette.reports.provenance import citation, last_version_and_date, spec_toml, versions_table
 from vedette.reports.replay import replay_data
 from vedette.reports.saving import run_errors
 from vedette.reports.svg import inline_png, inline_svg
@@ -91,24 +91,24 @@ def write_report(
     """
     _check_replays(results, replays or ())
     target = Path(path)
-    make_room(target)
+    prepare_folder(target)
     sections: list[_Section] = []
     runs: list[dict[str, Any]] = []
     errors: dict[str, Floats] = {}
     claims: list[CheckedClaim] = []
     reference = published_comparison_of(results.campaign)
-    for number, group in enumerate(gather(results)):
+    for number, group in enumerate(comparison_groups(results)):
         if reference is not None and group.comparison is not None:
             claims += checked_claims(reference, group.comparison)
         errors.update(run_errors(group))
         is_brief = sum(section.size for section in sections) > MAX_FIGURE_BYTES
         sections.append(section_of(group, f"g{number}", is_brief))
         runs += _replays(results, group, replays, trust)
-    sweeps = _drawn(tuple(sweep_drawings(results.campaign, errors)), "sweep")
+    sweeps = _inline_figures(tuple(sweep_drawings(results.campaign, errors)), "sweep")
     kept = _within(runs, MAX_REPLAY_BYTES) if replays is None else runs
     untrusted = () if trust else replay_code(results)
     campaign = results.campaign
-    made = made_with(results.manifest)
+    made = last_version_and_date(results.manifest)
     page = render(
         "report.html",
         kept,
@@ -147,10 +147,10 @@ def write_demo(results: CampaignResults, path: str | Path, *, trust: bool = Fals
         InputError: a run that does not exist, or a file that cannot be written.
     """
     target = Path(path)
-    make_room(target)
+    prepare_folder(target)
     first = [(cell.name, 0) for cell in results.campaign.cells]
     _check_replays(results, first)
-    (group,) = gather(results)
+    (group,) = comparison_groups(results)
     page = render(
         "demo.html",
         _replays(results, group, first, trust),
@@ -185,7 +185,7 @@ def _spans(runs: Sequence[int]) -> str:
     return ", ".join(" to ".join(map(str, span)) for span in spans) or "there is none yet"
 
 
-def make_room(path: Path) -> None:
+def prepare_folder(path: Path) -> None:
     """Create the folders of the page before the work that an invalid path would waste."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -219,7 +219,7 @@ def section_of(group: Group, prefix: str, is_brief: bool = False) -> _Section:
         pairs=() if comparison is None or len(comparison.strategies) < 3 else all_pairs(comparison),
         diagnostics=diagnostics_table(group),
         tables=tuple((title, table) for title, table in named.items() if table is not None),
-        figures=_drawn(
+        figures=_inline_figures(
             tuple(error_drawings(group) if is_brief else group_drawings(group)),
             prefix,
             elided_names([each.label for each in group.strategies]),
@@ -227,7 +227,7 @@ def section_of(group: Group, prefix: str, is_brief: bool = False) -> _Section:
     )
 
 
-def _drawn(
+def _inline_figures(
     drawings: Sequence[Drawing], prefix: str, names: Mapping[str, str] | None = None
 ) -> tuple[tuple[Drawing, Markup], ...]:
     found = []

@@ -19,13 +19,13 @@ from vedette.kernels.base.types import Floats
 from vedette.live import Answer, Live, LiveState
 from vedette.reports.html import render
 from vedette.reports.replay import (
-    drawn_decision,
-    drawn_estimate,
-    drawn_measurements,
-    drawn_pose,
-    drawn_sensor,
-    places_of,
-    rounded_to,
+    decimals_for,
+    decision_data,
+    estimate_data,
+    measurement_data,
+    pose_data,
+    rounded_list,
+    sensor_data,
 )
 from vedette.scenarios import Scenario
 from vedette.scenarios.sections.tracking import UNLABELLED
@@ -87,8 +87,8 @@ class LiveScreen:
             "group": model.name,
             "run": 0,
             "labelled": model.filter.kind not in UNLABELLED,
-            "zones": [[zone.kind, [rounded_to(corner, 3) for corner in zone.corners]] for zone in scene.zones],
-            "sensors": [drawn_sensor(*each) for each in zip(self._names, self._sections, strict=True)],
+            "zones": [[zone.kind, [rounded_list(corner, 3) for corner in zone.corners]] for zone in scene.zones],
+            "sensors": [sensor_data(*each) for each in zip(self._names, self._sections, strict=True)],
             "recorded": True,
             "known": False,
             "origin": None if model.origin is None else [model.origin.lon, model.origin.lat],
@@ -116,18 +116,18 @@ class LiveScreen:
         time = None if state.start is None or belief.time is None else belief.time + state.start
         found = None if time is None else self.live.estimate(belief.fused, belief.step)
         extent = self._extent(poses[:, :2], np.empty((0, 2)) if found is None else found.means[:, :2])
-        places = places_of(extent)
+        places = decimals_for(extent)
         frame = {
             "scene": self._scene,
             "time": time,
             "utc": 0.0 if state.is_utc else None,
-            "extent": rounded_to(extent, places),
+            "extent": rounded_list(extent, places),
             "estimates": []
             if found is None
-            else [[*drawn_estimate(found, i, places), 0, 0.0] for i in range(len(found.labels))],
-            "poses": [drawn_pose(*each, places) for each in zip(poses, self._sections, strict=True)],
+            else [[*estimate_data(found, i, places), 0, 0.0] for i in range(len(found.labels))],
+            "poses": [pose_data(*each, places) for each in zip(poses, self._sections, strict=True)],
             "scans": self._scans(timeline, places),
-            "decision": self._told_decision(poses),
+            "decision": self._decision_data(poses),
             "health": self._health(timeline),
             "silence": self._silence(state),
             "fault": self._fault,
@@ -164,17 +164,17 @@ class LiveScreen:
             for scan in scans
         )
         return [
-            drawn_measurements(scan, section.measurement.kind, pose, places)
+            measurement_data(scan, section.measurement.kind, pose, places)
             for scan, section, pose in zip(drawn, self._sections, latest.poses, strict=True)
         ]
 
-    def _told_decision(self, poses: Floats) -> dict[str, Any] | None:
+    def _decision_data(self, poses: Floats) -> dict[str, Any] | None:
         if self._planner is None:
             return None
         plan = self._planner.last
         if plan is not None and plan is not self._decided[0]:
             axes = dict[str, dict[str, Any]]()
-            told = drawn_decision(Decision(1, 0.0, poses, plan.without_evidence(explained=True)), axes, self._names)
+            told = decision_data(Decision(1, 0.0, poses, plan.without_evidence(explained=True)), axes, self._names)
             self._decided = (plan, {**told, "axes": list(axes.values()), "number": self._planner.num_plans})
         return self._decided[1]
 

@@ -54,7 +54,7 @@ def _text(value: str) -> str:
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")  # JSON strings are valid TOML
 
 
-def made_with(manifest: Mapping[str, Any]) -> tuple[str, str]:
+def last_version_and_date(manifest: Mapping[str, Any]) -> tuple[str, str]:
     """Return the version of this program and the date of the last session of a campaign."""
     last = manifest["sessions"][-1]
     return str(last["versions"]["vedette"]), str(last["started"])[:10]

@@ -42,14 +42,14 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
     """
     scenario = strategy.cell.scenario
     extent = _extent(record, scenario)
-    places = places_of(extent)
+    places = decimals_for(extent)
     scene, names, sections = strategy.scene, scenario.model.sensor_names, scenario.model.sensors
-    sensors = [drawn_sensor(name, section) for name, section in zip(names, sections, strict=True)]
+    sensors = [sensor_data(name, section) for name, section in zip(names, sections, strict=True)]
     has_velocity = scenario.model.motion.kind != "custom"
     is_known, origin = scenario.model.targets.kind != "unknown", scenario.model.origin
     told = told_by(record, scenario)
     axes = dict[str, dict[str, Any]]()
-    decisions = [drawn_decision(each, axes, names) for each in record.decisions]
+    decisions = [decision_data(each, axes, names) for each in record.decisions]
     return {
         "cell": strategy.cell.name,
         "group": group,
@@ -58,14 +58,14 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
         "mean": _mean_error(strategy, record) if is_known else None,
         "run": record.run,
         "labelled": strategy.has_labels,
-        "extent": rounded_to(extent, places),
-        "zones": [[zone.kind, [rounded_to(corner, places) for corner in zone.corners]] for zone in scene.zones],
+        "extent": rounded_list(extent, places),
+        "zones": [[zone.kind, [rounded_list(corner, places) for corner in zone.corners]] for zone in scene.zones],
         "sensors": sensors,
-        "times": rounded_to(record.times, 6),
+        "times": rounded_list(record.times, 6),
         "truth": [_targets(record, scan, places, has_velocity) for scan in range(record.num_scans)],
         "estimates": _estimates(record, scenario, places),
         "poses": [
-            [drawn_pose(pose, section, places) for pose, section in zip(poses, sections, strict=True)]
+            [pose_data(pose, section, places) for pose, section in zip(poses, sections, strict=True)]
             for poses in record.poses
         ],
         "scans": _scans(record, scenario, places, trust),
@@ -75,7 +75,7 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
         "utc": told.start if told.is_utc else None,
         "origin": None if origin is None else [origin.lon, origin.lat],
         **({"compass": True} if scenario.model.by_compass else {}),
-        "ospa": [rounded_to(parts, 2) for parts in record.ospa] if is_known else [],
+        "ospa": [rounded_list(parts, 2) for parts in record.ospa] if is_known else [],
         "ospa_unit": scenario.model.ospa.unit,
         "axes": list(axes.values()),
         "reward": scene.reward,
@@ -89,12 +89,12 @@ def _mean_error(strategy: Strategy, record: RunRecord) -> float | None:
     return round(float(record.ospa[counted, 0].mean()), 2) if counted.any() else None
 
 
-def rounded_to(values: Any, places: int) -> list[float]:
+def rounded_list(values: Any, places: int) -> list[float]:
     """Return rounded numbers as a list."""
     return [round(float(value), places) for value in values]
 
 
-def places_of(extent: Sequence[float]) -> int:
+def decimals_for(extent: Sequence[float]) -> int:
     """Return the number of decimals that a pixel can show."""
     return max(0, _DIGITS - math.floor(math.log10(max(extent[1] - extent[0], extent[3] - extent[2]))))
 
@@ -116,7 +116,7 @@ def _extent(record: RunRecord, scenario: Scenario) -> tuple[float, float, float,
     return x_min, x_max, y_min, y_max
 
 
-def drawn_sensor(name: str, section: SensorSection) -> dict[str, Any]:
+def sensor_data(name: str, section: SensorSection) -> dict[str, Any]:
     """Return drawing data of a sensor: the shape of its measurements in the plane, and its field of view if bounded.
 
     `unturned` is the heading (rad) of a stationary sensor with a uniform view, which has no meaning.
@@ -131,12 +131,12 @@ def drawn_sensor(name: str, section: SensorSection) -> dict[str, Any]:
     return found
 
 
-def drawn_pose(pose: Floats, section: SensorSection, places: int) -> list[float]:
+def pose_data(pose: Floats, section: SensorSection, places: int) -> list[float]:
     """Return position and heading; for a camera also its field of view: middle and half width in rad, reach in m."""
-    found = [*rounded_to(pose[:2], places), round(float(pose[2]), 4)]
+    found = [*rounded_list(pose[:2], places), round(float(pose[2]), 4)]
     if section.detection.kind == "camera":
         field = field_of_view(section, pose.tolist())
-        found += [] if field is None else [*rounded_to(field[:2], 4), round(field.reach, places)]
+        found += [] if field is None else [*rounded_list(field[:2], 4), round(field.reach, places)]
     return found
 
 
@@ -144,7 +144,7 @@ def _targets(record: RunRecord, scan: int, places: int, has_velocity: bool) -> l
     """Return number (from 1) and position of each target, and its velocity unless the motion model is custom."""
     ids, states = record.truth.at(scan)
     return [
-        [target + 1, *rounded_to(state[:2], places), *(rounded_to(state[2:4], 2) if has_velocity else [])]
+        [target + 1, *rounded_list(state[:2], places), *(rounded_list(state[2:4], 2) if has_velocity else [])]
         for target, state in zip(ids.tolist(), states, strict=True)
     ]
 
@@ -173,26 +173,26 @@ def _estimates(record: RunRecord, scenario: Scenario, places: int) -> list[list[
         rows: list[list[Any]] = []
         for place, label in enumerate(estimate.labels.tolist()):
             partner = partners.get((scan, *label, *estimate.means[place, :2].tolist()), (0, 0.0))
-            rows.append([*drawn_estimate(estimate, place, places), *partner])
+            rows.append([*estimate_data(estimate, place, places), *partner])
         found.append(rows)
     return found
 
 
-def drawn_estimate(estimate: Estimate, place: int, places: int) -> list[Any]:
+def estimate_data(estimate: Estimate, place: int, places: int) -> list[Any]:
     """Return label, position, existence and ellipse (semi-axes in m, angle in rad) of one target of an estimate."""
     born, number = estimate.labels[place].tolist()
-    position, existence = rounded_to(estimate.means[place, :2], places), round(float(estimate.existence[place]), 4)
+    position, existence = rounded_list(estimate.means[place, :2], places), round(float(estimate.existence[place]), 4)
     return [f"{born}.{number}", *position, existence, *_ellipse(estimate.covs[place, :2, :2], places)]
 
 
 def _ellipse(cov: Floats, places: int) -> list[float]:
     variances, axes = np.linalg.eigh(cov)
     semi = _SIGMAS * np.sqrt(np.maximum(variances, 0.0))
-    return [*rounded_to(semi[::-1], places), round(math.atan2(axes[1, 1], axes[0, 1]), 3)]
+    return [*rounded_list(semi[::-1], places), round(math.atan2(axes[1, 1], axes[0, 1]), 3)]
 
 
 def _scans(record: RunRecord, scenario: Scenario, places: int, trust: bool) -> list[list[list[list[float]]]]:
-    """Return for each scan and sensor its measurements, see `drawn_measurements`.
+    """Return for each scan and sensor its measurements, see `measurement_data`.
 
     Empty if the models of the scenario, or its recording, are not available.
     """
@@ -204,21 +204,23 @@ def _scans(record: RunRecord, scenario: Scenario, places: int, trust: bool) -> l
     except VedetteError:
         return []
     return [
-        [drawn_measurements(scan, kind, pose, places) for scan, kind, pose in zip(sensors, kinds, poses, strict=True)]
+        [measurement_data(scan, kind, pose, places) for scan, kind, pose in zip(sensors, kinds, poses, strict=True)]
         for sensors, poses in zip(scans, record.poses, strict=True)
     ]
 
 
-def drawn_measurements(scan: Scan | None, kind: str, pose: Floats, places: int) -> list[list[float]]:
+def measurement_data(scan: Scan | None, kind: str, pose: Floats, places: int) -> list[list[float]]:
     """Return for each measurement of a scan its target (0: clutter, -1: unknown), and its position in the plane."""
     if scan is None or kind not in LIE:
         return []
     digits = _ANGLE_DIGITS if LIE[kind] == "ray" else places
     lie = in_plane(scan.measurements, kind, pose)
-    return [[origin + 1, *rounded_to(place, digits)] for origin, place in zip(scan.origins.tolist(), lie, strict=True)]
+    return [
+        [origin + 1, *rounded_list(place, digits)] for origin, place in zip(scan.origins.tolist(), lie, strict=True)
+    ]
 
 
-def drawn_decision(decision: Decision, axes: dict[str, dict[str, Any]], names: Sequence[str]) -> dict[str, Any]:
+def decision_data(decision: Decision, axes: dict[str, dict[str, Any]], names: Sequence[str]) -> dict[str, Any]:
     """Return a decision with its rewards, whose axes are added to `axes`, and its explanation."""
     plan = decision.plan
     return {
@@ -263,7 +265,7 @@ def _curves(plan: Plan, axes: dict[str, dict[str, Any]]) -> list[dict[str, Any]]
             axis = {
                 "axis": along.title(),
                 "numeric": along.is_numeric,
-                "places": rounded_to(along.places[order], 1),
+                "places": rounded_list(along.places[order], 1),
                 "labels": [along.labels[i] for i in order],
                 "ticks": [along.ticks[i] for i in order],
             }

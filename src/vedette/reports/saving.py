@@ -13,7 +13,7 @@ from vedette.evaluation.tables import decisions_markdown, strategy_csv, strategy
 from vedette.internal.files import write_whole
 from vedette.kernels.base.types import Floats
 from vedette.reports.drawings import Drawing, group_drawings, sweep_drawings, typical_records
-from vedette.reports.groups import Group, gather, group_of_run
+from vedette.reports.groups import Group, comparison_groups, group_of_run
 from vedette.scenarios import Scenario
 from vedette.simulation.records import RunRecord
 
@@ -26,7 +26,7 @@ def write_summary(results: CampaignResults, folder: Path) -> tuple[Path, ...]:
     Raises:
         InputError: the folder cannot be written.
     """
-    groups = [group for group in gather(results) if group.comparison is not None]
+    groups = [group for group in comparison_groups(results) if group.comparison is not None]
     compared = {group.name: group.comparison for group in groups if group.comparison is not None}
     contents = {MARKDOWN: "\n".join(map(_markdown, groups)), CSV: strategy_csv(compared)}
     try:
@@ -61,7 +61,7 @@ def write_figures(results: CampaignResults, path: str | Path) -> tuple[Path, ...
     written: list[Path] = []
     errors: dict[str, Floats] = {}
     several = len(results.campaign.groups()) > 1
-    for group in gather(results):
+    for group in comparison_groups(results):
         errors.update(run_errors(group))
         prefix = f"{group.name}-" if several else ""
         written += _save(group_drawings(group), folder, prefix)

@@ -8,7 +8,7 @@ from typing import Any
 
 from vedette.evaluation.scans import code_of_sensors
 from vedette.reports.groups import group_of_run
-from vedette.reports.html import make_room, render, section_of, write_page
+from vedette.reports.html import prepare_folder, render, section_of, write_page
 from vedette.reports.provenance import citation
 from vedette.reports.replay import replay_data
 from vedette.reports.tables import Table
@@ -39,7 +39,7 @@ def write_run_report(
         InputError: the run has other sensors than the scenario, or the file cannot be written.
     """
     target = Path(path)
-    make_room(target)
+    prepare_folder(target)
     group = group_of_run(record, scenario)
     (strategy,) = group.strategies
     page = render(

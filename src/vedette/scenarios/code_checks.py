@@ -13,7 +13,7 @@ from vedette.scenarios.build import build_experiment, build_planner, build_senso
 from vedette.scenarios.faults import Told
 from vedette.scenarios.loading import Scenario, document_of, place_fault
 from vedette.scenarios.sections.custom import NotGiven, customs
-from vedette.simulation.journal import RunStopped, cause_of
+from vedette.simulation.journal import RunStopped, error_cause
 from vedette.simulation.loop import simulate
 
 _SCANS = 3  # that are tried: enough for one that is missing, and one after births
@@ -46,7 +46,7 @@ def _faults(scenario: Scenario) -> Iterator[Told]:
         except NotGiven as fault:
             yield Told((*places[id(fault.section)], fault.key), fault.wanted, fault.got)
         except RunStopped as stop:
-            cause = cause_of(stop.__cause__) if isinstance(stop.__cause__, Exception) else str(stop)
+            cause = error_cause(stop.__cause__) if isinstance(stop.__cause__, Exception) else str(stop)
             yield Told((), "parts that fit together", f"in {stop.stage} at step {stop.step}: {cause}")
         except VedetteError as error:
             yield Told((), "parts that fit together", str(error))

@@ -12,7 +12,7 @@ from vedette.internal.representation import SummaryRepr
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models.arguments import pose_vector, reject
 from vedette.platforms import Fleet, Platform
-from vedette.simulation.true_sensors import TrueSensor, scanning, true_sensors_of
+from vedette.simulation.true_sensors import TrueSensor, sensors_at_step, true_sensors_of
 from vedette.simulation.truth import TargetSource
 from vedette.tracking import Tracker
 
@@ -95,10 +95,10 @@ class Experiment(SummaryRepr):
     def sensors_at(self, step: int, scans_at: Bools | None = None) -> tuple[TrueSensor | None, ...]:
         """Return the true sensors at a step (from 1); None for one that does not scan then.
 
-        scans_at: scans of the run, see `vedette.simulation.loop.scans_of_run`; None: without lost scans.
+        scans_at: scans of the run, see `vedette.simulation.loop.scan_flags_of_run`; None: without lost scans.
         """
         times = self.scans_at if scans_at is None else scans_at
-        return scanning(self._scanning, times, step)
+        return sensors_at_step(self._scanning, times, step)
 
     def fleet(self, *, moving: bool = True) -> Fleet:
         """Return the platforms at the first scan; without an initial action, or if not `moving`, they do not move."""

@@ -27,7 +27,7 @@ STAGES = ("scans", "filter", "fusion", "estimate", "planning")
 _LIBRARIES = (str(Path(__file__).parents[1]), *(sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")))
 
 
-def cause_of(error: Exception) -> str:
+def error_cause(error: Exception) -> str:
     """Return the message of an error; with its type and place in the user's code if the library did not raise it."""
     if isinstance(error, VedetteError):
         return str(error)
@@ -121,7 +121,7 @@ class Journal:
         self._off.append(off)
         self.estimates.append(estimate)
 
-    def decide(self, plan: Plan, undetected: UndetectedIntensity | None = None, *, explain: bool) -> None:
+    def note_decision(self, plan: Plan, undetected: UndetectedIntensity | None = None, *, explain: bool) -> None:
         """Record the decision after the current scan, with its explanation if explanations are kept."""
         kept = plan.without_evidence(explained=explain)
         found = undetected if explain and kept.explanation is not None else None
@@ -179,7 +179,7 @@ class Journal:
         num = len(self.estimates)
         return np.full((num, 3), np.nan) if score is None else score(self.truth.first(num), self.estimates)
 
-    def filled(self, go: Callable[[], None], score: Score | None) -> RunRecord:
+    def run_of(self, go: Callable[[], None], score: Score | None) -> RunRecord:
         """Return the record of a run; `go` processes its scans and notes each of them here.
 
         Args:
@@ -198,6 +198,6 @@ class Journal:
             message = f"{self.place(interrupt)}: interrupted"
             raise RunInterrupted(message, self._partial(score, message)) from interrupt
         except Exception as error:
-            message = f"{self.place(error)}: {cause_of(error)}"
+            message = f"{self.place(error)}: {error_cause(error)}"
             record = self._partial(score, message)
             raise RunStopped(message, self.step, self.time, self.stage(error), record) from error

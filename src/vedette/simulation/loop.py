@@ -16,7 +16,7 @@ from vedette.kernels.base.types import Bools, Floats
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.journal import Journal, Score
 from vedette.simulation.records import RunRecord
-from vedette.simulation.scans import Scan, kept_scans, simulate_scans
+from vedette.simulation.scans import Scan, active_scans, simulate_scans
 from vedette.simulation.truth import Truth
 from vedette.tracking import Central, Stages, State, Tracker, TrackerInfo
 
@@ -34,7 +34,7 @@ def sensor_streams(seed: int, run: int, stream: int, num_sensors: int) -> tuple[
     return tuple(run_stream(seed, run, stream, sensor) for sensor in range(num_sensors))
 
 
-def scans_of_run(
+def scan_flags_of_run(
     scans_at: Bools | None, drop_out: Sequence[float], num_scans: int, seed: int, run: int
 ) -> Bools | None:
     """(num_sensors, num_scans or more) whether each sensor scans in a run, without lost scans; None: always.
@@ -111,7 +111,7 @@ class SimulationRun:
         self.truth = truth_of_run(experiment, seed, run) if truth is None else truth
         scans, filters = (sensor_streams(seed, run, stream, experiment.num_sensors) for stream in (SCANS, FILTER))
         self._scan_rngs = scans
-        self._scans_at = scans_of_run(experiment.scans_at, experiment.drop_out, len(experiment.times), seed, run)
+        self._scans_at = scan_flags_of_run(experiment.scans_at, experiment.drop_out, len(experiment.times), seed, run)
         self._tracker = RunningTracker(experiment.tracker, experiment.estimate, self.truth, filters)
         self.fleet = experiment.fleet(moving=moving)
         self.outcome: ScanOutcome | None = None
@@ -152,7 +152,7 @@ class SimulationRun:
         with clock.timing("scans"):
             ids, states = self.truth.at(step - 1)
             sensors = experiment.sensors_at(step, self._scans_at)
-            scans = kept_scans(simulate_scans(states, poses, sensors, ids=ids, rngs=self._scan_rngs), off)
+            scans = active_scans(simulate_scans(states, poses, sensors, ids=ids, rngs=self._scan_rngs), off)
             measurements = tuple([None if scan is None else scan.measurements for scan in scans])
         tracked = self._tracker.step(step, measurements, poses, time, clock)
         self.outcome = ScanOutcome(step, time, poses, measurements, scans, off, *tracked)
@@ -201,13 +201,13 @@ def simulate(
 
     Raises:
         VedetteError: the true targets cannot be drawn.
-        RunStopped, RunInterrupted: models, tracker, estimate, planner or score raised, see `Journal.filled`.
+        RunStopped, RunInterrupted: models, tracker, estimate, planner or score raised, see `Journal.run_of`.
     """
     name = "still" if planner is None else planner.name
     truth = truth_of_run(experiment, seed, run)
     journal = Journal(experiment.name, name, seed, run, truth, experiment.num_sensors)
     with suppress_unit_warnings():  # no warnings of implausible numbers in simulated scans
-        return journal.filled(partial(_run_scans, experiment, planner, journal, watch), score)
+        return journal.run_of(partial(_run_scans, experiment, planner, journal, watch), score)
 
 
 def _with_truth(planner: Any, truth: Truth) -> Planner | None:
@@ -231,5 +231,5 @@ def _run_scans(
         if planner is not None and moment.step in experiment.decision_steps:
             with journal.timing("planning"):
                 plan = planner.plan(moment.state, moment.poses, rng=planner_rng)
-            journal.decide(plan, moment.state.undetected, explain=experiment.explain)
+            journal.note_decision(plan, moment.state.undetected, explain=experiment.explain)
             world.follow(plan.chosen_actions)

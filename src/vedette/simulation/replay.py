@@ -7,9 +7,9 @@ from functools import partial
 
 from vedette.errors import InputError
 from vedette.simulation.experiment import Experiment
-from vedette.simulation.loop import SCANS, scans_of_run, sensor_streams
+from vedette.simulation.loop import SCANS, scan_flags_of_run, sensor_streams
 from vedette.simulation.records import RunRecord
-from vedette.simulation.scans import Scan, kept_scans, simulate_scans
+from vedette.simulation.scans import Scan, active_scans, simulate_scans
 from vedette.simulation.true_sensors import TrueSensor
 
 
@@ -30,7 +30,9 @@ def scans_of(record: RunRecord, experiment: Experiment) -> tuple[tuple[Scan | No
         InputError: the record and the experiment have different numbers of sensors.
         VedetteError: as the models.
     """
-    scans_at = scans_of_run(experiment.scans_at, experiment.drop_out, len(experiment.times), record.seed, record.run)
+    scans_at = scan_flags_of_run(
+        experiment.scans_at, experiment.drop_out, len(experiment.times), record.seed, record.run
+    )
     return scans_of_sensors(record, experiment.num_sensors, partial(experiment.sensors_at, scans_at=scans_at))
 
 
@@ -42,7 +44,7 @@ def scans_of_sensors(
         raise InputError(f"record: expected {num_sensors} sensors; got {record.num_sensors}")
     streams = sensor_streams(record.seed, record.run, SCANS, num_sensors)
     return tuple(
-        kept_scans(
+        active_scans(
             simulate_scans(states, record.poses[step], sensors_at(step + 1), ids=ids, rngs=streams), record.off[step]
         )
         for step, (ids, states) in enumerate(record.truth.at(scan) for scan in range(record.num_scans))

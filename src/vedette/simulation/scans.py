@@ -134,7 +134,7 @@ def simulate_scans(
     return tuple(scans)
 
 
-def kept_scans(scans: Sequence[Scan | None], off: Bools) -> tuple[Scan | None, ...]:
+def active_scans(scans: Sequence[Scan | None], off: Bools) -> tuple[Scan | None, ...]:
     """Return the scans of one time, with None for sensors that are off (num_sensors,).
 
     All scans are drawn first, so that random numbers do not depend on whether a sensor was off before.

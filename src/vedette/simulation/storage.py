@@ -47,7 +47,7 @@ def save_run(
     Returns the folder. Raises `InputError` if it exists already, cannot be written, or the record contradicts itself.
     """
     target = Path(directory)
-    check_free(target, overwrite)
+    check_target(target, overwrite)
     files = {**encode_run(record), TIMINGS: encode_timings(record)}
     if scenario_text is not None:
         files[SCENARIO] = scenario_text.encode()
@@ -196,7 +196,7 @@ def _read(path: Path) -> bytes:
         raise InputError(f"{path}: expected a file of a saved run; {error}") from error
 
 
-def check_free(target: Path, overwrite: bool) -> None:
+def check_target(target: Path, overwrite: bool) -> None:
     """Raise `InputError` unless a run may be saved there.
 
     The place must be new, empty, or a run that may be overwritten, and its parent folder must be writable.

@@ -78,7 +78,7 @@ def true_sensors_of(given: Sequence[TrueSensor], known: Sequence[SensorModel]) -
     return tuple(given)
 
 
-def scanning(sensors: Sequence[TrueSensor], scans_at: Bools | None, step: int) -> tuple[TrueSensor | None, ...]:
+def sensors_at_step(sensors: Sequence[TrueSensor], scans_at: Bools | None, step: int) -> tuple[TrueSensor | None, ...]:
     """Return the true sensors at a step; None for one that does not scan then.
 
     Args:
