@@ -55,7 +55,7 @@ stub, parts = os.environ.get("STUB"), []
 
 def perform(task):
     from vedette.campaigns.rows import row_of
-    from vedette.campaigns.tasks import Landed
+    from vedette.campaigns.tasks import CompletedRun
     if not parts:
         with open(stub + ".start", "w") as file:
             file.write(str(time.process_time()))
@@ -63,7 +63,7 @@ def perform(task):
             parts.extend(pickle.load(file))
     payload, timings, metrics = parts
     rows = (row_of(task.cell.name, run, payload + b"%d" % run, timings, metrics) for run in task.runs)
-    return tuple(Landed(row, 1.0, 0.2) for row in rows)
+    return tuple(CompletedRun(row, 1.0, 0.2) for row in rows)
 
 def carry_out(*given):
     from vedette.campaigns import engine

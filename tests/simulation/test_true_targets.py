@@ -72,9 +72,8 @@ def told_of(kind: str, births: bool) -> State:
     unfound = UndetectedIntensity(CELLS, np.ones(4))
     state = State((fused, local), fused, step=1, time=1.0, undetected=unfound)
     inner = Keeps()
-    plan = (
-        ToldPlanner(inner, sensors(kind, births)).with_truth(truth()).plan(state, POSES, rng=np.random.default_rng(0))
-    )
+    planner = TrueTargetsPlanner(inner, sensors(kind, births)).with_truth(truth())
+    plan = planner.plan(state, POSES, rng=np.random.default_rng(0))
     assert plan.planner == "told"
     found: State = inner.state
     return found

@@ -31,7 +31,7 @@ from vedette.control.evidence import Evidence
 from vedette.control.search import first_best, tie_tolerance
 from vedette.kernels.base.types import Bools, Floats, Ints
 
-# Samples of the first round, and the growth factor of their number per round (docs/evidence/planning.md gives the cost).
+# Samples of the first round, and the factor by which each round adds to them (costs: docs/evidence/planning.md).
 FIRST_ROUND = 8
 _GROWTH = 1.5
 

@@ -28,7 +28,8 @@ from vedette.kernels.labelled.least_ospa import least_ospa_tracks
 from vedette.models.arguments import no_gaussians
 
 _MARGINAL_COMPONENTS = 10
-# A component of weight 1.5 to 2 is more often one target with fits two measurements than two targets: docs/evidence/estimates.md.
+# A component of weight 1.5 to 2 is more often one target that fits two measurements than two targets
+# (docs/evidence/estimates.md).
 _RANK_OF_HALF_LEFT = 0.2
 
 

@@ -101,7 +101,8 @@ def state_columns(means: Floats, covs: Floats, *, has_height: bool = False) -> d
     """Return the columns `x_m`, `y_m`, `vx_mps`, `vy_mps` of states and their stds `std_...`.
 
     Args:
-        means: (num, are included only for states of (num, state_dim, state_dim).
+        means: (num, state_dim). With four components or more the third and fourth are velocities.
+        covs: (num, state_dim, state_dim).
         has_height: True if components 4 and 5 are height and vertical velocity: `z_m` and `vz_mps`.
     """
     names = _COLUMNS[: 4 if means.shape[1] >= 4 else min(2, means.shape[1])]

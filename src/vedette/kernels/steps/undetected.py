@@ -52,7 +52,7 @@ class Undetected(NamedTuple):
     intensity: Mixture
     tables: Floats  # (num_tables, num_cells) expected numbers; the first is of the targets, others move as they do
     cells: Cells
-    places: Floats  # (num_measurements, 2 or 3) position of each; empty: no first detections of targets in cells
+    places: Floats  # (num_measurements, 2 or 3) positions, with heights; empty: no first detections in cells
     std: Floats  # (state_dim,) of a target that appears in a cell, about its place and at rest
     step: int  # of the labels
     first_index: int  # of the label of the scan's first measurement
