@@ -2,7 +2,7 @@
 
     python benchmarks/late_births.py                           # 16 scenes, 8 runs, a table
     python benchmarks/late_births.py --scenes 20 26 --runs 30
-    python benchmarks/late_births.py --write docs/tracking.md
+    python benchmarks/late_births.py --write docs/evidence/search.md
 
 Two to four sensors see 80, 120 or 180 m in a square of 600, 900 or 1,200 m, and decide after every scan, every second
 or every fifth. Two to four targets are there at first; in three of four scenes four to eight more are born later,

@@ -2,7 +2,7 @@
 
     python benchmarks/range_rate.py                       # 1000 scenes with one radar, 1000 with two
     python benchmarks/range_rate.py --scenes 10
-    python benchmarks/range_rate.py --write docs/tracking.md
+    python benchmarks/range_rate.py --write docs/evidence/range-rates.md
 
 Each scene is drawn: two pairs of targets whose straight courses cross at an angle of 15 to 165 degrees, and two targets
 that turn by 2 to 6 degrees a second; speeds of 8 to 30 m/s, 30 scans, one every 2 s. The radars are 3 to 5 km away
