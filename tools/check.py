@@ -74,6 +74,7 @@ STAGES = {
     "tests-campaigns": tests("campaigns, fuzzers, extensions, the project itself", *CAMPAIGNS),
     "docs": Stage("the site of the documentation, without warnings", [sys.executable, "tools/docs.py"]),
     "format": Stage("the layout of the source", python("ruff", "format", "--check", "--output-format=concise", ".")),
+    "prose": Stage("turns of phrase and lengths of guides", [sys.executable, "tools/prose.py"]),
     "lint": Stage("likely mistakes", python("ruff", "check", "--output-format=concise", ".")),
     "imports": Stage(
         "which package may import which", [str(Path(sys.executable).with_name("lint-imports")), "--no-logo"]
