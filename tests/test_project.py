@@ -175,6 +175,25 @@ def test_the_check_names_its_stages_and_refuses_others() -> None:
     assert check.main(["everything"]) == 2
 
 
+def test_more_of_a_phrase_than_allowed_fails_the_prose_check(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    prose = load("tools/prose.py")
+    monkeypatch.setattr(sys, "argv", ["prose.py"])
+    assert prose.main() == 0
+    source = tmp_path / "some.py"
+    source.write_text('"""Whether it is told what is so."""\n\n# but for this `of which`\n', "utf-8")
+    assert prose.places(source) == ["is told", "Whether it is told what is so.", "but for"]
+    page = tmp_path / "page.md"
+    page.write_text("```\nnobody\n```\nNobody reads `but for`.\n", "utf-8")
+    assert prose.places(page) == ["Nobody"]
+    monkeypatch.setattr(prose, "ROOT", tmp_path)
+    monkeypatch.setattr(prose, "files", lambda: [page])
+    monkeypatch.setattr(prose, "guides", lambda: [])
+    assert prose.main() == 1
+    assert capsys.readouterr().out.endswith("page.md: expected at most 0 phrases; got 1\n")
+
+
 def test_a_failed_stage_fails_the_check_and_the_rest_is_run(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

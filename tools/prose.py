@@ -51,7 +51,7 @@ def prose_of_source(text: str) -> Iterator[tuple[str, bool]]:
             yield re.sub(r"`[^`\n]*`", "", found), True
     for token in tokenize.generate_tokens(io.StringIO(text).readline):
         if token.type == tokenize.COMMENT:
-            yield token.string, False
+            yield re.sub(r"`[^`\n]*`", "", token.string), False
 
 
 def places(path: Path) -> list[str]:
