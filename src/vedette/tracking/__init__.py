@@ -1,4 +1,4 @@
-"""All sensors' beliefs through time: filtered apart and fused, by one filter of all scans, or over a radio network."""
+"""Trackers of all sensors: local filters with fusion, one central filter, or a radio network; late scans; snapshots."""
 
 from vedette.tracking.base import Stages, State, Tracker, TrackerInfo, stage_of
 from vedette.tracking.belief_network import BeliefNetwork

@@ -1,4 +1,4 @@
-"""What every tracker is: its state between scans, what it reports, its stopwatch, the checks of what it is given."""
+"""Protocol of trackers, their state and report, timing of the stages of a step, and checks of its input."""
 
 from __future__ import annotations
 
@@ -21,24 +21,24 @@ from vedette.kernels.base.types import Floats
 from vedette.models import SensorModel, TargetModel
 from vedette.models.arguments import float_array, one_a_sensor, real, reject
 
-# s. The belief before the first scan holds no target, so that the time before it changes nothing.
+# s. The belief before the first scan has no targets, so the length of the first prediction has no effect.
 FIRST_PERIOD = 1.0
-NUMBER = 8  # bytes; each symmetric matrix is sent as its triangle, nothing is compressed
+NUMBER = 8  # bytes; each symmetric matrix is sent as its triangle, without compression
 _NOTE = "stage: "
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class State(SummaryRepr):
-    """What is believed after a scan.
+    """State of a tracker after a scan.
 
     Attributes:
-        local: the belief of each sensor.
-        fused: that of all together.
+        local: belief of each sensor.
+        fused: fused belief of all sensors.
         step: number of the scan, from 1; 0 before the first.
-        time: s, of that scan; None before the first.
-        memory: what the tracker itself must know at the next step, such as who may then be born; None: nothing.
-        undetected: the targets that no sensor has found yet, where `BirthModel.anywhere` has cells for those of the
-            belief, or the tracker keeps account of them (`Searching`).
+        time: time of that scan in s; None before the first.
+        memory: data of the tracker itself for the next step, such as birth candidates; None if it needs none.
+        undetected: intensity of undetected targets, if `BirthModel.anywhere` has cells for those of the belief, or the
+            tracker maintains it (`Searching`); else None.
     """
 
     local: tuple[Any, ...]
@@ -66,10 +66,10 @@ class TrackerInfo(SummaryRepr):
     """Report of one step of a tracker.
 
     Attributes:
-        filters: what the filters reported: one a sensor, or a single one for all sensors together.
-        fusion: what the fusion reported; None where nothing was fused.
-        seconds: wall time by stage, of which "filter" and "fusion" are kept in the record of a run.
-        bytes_sent: for each sensor, the bytes that it sent; empty where the tracker does not count them.
+        filters: reports of the filters: one per sensor, or a single one for all sensors together.
+        fusion: report of the fusion; None without fusion.
+        seconds: wall time by stage; the record of a run contains "filter" and "fusion".
+        bytes_sent: bytes that each sensor sent; empty if the tracker does not count them.
     """
 
     filters: tuple[FilterInfo, ...]
@@ -80,56 +80,57 @@ class TrackerInfo(SummaryRepr):
 
 @runtime_checkable
 class Tracker(Protocol):
-    """Carries the beliefs of all sensors from scan to scan; one of your own is as good as those that are here."""
+    """A tracker: updates the beliefs of all sensors scan by scan. Custom trackers implement this protocol."""
 
     @property
     def targets(self) -> TargetModel:
-        """The targets as all sensors know them."""
+        """Target model that all sensors share."""
         ...
 
     @property
     def sensors(self) -> tuple[SensorModel, ...]:
-        """What each sensor sees, in the order of scans and poses."""
+        """Model of each sensor, in the order of scans and poses."""
         ...
 
     def initial(self) -> State:
-        """The state before the first scan."""
+        """Return the state before the first scan."""
         ...
 
     def step(
         self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[State, TrackerInfo]:
-        """Predict to `time` and take in the scans of that time.
+        """Predict to `time` and update with the scans of that time.
 
         Args:
-            state: as the step before left it.
-            scans: one a sensor: (num, meas_dim) measurements, in any order; angles in radians. Empty where a scan
-                has found nothing; None of a sensor that did not scan at `time`.
+            state: state that the previous step returned.
+            scans: one per sensor: (num, meas_dim) measurements, in any order; angles in radians. Empty for a scan
+                without detections; None for a sensor that did not scan at `time`.
             poses: (num_sensors, 3 or more) [px, py, heading_rad, ...] of each sensor at `time`.
-            time: s, after `state.time`; or the same, for scans of that time that come apart: nobody then moves, dies
-                or is born in between. Networks exchange messages at each such step; their delays count times.
-            rngs: one a sensor, for filters that draw.
+            time: time in s, at least `state.time`. Equal for further scans of the same time: no motion, deaths or
+                births in between. Networks exchange messages at each such step; their delays count times.
+            rngs: one per sensor, for filters that draw random numbers.
 
         Returns:
             The state after these scans, and a report.
 
         Raises:
-            InputError: another number of scans, poses or generators than of sensors; a time before the last.
-            ModelError, NumericalError: as the filters and the fusion. Any exception has a note that says in which
-                stage it was raised (`vedette.tracking.stage_of`).
+            InputError: a number of scans, poses or generators that differs from the number of sensors; a time before
+                the last.
+            ModelError, NumericalError: from the filters and the fusion. Every exception has a note with the stage that
+                raised it (`vedette.tracking.stage_of`).
         """
         ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AroundTracker:
-    """What the trackers share that are another one, and something more.
+    """Base of trackers that wrap another tracker.
 
     Attributes:
-        tracker: any.
+        tracker: the wrapped tracker.
 
     Raises:
-        InputError: something else than a tracker.
+        InputError: `tracker` is not a tracker.
     """
 
     tracker: Tracker
@@ -140,19 +141,19 @@ class AroundTracker:
 
     @property
     def targets(self) -> TargetModel:
-        """The targets as all sensors know them."""
+        """Target model that all sensors share."""
         return self.tracker.targets
 
     @property
     def sensors(self) -> tuple[SensorModel, ...]:
-        """What each sensor sees."""
+        """Model of each sensor."""
         return self.tracker.sensors
 
 
 def check_step(
     state: State, scans: Sequence[Any], poses: Any, time: float, rngs: Sequence[Any], num_sensors: int
 ) -> tuple[Floats, float]:
-    """The poses as an array, and the seconds since the last scan; `InputError` as `Tracker.step` says."""
+    """Return the poses as an array and the seconds since the last scan; raise `InputError` as `Tracker.step` does."""
     if not isinstance(state, State):
         raise InputError(f"state: expected a State; got {type(state).__name__}")
     one_a_sensor(num_sensors, scans=scans, poses=poses, rngs=rngs)
@@ -164,10 +165,10 @@ def check_step(
 
 
 class Stages:
-    """A stopwatch for the parts of a step, which also notes on an exception in which part it was raised.
+    """Stopwatch for the stages of a step; it also adds a note with the stage to an exception raised inside.
 
     Attributes:
-        seconds: wall time by the name of the part, in order of their first start.
+        seconds: wall time by stage, in order of their first start.
     """
 
     def __init__(self) -> None:
@@ -175,12 +176,12 @@ class Stages:
 
     @contextmanager
     def timing(self, name: str, sensor: int | None = None) -> Iterator[None]:
-        """Take the time of what runs inside. sensor: counted from 0, where the part is of one sensor alone."""
+        """Time the code inside the context. sensor: number from 0, if the stage belongs to one sensor."""
         start = perf_counter()
         try:
             yield
         except BaseException as error:
-            if stage_of(error) is None:  # the innermost part says it best
+            if stage_of(error) is None:  # the innermost stage is the most precise
                 error.add_note(f"{_NOTE}the {name}" + ("" if sensor is None else f" of sensor {sensor + 1}"))
             raise
         finally:
@@ -188,18 +189,18 @@ class Stages:
 
 
 def stage_of(error: BaseException) -> str | None:
-    """Where an exception was raised, as a stopwatch noted it: "the filter of sensor 2"; None where none did."""
+    """Return the stage that raised an exception, such as "the filter of sensor 2"; None without a note of `Stages`."""
     notes = [note for note in getattr(error, "__notes__", ()) if note.startswith(_NOTE)]
     return notes[0].removeprefix(_NOTE) if notes else None
 
 
 def bytes_of_scan(scan: Any, pose: Any) -> int:
-    """The measurements, and the pose that they were taken from; 0 where there was no scan."""
+    """Return the bytes of the measurements and of the sensor's pose; 0 without a scan."""
     return 0 if scan is None else NUMBER * (np.size(scan) + len(pose))
 
 
 def bytes_of_belief(belief: Any) -> int:
-    """Labels, existences or hypotheses, and the components of all tracks; 0 of a density without labels."""
+    """Return the bytes of labels, existences or hypotheses, and track components; 0 for a density without labels."""
     if not isinstance(belief, LabelledDensity):
         return 0
     tracks = belief.tracks
@@ -209,6 +210,6 @@ def bytes_of_belief(belief: Any) -> int:
         return NUMBER * (numbers + num)
     own = belief.to_factors()
     hyps = len(own.hyp_log_weights) + len(own.hyp_tracks)
-    # Of those of one label an existence says all.
+    # A factor of one label is sent as its existence alone.
     singles = int(np.count_nonzero(bernoulli_factors(own))) if belief.is_product else 0
     return NUMBER * (numbers + hyps - 2 * singles)

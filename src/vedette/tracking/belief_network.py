@@ -1,4 +1,4 @@
-"""Sensors that send their beliefs: each fuses its own with those that it hears, or all agree by consensus."""
+"""Networks of sensors that send their beliefs: fusion of the received beliefs, or consensus."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ from vedette.tracking.network import NEVER, Network, bytes_of_messages, heard_by
 
 
 class _Sent(NamedTuple):
-    """What each sensor sent at a step, and when the others have it."""
+    """The messages that the sensors sent at a step, and the steps at which the others receive them."""
 
     step: int
     time: float
-    poses: Floats  # from where, and by whom it was scanned
+    poses: Floats  # of the sensors at this step
     scanned: tuple[bool, ...]
-    predictions: tuple[Any, ...]  # what each belief was updated from, where the fusion divides by it; else None
+    predictions: tuple[Any, ...]  # prediction that each belief was updated from, if the fusion divides by it; else None
     beliefs: tuple[Any, ...]
-    arrives: Ints  # (num_sensors, num_sensors) as of `Network.arrivals`
+    arrives: Ints  # (num_sensors, num_sensors) from `Network.arrivals`
 
 
 class _Memory(NamedTuple):
-    """Who may be born at the next step, by sensor, and the messages that may still be on their way."""
+    """Birth candidates of each sensor for the next step, and the messages that may still be on their way."""
 
     births: tuple[LMB | None, ...]
     sent: tuple[_Sent, ...]
@@ -45,27 +45,28 @@ class _Memory(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BeliefNetwork(LocalFilters):
-    """A filter at each sensor; the fused belief of what a sensor hears replaces its own.
+    """Tracker with a filter at each sensor; each sensor replaces its belief by the fusion of the beliefs it received.
 
-    Of each other sensor, a sensor fuses the newest belief that has arrived, predicted to the time of its own. Where the
-    fusion divides by the common prediction and the sensors' predictions differ (as of groups that have met again, or
-    after few rounds of consensus), they are first merged, and what each scan has said is added to the merged one.
+    A sensor fuses the newest belief that it has received from each other sensor, predicted to the time of its own. If
+    the fusion divides by the common prediction and the sensors' predictions differ (for example if two groups have met
+    again, or after few rounds of consensus), the predictions are first merged, and the information of each scan is then
+    added to the merged prediction.
 
-    Consensus: after L rounds of averaging with Metropolis weights W a sensor has the average of all that the sensors
-    put in, under the weights of its row of W^L; it is computed as that average. For sums, as of `ParallelUpdate`, it is
-    taken times the number of sensors in the group. As L grows both become those of all sensors together.
+    Consensus: after L rounds of averaging with Metropolis weights W, a sensor has the average of all sensors' inputs
+    with the weights in its row of W^L; it is computed as that average. For sums, as in `ParallelUpdate`, the average is
+    multiplied by the number of sensors in the group. As L grows, both converge to the result of all sensors together.
 
     Attributes:
-        filters: one a sensor; all hold the same targets.
-        targets, sensors: as of `Tracker`.
-        fusion: of beliefs that are heard; its weights are replaced by equal ones, or those of the consensus.
-        network: who hears whom.
-        merging: fusion of predictions of different pasts, and of the one belief that is reported where sensors believe
-            different things; weights likewise.
+        filters: one per sensor; all have the same target model.
+        targets, sensors: as in `Tracker`.
+        fusion: fusion of the received beliefs; its weights are replaced by equal ones, or by those of the consensus.
+        network: radio network between the sensors.
+        merging: fusion of predictions with different histories, and of the sensors' beliefs into the one that is
+            reported if they differ; its weights are replaced in the same way.
 
     Raises:
-        InputError: filters as in `Distributed`; a fusion without weights; one that divides by the common prediction
-            with messages that are delayed; one that goes by labels where sensors make their own from measurements.
+        InputError: filters as in `Distributed`; a fusion without weights; a fusion that divides by the common
+            prediction, with delayed messages; a fusion by label, if sensors label births from their own measurements.
     """
 
     fusion: Fusion
@@ -83,14 +84,14 @@ class BeliefNetwork(LocalFilters):
             raise InputError("network.delay: expected 0, as the fusion divides by the prediction of the same time")
 
     def initial(self) -> State:
-        """No target anywhere: one belief, which all sensors share."""
+        """Return the state without targets: one belief, which all sensors share."""
         belief = self.filters[0].initial()
         return State((belief,) * len(self.filters), belief, memory=_Memory((None,) * len(self.filters), ()))
 
     def step(
         self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[State, TrackerInfo]:
-        """Filter each sensor's scan, send, and fuse what has arrived; see `Tracker.step`."""
+        """Filter each sensor's scan, send the beliefs and fuse those that have arrived; see `Tracker.step`."""
         at, dt = check_step(state, scans, poses, time, rngs, len(self.filters))
         if dt == 0.0 and self.network.delay > 0:
             expected = f"one after that of the last scan, {time:g} s, as beliefs that are late would count again"
@@ -120,7 +121,7 @@ class BeliefNetwork(LocalFilters):
     def _filtered(
         self, state: State, scans: Sequence[Any], poses: Floats, dt: float, rngs: Sequence[np.random.Generator]
     ) -> tuple[tuple[Any, ...], tuple[Any, ...], tuple[FilterInfo, ...]]:
-        """Predictions (where the fusion divides by them), posteriors and reports of all sensors."""
+        """Return the predictions (None unless the fusion divides by them), posteriors and reports of all sensors."""
         step, birth = state.step + 1, self.targets.birth
         predictions: list[Any] = []
         found: dict[tuple[int, int], Any] = {}
@@ -131,7 +132,7 @@ class BeliefNetwork(LocalFilters):
                 predictions.append(None)
                 results.append(self._stepped(s, belief, scans[s], poses[s], dt, step, due, rngs[s]))
                 continue
-            key = id(belief), id(own)  # one prediction object for all who believe the same
+            key = id(belief), id(own)  # sensors with the same belief share one prediction object
             if key not in found:
                 found[key], _ = self._predicted(s, belief, dt, step, due)
             predictions.append(found[key])
@@ -140,7 +141,7 @@ class BeliefNetwork(LocalFilters):
         return tuple(predictions), beliefs, infos
 
     def _fused(self, waiting: Sequence[_Sent], hops: Ints) -> tuple[list[Any], list[FusionInfo | None]]:
-        """What each sensor believes after fusing; one object for those who have fused the same."""
+        """Return each sensor's fused belief and report; sensors that fused the same messages share one object."""
         now, num = waiting[-1], len(self.filters)
         shares = self._weights(hops)
         done: dict[tuple[Any, ...], tuple[Any, FusionInfo | None]] = {}
@@ -161,11 +162,14 @@ class BeliefNetwork(LocalFilters):
         return beliefs, reports
 
     def _heard_weights(self, shares: Floats) -> Floats:
-        """Of a mean, scaled to those that are heard; of a sum, as they are: who is not heard adds nothing."""
+        """Return the weights of the received messages: scaled to sum 1 for a mean, unchanged for a sum."""
         return shares if requires_common_prior(self.fusion) else shares / shares.sum()
 
     def _fuse(self, messages: Sequence[_Sent], heard: Sequence[int], weights: Floats) -> tuple[Any, FusionInfo | None]:
-        """What these sensors' messages are together; `weights` are of a mean, or of a sum where predictions divide."""
+        """Return the fusion of these sensors' messages and its report.
+
+        weights: of a mean, or of a sum if the fusion divides by the prediction.
+        """
         seen = views_of([self._views(sent) for sent in messages], heard)
         if not requires_common_prior(self.fusion):
             now = max(messages, key=lambda sent: sent.step)
@@ -194,7 +198,7 @@ class BeliefNetwork(LocalFilters):
         return FieldsOfView(self.sensors, sent.poses, sent.scanned)
 
     def _current(self, sent: _Sent, now: _Sent, sensor: int) -> Any:
-        """A sensor's belief at the time of the step `now`; nobody is born on the way."""
+        """Return a sensor's belief, predicted without births to the time of the step `now`."""
         if sent is now:
             return sent.beliefs[sensor]
         nobody = LMB.empty(self.targets.state_dim)
@@ -202,7 +206,7 @@ class BeliefNetwork(LocalFilters):
         return self._predicted(sensor, sent.beliefs[sensor], elapsed, now.step, nobody)[0]
 
     def _weights(self, hops: Ints) -> Floats:
-        """(num_sensors, num_sensors) the weight that each sensor gives to each in its group, heard or not yet."""
+        """Weight that each sensor gives to each sensor of its group, received or not, (num_sensors, num_sensors)."""
         groups = hops < NEVER
         sizes = groups.sum(axis=1, keepdims=True)
         rounds = self.network.consensus_rounds
@@ -212,9 +216,10 @@ class BeliefNetwork(LocalFilters):
     def _births(
         self, before: Sequence[LMB | None], fused: Sequence[Any], scans: Sequence[Any], poses: Floats, sent: _Sent
     ) -> tuple[LMB | None, ...]:
-        """For each sensor, who may be born at the next step: the same for those who have heard and believe the same.
+        """Return each sensor's birth candidates for the next step.
 
-        before: who may by earlier scans of the same time.
+        Sensors with the same belief and the same received scans share one object. before: candidates from earlier scans
+        of the same time.
         """
         birth, num = self.targets.birth, len(fused)
         if birth.from_measurements is None:

@@ -1,4 +1,4 @@
-"""What range rates say of the velocities of births, and where births are at the time of a turning radar's scan."""
+"""Velocities of births from range rates, and positions of births at the scan time of a turning radar."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from vedette.models.turns import is_turn, lags
 def with_velocities(born: LMB, std: Floats, sensors: Sequence[SensorModel], scans: Sequence[Any], poses: Any) -> LMB:
     """Condition the velocities of births on the components of measurements that depend on them.
 
-    For each birth and sensor, the measurement nearest to it is that of the birth where it lies within `std` along each
-    axis. At its place a component z_c is linear in the velocity v: with h(x) and its slope H at rest, the prior N(v; m,
-    P) becomes the posterior of z_c = h_c + H v + noise. Along the line of sight that is the noise of a range rate,
-    across it the prior.
+    For each birth and sensor, the nearest measurement is attributed to the birth if it lies within `std` along each
+    axis. At its position a component z_c is linear in the velocity v: with h(x) and its slope H at rest, the prior
+    N(v; m, P) becomes the posterior of z_c = h_c + H v + noise. Along the line of sight the uncertainty becomes that of
+    a range rate; across it the prior remains.
 
     Args:
         born: births of one component each, at rest.
         std: (state_dim,) standard deviation of a birth.
-        sensors, scans, poses: one a sensor; a scan is None where there was none.
+        sensors, scans, poses: one per sensor; a scan is None if the sensor did not scan.
     """
     said = [
         (sensor, np.ascontiguousarray(scan, np.float64), pose_vector("pose", pose))

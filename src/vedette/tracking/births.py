@@ -1,4 +1,4 @@
-"""Births from measurements: who may have been born, as the scans of all sensors say and no track explains."""
+"""Births from measurements: birth candidates from the measurements of all sensors that no track explains."""
 
 from __future__ import annotations
 
@@ -27,23 +27,23 @@ from vedette.models import BirthModel, MeasurementBirth, SensorModel
 from vedette.models.arguments import pose_vector, reject
 from vedette.tracking.birth_velocities import at_scan_time, with_velocities
 
-# What a track explains surer than this is no birth: each costs a track until the next scan.
+# A measurement unexplained with at most this probability makes no birth: each birth costs a track until the next scan.
 LEAST_UNEXPLAINED = 0.01
-# Squared distance, in standard deviations of a birth, within which two sensors have measured one target: the 99 %
-# quantile of chi-squared of two degrees of freedom.
+# Squared distance, in standard deviations of a birth, within which the measurements of two sensors are attributed to
+# one target: the 99 % quantile of the chi-squared distribution with two degrees of freedom.
 _SAME_TARGET = 9.21
 
 
 class Unexplained(NamedTuple):
-    """Measurements that no track explains surely."""
+    """Measurements that no track explains with certainty."""
 
     positions: Floats  # (num, 2) m
-    probabilities: Floats  # (num,) that no track explains it
-    sensors: Ints  # (num,) which sensor measured it
+    probabilities: Floats  # (num,) probability that no track explains the measurement
+    sensors: Ints  # (num,) number of the sensor that measured it
 
 
 def check_measured_births(birth: BirthModel, sensors: Sequence[SensorModel]) -> None:
-    """`InputError` where targets are born of measurements that do not say where they were taken."""
+    """Raise `InputError` for births from measurements if a sensor's measurements cannot be placed (no `places`)."""
     for s, sensor in enumerate(sensors):
         if birth.from_measurements is not None and sensor.measurement.places is None:
             expected = "a measurement with `places`, as targets are born of measurements"
@@ -51,9 +51,10 @@ def check_measured_births(birth: BirthModel, sensors: Sequence[SensorModel]) -> 
 
 
 def births_of_tracker(birth: BirthModel, local: Any) -> BirthModel:
-    """The births without those from measurements where a filter has these itself (`starts_tracks`).
+    """Return the births that the tracker must add: without those from measurements if a filter starts tracks itself.
 
-    Raises `InputError` where a tracker must start tracks, and the number of births is to be learnt.
+    A filter that starts tracks has `starts_tracks`. Raises `InputError` if the tracker must start tracks and the
+    expected number of births is to be learnt.
     """
     if getattr(local, "starts_tracks", False):
         return _at_sites(birth)
@@ -70,10 +71,10 @@ def _at_sites(birth: BirthModel) -> BirthModel:
 
 
 def births_due(birth: BirthModel, step: int, dt: float, measured: LMB | None) -> LMB | None:
-    """Who may have been born within the `dt` seconds before a step, at the sites or where was measured; None: at the
-    sites alone.
+    """Return the birth candidates of the `dt` seconds before a step, at sites and from measurements.
 
-    measured: as `births_from_scans` gave for this step; None: of no scan.
+    Returns None if there are births at sites only, which filters add themselves. measured: the result of
+    `births_from_scans` for this step; None without a scan.
     """
     if birth.from_measurements is None:
         return None
@@ -92,17 +93,17 @@ def births_from_scans(
     *,
     owner: int | None = None,
 ) -> LMB | None:
-    """Who may be born at `step`, after the scans before it; what several sensors measured of one target is one birth.
+    """Return the birth candidates for `step` from the scans before it; several sensors' measurements are pooled.
 
     Args:
-        birth: whose `from_measurements` says how; None is returned where it says nothing.
-        belief: after those scans.
-        sensors, scans, poses: one a sensor; a scan is None where there was none.
-        step: with which the births are labelled; their indices follow those of the sites.
-        owner: the sensor that makes them by itself, with indices of its own; None: all sensors together.
+        birth: birth model; None is returned if its `from_measurements` is None.
+        belief: belief after those scans.
+        sensors, scans, poses: one per sensor; a scan is None if the sensor did not scan.
+        step: step in the labels of the births; their indices follow those of the sites.
+        owner: sensor that makes the births alone, with its own range of indices; None: all sensors together.
 
     Raises:
-        InputError: a belief without labels, or a measurement that does not say where its target is.
+        InputError: a belief without labels, or a measurement that does not determine the position of its target.
     """
     model = birth.from_measurements
     if model is None:
@@ -119,9 +120,9 @@ def births_from_scans(
 
 
 def births_waiting(birth: BirthModel, before: LMB | None, found: LMB | None) -> LMB | None:
-    """Who may be born after scans of one time that came apart: those of the first, and of the others who is not near.
+    """Return the birth candidates after separate scans of one time: earlier ones, and later ones not close to them.
 
-    before, found: as `births_from_scans` gave of the scans before and of these.
+    before, found: results of `births_from_scans` for the earlier scans and for these.
     """
     model = birth.from_measurements
     if model is None or found is None or before is None:
@@ -136,7 +137,7 @@ def births_waiting(birth: BirthModel, before: LMB | None, found: LMB | None) -> 
 def unexplained(
     model: MeasurementBirth, belief: LabelledDensity, sensors: Sequence[SensorModel], scans: Sequence[Any], poses: Any
 ) -> Unexplained:
-    """What no track explains surely, once for what several sensors measured of one target; see `births_from_scans`."""
+    """Return the measurements that no track explains with certainty, pooled over sensors; see `births_from_scans`."""
     lmb = _as_kernel(belief)
     found = [
         _unexplained(lmb, sensor, scans[s], poses[s], s) for s, sensor in enumerate(sensors) if scans[s] is not None
@@ -155,7 +156,7 @@ def births_heard(
     step: int,
     heard: Sequence[int],
 ) -> LMB | None:
-    """As `births_from_scans`, of the scans of the sensors `heard`; where these are not all, the first of them owns."""
+    """Return `births_from_scans` for the scans of the sensors `heard`; the first is the owner if some are missing."""
     known = [scan if s in heard else None for s, scan in enumerate(scans)]
     owner = None if len(heard) == len(sensors) else heard[0]
     return births_from_scans(birth, belief, sensors, known, poses, step, owner=owner)
@@ -168,7 +169,7 @@ def _as_kernel(belief: LabelledDensity) -> Lmb:
 
 
 def _look(belief: Lmb, sensor: SensorModel, scan: Any, pose: Any) -> ScanInput:
-    """A scan that the filters have checked."""
+    """Return a scan, already checked by the filters, as input of kernels."""
     measurements = np.ascontiguousarray(scan, np.float64).reshape(-1, sensor.meas_dim)
     return ScanInput(
         no_births_for_kernel(belief.tracks.components.means.shape[1]), measurements, pose_vector("pose", pose), 0.0
@@ -198,14 +199,15 @@ def _born_of_one(
 
 @cache
 def _truncation(meas_dim: int) -> Truncation:
-    """Gates and the floor of clutter, as filters have them by default."""
+    """Return the default gates and clutter floor of filters."""
     return Limits().truncation(meas_dim)
 
 
 def _pool(found: Unexplained, model: MeasurementBirth) -> Unexplained:
-    """One entry for what different sensors have measured near each other, from the least explained on.
+    """Return one entry for measurements of different sensors that are close together, the least explained first.
 
-    A group has at most one measurement of a sensor; it lies at their mean and is as unexplained as the least explained.
+    A group has at most one measurement per sensor. Its position is their mean, and its probability that of the least
+    explained measurement.
     """
     order = np.argsort(-found.probabilities, kind="stable")
     if (found.sensors == found.sensors[:1]).all():  # every measurement by itself
@@ -232,25 +234,25 @@ def _pool(found: Unexplained, model: MeasurementBirth) -> Unexplained:
 
 
 class _Cells:
-    """Which groups lie where, so that each measurement meets those near it alone."""
+    """Index of groups by grid cell, so that each measurement is compared with nearby groups only."""
 
     def __init__(self, reach: Floats) -> None:
-        """reach: (2,) m, along each axis; what is nearer along both is found."""
-        self._size = reach * (1.0 + 1e-9)  # and a little more for what rounding does
+        """reach: (2,) in m, along each axis; groups closer than this along both axes are found."""
+        self._size = reach * (1.0 + 1e-9)  # margin for rounding
         self._groups: defaultdict[tuple[float, float], set[int]] = defaultdict(set)
 
     def near(self, position: Floats) -> Ints:
-        """(num,) groups that may lie within reach of a position, in increasing order."""
+        """Return the groups that may lie within reach of a position, (num,), in increasing order."""
         x, y = self._cell(position)
         around = [self._groups.get((x + i, y + j), ()) for i in (-1.0, 0.0, 1.0) for j in (-1.0, 0.0, 1.0)]
         return np.array(sorted({group for groups in around for group in groups}), np.int64)
 
     def add(self, group: int, place: Floats) -> None:
-        """Note that a group lies at a place."""
+        """Add a group at a position."""
         self._groups[self._cell(place)].add(group)
 
     def remove(self, group: int, place: Floats) -> None:
-        """Forget a group that was noted at this place."""
+        """Remove a group that was added at this position."""
         self._groups[self._cell(place)].remove(group)
 
     def _cell(self, place: Floats) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""One filter takes the scans of all sensors: what any fusion of their beliefs is measured against."""
+"""Central tracker: one filter processes the scans of all sensors. It is the reference for every fusion of beliefs."""
 
 from __future__ import annotations
 
@@ -26,41 +26,41 @@ from vedette.tracking.losing import undetected_of
 
 @runtime_checkable
 class CentralFilter(Protocol):
-    """A filter of several sensors: `MultiSensorGlmbFilter`, `MultiSensorLmbFilter`, or one of your own."""
+    """A multi-sensor filter: `MultiSensorGlmbFilter`, `MultiSensorLmbFilter` or a custom one."""
 
     @property
     def targets(self) -> TargetModel:
-        """The targets."""
+        """Target model."""
         ...
 
     @property
     def sensors(self) -> tuple[SensorModel, ...]:
-        """What each sensor sees."""
+        """Model of each sensor."""
         ...
 
     def initial(self) -> Any:
-        """The belief before the first scans."""
+        """Return the belief before the first scans."""
         ...
 
     def step(
         self, belief: Any, scans: Any, poses: Any, dt: float, step: int, *, rng: np.random.Generator
     ) -> tuple[Any, FilterInfo]:
-        """Predict over `dt` seconds and update with one scan a sensor, None of one that did not scan.
+        """Predict over `dt` seconds and update with one scan per sensor, None for a sensor that did not scan.
 
-        Where targets are born of measurements, a further argument `births` is an LMB of all who may have been born.
+        For births from measurements, a further argument `births` is the LMB of all birth candidates.
         """
         ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OfAllScans:
-    """What the trackers share that have one filter for the scans of all sensors.
+    """Base of trackers with one multi-sensor filter.
 
     Attributes:
-        filter: of all sensors' scans.
+        filter: the multi-sensor filter.
 
     Raises:
-        InputError: something else than such a filter; births from measurements that do not say where they were taken.
+        InputError: `filter` is not a multi-sensor filter; births from measurements that do not determine a position.
     """
 
     filter: CentralFilter
@@ -72,17 +72,17 @@ class OfAllScans:
 
     @property
     def targets(self) -> TargetModel:
-        """The targets."""
+        """Target model."""
         return self.filter.targets
 
     @property
     def sensors(self) -> tuple[SensorModel, ...]:
-        """What each sensor sees."""
+        """Model of each sensor."""
         return tuple(self.filter.sensors)
 
     @property
     def birth(self) -> BirthModel:
-        """The births that the tracker adds to those of the filter."""
+        """Births that the tracker adds to those of the filter."""
         return births_of_tracker(self.targets.birth, self.filter)
 
     def _filtered(
@@ -95,7 +95,7 @@ class OfAllScans:
         step: int,
         rng: np.random.Generator,
     ) -> tuple[Any, FilterInfo]:
-        """The belief after a step. measured: who may be born of measurements, as of `births_due`."""
+        """Return the belief after a step and the report. measured: birth candidates, as in `births_due`."""
         due = births_due(self.birth, step, dt, measured)
         births = {} if due is None else {"births": due}
         return self.filter.step(belief, scans, poses, dt, step, rng=rng, **births)
@@ -103,23 +103,23 @@ class OfAllScans:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Central(OfAllScans):
-    """A single belief, which is every sensor's and the fused one at once.
+    """Central tracker: a single belief serves as the belief of every sensor and as the fused one.
 
-    Attributes and errors: as `OfAllScans`.
+    Attributes and errors: as in `OfAllScans`.
     """
 
     def with_truth(self, truth: Any) -> Central:
-        """The same, where the filter is one that is told the targets of a run."""
+        """Return the tracker with a run's true targets passed to its filter, if the filter takes them; else itself."""
         return replace(self, filter=self.filter.with_truth(truth)) if hasattr(self.filter, "with_truth") else self
 
     def initial(self) -> State:
-        """No target."""
+        """Return the state without targets."""
         return self._state(self.filter.initial(), 0, None)
 
     def step(
         self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[State, TrackerInfo]:
-        """Update the one belief with all scans; see `Tracker.step`. Only the first of `rngs` is drawn from."""
+        """Update the belief with all scans; see `Tracker.step`. Uses only `rngs[0]`."""
         at, dt = check_step(state, scans, poses, time, rngs, len(self.sensors))
         stages, step = Stages(), state.step + 1
         with stages.timing("filter"):

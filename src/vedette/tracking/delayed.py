@@ -1,4 +1,4 @@
-"""Scans that come late in a loop that goes on meanwhile: a tracker that is told of them when they arrive."""
+"""Tracker with delayed scans: it continues with the scans that have arrived and adds late ones on arrival."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from vedette.tracking.late import LateScans, SensorScan, Timeline
 
 @dataclass(frozen=True, slots=True)
 class Delay:
-    """How the scans of a sensor come late.
+    """Distribution of the delays of a sensor's scans.
 
     Attributes:
-        share: probability that a scan does.
-        up_to: s; by how much, uniform from 0.
-        start, end: s; scans taken before or after these times come at once.
-        window: s; a scan that is later than this is lost.
+        share: probability that a scan is delayed.
+        up_to: largest delay in s; delays are uniform from 0 to it.
+        start, end: times in s; scans taken before `start` or after `end` arrive at once.
+        window: s; a scan delayed by more than this is lost.
 
     Raises:
-        InputError: a share that is no probability, times that are no numbers or in another order.
+        InputError: a share that is not a probability, times that are not numbers, or an end before the start.
     """
 
     share: float
@@ -44,20 +44,20 @@ class Delay:
             raise reject("Delay.end", f"a time from start on, {self.start:g} s", self.end)
 
     def drawn(self, time: float, rng: np.random.Generator) -> float:
-        """s by which a scan of this time is late; two numbers are drawn, whatever comes of them."""
+        """Draw the delay of a scan of this time, in s; always draws two random numbers."""
         luck, part = rng.random(2).tolist()
         return self.up_to * part if self.start <= time <= self.end and luck < self.share else 0.0
 
 
 class _Coming(NamedTuple):
-    """A scan on its way."""
+    """A scan that has not arrived yet."""
 
     arrives: float  # s
     scan: SensorScan
 
 
 class _Memory(NamedTuple):
-    """What has arrived, what has not, and the seed of filters that draw; nothing before the first step."""
+    """Timeline of the scans that arrived (None before the first step), scans on their way, and seed for filters."""
 
     timeline: Timeline | None = None
     coming: tuple[_Coming, ...] = ()
@@ -66,21 +66,21 @@ class _Memory(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Delayed(AroundTracker):
-    """Another tracker, which hears of some scans late and puts them in their places (`LateScans`).
+    """Wrapper of a tracker that receives some scans late and processes them at their own time (`LateScans`).
 
-    Its state is what is believed of now by what has arrived, predicted to now where the latest scan is older. Births
-    are named after the scans that the other tracker has taken, in order of time.
+    Its state is the belief at the current time from the scans that have arrived, predicted if the latest of them is
+    older. Births are labelled by the wrapped tracker's steps, in order of time.
 
     Attributes:
-        tracker: any.
-        delays: by the number of a sensor; scans of others come at once.
+        tracker: the wrapped tracker.
+        delays: delay by the number of a sensor; scans of other sensors arrive at once.
 
     Raises:
-        InputError: something else than a tracker, a sensor that there is not, no delay.
+        InputError: `tracker` is not a tracker, an unknown sensor, or a value that is not a `Delay`.
     """
 
     delays: Mapping[int, Delay]
-    _window: float = field(init=False, repr=False)  # s, in which nothing that is not lost is too late
+    _window: float = field(init=False, repr=False)  # s; longer than every delay of a scan that is not lost
 
     def __post_init__(self) -> None:
         AroundTracker.__post_init__(self)
@@ -92,15 +92,15 @@ class Delayed(AroundTracker):
         object.__setattr__(self, "_window", max(longest, default=0.0) + 1.0)
 
     def initial(self) -> State:
-        """As the tracker's."""
+        """Return the wrapped tracker's state before the first scan."""
         return replace(self.tracker.initial(), memory=_Memory())
 
     def step(
         self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[State, TrackerInfo]:
-        """Send the scans of a time, and take in what has arrived by then; see `Tracker.step`.
+        """Send the scans of a time, and process those that have arrived by then; see `Tracker.step`.
 
-        The delays of a sensor's scans are drawn from its own of `rngs`.
+        The delays of the scans of sensor s are drawn from `rngs[s]`.
         """
         at, _ = check_step(state, scans, poses, time, rngs, len(self.sensors))
         memory, now = state.memory, real("time", time)
@@ -120,7 +120,7 @@ class Delayed(AroundTracker):
     def _sent(
         self, scans: Sequence[Any], poses: Floats, now: float, rngs: Sequence[np.random.Generator]
     ) -> list[_Coming]:
-        """The scans of a time that arrive, now or later."""
+        """Return the scans of a time that arrive now or later; lost ones are left out."""
         found = []
         for s, scan in enumerate(scans):
             if scan is not None:

@@ -1,4 +1,4 @@
-"""Every sensor filters its own scans, and the beliefs are fused (paper, Algorithm 1)."""
+"""Distributed tracker: every sensor filters its own scans, and the beliefs are fused (paper, Algorithm 1)."""
 
 from __future__ import annotations
 
@@ -23,22 +23,23 @@ from vedette.tracking.losing import undetected_of, without_forgotten
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Distributed(LocalFilters):
-    """A filter at each sensor, and a fusion of what they believe.
+    """Tracker with a filter at each sensor and a fusion of their beliefs.
 
     Attributes:
-        filters: one a sensor; all hold the same targets.
-        targets, sensors: as of `Tracker`.
-        fusion: of their beliefs, after every scan; None for a single sensor.
-        feedback: whether the fused belief replaces the sensors' own (paper-notes 9). Without it a fusion by views
-            counts a sensor that did not scan as if it had, since its belief is its own, of its earlier scans.
-        min_detection: without feedback, where targets are born of measurements, a sensor forgets labels that it would
-            detect with less than this probability, once a birth would say more of them (`without_forgotten`); they
-            would pile up, and be matched with whatever is near. Counted in its `FilterInfo.dropped_existence`. 0: none.
+        filters: one per sensor; all have the same target model.
+        targets, sensors: as in `Tracker`.
+        fusion: fusion of the beliefs after every scan; None for a single sensor.
+        feedback: True if the fused belief replaces the sensors' own (paper-notes 9). Without feedback, a fusion by
+            views counts a sensor that did not scan as if it had, because its belief is its own, from its earlier scans.
+        min_detection: without feedback and with births from measurements, a sensor drops labels that it would detect
+            with less than this probability, once a birth would have more information (`without_forgotten`). Otherwise
+            they would accumulate and be matched with other labels nearby. Their existence is added to
+            `FilterInfo.dropped_existence`. 0: none is dropped.
 
     Raises:
-        InputError: no filter or something else, filters of different targets, several sensors without a fusion; births
-            from measurements, a fusion of beliefs that share their prediction, or one that matches labels, where it
-            does not go together with `feedback`; no probability.
+        InputError: no filter, an object that is not a filter, filters with different target models, or several sensors
+            without a fusion; without feedback, a fusion of beliefs that share their prediction, or births from
+            measurements with a fusion by label; a `min_detection` that is not a probability.
     """
 
     fusion: Fusion | None = None
@@ -63,14 +64,14 @@ class Distributed(LocalFilters):
             check_labels_of_births(self.fusion, self.targets)
 
     def initial(self) -> State:
-        """No target anywhere; the fused belief is then the first sensor's."""
+        """Return the state without targets; its fused belief is the first sensor's."""
         local = tuple(local.initial() for local in self.filters)
         return State(local, local[0], undetected=undetected_of(local[0], self.targets.birth))
 
     def step(
         self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[State, TrackerInfo]:
-        """Filter each sensor's scan, then fuse; see `Tracker.step`."""
+        """Filter each sensor's scan, then fuse the beliefs; see `Tracker.step`."""
         at, dt = check_step(state, scans, poses, time, rngs, len(self.filters))
         step, stages, num, birth = state.step + 1, Stages(), len(self.filters), self.birth
         births: Sequence[LMB | None] = (None,) * num
@@ -89,7 +90,7 @@ class Distributed(LocalFilters):
             local.append(belief)
             infos.append(info)
             sent.append(bytes_of_belief(belief))
-            # Without feedback a sensor still knows what it saw at earlier scans.
+            # Without feedback, a sensor's belief still has the information of its earlier scans.
             scanned.append(scans[s] is not None or not self.feedback)
         fused, report, measured, rule = local[0], None, None, self.fusion
         if rule is not None:
@@ -99,7 +100,7 @@ class Distributed(LocalFilters):
                     local, infos = self._without_forgotten(birth.from_measurements, local, infos, views)
                 made = self._for_fusion(local)
                 if isinstance(rule, LabelMatchedFusion):
-                    # Labels then outlast the sensor that led them, and are those that decisions need.
+                    # The sensors keep the matched labels, which outlast the sensor that made them; decisions need them.
                     local, rule = rule.match(made), rule.rule
                     made = self._for_fusion(local)
                 fused, report = rule.fuse(made, views)
@@ -119,7 +120,7 @@ class Distributed(LocalFilters):
     def _without_forgotten(
         self, birth: MeasurementBirth, local: list[Any], infos: list[FilterInfo], views: FieldsOfView
     ) -> tuple[list[Any], list[FilterInfo]]:
-        """The sensors' own beliefs without what they have lost sight of, and their reports with what that was."""
+        """Return the sensors' beliefs without forgotten labels, and their reports with the dropped existence."""
         kept, dropped = zip(
             *(without_forgotten(belief, birth, views, s, self.min_detection) for s, belief in enumerate(local)),
             strict=True,
@@ -131,7 +132,7 @@ class Distributed(LocalFilters):
         return list(kept), told
 
     def _measured(self, local: Sequence[Any], scans: Sequence[Any], poses: Floats, step: int) -> tuple[LMB | None, ...]:
-        """For each sensor, who may be born at `step`: the same for all where they share a belief."""
+        """Return each sensor's birth candidates for `step`; one object for all sensors if they share a belief."""
         birth, sensors = self.birth, self.sensors
         if self.feedback or len(local) == 1:
             return (births_from_scans(birth, local[0], sensors, scans, poses, step),) * len(local)
@@ -142,9 +143,9 @@ class Distributed(LocalFilters):
 
 
 def check_labels_of_births(fusion: Fusion, targets: TargetModel) -> None:
-    """Raise `InputError` where sensors make labels of their own from measurements, and the fusion goes by labels.
+    """Raise `InputError` if sensors label births from their own measurements and the fusion is by label.
 
-    One that divides by a common prediction does not: a tracker gives it the labels of that prediction.
+    A fusion that divides by a common prediction is accepted: a tracker gives it the labels of that prediction.
     """
     if targets.birth.from_measurements is None or requires_common_prior(fusion):
         return

@@ -1,4 +1,4 @@
-"""Scans in whatever order they come: one that is late is put in its place, and what came after is worked again."""
+"""Tracking with scans in any order of arrival: the steps since the time of a late scan are computed again."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ class SensorScan(SummaryRepr):
     """One scan of one sensor, as it arrives.
 
     Attributes:
-        sensor: which of the tracker's sensors it is of, from 0.
-        time: s, when it was taken.
-        measurements: (num, meas_dim), in any order; angles in radians. Empty where nothing was found.
-        pose: [px, py, heading_rad, ...] of the sensor then.
+        sensor: number of the sensor in the tracker, from 0.
+        time: time of the scan in s.
+        measurements: (num, meas_dim), in any order; angles in radians. Empty without detections.
+        pose: [px, py, heading_rad, ...] of the sensor at that time.
     """
 
     sensor: int
@@ -40,14 +40,14 @@ class SensorScan(SummaryRepr):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Instant(SummaryRepr):
-    """A time at which sensors scanned, and what was believed after it.
+    """A time at which sensors scanned, and the state of the tracker after it.
 
     Attributes:
-        time: s.
-        scans: of the sensors that scanned, by their numbers.
-        poses: (num_sensors, 3 or more) of all sensors, each where its last scan was.
-        state: the tracker's, after these scans.
-        info: what its step reported.
+        time: time in s.
+        scans: scans by the number of their sensor.
+        poses: (num_sensors, 3 or more) pose of each sensor at its last scan.
+        state: state of the tracker after these scans.
+        info: report of the tracker's step.
     """
 
     time: float
@@ -65,17 +65,17 @@ class Instant(SummaryRepr):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Timeline(TabularRepr):
-    """The instants that a late scan may still come before, and what was believed at the one before them.
+    """The instants in the window, which late scans may still change, and the final state before them.
 
     Attributes:
-        settled: the state before all instants, which no scan changes any more.
-        settled_poses: (num_sensors, 3 or more) of the sensors then.
+        settled: state before all instants; it is final.
+        settled_poses: (num_sensors, 3 or more) poses of the sensors in that state.
         instants: in order of time.
-        newest: s, the latest time of all scans that came; None before the first.
-        num_taken: scans that are in the beliefs.
-        num_late: of these, how many came after a later one.
-        num_dropped: scans that came too late.
-        num_repeated: scans that came again.
+        newest: latest time of all scans that arrived, in s; None before the first.
+        num_taken: number of scans that were used.
+        num_late: number of these that arrived after a scan of a later time.
+        num_dropped: number of scans that arrived too late.
+        num_repeated: number of scans that arrived again.
     """
 
     settled: State
@@ -89,16 +89,16 @@ class Timeline(TabularRepr):
 
     @property
     def state(self) -> State:
-        """What is believed at the latest instant."""
+        """State at the latest instant."""
         return self.instants[-1].state if self.instants else self.settled
 
     @property
     def poses(self) -> Floats:
-        """(num_sensors, 3 or more) where each sensor was last, at the latest instant."""
+        """Last pose of each sensor at the latest instant, (num_sensors, 3 or more)."""
         return self.instants[-1].poses if self.instants else self.settled_poses
 
     def to_table(self) -> dict[str, list[Any]]:
-        """A row an instant, by columns: `time_s`, `num_scans` and `num_measurements`, of all sensors."""
+        """Return one row per instant as columns: `time_s`, `num_scans` and `num_measurements` over all sensors."""
         found = [sum(len(scan.measurements) for scan in instant.scans.values()) for instant in self.instants]
         scans = [len(instant.scans) for instant in self.instants]
         return {"time_s": [i.time for i in self.instants], "num_scans": scans, "num_measurements": found}
@@ -113,12 +113,12 @@ class Timeline(TabularRepr):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class LateInfo(SummaryRepr):
-    """What was done with scans that arrived.
+    """Report on the processing of scans that arrived.
 
     Attributes:
-        steps: reports of the tracker's steps that were made, in order of time.
-        num_worked_again: how many of these steps had been made before, with fewer scans.
-        dropped: the scans that came too late.
+        steps: reports of the tracker's steps, in order of time.
+        num_worked_again: number of instants that were computed before and had to be computed again.
+        dropped: scans that arrived too late.
     """
 
     steps: tuple[TrackerInfo, ...]
@@ -128,24 +128,25 @@ class LateInfo(SummaryRepr):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LateScans:
-    """A tracker for scans that come late, early or not at all, each with its own time.
+    """Wrapper of a tracker for scans that arrive late, early or not at all, each with its own time.
 
-    Scans of one time are one step of the tracker. A scan that comes after later ones is put in its place, and the
-    steps since then are made again from the state before it: inside the window the beliefs are bit for bit those of
-    the same scans in order. One that is older than the window is counted and dropped.
+    Scans of one time are one step of the tracker. If a scan arrives after scans of later times, the steps since its
+    time are computed again from the state before it. Inside the window the beliefs are bit for bit those of the same
+    scans in order. A scan older than the window is counted and dropped.
 
-    Steps are numbered in order of time, and so are the labels of births: a target that is born after the time of a
-    late scan, within the window, gets the label that it would have had.
+    Steps are numbered in order of time, and so are the labels of births: a target born after the time of a late scan,
+    within the window, gets the label that it would have had with the scans in order.
 
     Attributes:
-        tracker: any.
-        poses: (num_sensors, 3 or more) where each sensor is before its first scan.
-        window: s, from the latest scan back.
-        seed: of the random numbers of filters that draw; those of a step are the same whenever it is made.
-        max_instants: most times of scans that are kept; of more, as in a flood, the window becomes shorter.
+        tracker: the wrapped tracker.
+        poses: (num_sensors, 3 or more) pose of each sensor before its first scan.
+        window: length of the window in s, back from the latest scan.
+        seed: seed for filters that draw random numbers; a step has the same numbers whenever it is computed.
+        max_instants: largest number of instants in the window; with more of them, the window becomes shorter.
 
     Raises:
-        InputError: something else than a tracker, not one pose a sensor, no positive window or number of instants.
+        InputError: `tracker` is not a tracker, the number of poses differs from that of the sensors, or a window or
+            number of instants that is not positive.
     """
 
     tracker: Tracker
@@ -171,23 +172,23 @@ class LateScans:
         object.__setattr__(self, "_start", start)
 
     def initial(self) -> Timeline:
-        """Before the first scan."""
+        """Return the timeline before the first scan."""
         return Timeline(self.tracker.initial(), self._start)
 
     def take(self, timeline: Timeline, scans: Iterable[SensorScan]) -> tuple[Timeline, LateInfo]:
-        """Take in scans, in the order in which they arrived; those of one call are worked at once.
+        """Process scans in their order of arrival; the scans of one call are processed together.
 
         Args:
-            timeline: as the call before left it.
-            scans: of whatever sensors and times.
+            timeline: timeline that the previous call returned.
+            scans: scans of any sensors and times.
 
         Returns:
-            The timeline with them, and what was done.
+            The timeline with these scans, and a report.
 
         Raises:
-            InputError: a sensor that there is not, a time that is no finite number, a pose or measurements that no
-                scan of the sensor has, two different scans of a sensor at one time. The timeline given stays as it was.
-            ModelError, NumericalError: as of the tracker's step.
+            InputError: an unknown sensor, a time that is not finite, an invalid pose or invalid measurements, or two
+                different scans of a sensor at one time. The given timeline is not changed.
+            ModelError, NumericalError: from the tracker's step.
         """
         came: dict[float, dict[int, SensorScan]] = {}
         first, newest, dropped = math.inf, timeline.newest, list[SensorScan]()
@@ -223,7 +224,7 @@ class LateScans:
         return self._settled(after), info
 
     def at(self, timeline: Timeline, time: float) -> State:
-        """What is believed of a time from the latest instant on, by what has come so far: predicted, and kept nowhere.
+        """Return the state predicted to `time` from the scans so far; the timeline does not change.
 
         Raises:
             InputError: a time before the latest instant.
@@ -231,7 +232,7 @@ class LateScans:
         return self.predicted(timeline, time)[0]
 
     def predicted(self, timeline: Timeline, time: float) -> tuple[State, TrackerInfo]:
-        """As `at`, with what the tracker reports of it."""
+        """Return the same state as `at`, and the tracker's report."""
         state, now = timeline.state, real("time", time)
         if state.time == now and timeline.instants:
             return state, timeline.instants[-1].info
@@ -243,7 +244,7 @@ class LateScans:
     def _worked(
         self, timeline: Timeline, num_kept: int, came: dict[float, dict[int, SensorScan]]
     ) -> tuple[Instant, ...]:
-        """The tracker's steps with the scans that came, on from the instants that stay as they are."""
+        """Return the instants after the first `num_kept` of the timeline, computed with the scans that arrived."""
         due = {i.time: i.scans for i in timeline.instants[num_kept:]}
         for time, scans in came.items():
             due[time] = due.get(time, {}) | scans
@@ -266,14 +267,14 @@ class LateScans:
         return tuple(made)
 
     def _streams(self, step: int) -> tuple[np.random.Generator, ...]:
-        """The random numbers of each sensor at a step."""
+        """Return the random generator of each sensor at a step."""
         return tuple(
             np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(step, s)))
             for s in range(len(self.tracker.sensors))
         )
 
     def _settled(self, timeline: Timeline) -> Timeline:
-        """Without the instants that no scan can come before any more."""
+        """Return the timeline without the instants older than the window or beyond `max_instants`."""
         if timeline.newest is None:
             return timeline
         past = max(_place(timeline, timeline.newest - self.window), len(timeline.instants) - self.max_instants)
@@ -284,10 +285,10 @@ class LateScans:
 
 
 def own_scan(scan: SensorScan, num_sensors: int) -> SensorScan:
-    """The scan with arrays of its own, so that what is worked again is what came; measurements: of whatever shape.
+    """Return a copy of the scan with its own arrays, so that later changes by the caller have no effect.
 
-    What a scan of the sensor may hold is for the tracker to check, which does so whenever it takes it. Raises
-    `InputError` for a sensor that there is not, a time that is no finite number, a pose or measurements that are none.
+    The shape and values of the measurements are not checked here; the tracker checks them at its step. Raises
+    `InputError` for an unknown sensor, a time that is not finite, an invalid pose, or measurements without numbers.
     """
     instance("scan", scan, SensorScan)
     if count("scan.sensor", scan.sensor) >= num_sensors:
@@ -299,29 +300,29 @@ def own_scan(scan: SensorScan, num_sensors: int) -> SensorScan:
 
 
 def name_of(scan: SensorScan) -> str:
-    """As errors call it."""
+    """Return the name of a scan in error messages."""
     return f"scan of sensor {scan.sensor} at {scan.time:g} s"
 
 
 def _place(timeline: Timeline, time: float) -> int:
-    """How many instants are before a time."""
+    """Return the number of instants before a time."""
     return bisect_left(timeline.instants, time, key=_TIME)
 
 
 def _is_settled(timeline: Timeline, time: float) -> bool:
-    """Whether a time is not after all that no scan changes any more."""
+    """Return True if a time is not after the settled state."""
     return timeline.settled.time is not None and time <= timeline.settled.time
 
 
 def _scans_at(timeline: Timeline, time: float) -> dict[int, SensorScan]:
-    """The scans of a time that are in the timeline already."""
+    """Return the scans of a time that are already in the timeline, by sensor."""
     place = _place(timeline, time)
     found = timeline.instants[place : place + 1]
     return found[0].scans if found and found[0].time == time else {}
 
 
 def _check_same(there: SensorScan, again: SensorScan) -> None:
-    """Raise `InputError` where a sensor has scanned at a time already, and measured something else, in any order."""
+    """Raise `InputError` if two scans of a sensor at one time differ in their pose or, in any order, measurements."""
     if not np.array_equal(_in_order(there.measurements), _in_order(again.measurements)) or not np.array_equal(
         there.pose, again.pose
     ):
@@ -330,7 +331,7 @@ def _check_same(there: SensorScan, again: SensorScan) -> None:
 
 
 def _in_order(measurements: Floats) -> Floats:
-    """The rows by their first number, then the second, and so on."""
+    """Return the rows sorted by their first number, then the second, and so on."""
     return (
         measurements[np.lexsort(measurements.T[::-1])] if measurements.ndim == 2 and measurements.size else measurements
     )

@@ -1,4 +1,4 @@
-"""The filters of all sensors, and what a tracker asks of each of them: a step, a prediction or an update."""
+"""Local filters of all sensors: step, prediction and update of each sensor's belief."""
 
 from __future__ import annotations
 
@@ -30,23 +30,23 @@ _BORN = "targets are born of measurements"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LocalFilters:
-    """What the trackers share that keep a filter at each sensor.
+    """Base of trackers with a filter at each sensor.
 
     Attributes:
-        filters: one a sensor; all hold the same targets. Several have labelled births, whatever they were given with:
-            two sensors' first detections of one target would be two labels.
-        targets: as all sensors know them.
-        sensors: what each sensor sees.
+        filters: one per sensor; all have the same target model. Several filters always use labelled births, because
+            two sensors' first detections of one target would otherwise be two labels.
+        targets: target model that all sensors share.
+        sensors: model of each sensor.
 
     Raises:
-        InputError: no filter or something else, filters of different targets; where targets are born of measurements,
-            filters or measurements that these cannot be had of.
+        InputError: no filter, an object that is not a filter, or filters with different target models; for births from
+            measurements, filters or measurements that do not support them.
     """
 
     filters: tuple[Filter, ...]
     targets: TargetModel = field(init=False)
     sensors: tuple[SensorModel, ...] = field(init=False)
-    _are_own: bool = field(init=False, repr=False)  # whether all filters are the library's
+    _are_own: bool = field(init=False, repr=False)  # True if all filters are the library's
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "filters", sequence("filters", self.filters, "a Filter of each sensor"))
@@ -68,7 +68,7 @@ class LocalFilters:
 
     @property
     def birth(self) -> BirthModel:
-        """The births that the tracker adds to those of the filters."""
+        """Births that the tracker adds to those of the filters."""
         return births_of_tracker(self.targets.birth, self.filters[0])
 
     def _stepped(
@@ -82,7 +82,7 @@ class LocalFilters:
         births: LMB | None,
         rng: np.random.Generator,
     ) -> tuple[Any, FilterInfo]:
-        """What sensor `s` believes after a scan; where it did not scan, what it predicts."""
+        """Return the belief of sensor `s` after a scan, or its prediction if it did not scan, and the report."""
         own = self.filters[s]
         if scan is None:
             return self._predicted(s, belief, dt, step, births)
@@ -91,19 +91,22 @@ class LocalFilters:
         return self._two_step(s, _BORN).step(belief, scan, pose, dt, step, rng=rng, births=births)
 
     def _predicted(self, s: int, belief: Any, dt: float, step: int, births: LMB | None) -> tuple[Any, FilterInfo]:
-        """What sensor `s` expects `dt` seconds later."""
+        """Return the prediction of sensor `s` over `dt` seconds, and the report."""
         return self._two_step(s, "it must predict without a scan").predict(belief, dt, step, births=births)
 
     def _updated(
         self, s: int, prediction: Any, scan: Any, pose: Any, rng: np.random.Generator
     ) -> tuple[Any, FilterInfo]:
-        """The prediction after the scan of sensor `s`, no label dropped; as it is where the sensor did not scan."""
+        """Return the prediction updated with the scan of sensor `s`, and the report.
+
+        No label is dropped. If the sensor did not scan, the prediction is returned unchanged.
+        """
         own = self.filters[s]
         if not isinstance(own, LmbFilter | FactoredGlmbFilter):
             raise reject(f"filters[{s}]", "an LmbFilter or FactoredGlmbFilter, as sensors share their prediction", own)
         whole = replace(own, limits=own.limits.keeping_labels())
         if isinstance(whole, FactoredGlmbFilter):
-            # The errors of all sensors' splits add up, and mixtures are divided by the prediction as they are.
+            # The errors of all sensors' splits add up, and mixtures are divided by the prediction without merging.
             apart = replace(whole.limits, merge_distance=0.0)
             num, error = len(self.filters), whole.max_split_error
             whole = replace(whole, limits=apart, max_split_error=error / num, scans_together=num)
@@ -113,18 +116,18 @@ class LocalFilters:
         return whole.update(prediction, scan, pose, rng=rng)
 
     def _kept(self, belief: Any) -> Any:
-        """The belief without the labels that the limits of the first filter drop."""
+        """Return the belief without the labels that the limits of the first filter drop."""
         own = self.filters[0]
         assert isinstance(own, SingleSensorFilter)
         return own.limits.kept(belief)
 
     def _as_kept(self, belief: Any) -> Any:
-        """The same density as the filters keep it: an LMB as a product of GLMBs where they keep these."""
+        """Return the density in the form of the filters: a product of GLMBs if they use these."""
         factored = isinstance(self.filters[0], FactoredGlmbFilter) and isinstance(belief, LabelledDensity)
         return FactoredGLMB.of(belief) if factored else belief
 
     def _for_fusion(self, beliefs: Sequence[Any]) -> Sequence[Any]:
-        """What was made of the filters' beliefs at this step, to be fused: checked where a filter is the user's own."""
+        """Return the beliefs for fusion, marked as valid if all filters are the library's."""
         return PrevalidatedBeliefs(beliefs) if self._are_own else beliefs
 
     def _two_step(self, s: int, why: str) -> PredictUpdateFilter:

@@ -1,4 +1,4 @@
-"""Labels that a sensor has lost sight of, and where targets without a label are, on a grid."""
+"""Lost labels, and the expected number of targets without a label on a grid."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from vedette.models import BirthModel, CellGrid, MeasurementBirth, SensorModel, 
 
 _Labelled = TypeVar("_Labelled", bound=LabelledDensity)
 _NODES = spread_nodes()
-_LEAST = 1e-300  # of a probability that is divided by
+_LEAST = 1e-300  # lower bound of a probability in a denominator
 
 
 def lost_labels(before: Any, after: Sequence[Any]) -> LMB | None:
-    """The labels of a belief that none of the beliefs after the next scan holds; None where beliefs have no labels."""
+    """Return the labels of a belief that no belief after the next scan has; None if the beliefs have no labels."""
     if not all(isinstance(belief, LabelledDensity) for belief in (before, *after)):
         return None
     held = [existence_probabilities(belief)[0] for belief in {id(belief): belief for belief in after}.values()]
@@ -33,16 +33,17 @@ def lost_labels(before: Any, after: Sequence[Any]) -> LMB | None:
 def expected_of_lost(
     lost: LMB, targets: TargetModel, looks: Sequence[tuple[SensorModel, Floats]], dt: float, grid: CellGrid
 ) -> Floats:
-    """(num_cells,) mean number of lost targets in each cell, `dt` seconds after they were believed, none detected.
+    """Mean number of lost, undetected targets in each cell, `dt` seconds after the belief `lost`, (num_cells,).
 
-    A label that exists with r, lives on with p, is predicted as f(x) and missed at x by all scans with q(x) exists with
+    For a label of existence r, survival probability p, predicted density f(x) and probability q(x) that all scans miss
+    a target at x, the existence is
 
         r p int q f / (1 - r p + r p int q f)
 
-    and has the density q f. f is taken at nodes, whose shares go to the cells that they lie in; those outside of the
-    grid are lost.
+    and the density is proportional to q f. f is evaluated at nodes, whose shares go to the cells that contain them;
+    nodes outside of the grid do not count.
 
-    looks: the sensors that scanned, and where.
+    looks: the sensors that scanned, and their poses.
     """
     tracks = lost.tracks
     of_component = np.repeat(np.arange(tracks.num_tracks), np.diff(tracks.offsets))
@@ -60,9 +61,9 @@ def expected_of_lost(
 
 
 def undetected_of(belief: Any, birth: BirthModel) -> UndetectedIntensity | None:
-    """The undetected targets of a belief on the cells of `birth.anywhere`, wherever they come from.
+    """Return the intensity of all undetected targets of a belief on the cells of `birth.anywhere`.
 
-    None where there are no such cells, or the belief has no undetected targets.
+    None if there are no such cells, or the belief has no undetected targets.
     """
     held = getattr(belief, "undetected", None)
     if birth.anywhere is None or held is None:
@@ -75,14 +76,14 @@ def undetected_of(belief: Any, birth: BirthModel) -> UndetectedIntensity | None:
 
 
 def _nodes_of(means: Floats, covs: Floats) -> Floats:
-    """(num_components * num_nodes, state_dim) states that share each Gaussian's position evenly, one by one."""
+    """Nodes over the position of each Gaussian, as states (num_components * num_nodes, state_dim), by component."""
     states = np.repeat(means[:, None], len(_NODES), axis=1)
     states[..., :2] += np.einsum("cij,nj->cni", np.linalg.cholesky(covs[:, :2, :2]), _NODES[:, 1:])
     return states.reshape(-1, states.shape[2])
 
 
 def expected_in_cells(states: Floats, shares: Floats, grid: CellGrid) -> Floats:
-    """(num_cells,) sums of the shares (n,) of states (n, 2 or more) in each cell; nobody counts those outside."""
+    """Sum of the shares (n,) of states (n, 2 or more) in each cell, (num_cells,); states outside do not count."""
     cells = grid.cells_at(states)
     return np.bincount(cells[cells >= 0], shares[cells >= 0], grid.num_cells).astype(np.float64)
 
@@ -90,14 +91,14 @@ def expected_in_cells(states: Floats, shares: Floats, grid: CellGrid) -> Floats:
 def without_forgotten(
     belief: _Labelled, birth: MeasurementBirth, views: FieldsOfView, sensor: int, min_detection: float
 ) -> tuple[_Labelled, float]:
-    """A sensor's own belief without the labels that it cannot see and knows too little of, and their summed existence.
+    """Return a sensor's belief without labels that are out of view and vague, and the sum of their existences.
 
-    Not seen is a label that the sensor detects with a probability below `min_detection`, on average over its density.
-    Known too little is one of which no place is likelier to hold a target than that of a birth at its most: r / sqrt
-    det of the covariance of its position is less than `max_existence` / (std_x std_y). Where such a target comes back
-    into view, the birth from its first measurement says more of it than the label.
+    A label is out of view if the mean probability of its detection by the sensor, over its density, is below
+    `min_detection`. It is vague if its peak intensity is below that of the most certain birth: r / sqrt det of the
+    covariance of its position is less than `max_existence` / (std_x std_y). When such a target comes back into view,
+    the birth from its first measurement has more information than the label.
 
-    views: of all sensors; who has just scanned is not asked.
+    views: fields of view of all sensors; each sensor is taken to have scanned.
     """
     lmb = as_lmb(belief)
     covs = track_moments(lmb.tracks)[1][:, :2, :2]

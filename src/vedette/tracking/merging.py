@@ -1,4 +1,4 @@
-"""Beliefs of different pasts as one, and a fusion under other weights than its own."""
+"""Merging of beliefs with different histories, and fusions with replaced weights."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from vedette.fusion import FieldsOfView, Fusion, FusionInfo, LabelMatchedFusion
 def merged(
     merging: Fusion, beliefs: Sequence[Any], sensors: Sequence[int], views: FieldsOfView
 ) -> tuple[Any, FusionInfo | None]:
-    """The one belief of these sensors under equal weights, and what was done; the first where all are the same object.
+    """Return the fusion of the sensors' beliefs with equal weights, and its report.
 
-    views: of all sensors.
+    If all beliefs are the same object, returns that object and None. views: fields of view of all sensors.
     """
     if all(belief is beliefs[0] for belief in beliefs):
         return beliefs[0], None
@@ -26,7 +26,7 @@ def merged(
 
 
 def views_of(views: Sequence[FieldsOfView], sensors: Sequence[int]) -> FieldsOfView:
-    """The views of some of the sensors, in that order, each as of its own time."""
+    """Return the fields of view of some sensors, in that order, each taken from its own element of `views`."""
     places = list(zip(views, sensors, strict=True))
     return FieldsOfView(
         tuple(own.sensors[s] for own, s in places),
@@ -36,10 +36,10 @@ def views_of(views: Sequence[FieldsOfView], sensors: Sequence[int]) -> FieldsOfV
 
 
 def with_weights(fusion: Fusion, weights: Sequence[float]) -> Fusion:
-    """The fusion under these weights, one a belief.
+    """Return the fusion with these weights, one per belief.
 
     Raises:
-        InputError: a fusion that is no dataclass with a field `weights`, nor one that matches labels for such a rule.
+        InputError: a fusion that is neither a dataclass with a field `weights` nor a `LabelMatchedFusion` of one.
     """
     names: list[str] = [field.name for field in fields(fusion)] if is_dataclass(fusion) else []
     if "weights" in names:

@@ -1,4 +1,4 @@
-"""Radio links between sensors: who hears whom, how late, and how many bytes each sends, without compression."""
+"""Radio links between sensors: connectivity, message delays and uncompressed bytes sent."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ NEVER = np.iinfo(np.int64).max // 2
 
 @dataclass(frozen=True, slots=True)
 class Network:
-    """A radio network of moving sensors, in which every message is passed on from neighbour to neighbour.
+    """Radio network of moving sensors, in which every message is passed on from neighbour to neighbour.
 
     Attributes:
-        radio_range: distance up to which sensors hear each other; none: any [m].
-        hops: links that a message may travel; none: as far as they reach.
+        radio_range: distance up to which two sensors have a link; none: unlimited [m].
+        hops: maximum number of links that a message may travel; none: unlimited.
         loss: probability that a link fails at a scan, in both directions, for all messages.
-        delay: scans that a message takes for each link.
+        delay: number of scans that a message takes for each link.
         consensus_rounds: rounds of averaging with the neighbours (Metropolis weights) after each scan, instead of
             passing messages on; for fusions of densities; none: no consensus.
 
     Raises:
-        InputError: names the field, what was expected and what came.
+        InputError: an invalid field; the message has its name, the expected and the given value.
     """
 
     radio_range: Limit = math.inf
@@ -54,9 +54,9 @@ class Network:
         return NEVER - 1 if self.hops is None else self.hops
 
     def links(self, poses: Floats, rng: np.random.Generator) -> Bools:
-        """(num_sensors, num_sensors) which sensors hear each other directly; symmetric, nobody itself.
+        """Return the direct links, (num_sensors, num_sensors): symmetric, False on the diagonal.
 
-        Drawn from `rng` only where links fail.
+        Random numbers are drawn from `rng` only if links can fail (`loss` > 0).
         """
         offsets = poses[:, None, :2] - poses[None, :, :2]
         near: Bools = np.hypot(offsets[..., 0], offsets[..., 1]) <= self.radio_range
@@ -67,26 +67,27 @@ class Network:
         return near
 
     def arrivals(self, hops: Ints, step: int) -> Ints:
-        """(num_sensors, num_sensors) step at which sensor i has the message that sensor j sends now, or `NEVER`.
+        """Step at which sensor i has the message that sensor j sends now, or `NEVER`, (num_sensors, num_sensors).
 
-        hops: `hop_counts` of the links of the step; messages travel over those of the step at which they are sent.
-        step: its number, where steps of one time count once.
+        hops: `hop_counts` of the links of this step; messages travel over the links of the step at which they are sent.
+        step: number of the step, where all steps at one time count once.
         """
         return np.where(self.reaches(hops), step + self.delay * np.minimum(hops, len(hops)), NEVER)
 
     def reaches(self, hops: Ints) -> Bools:
-        """Whether messages travel over so many links."""
+        """Return True, elementwise, if messages may travel over this number of links."""
         return np.asarray(hops <= self._most_hops)
 
     def longest_delay(self, num_sensors: int) -> int:
-        """Scans after which no message arrives any more."""
+        """Return the largest delay of a message, in scans."""
         return self.delay * min(num_sensors - 1, self._most_hops)
 
     def bytes_sent(self, hops: Ints, sizes: Sequence[int]) -> tuple[int, ...]:
-        """What each sensor sends at a step, where sensor j has a message of `sizes[j]` bytes; hops: as of `arrivals`.
+        """Return the bytes that each sensor sends at a step, if sensor j has a message of `sizes[j]` bytes.
 
-        A message is sent once by each sensor that has it and may still pass it on, and heard by all its neighbours;
-        with consensus, each sensor sends its average, as large as the largest message, in each round.
+        A message is sent once by each sensor that has it and may still pass it on, and received by all its neighbours.
+        With consensus, each sensor sends its average, as large as the largest message, in each round. hops: as in
+        `arrivals`.
         """
         heard: Bools = (hops == 1).sum(axis=1) > 0
         if self.consensus_rounds is not None:
@@ -96,15 +97,15 @@ class Network:
 
 
 def heard_by(sensor: int, arrives: Ints, step: int) -> tuple[int, ...]:
-    """The sensors whose messages, of `Network.arrivals`, a sensor has by a step; its own among them."""
+    """Return the sensors whose messages a sensor has by a step, itself included. arrives: from `Network.arrivals`."""
     return tuple(np.flatnonzero(arrives[sensor] <= step).tolist())
 
 
 def hop_counts(links: Bools) -> Ints:
-    """(n, n) fewest links between any two sensors; 0 from each to itself, `NEVER` where there is no way."""
+    """Smallest number of links between any two sensors, (n, n); 0 on the diagonal, `NEVER` if not connected."""
     reached = np.eye(len(links), dtype=np.bool_)
     hops, count = np.where(reached, 0, NEVER), 0
-    while reached.any():  # those that the last link has brought
+    while reached.any():  # sensors first reached over the last link
         count += 1
         reached = (reached @ links) & (hops == NEVER)
         hops[reached] = count
@@ -112,9 +113,9 @@ def hop_counts(links: Bools) -> Ints:
 
 
 def metropolis_weights(links: Bools) -> Floats:
-    """(n, n) symmetric weights of one round of averaging: 1 / (1 + the larger number of neighbours) on each link.
+    """Symmetric (n, n) weights of one round of averaging: 1 / (1 + the larger number of neighbours) on each link.
 
-    Rows and columns sum to one, so that averages are kept and rounds converge to the mean of each connected group
+    Rows and columns sum to one, so that averages are preserved and rounds converge to the mean of each connected group
     (Xiao, Boyd and Lall 2005).
     """
     degrees = links.sum(axis=1)
@@ -123,9 +124,10 @@ def metropolis_weights(links: Bools) -> Floats:
 
 
 def parts_of_belief(belief: Any) -> dict[bytes, int]:
-    """The independent parts of a belief, each by a fingerprint of its content, with its bytes as of `bytes_of_belief`.
+    """Return the sizes of the independent parts of a belief in bytes, by a fingerprint of their content.
 
-    A label of an LMB, a factor of a factored density, a GLMB as a whole; nothing of a density without labels.
+    A part is a label of an LMB, a factor of a factored density, or a whole GLMB. Sizes are counted as in
+    `bytes_of_belief`. The result is empty for a density without labels.
     """
     if not isinstance(belief, LabelledDensity):
         return {}
@@ -160,12 +162,13 @@ def parts_of_belief(belief: Any) -> dict[bytes, int]:
 
 
 def bytes_of_messages(network: Network, hops: Ints, messages: Sequence[Sequence[Any]]) -> tuple[int, ...]:
-    """What each sensor sends so that all have the beliefs of those whom they hear.
+    """Return the bytes that each sensor sends so that all sensors have the beliefs of those they can reach.
 
-    Each sends the fingerprints of its own parts, a number each, as far as messages travel; then each part goes to those
-    who lack it, from the nearest who hold it, by one neighbour of each. In consensus, averages are sent whole.
+    Each sensor first sends the fingerprints of its own parts, one number each, as far as messages travel. Each part
+    then goes to the sensors that lack it, from the nearest holders, through one neighbour of each receiver. In
+    consensus, averages are sent whole.
 
-    hops: as of `Network.arrivals`. messages: the beliefs that each sensor sends.
+    hops: as in `Network.arrivals`. messages: the beliefs that each sensor sends.
     """
     if network.consensus_rounds is not None:
         return network.bytes_sent(hops, [sum(map(bytes_of_belief, beliefs)) for beliefs in messages])
@@ -192,7 +195,7 @@ def bytes_of_messages(network: Network, hops: Ints, messages: Sequence[Sequence[
 
 
 def _senders(network: Network, hops: Ints, holders: Collection[int]) -> Ints:
-    """Who passes on what these sensors hold until all who hear them have it."""
+    """Return the sensors that must transmit a part that `holders` have, so that every sensor in reach receives it."""
     away = hops[:, list(holders)].min(axis=1)
     lacking = np.flatnonzero((away > 0) & network.reaches(away))
     before = (hops[lacking] == 1) & (away == away[lacking, None] - 1)

@@ -1,4 +1,4 @@
-"""A tracker that is a program of its own, in any language: it gets the scans of a time as a line of JSON."""
+"""Tracker that runs as a separate program in any language: it gets the scans of a time as a line of JSON."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ from vedette.internal.programs import Program, start_program
 from vedette.kernels.base.types import Floats
 from vedette.models import SensorModel, TargetModel
 
-# m^2 and m^2/s^2: of what a program says nothing of.
+# m^2 and m^2/s^2: variance of state components that a program does not estimate.
 UNKNOWN_VARIANCE = 1e12
 
 
 @dataclass(slots=True, eq=False)
 class ProgramFilter:
-    """A `CentralFilter` that asks a program for the targets; docs/benchmark.md says what it is told and answers.
+    """A `CentralFilter` that gets its estimates from a program; docs/benchmark.md has the messages and answers.
 
-    What is believed is an LMB of what the program answers. A program goes through the scans of a run in order; it is
-    started at the first, with a seed drawn from the numbers of that scan.
+    The belief is an LMB of the program's answer. A program processes the scans of a run in order. It is started at the
+    first scan, with a seed drawn from that scan's random generator.
 
     Attributes:
-        targets: as the scene describes them.
-        sensors: all of them.
+        targets: target model of the scene.
+        sensors: models of all sensors.
         command: the program and its arguments.
-        scene: what it is told first, as plain data.
-        folder: in which the program is started.
-        seconds: that it may take for an answer.
-        start_seconds: that it may take for its first answer, that it is ready.
+        scene: function that returns the first message to the program, as plain data.
+        folder: working directory of the program.
+        seconds: time limit for an answer in s.
+        start_seconds: time limit in s for the first answer, which reports that the program is ready.
     """
 
     targets: TargetModel
@@ -51,7 +51,7 @@ class ProgramFilter:
     _names: dict[Hashable, tuple[int, int]] = field(init=False, default_factory=dict, repr=False)
 
     def initial(self) -> LMB:
-        """No target."""
+        """Return the belief without targets."""
         return LMB.empty(self.targets.state_dim)
 
     def step(
@@ -65,11 +65,11 @@ class ProgramFilter:
         rng: np.random.Generator,
         births: LMB | None = None,
     ) -> tuple[LMB, FilterInfo]:
-        """What the program answers; what is believed already, and who may be born, is for the program to know.
+        """Return the program's answer as an LMB, and a report. `belief` and `births` are not used.
 
         Raises:
             InputError: a step that is not the next, or a command that cannot be started.
-            VedetteError: no answer in time, or one that is none; the program is ended.
+            VedetteError: no answer in time, or an invalid answer; the program is then terminated.
         """
         if step == 1:
             scene = self.scene()
@@ -101,12 +101,12 @@ class ProgramFilter:
 
 
 def untold(num_labels: int) -> FilterInfo:
-    """What is reported of a step of which nothing but its labels is known."""
+    """Return the report of a step with nothing known except the number of labels."""
     return FilterInfo(nan, 1, num_labels, 0.0, 0.0, 0, 0, 0, search_cut=False, cap_met=False)
 
 
 class _Row:
-    """One estimate of an answer, checked for its form."""
+    """One estimate of an answer, with its form checked."""
 
     def __init__(self, program: Program, place: int, given: Any, dim: int) -> None:
         known = {"state", "cov", "existence", "label"}
@@ -135,7 +135,7 @@ class _Row:
 
 
 def _numbers(program: Program, name: str, given: Any, shapes: tuple[tuple[int, ...], ...]) -> Floats:
-    """Finite numbers of one of the shapes."""
+    """Return `given` as finite numbers in one of the shapes; otherwise refuse the program's answer."""
     try:
         found = np.array(given, np.float64)
     except (TypeError, ValueError):

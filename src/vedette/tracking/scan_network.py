@@ -1,4 +1,4 @@
-"""Sensors that send their scans: each updates with all that it hears, and puts what is late where it belongs."""
+"""Networks of sensors that send their scans: each sensor filters all scans that it receives, in order of time."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from vedette.tracking.network import Network, bytes_of_messages, heard_by, hop_c
 
 
 class _Known(NamedTuple):
-    """What a sensor believes after a step, who may be born at the next, and what its filter said."""
+    """A sensor's belief after a step, its birth candidates for the next step, and its filter's report."""
 
     belief: Any
     births: LMB | None
@@ -29,39 +29,39 @@ class _Known(NamedTuple):
 
 
 class _Frame(NamedTuple):
-    """The scans of one step, and when each sensor has them."""
+    """The scans of one step, and the times at which each sensor receives them."""
 
     step: int
-    instant: int  # number of its time, by which messages are late
+    instant: int  # number of its time; delays are counted in these
     dt: float
     scans: tuple[Any, ...]
     poses: Floats
-    arrives: Ints  # (num_sensors, num_sensors) as of `Network.arrivals`
+    arrives: Ints  # (num_sensors, num_sensors) from `Network.arrivals`
 
 
 class _Memory(NamedTuple):
-    """What every sensor knew before the first of the steps that messages may still arrive for, and these steps."""
+    """The steps for which messages may still arrive, and the state of every sensor before the first of them."""
 
     known: tuple[_Known, ...]
     frames: tuple[_Frame, ...]
     last: tuple[_Frame, ...]  # all steps of the last time
-    instant: int  # times so far
+    instant: int  # number of times so far
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScanNetwork(OfAllScans):
-    """Every sensor runs the same filter of several sensors on the scans that it hears, its own among them.
+    """Tracker in which every sensor runs the same multi-sensor filter on all scans that it receives and its own.
 
-    A scan that comes late is put in its place: the steps since then are filtered again with it, so that sensors that
-    have heard the same believe the same, whatever came when. Where sensors that hear each other believe different
-    things (as two groups that have met again), they merge their beliefs first, unless messages are delayed.
+    When a late scan arrives, the steps since its time are filtered again with it. Sensors that have received the same
+    scans therefore have the same belief, in whatever order the scans arrived. If connected sensors have different
+    beliefs (for example when two groups meet again), they merge them first, unless messages are delayed.
 
     Attributes:
-        filter: of all sensors' scans; a scan that was not heard is None to it. Its births are labelled, as sensors that
-            know different scans would name first detections differently.
-        network: who hears whom.
-        merging: fusion of beliefs of different pasts; all its weights are replaced by equal ones. It also makes the one
-            belief that is reported where sensors believe different things.
+        filter: multi-sensor filter; a scan that was not received is passed to it as None. Its births are labelled,
+            because sensors with different scans would give different labels to first detections.
+        network: radio network between the sensors.
+        merging: fusion of beliefs with different histories; all its weights are replaced by equal ones. It also fuses
+            the sensors' beliefs into the one that is reported if they differ.
 
     Raises:
         InputError: a filter or network of another kind, or a network with consensus.
@@ -77,7 +77,7 @@ class ScanNetwork(OfAllScans):
             raise reject("network", "a Network without consensus, as scans are no averages", self.network)
 
     def initial(self) -> State:
-        """No target."""
+        """Return the state without targets."""
         belief = self.filter.initial()
         known = (_Known(belief, None, None),) * len(self.sensors)
         return State((belief,) * len(self.sensors), belief, memory=_Memory(known, (), (), 0))
@@ -85,7 +85,7 @@ class ScanNetwork(OfAllScans):
     def step(
         self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[State, TrackerInfo]:
-        """Send the scans and filter what has arrived; see `Tracker.step`. Only the first of `rngs` is drawn from."""
+        """Send the scans and filter those that have arrived; see `Tracker.step`. Uses only `rngs[0]`."""
         at, dt = check_step(state, scans, poses, time, rngs, len(self.sensors))
         stages, step, num = Stages(), state.step + 1, len(self.sensors)
         instant = state.memory.instant + (dt > 0.0)
@@ -113,9 +113,10 @@ class ScanNetwork(OfAllScans):
         return State(local, fused, step, float(time), _Memory(known, frames, last, instant)), info
 
     def _merge(self, memory: _Memory, frame: _Frame, views: FieldsOfView) -> tuple[_Known, ...]:
-        """Each sensor's belief and those of all that it hears as one; the same for those who hear the same.
+        """Return each sensor's state after merging its belief with the beliefs it receives.
 
-        Who scans at this step is not asked, as the beliefs are those of before.
+        Sensors that receive the same beliefs share one object. The beliefs are those before this step, so the merging
+        takes all sensors to have scanned, whether or not they scan at this step.
         """
         found: dict[tuple[int, ...], _Known] = {}
         everyone = [heard_by(i, frame.arrives, frame.instant) for i in range(len(self.sensors))]
@@ -133,13 +134,16 @@ class ScanNetwork(OfAllScans):
         return tuple(found[heard] for heard in everyone)
 
     def _measured(self, before: LMB | None, belief: Any, frame: _Frame, heard: tuple[int, ...]) -> LMB | None:
-        """Who may be born after a step of which these sensors' scans are known. before: after those of its time."""
+        """Return the birth candidates after a step, from the scans of the sensors `heard`.
+
+        before: candidates from earlier scans of the same time.
+        """
         birth, after = self.targets.birth, frame.step + 1
         found = births_heard(birth, belief, self.sensors, frame.scans, frame.poses, after, heard)
         return births_waiting(birth, before, found)
 
     def filtered(self, known: _Known, frame: _Frame, heard: tuple[int, ...], rng: np.random.Generator) -> _Known:
-        """What a sensor knows after a step of which it has heard these sensors' scans."""
+        """Return a sensor's state after a step, given that it received the scans of the sensors `heard`."""
         scans = [scan if s in heard else None for s, scan in enumerate(frame.scans)]
         belief, info = self._filtered(known.belief, known.births, scans, frame.poses, frame.dt, frame.step, rng)
         before = known.births if frame.dt == 0.0 else None
@@ -147,15 +151,15 @@ class ScanNetwork(OfAllScans):
 
 
 class _Runs:
-    """Steps of sensors, each computed once for all sensors that knew the same and heard the same."""
+    """Steps of sensors, each computed once for all sensors with the same state and the same received scans."""
 
     def __init__(self, tracker: ScanNetwork, rng: np.random.Generator) -> None:
         self.tracker, self.rng = tracker, rng
         self.done: dict[tuple[int, int, tuple[int, ...]], _Known] = {}
-        self.kept: list[_Known] = []  # so that no two of the ids are of one after the other
+        self.kept: list[_Known] = []  # keeps the objects alive, so that their ids are not reused
 
     def through(self, known: _Known, frames: Sequence[_Frame], sensor: int, now: int) -> _Known:
-        """What a sensor knows after these steps, by what of them it has heard by now."""
+        """Return a sensor's state after these steps, given the scans that it has received by the instant `now`."""
         for frame in frames:
             heard = heard_by(sensor, frame.arrives, now)
             key = id(known), frame.step, heard

@@ -21,21 +21,21 @@ from vedette.tracking.losing import expected_in_cells, expected_of_lost, lost_la
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Searching(AroundTracker):
-    """Another tracker, whose states also say how many undetected targets are expected where (`State.undetected`).
+    """Wrapper of a tracker whose states also have the intensity of undetected targets (`State.undetected`).
 
-    The beliefs are the other tracker's, to the last bit. A scan takes out of every cell the share that it would have
-    detected, expected times the mean over the cell of 1 - P_D; what came of its measurements is the other tracker's
-    to say. Labels that it drops are undetected again (`expected_of_lost`). Where targets are born of measurements, who
-    may be so is undetected until then, as it is found only if it is looked at again: a measurement that no track
-    explains with probability p is one with p times the most that such a birth may have. All scans are taken as known at
-    once, also where a network brings them late or not at all.
+    The beliefs are bit for bit those of the wrapped tracker. A scan multiplies the expected number in each cell by the
+    mean over the cell of 1 - P_D; the wrapped tracker processes its measurements. Labels that the tracker drops become
+    undetected again (`expected_of_lost`). With births from measurements, birth candidates count as undetected until
+    they are born, because they are found only if they are observed again: a measurement that is unexplained with
+    probability p counts as p times the largest existence of such a birth. All scans are used at once, even if a network
+    delivers them late or not at all.
 
     Attributes:
-        tracker: of the targets that are found.
-        model: how many others there are at first, and how they move, appear and end.
+        tracker: tracker of the detected targets.
+        model: model of the undetected targets: initial number, motion, appearance and disappearance.
 
     Raises:
-        InputError: something else than a tracker or a model.
+        InputError: `tracker` is not a tracker, or `model` is not an `UndetectedModel` with a fixed birth rate.
     """
 
     model: UndetectedModel
@@ -55,16 +55,16 @@ class Searching(AroundTracker):
         object.__setattr__(self, "_node_weights", self.model.grid.node_weights())
 
     def initial(self) -> State:
-        """As the tracker's, with those that the model expects to be there at first."""
+        """Return the wrapped tracker's first state, with the model's initial undetected targets."""
         return replace(self.tracker.initial(), undetected=UndetectedIntensity(self.model.grid, self.model.initial()))
 
     def step(
         self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[State, TrackerInfo]:
-        """The tracker's step, then the same time and scans for those not yet found; see `Tracker.step`.
+        """Step the wrapped tracker, then update the undetected targets for the same scans; see `Tracker.step`.
 
         Raises:
-            InputError: a state without `undetected`, or with that of another grid; and as the tracker.
+            InputError: a state without `undetected`, or with one on another grid; and the errors of the tracker.
         """
         after, info = self.tracker.step(state, scans, poses, time, rngs=rngs)
         stages = Stages()
@@ -81,7 +81,7 @@ class Searching(AroundTracker):
         return replace(after, undetected=left), replace(info, seconds=seconds)
 
     def _predicted(self, state: State, time: float) -> Floats:
-        """(num_cells,) expected before the scans of a time; as at first, where they are the first."""
+        """Expected number in each cell before the scans of a time, (num_cells,); the initial one for the first."""
         before, grid = state.undetected, self.model.grid
         if before is None:
             raise InputError("state.undetected: expected an UndetectedIntensity, as of initial(); got None")
@@ -104,14 +104,14 @@ class Searching(AroundTracker):
     def _lost(
         self, before: State, after: State, looks: Sequence[tuple[SensorModel, Floats]], time: float
     ) -> Floats | float:
-        """Expected in each cell of labels that are no longer held."""
+        """Expected number in each cell of targets whose labels were dropped, (num_cells,), or 0."""
         lost = lost_labels(before.fused, (*after.local, after.fused))
         if before.time is None or lost is None or lost.tracks.num_tracks == 0:
             return 0.0
         return expected_of_lost(lost, self.targets, looks, time - before.time, self.model.grid)
 
     def _new(self, after: State, scans: Sequence[Any], poses: Floats) -> Floats | float:
-        """Expected in each cell of who may be born of measurements."""
+        """Expected number in each cell of birth candidates from measurements, (num_cells,), or 0."""
         birth = self.targets.birth.from_measurements
         if birth is None:
             return 0.0

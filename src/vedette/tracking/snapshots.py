@@ -1,8 +1,8 @@
-"""What a tracking loop holds, in a file: states, random numbers, counters; taken up again as if nothing had been.
+"""Snapshots of a tracking loop in a file: states, random generators and counters, restored exactly.
 
-A file is NumPy's .npz: arrays of their own, and a text that says how they hang together. What stands there twice is one
-object again, as some trackers tell by that who believes the same. Nothing is unpickled: objects are made by the
-constructors, and their checks, of the library's own data classes.
+A file is a NumPy .npz archive of arrays and a JSON text with the structure of the objects. Shared objects are restored
+as shared, because some trackers recognise equal beliefs by identity. Nothing is unpickled: objects are built by the
+constructors of the library's own data classes, with their checks.
 """
 
 from __future__ import annotations
@@ -26,22 +26,22 @@ from vedette.models.arguments import reject
 FORMAT_NAME = "vedette-snapshot"
 FORMAT_VERSION = 1
 
-# The rooms whose data classes may stand in a file; they hold arrays and open nothing.
+# Packages whose data classes may occur in a file; they hold arrays and open no files.
 _ROOMS = ("densities", "filters", "fusion", "tracking", "models", "control", "calibration", "kernels.base")
 _BITS = {kind.__name__: kind for kind in (np.random.PCG64, np.random.PCG64DXSM, np.random.SFC64, np.random.Philox)}
 _PLAIN = (bool, int, str, type(None))
 
 
 def save_snapshot(path: str | os.PathLike[str], parts: Mapping[str, Any]) -> None:
-    """Write what a loop holds to `path`. The file appears whole or not at all.
+    """Write a snapshot of the parts of a loop to `path`. The file is complete or absent.
 
     Args:
-        path: of the file, which is replaced.
-        parts: by names of your own: states of trackers, timelines, densities, generators of random numbers, arrays,
-            numbers, texts, and tuples, lists and dictionaries of these.
+        path: path of the file, which is replaced.
+        parts: by any names: states of trackers, timelines, densities, random generators, arrays, numbers, texts, and
+            tuples, lists and dictionaries of these.
 
     Raises:
-        InputError: something else, named by where it is; or a path that cannot be written.
+        InputError: an object of another type, with its place in `parts`; or a path that cannot be written.
     """
     writing = _Writing()
     root = writing.node(dict(parts), "parts")
@@ -52,11 +52,10 @@ def save_snapshot(path: str | os.PathLike[str], parts: Mapping[str, Any]) -> Non
 
 
 def load_snapshot(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """The parts that `save_snapshot` wrote, every bit of every number as it was.
+    """Return the parts that `save_snapshot` wrote, with every number bit for bit the same.
 
     Raises:
-        InputError: a file that is missing, damaged, of another origin or a later version, or that holds what no such
-            object can be made of.
+        InputError: a file that is missing, damaged, of another format or version, or whose parts are not valid.
     """
     source = Path(path)
     try:
@@ -84,16 +83,16 @@ def load_snapshot(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 class _Writing:
-    """Nodes of a structure that refer to each other by number."""
+    """Writer of a structure as nodes that refer to each other by number."""
 
     def __init__(self) -> None:
         self.nodes: list[list[Any]] = []
         self.arrays: list[np.ndarray[Any, Any]] = []
         self._numbers: dict[int, int] = {}
-        self._kept: list[Any] = []  # so that no two of the ids are of one after the other
+        self._kept: list[Any] = []  # keeps the objects alive, so that their ids are not reused
 
     def node(self, value: Any, place: str) -> int:
-        """The number of the node of a value."""
+        """Return the number of the node of a value, written at its first occurrence."""
         if id(value) in self._numbers:
             return self._numbers[id(value)]
         made = self._made(value, place)
@@ -146,7 +145,7 @@ class _Writing:
 
 
 class _Reading:
-    """The values of nodes, each made once."""
+    """Reader of nodes; the value of each node is made once."""
 
     def __init__(self, arrays: Mapping[str, Any], nodes: list[list[Any]]) -> None:
         self._arrays, self._nodes = arrays, nodes
@@ -163,7 +162,7 @@ class _Reading:
         }
 
     def value(self, number: int) -> Any:
-        """The value of a node. A node refers to earlier ones only, so that no circle can be written."""
+        """Return the value of a node. Nodes refer to earlier nodes only, so there are no cycles."""
         if number not in self._made:
             kind, *content = self._nodes[number]
             self._made[number] = self._makers[kind](*content)
@@ -189,14 +188,14 @@ class _Reading:
 
 
 def _field_names(kind: type) -> tuple[str, ...] | None:
-    """The arguments of a data class or named tuple; None of anything else."""
+    """Return the arguments of a data class or named tuple; None for any other class."""
     if is_dataclass(kind):
         return tuple(field.name for field in fields(kind) if field.init)
     return getattr(kind, "_fields", None) if issubclass(kind, tuple) else None
 
 
 def _class_of(module: str, name: str) -> Any:
-    """A data class or named tuple of the library by its name; None of anything else."""
+    """Return a data class or named tuple of the library by its name; None for any other name."""
     if not any(module == f"vedette.{room}" or module.startswith(f"vedette.{room}.") for room in _ROOMS):
         return None
     try:
