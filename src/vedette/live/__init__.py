@@ -1,4 +1,4 @@
-"""Scans that come in while they are taken: lines of JSON in, estimates and plans out; kept, and taken up again."""
+"""Live tracking: lines of JSON with scans in, estimates and plans out; recorded, and resumed after interruptions."""
 
 from vedette.live.building import live_of
 from vedette.live.keeping import Keeping

@@ -27,20 +27,20 @@ def live_of(
     seed: int = 0,
     num_threads: int = 0,
 ) -> Live:
-    """The loop of a scenario of scans that are to come.
+    """Return the live loop of a scenario.
 
     Args:
-        known: see `vedette.scenarios.of_recording.scenario_of_sensors`.
-        planner: of decisions, where there are any: at the scenario's times, or every so many seconds.
-        window: s that a scan may be late.
-        ahead: s that it may be ahead of all others.
-        decide_every: s from one decision to the next; None: as the scenario says.
-        seed: of filters that draw, and of decisions.
-        num_threads: share a decision; 0: one a processor.
+        known: scenario and conventions, see `vedette.scenarios.of_recording.scenario_of_sensors`.
+        planner: name of the planner, used if there are decisions: at the scenario's times or every `decide_every`.
+        window: largest delay of a scan in s.
+        ahead: largest time in s by which a scan may be ahead of all others.
+        decide_every: time between decisions in s; None: at the times of the scenario.
+        seed: seed for decisions and for filters that draw random numbers.
+        num_threads: number of threads for a decision; 0: one per processor.
 
     Raises:
-        InputError: parts that do not fit together, measurements of a kind that lines cannot tell, or a planner that
-            knows the targets.
+        InputError: incompatible parts, a kind of measurement that lines cannot express, or a planner that needs the
+            true targets.
     """
     model = known.scenario.model
     sites = tuple(sites_of(model))
@@ -54,7 +54,7 @@ def live_of(
         inside: Any = decides
         while isinstance(
             inside, Named | ConstraintReportingPlanner
-        ):  # which pass the truth on, and need none themselves
+        ):  # these pass the truth on and do not need it themselves
             inside = inside.planner
         if isinstance(inside, RequiresTruth):
             raise InputError(f"planner: expected one that does not know the targets; got {planner}")

@@ -1,4 +1,4 @@
-"""What a live loop leaves on disk, to go on from after any end: the lines as they came, and snapshots of its state."""
+"""Files of a live loop: a record of its lines and snapshots of its state, to resume after any interruption."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ from vedette.tracking import load_snapshot, save_snapshot
 class Keeping:
     """A live loop with its files.
 
-    A line is written to the record before it is taken. After whatever end, the next loop has the state of the snapshot,
-    takes the lines that the record has after it, and goes on: all is as if nothing had been, but that the answers to
-    those lines are given a second time.
+    A line is written to the record before it is processed. After any interruption, the next loop starts from the
+    snapshot, processes the lines of the record after it, and continues. The result is the same as without the
+    interruption, except that these lines are answered a second time.
 
     Args:
         live: the loop.
-        of: by which a snapshot is known to be of this loop, such as a digest of its files.
-        snapshot: the file of the state; None: none.
-        every: s between snapshots.
-        record: the file of the lines; None: none.
-        clock: s, by which it is time for a snapshot.
-        tell: is told of a snapshot that could not be written; the loop goes on.
+        of: identifier of the loop in its snapshots, such as a digest of its files.
+        snapshot: file of the state; None: no snapshots.
+        every: time between snapshots in s.
+        record: file of the lines; None: no record.
+        clock: function that returns a time in s, for the times of snapshots.
+        tell: receives the message if a snapshot cannot be written; the loop continues.
 
     Raises:
-        InputError: a file that cannot be read or written, is of another loop, or is written by another process.
+        InputError: a file that cannot be read or written, belongs to another loop, or is in use by another process.
     """
 
     def __init__(
@@ -64,7 +64,7 @@ class Keeping:
             self._locks = locks.pop_all()
 
     def resume(self) -> Iterator[tuple[Answer, ...]]:
-        """Take the lines that the record has beyond the snapshot; the answers to each."""
+        """Process the lines of the record after the snapshot; yield the answers to each."""
         if self._record is None:
             return
         before, num = self.state.num_lines, 0
@@ -79,7 +79,7 @@ class Keeping:
         _cut(self._record)
 
     def take(self, line: bytes) -> tuple[Answer, ...]:
-        """Write a line down, take it, and save the state when it is time."""
+        """Record a line, process it, save the state if a snapshot is due, and return the answers."""
         if self._record is not None:
             try:
                 self._record.write(line + b"\n")
@@ -92,7 +92,7 @@ class Keeping:
         return answers
 
     def save(self) -> None:
-        """Save the state, where there is a file for it and something has come since."""
+        """Save the state if there is a file for it and lines arrived since the last snapshot."""
         if self._snapshot is None or self.state.num_lines == self._saved_lines:
             return
         try:
@@ -104,7 +104,7 @@ class Keeping:
         self._saved_at = self._clock()
 
     def close(self) -> None:
-        """Save what is not, and close the record."""
+        """Save the state if it changed, and close the record."""
         self.save()
         if self._record is not None:
             self._record.close()
@@ -133,7 +133,7 @@ def _opened(path: Path) -> BinaryIO:
 
 
 def _may_be_record(file: BinaryIO) -> bool:
-    """Whether some line of a file is a message, or it ends within its first line, which may become one."""
+    """Return True if a line of a file is a message, or the file is empty or an incomplete first message."""
     is_whole = False
     for line in _lines(file):
         if is_message(line):
@@ -144,14 +144,14 @@ def _may_be_record(file: BinaryIO) -> bool:
 
 
 def _lines(file: BinaryIO) -> Iterator[bytes]:
-    """The whole lines of a record."""
+    """Yield the complete lines of a record."""
     splitter = LineSplitter(MOST_BYTES)
     while chunk := file.read(CHUNK):
         yield from splitter.feed(chunk)
 
 
 def _cut(file: BinaryIO) -> None:
-    """Behind the last whole line, without what was half written when the loop ended."""
+    """Remove an incomplete last line, and move to the end of the file."""
     size = end = file.seek(0, os.SEEK_END)
     while end > 0:
         start = max(end - CHUNK, 0)

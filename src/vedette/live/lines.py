@@ -1,4 +1,4 @@
-"""Lines out of bytes of whatever source, in bounded memory."""
+"""Splitting of bytes from any source into lines, in bounded memory."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ CHUNK = 1 << 16
 
 
 class LineSplitter:
-    """Lines of bytes as they come, in bounded memory: of a longer line no more than `most + 1` bytes are kept."""
+    """Splitter of arriving bytes into lines, in bounded memory: at most `most + 1` bytes of a line are kept."""
 
     def __init__(self, most: int) -> None:
         self._most, self._part = most, bytearray()
 
     def feed(self, data: bytes) -> list[bytes]:
-        """The lines that these bytes end, stripped; without empty ones."""
+        """Return the lines that these bytes complete, stripped, without empty ones."""
         found = []
         *ended, last = data.split(b"\n")
         for piece in ended:
@@ -32,7 +32,7 @@ class LineSplitter:
         return [line for line in found if line]
 
     def rest(self) -> list[bytes]:
-        """The last line, where it has no end."""
+        """Return the last line if it has no end."""
         return self.feed(b"\n")
 
     def _keep(self, piece: bytes) -> None:
@@ -40,9 +40,9 @@ class LineSplitter:
 
 
 async def lines_of(source: Any) -> AsyncIterator[bytes]:
-    """The lines of a binary file such as standard input, which is read ahead by one chunk."""
+    """Yield the lines of a binary file such as standard input, which is read ahead by one chunk."""
     loop, chunks = asyncio.get_running_loop(), asyncio.Queue[bytes](1)
-    try:  # what is buffered would be locked for as long as nothing comes, even at the end of the process
+    try:  # a buffered file would stay locked while it waits for data, even at the end of the process
         number = source.fileno()
     except OSError:
         number = None

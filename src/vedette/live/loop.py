@@ -1,4 +1,4 @@
-"""The loop of scans that come in: (state, line) to (state, lines out), and nothing else of the world."""
+"""The live loop: a pure function from (state, line) to (state, answers)."""
 
 from __future__ import annotations
 
@@ -26,26 +26,26 @@ from vedette.simulation.loop import PLANNER
 from vedette.tracking import LateScans, SensorScan, Timeline
 
 Answer: TypeAlias = dict[str, Any]
-# So many scans in a row that agree about a time far ahead are believed, as all may have been silent for long; of one
-# sensor among several it takes more, as that one may just be the fastest.
+# Number of consecutive scans that must agree on a time far ahead before it is accepted, since all sensors may have been
+# silent for long. If they are all from one of several sensors, more are needed, as it may only be the fastest one.
 _AGREEING, _ALONE = 3, 10
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LiveState:
-    """All that the loop knows.
+    """Complete state of the loop.
 
     Attributes:
-        timeline: of the scans that were taken.
-        num_lines: lines that came.
-        num_errors: of these, how many could not be taken.
-        start: s, what is added to the times of the timeline to have them as they came; None before the first scan.
-        is_utc: whether that makes them seconds since 1970.
-        latest: (num_sensors,) s, the latest scan of each sensor; -inf before its first.
-        claimed: s, the time that a scan far ahead has claimed; inf: none.
-        claimants: the sensors of the scans in a row that agreed on it.
-        due: s, of the next decision; inf: there is none.
-        num_decisions: that were made.
+        timeline: timeline of the scans that were processed.
+        num_lines: number of lines that arrived.
+        num_errors: number of errors in lines and plans.
+        start: offset in s from times of the timeline to times in lines; None before the first scan.
+        is_utc: True if times in lines are seconds since 1970.
+        latest: (num_sensors,) time of the latest scan of each sensor in s; -inf before its first.
+        claimed: time of the latest scan that was far ahead, in s; inf: none.
+        claimants: sensors of the consecutive scans that agreed on it.
+        due: time of the next decision in s; inf: none.
+        num_decisions: number of decisions so far.
     """
 
     timeline: Timeline
@@ -62,24 +62,24 @@ class LiveState:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Live:
-    """A loop that takes lines with scans, in whatever order they come, and answers each.
+    """A loop that processes lines with scans, in any order of time, and answers each.
 
     The same lines in the same order have the same answers, byte for byte.
 
     Attributes:
-        late: puts the scans in their places.
-        sites: the sensors, as `read_message` takes them.
-        estimate: reads the targets off.
-        conventions, origin: of what lines say.
-        first: s, where on the clock of the tracker the first scan is whose time is a date; other times are as they are.
-        planner: decides; None: nobody.
-        decision_times: s, of the decisions, increasing.
-        decide_every: s from one decision to the next, from the first scan on, instead of these.
-        ahead: s; a scan further ahead of all others is refused, as one wrong clock would end the window of all others;
-            unless several in a row agree.
-        seed: of the decisions.
-        within: (2, 2) m, the lower left and upper right corner of where measurements are taken; others are left out
-            and counted in the answer as `beyond`. None: everywhere.
+        late: tracker for scans in any order of arrival.
+        sites: the sensors, as in `read_message`.
+        estimate: estimator of the targets.
+        conventions, origin: conventions of the lines, and origin of the plane.
+        first: time of the first scan on the clock of the tracker, in s, if times are dates; other times are unchanged.
+        planner: planner of the decisions; None: no decisions.
+        decision_times: times of the decisions in s, increasing.
+        decide_every: time between decisions in s, from the first scan on, instead of `decision_times`.
+        ahead: s; a scan further ahead of all others is refused unless several in a row agree, because one wrong clock
+            would otherwise end the window of all other sensors.
+        seed: seed of the decisions.
+        within: (2, 2) lower left and upper right corner of the area of valid measurements, in m; others are left out
+            and counted in the answer as `beyond`. None: no limit.
     """
 
     late: LateScans
@@ -97,20 +97,20 @@ class Live:
 
     @property
     def compass(self) -> Compass | None:
-        """By which directions go out; None: they are angles of the plane, counter-clockwise from east."""
+        """Compass of directions in answers; None: angles in the plane, counter-clockwise from east."""
         if self.origin is not None:
             return self.origin
         return PlaneCompass() if any(site.compass for site in self.sites) else None
 
     def initial(self) -> LiveState:
-        """Before the first line."""
+        """Return the state before the first line."""
         return LiveState(self.late.initial(), latest=(-math.inf,) * len(self.sites))
 
     def take(self, state: LiveState, line: bytes) -> tuple[LiveState, tuple[Answer, ...]]:
-        """Take a line, and answer by the estimates and, where it was due, a plan; or by what is wrong with the line.
+        """Process a line; answer with the estimates and, if one was due, a plan, or with the error in the line.
 
         Returns:
-            The state after it, and the answers, of which `encoded` makes lines.
+            The state after the line, and the answers; `encoded` converts each into a line.
         """
         state = replace(state, num_lines=state.num_lines + 1)
         place = f"line {state.num_lines}"
@@ -128,7 +128,7 @@ class Live:
             latest[message.scan.sensor] = max(latest[message.scan.sensor], time)
             taken = replace(checked, timeline=timeline, latest=tuple(latest))
             answer = self._estimates(taken) | ({"beyond": num_beyond} if num_beyond else {})
-        except Exception as error:  # of whatever code of the user's own it comes, the next line is another
+        except Exception as error:  # custom code may raise anything; the loop continues with the next line
             text = str(error) if isinstance(error, VedetteError) else error_cause(error)
             return _failed(state, text if text.startswith(place) else f"{place}: {text}")
         if self._is_due(taken):
@@ -137,7 +137,7 @@ class Live:
         return taken, (answer,)
 
     def _within(self, scan: SensorScan) -> tuple[SensorScan, int]:
-        """A scan without measurements beyond where they are taken or their sensor reaches, and how many these are."""
+        """Return the scan without measurements outside `within` or the sensor's reach, and the number removed."""
         site, pose = self.sites[scan.sensor], np.asarray(scan.pose)
         if self.within is None or site.kind not in PLACED:
             return scan, 0
@@ -147,9 +147,9 @@ class Live:
         return replace(scan, measurements=measured[inside]), int(np.count_nonzero(~inside))
 
     def _on_clock(self, state: LiveState, message: Message, place: str) -> tuple[LiveState, float]:
-        """The state that knows how times are told, and the scan's time on the clock of the tracker.
+        """Return the state with the form and offset of times set, and the scan's time on the clock of the tracker.
 
-        It has claimants where the scan is not believed.
+        The state has claimants if the scan's time is not accepted.
         """
         told = message.scan.time
         if state.start is None:
@@ -169,7 +169,7 @@ class Live:
         return replace(state, claimed=time, claimants=() if len(claimants) >= enough else claimants), time
 
     def _told(self, state: LiveState, time: float) -> Answer:
-        """A time of the tracker's clock as times come in."""
+        """Return a time of the tracker's clock in the form of times in lines."""
         told = time + (state.start or 0.0)
         return {"time": told, "utc": utc_text(told)} if state.is_utc else {"time": told}
 
@@ -198,7 +198,7 @@ class Live:
         return {"line": state.num_lines, **self._told(state, belief.time), "tracks": tracks, **counts}
 
     def _due_after(self, first: float, now: float) -> float:
-        """s, of the first decision after a time."""
+        """Return the time of the first decision after `now`, in s."""
         if self.planner is None:
             return math.inf
         if self.decide_every is not None:
@@ -207,12 +207,12 @@ class Live:
         return self.decision_times[place] if place < len(self.decision_times) else math.inf
 
     def _is_due(self, state: LiveState) -> bool:
-        """Whether all scans of the time of a decision have come, or one after it."""
+        """Return True if all scans up to the time of the next decision have arrived, or a later one has."""
         newest = state.timeline.newest
         return newest is not None and (newest > state.due or min(state.latest) >= state.due)
 
     def _decided(self, state: LiveState) -> tuple[LiveState, Answer]:
-        """A decision on what is believed now; the error where it cannot be made, which the next may."""
+        """Return the state after a decision from the current belief, and its plan or error."""
         assert self.planner is not None
         timeline, now = state.timeline, state.timeline.state.time
         assert now is not None
@@ -228,7 +228,7 @@ class Live:
             told = {**self._told(state, now), "planner": plan.planner, "actions": actions}
             told |= {"expected_rewards": rewards, "notes": plan.notes}
             return after, {"line": state.num_lines, "plan": {**told, "why": _why(plan)}}
-        except Exception as error:  # as above; the scan was taken
+        except Exception as error:  # as above; the scan itself was processed
             told = {
                 "line": state.num_lines,
                 "error": f"line {state.num_lines}, plan at {now:g} s: {error_cause(error)}",
@@ -248,7 +248,7 @@ def _failed(state: LiveState, text: str) -> tuple[LiveState, tuple[Answer, ...]]
 
 
 def encoded(answer: Answer) -> bytes:
-    """A line of JSON, with its end. Numbers that are none become null."""
+    """Return an answer as a line of JSON, with its end. Numbers that are not finite become null."""
     try:
         text = json.dumps(answer, ensure_ascii=False, allow_nan=False)
     except ValueError:

@@ -1,4 +1,4 @@
-"""A scan as a line of JSON, read strictly: whatever is wrong with it is said, and nothing of it is taken."""
+"""Strict reader of scans as lines of JSON: an invalid line is an error, and no part of it is used."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from vedette.recorded.tables import Table, is_number, seconds
 from vedette.recorded.turns import bearings_of
 from vedette.tracking import SensorScan
 
-MOST_BYTES = 1_000_000  # of a line
-MOST_MEASUREMENTS = 2000  # of a scan
+MOST_BYTES = 1_000_000  # per line
+MOST_MEASUREMENTS = 2000  # per scan
 _KEYS = ("sensor", "time", "measurements", "pose", "velocity", "times")
 
 
 def is_message(line: bytes) -> bool:
-    """Whether a line has the form of a message, whatever its values are."""
+    """Return True if a line has the form of a message; its values are not checked."""
     try:
         _object(line, "line")
     except InputError:
@@ -36,7 +36,7 @@ def is_message(line: bytes) -> bool:
 
 
 class Message(NamedTuple):
-    """A scan, at its time as it was told; and whether that is seconds since 1970 UTC."""
+    """A scan with its time as given in the line, and whether that is in seconds since 1970 UTC."""
 
     scan: SensorScan
     is_utc: bool
@@ -45,26 +45,26 @@ class Message(NamedTuple):
 def read_message(
     line: bytes, place: str, sites: Sequence[Site], conventions: Conventions, origin: Origin | None = None
 ) -> Message:
-    """The scan that a line tells of.
+    """Return the scan of a line.
 
-    `{"sensor": name or number from 1, "time": s or ISO 8601, "measurements": [[...], ...], "pose": ...}`: measurements
-    as `vedette.internal.quantities.COMPONENTS` has them, in rad (of a sensor with a compass in degrees) and m unless
-    `conventions.units` says another; angles count as `conventions.bearings` says, else as the sensor tells them. The
-    pose, which may be left out, is `[x, y, heading_rad, ...]`, or `{"lon": , "lat": , "course_deg": }`, where the
-    course, clockwise from true north as in plans, may be left out; or with `heading_deg`, which counts as bearings do
-    and needs `bearings` or a compass. Of a sensor that measures range rates or turns `"velocity": [vx, vy]` is its own,
-    m/s. Of one that turns `"times"` has the time of each measurement, and `time` is the middle of the turn; without
-    them all are of one time.
+    `{"sensor": name or number from 1, "time": s or ISO 8601, "measurements": [[...], ...], "pose": ...}`. Measurements
+    have the components of `vedette.internal.quantities.COMPONENTS`, in rad (degrees for a sensor with a compass) and m
+    unless `conventions.units` has others. The direction of angles is that of `conventions.bearings`, else the sensor's.
+    The optional pose is `[x, y, heading_rad, ...]`, or `{"lon": , "lat": , "course_deg": }`, where the course,
+    clockwise from true north as in plans, is optional; or with `heading_deg`, which has the direction of bearings and
+    needs `bearings` or a compass. For a sensor that measures range rates or turns, `"velocity": [vx, vy]` is its own
+    velocity in m/s. For a sensor that turns, `"times"` has the time of each measurement, and `time` is the middle of
+    the turn; without `"times"`, all measurements are of one time.
 
     Args:
-        line: of UTF-8 text.
-        place: what messages call it.
+        line: line of UTF-8 text.
+        place: name of the line in messages.
         sites: the sensors, in the order of the tracker's.
-        conventions: units and bearings; of the rest nothing counts.
-        origin: of longitudes and latitudes.
+        conventions: units and bearings; its other fields are not used.
+        origin: origin of longitudes and latitudes.
 
     Raises:
-        InputError: names the field, what was expected and what came.
+        InputError: an invalid field; the message has its name, the expected and the given value.
     """
     data = _object(line, place)
     number = _sensor(data["sensor"], place, sites)
@@ -88,14 +88,14 @@ def read_message(
         **{name: unit for name, unit in conventions.units.items() if name in names},
     }
     named = {_OF_POSE[name]: name for name in pose}
-    # The loop leaves out what lies beyond the reach, and counts it.
+    # The loop removes measurements beyond the reach, and counts them.
     everywhere = replace(site, reach=math.inf, turn="none")
     read = parse_scans(
         Table(columns, range(1, num + 1), place), [everywhere], replace(conventions, columns=named, units=units), origin
     )
     at = read.poses[0, 0].copy()
     at[3 : 3 + len(more)] = more
-    if course is not None and origin is not None:  # with a place in degrees an origin was needed
+    if course is not None and origin is not None:  # a position in degrees needed an origin
         at[2] = origin.angle(math.radians(course), at)
     scan = read.scans[0][0]
     if "times" in data and scan is not None:
@@ -105,7 +105,7 @@ def read_message(
 
 
 def _lags(given: Any, place: str, num: int, time: float, is_utc: bool) -> Floats:
-    """(num,) s after the time of the scan."""
+    """Time of each measurement after the time of the scan, (num,), s."""
     wanted = f"a list of {pluralise(num, 'time')}, one for each measurement, of the form of `time`"
     if not isinstance(given, list) or len(given) != num or any(isinstance(each, str) != is_utc for each in given):
         raise reject(place, wanted, given)
@@ -116,7 +116,7 @@ def _lags(given: Any, place: str, num: int, time: float, is_utc: bool) -> Floats
 
 
 def _with_beam(pose: Floats, scan: Floats, lags: Floats, site: Site, place: str) -> Floats:
-    """The pose with the beam, where the measurements and their times say that it was in the middle of the turn."""
+    """Return the pose with the bearing of the beam at the middle of the turn, from the measurements and their times."""
     if not isinstance(site.turn, Turn):
         raise reject(place, f"none, as the sensors file gives no `turn` of {site.name}", "some")
     if len(lags) and np.abs(lags).max() > site.turn.period:
@@ -158,7 +158,7 @@ def _object(line: bytes, place: str) -> Mapping[str, Any]:
 
 
 def _sensor(given: Any, place: str, sites: Sequence[Site]) -> int:
-    """Its number, from 0."""
+    """Return the number of a sensor, from 0."""
     for number, site in enumerate(sites):
         if given == site.name or (type(given) is int and given == number + 1):
             return number
@@ -179,7 +179,7 @@ def _rows(given: Any, field: str, site: Site) -> list[list[float]]:
 
 
 def _pose(given: Any, field: str, site: Site) -> tuple[dict[str, float], list[float]]:
-    """What it says as columns of a table; and components beyond the heading."""
+    """Return the pose as columns of a table, and its components after the heading."""
     if given is None:
         return {}, []
     if isinstance(given, dict):
@@ -200,7 +200,7 @@ def _pose(given: Any, field: str, site: Site) -> tuple[dict[str, float], list[fl
 
 
 def _velocity(given: Any, field: str, site: Site) -> dict[str, float]:
-    """What it says as columns of a table."""
+    """Return the velocity as columns of a table."""
     if given is None:
         return {}
     if not is_doppler(site.kind):

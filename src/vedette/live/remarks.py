@@ -1,4 +1,4 @@
-"""Remarks about clients, so few that no client can fill the screen or a log with them."""
+"""Remarks about clients, limited in number so that no client can fill the screen or a log with them."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from collections.abc import Callable
 from typing import Protocol
 
 SECONDS = 60.0  # between two remarks of one kind and address
-_MOST_ADDRESSES = 16  # of one kind, with remarks of their own
+_MOST_ADDRESSES = 16  # addresses per kind that have separate remarks
 
 
 class Named(Protocol):
-    """What remarks are about."""
+    """A client that remarks are about."""
 
     name: str
     address: str
 
 
 class Remarks:
-    """Passes on one remark of a kind and address a minute, with the number of those in between.
+    """Filter that passes on one remark per kind, address and minute, with the number of those left out.
 
-    From the 17th address on, addresses share their remarks, so that many addresses are no flood either.
+    From the 17th address of a kind on, addresses share their remarks, which also limits the remarks of many addresses.
 
     Args:
         tell: receives each remark that is passed on.
@@ -34,9 +34,9 @@ class Remarks:
         """Remark that a client did something.
 
         Args:
-            client: whose name begins the remark.
-            kind: what it did, the same words for all of a kind.
-            detail: what else is to be said of this one.
+            client: the client; the remark begins with its name.
+            kind: what the client did, with the same words for all remarks of a kind.
+            detail: further text for this remark.
         """
         now = time.monotonic()
         known = self._of(kind, client.address, now)

@@ -1,4 +1,4 @@
-"""Lines of many clients: an exchange that no client can fill, stop or enter without a token, and a TCP server."""
+"""Exchange of lines with many clients, protected against overload and clients without a token, and a TCP server."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ from vedette.live.messages import MOST_BYTES
 from vedette.live.remarks import Remarks
 from vedette.simulation.journal import error_cause
 
-MOST_CLIENTS = 128  # pages, too
-MOST_OF_ADDRESS = 64  # of these
-MOST_WAITING = 32  # beside these, that have not entered
+MOST_CLIENTS = 128  # including pages
+MOST_OF_ADDRESS = 64  # clients per address
+MOST_WAITING = 32  # further connections that have not entered
 BACKLOG = 16  # connections accepted before any of them is counted
-IDLE_SECONDS = 60.0  # after which a silent client makes way where there is no room
-WRONG_SECONDS = 1.0  # that the answer to a wrong token takes
+IDLE_SECONDS = 60.0  # silence after which a client may be disconnected to make room
+WRONG_SECONDS = 1.0  # delay of the answer to a wrong token
 LEAST_TOKEN = 16  # letters
-MOST_UNREAD = 8_000_000  # bytes of answers that a client leaves lying
-ENTER_WITHIN = 10.0  # s, with its token or handshake
-_LONGEST_TOKEN = 4096  # bytes of its line
+MOST_UNREAD = 8_000_000  # bytes of answers that a client has not read
+ENTER_WITHIN = 10.0  # s, for the token or handshake
+_LONGEST_TOKEN = 4096  # bytes of the line with the token
 
 
 def is_loopback(address: str) -> bool:
-    """Whether it is a number of this machine that no other can reach."""
+    """Return True if the address is a numeric loopback address, which other machines cannot reach."""
     try:
         return ipaddress.ip_address(address.partition("%")[0]).is_loopback
     except ValueError:
@@ -42,9 +42,7 @@ def is_loopback(address: str) -> bool:
 
 
 def check_address(host: str, token: str | None) -> None:
-    """`InputError` for an address that others can reach, without a token; or that there is not; or for a token that can
-    be guessed.
-    """
+    """Raise `InputError` for an unknown address, a token that is too short, or a public address without a token."""
     if token is not None and len(token.strip()) < LEAST_TOKEN:
         raise InputError(f"--token: expected at least {LEAST_TOKEN} letters; got {len(token.strip())}")
     try:
@@ -62,7 +60,7 @@ class Client(Protocol):
     address: str  # the name without the port
 
     def send(self, text: bytes) -> None:
-        """Send without waiting; what is not read stays in a buffer."""
+        """Send without waiting; unread bytes stay in a buffer."""
         ...
 
     def unread(self) -> int:
@@ -79,23 +77,23 @@ class Client(Protocol):
 
 
 def name_of(transport: asyncio.BaseTransport) -> tuple[str, str]:
-    """Return the name and the address of the other end, which may be gone before it was accepted."""
+    """Return the name and the address of the other end, which may have gone before it was accepted."""
     host, port = (transport.get_extra_info("peername") or ("a client that is gone", 0))[:2]
     return f"{host}:{port}", str(host)
 
 
 class Exchange:
-    """Takes lines of many clients in turn, and answers: estimates and plans to all, an error to who caused it.
+    """Exchange that processes the lines of many clients: estimates and plans go to all, an error only to its sender.
 
-    A client that sends faster than lines are taken is made to wait, by the flow control of TCP, while the others have
-    their turns; nothing is piled up. One that does not read its answers is put out. A client enters after its token or
-    its handshake. Of more than `MOST_WAITING` that have not entered, the first of the address with the most is put
-    out. Of those that have entered, one that has been silent for `IDLE_SECONDS` makes way where there is no room.
+    A client that sends faster than lines are processed waits, by the flow control of TCP, while other clients are
+    served; no queue builds up. A client that does not read its answers is disconnected. A client enters after its token
+    or its handshake. If more than `MOST_WAITING` have not entered, the first client of the address with the most of
+    them is disconnected. If there is no room, a client that was silent for `IDLE_SECONDS` is disconnected.
 
     Args:
-        take: what is done with a line; its answers.
-        token: that a client must know; None: none.
-        tell: receives remarks about clients, of one kind and address one a minute.
+        take: function that processes a line and returns its answers.
+        token: token that clients must send; None: no token.
+        tell: receives remarks about clients, at most one per kind, address and minute.
     """
 
     def __init__(
@@ -103,18 +101,18 @@ class Exchange:
     ) -> None:
         self._take, self._token, self.tell = take, token, tell
         self.remark = Remarks(tell)
-        self._waiting: dict[Client, None] = {}  # in the order in which they came
-        self._entered: dict[Client, float] = {}  # when each sent its last line; pages: never silent
+        self._waiting: dict[Client, None] = {}  # in order of arrival
+        self._entered: dict[Client, float] = {}  # time of each client's last line; inf for pages
         self.num_taken = 0
         self.changed = asyncio.Event()
 
     @property
     def needs_token(self) -> bool:
-        """Whether clients must know one."""
+        """True if clients must send a token."""
         return self._token is not None
 
     def is_token(self, given: object) -> bool:
-        """Whether a client may enter by this; with no token, by anything."""
+        """Return True if `given` is the token, or if no token is needed."""
         if self._token is None:
             return True
         return isinstance(given, str) and hmac.compare_digest(
@@ -122,7 +120,7 @@ class Exchange:
         )
 
     def open(self, client: Client) -> None:
-        """Note a connection that has not entered; it is to `leave`. Another one may be put out for it."""
+        """Register a connection that has not entered; another one may be disconnected. It must `leave` at its end."""
         self._waiting[client] = None
         if len(self._waiting) > MOST_WAITING:
             ((address, _),) = Counter(each.address for each in self._waiting).most_common(1)
@@ -132,7 +130,7 @@ class Exchange:
             first.abort()
 
     def enter(self, client: Client, *, is_page: bool = False) -> str:
-        """Let a client in, which from now on receives the answers; or return why there is no room for it."""
+        """Let a client in, which receives all answers from now on; return "", or the reason if there is no room."""
         num_of_address = sum(each.address == client.address for each in self._entered)
         if num_of_address >= MOST_OF_ADDRESS and not self._make_way(client.address):
             return f"expected at most {MOST_OF_ADDRESS} clients of one address; got one more"
@@ -143,7 +141,7 @@ class Exchange:
         return ""
 
     def _make_way(self, address: str | None) -> bool:
-        """Put out the client, of an address or of any, that has been silent for longest; false where none has."""
+        """Disconnect the client, of this or any address, that was silent longest; return False if none was."""
         now = asyncio.get_running_loop().time()
         silent = [
             (since, own)
@@ -159,19 +157,19 @@ class Exchange:
         return True
 
     def leave(self, client: Client) -> None:
-        """Forget a connection that has ended."""
+        """Remove a connection that has ended."""
         self._waiting.pop(client, None)
         self._entered.pop(client, None)
 
     async def refuse_token(self, client: Client) -> None:
-        """Remark on a wrong token, and make the client wait."""
-        if client.is_gone():  # put out before it had said anything
+        """Make a remark on a wrong token, and delay the answer."""
+        if client.is_gone():  # disconnected before it sent anything
             return
         self.remark(client, "had no token")
         await asyncio.sleep(WRONG_SECONDS)
 
     async def answer(self, line: bytes, sender: Client | None) -> None:
-        """Take a line, and let the others have their turn."""
+        """Process a line, send its answers, and let other clients be served."""
         if sender in self._entered:
             self._entered[sender] = asyncio.get_running_loop().time()
         for answer in self._take(line):
@@ -183,7 +181,7 @@ class Exchange:
         await asyncio.sleep(0.0)
 
     def _send(self, client: Client, text: bytes) -> None:
-        if client.is_gone():  # its task has not come to it yet
+        if client.is_gone():  # its task has not removed it yet
             return
         client.send(text)
         if client.unread() > MOST_UNREAD:
@@ -200,32 +198,32 @@ class _TcpClient:
 
 
 class TcpServer:
-    """Lines of clients over TCP, each of which sends `{"token": "..."}` first where one is needed."""
+    """TCP server of an exchange; each client first sends `{"token": "..."}` if a token is needed."""
 
     def __init__(self, exchange: Exchange) -> None:
         self._exchange = exchange
 
     async def listen(self, host: str, port: int) -> asyncio.Server:
-        """Raises `InputError` for an address that cannot be had."""
+        """Start to listen; raises `InputError` if the address is not available."""
         try:
             return await asyncio.start_server(self._meet, host, port, backlog=BACKLOG)
         except OSError as error:
             raise taken(error) from None
 
     async def _meet(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        """Serve a client to its end. Nothing is awaited after it, as a cancelled task of a stream is a traceback."""
+        """Serve a client to its end. Nothing is awaited after it, as a cancelled stream task prints a traceback."""
         client = _TcpClient(writer)
         self._exchange.open(client)
         try:
             await self._let_in(reader, client, writer)
-        except (ConnectionError, asyncio.CancelledError):  # it is gone, or the server is
+        except (ConnectionError, asyncio.CancelledError):  # the client or the server has ended
             pass
         except Exception as error:  # such as a record that cannot be written
             self._exchange.remark(client, "was put out", f": {error_cause(error)}")
         finally:
             self._exchange.leave(client)
             writer.close()
-            asyncio.get_running_loop().call_later(ENTER_WITHIN, client.abort)  # one that reads nothing more
+            asyncio.get_running_loop().call_later(ENTER_WITHIN, client.abort)  # a client that reads nothing more
 
     async def _let_in(self, reader: asyncio.StreamReader, client: _TcpClient, writer: asyncio.StreamWriter) -> None:
         if not await self._may_enter(reader):
@@ -250,7 +248,7 @@ class TcpServer:
         splitter, is_first = LineSplitter(MOST_BYTES), True
         while data := await reader.read(CHUNK):
             for line in splitter.feed(data):
-                # A web page of somebody else's can have a browser send lines here, under such a first one.
+                # A foreign web page can make a browser send lines here, after a first line of this form.
                 if is_first and line.rpartition(b" ")[2].startswith(b"HTTP/"):
                     self._exchange.remark(client, "spoke HTTP, and was put out")
                     return await _refuse(writer, "expected lines of JSON; got HTTP, for which there is ws://")
@@ -269,5 +267,5 @@ async def _refuse(writer: asyncio.StreamWriter, text: str) -> None:
 
 
 def taken(error: OSError) -> InputError:
-    """What is said of an address that cannot be had."""
+    """Return the error for an address that is not available."""
     return InputError(f"--listen: expected an address that is free; {error.strerror or error}")

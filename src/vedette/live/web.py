@@ -1,8 +1,8 @@
-"""WebSocket clients that send lines, and web pages that show what is believed, at one address.
+"""Server of WebSocket clients, which send lines, and of web pages, which show the estimates, at one address.
 
-`ws://HOST:PORT/` takes a line, or several, a message, and answers as TCP does; `http://HOST:PORT/` is the page, which
-is told of what is on the screen by `/page`. Browsers let any web page open sockets to this machine: who comes from
-another page, or by another name of this machine, is refused.
+`ws://HOST:PORT/` accepts messages of one or more lines and answers like the TCP server. `http://HOST:PORT/` is the
+page, which gets its frames from `/page`. Browsers let any web page open sockets to this machine, so connections from
+another page, or under another name of this machine, are refused.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from vedette.simulation.journal import error_cause
 
 FRAMES_PER_SECOND = 10.0
 _LOG = logging.getLogger("vedette.live.web")
-_LOG.addHandler(logging.NullHandler())  # what goes wrong with a client is told, without a traceback
+_LOG.addHandler(logging.NullHandler())  # faults of clients are reported as remarks, without a traceback
 _HEADERS = {
     "Content-Type": "text/html; charset=utf-8",
     "Cache-Control": "no-store",
@@ -37,12 +37,12 @@ _HEADERS = {
 
 
 class Screen(Protocol):
-    """What pages show."""
+    """Content of the web pages."""
 
     page: bytes
 
     def frame(self) -> bytes:
-        """What is on the screen now, as JSON."""
+        """Return the current frame as JSON."""
         ...
 
 
@@ -75,15 +75,15 @@ class _Socket(ServerConnection):
 
 
 class WebServer:
-    """Sockets and pages of an exchange.
+    """WebSocket and page server of an exchange.
 
-    What is on the screen is worked out at most ten times a second, for all pages at once and only where there are any;
-    a page gets the next when it has said that it has the last, so that a slow one misses some, and is told how many.
+    Frames are drawn at most ten times a second, once for all pages, and only if there are pages. A page gets the next
+    frame after it has acknowledged the last one; a slow page misses some, and receives the number it missed.
 
     Args:
-        exchange: takes the lines.
-        screen: what pages show.
-        host: by which they may call this machine, beside names of loopback; where a token is needed, by any.
+        exchange: processes the lines.
+        screen: content of the pages.
+        host: name of this machine that clients may use, in addition to loopback names; with a token, any name is valid.
     """
 
     def __init__(self, exchange: Exchange, screen: Screen, host: str) -> None:
@@ -92,7 +92,7 @@ class WebServer:
         self._drawn = asyncio.Condition()
 
     async def listen(self, port: int) -> Server:
-        """Raises `InputError` for an address that cannot be had."""
+        """Start to listen; raises `InputError` if the address is not available."""
 
         class Counted(_Socket):
             exchange = self._exchange
@@ -117,7 +117,7 @@ class WebServer:
         return server
 
     async def _refused_or_page(self, socket: ServerConnection, request: Request) -> Response | None:
-        """What is answered in place of opening a socket."""
+        """Return the page or a refusal; None to open a socket."""
         assert isinstance(socket, _Socket)
         address = urlsplit(request.path)
         if (fault := self._foreign(request)) is not None:
@@ -135,7 +135,7 @@ class WebServer:
         return Response(HTTPStatus.OK, "OK", headers, page)
 
     def _foreign(self, request: Request) -> str | None:
-        """How another web page, or another name of this machine, shows."""
+        """Return the fault of a request from another web page or for another name of this machine; None if valid."""
         try:
             host, origin = request.headers.get("Host", ""), request.headers.get("Origin")
             name = urlsplit(f"//{host}").hostname or ""
@@ -172,10 +172,10 @@ class WebServer:
                 await self._exchange.answer(line, client)
 
     async def _show(self, socket: ServerConnection) -> None:
-        """Frames to a page; the latest each time that it has the one before."""
+        """Send frames to a page: the latest one, each time it has acknowledged the one before."""
         drawn, shown, skipped = self._num_drawn, None, 0
         self._num_pages += 1
-        self._exchange.changed.set()  # draw what is there now
+        self._exchange.changed.set()  # draw the current frame
         try:
             while True:
                 await self._beyond(drawn)
@@ -187,12 +187,12 @@ class WebServer:
             self._num_pages -= 1
 
     async def _beyond(self, drawn: int) -> None:
-        """Wait for a frame after so many."""
+        """Wait until more than `drawn` frames have been drawn."""
         async with self._drawn:
             await self._drawn.wait_for(lambda: self._num_drawn > drawn)
 
     async def _draw(self) -> None:
-        """The frames of all pages; one that cannot be had is told, and the next is another."""
+        """Draw the frames of all pages; a frame that fails is reported, and the next one is tried."""
         while True:
             await self._exchange.changed.wait()
             self._exchange.changed.clear()
