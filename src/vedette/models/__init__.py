@@ -1,4 +1,4 @@
-"""How targets move and what a sensor at a place sees of them; all of it functions that a user can write too."""
+"""Models of targets and sensors: motion, survival, birth, measurement, noise, detection and clutter."""
 
 from vedette.models.bias import Bias
 from vedette.models.birth import BirthModel, MeasurementBirth

@@ -1,4 +1,4 @@
-"""Checks of plain arguments, each raising `InputError` with the field, what was expected and what came."""
+"""Checks of arguments; each raises `InputError` with the field, the expected and the given value."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ _MOST_STATE_DIMENSIONS = 10_000
 
 
 def reject(field: str, expected: str, got: Any) -> InputError:
-    """The error for one bad argument; a long value is cut short."""
+    """Return the error for an invalid argument; a long value is shortened."""
     text = printable(got if isinstance(got, str) else plain(got))
-    if not isinstance(got, str) and " at 0x" in text:  # where an object is says nothing of what it is
+    if not isinstance(got, str) and " at 0x" in text:  # the address of an object does not describe it
         text = " ".join([f"a {type(got).__name__}", *([got.__qualname__] if hasattr(got, "__qualname__") else [])])
     return InputError(f"{field}: expected {expected}; got {text if len(text) <= 200 else text[:197] + '...'}")
 
 
 def real(field: str, value: Any) -> float:
-    """A finite real number."""
+    """Return the value as a float; it must be a finite real number."""
     try:
         number = math.nan if isinstance(value, bool) or not isinstance(value, numbers.Real) else float(value)
     except OverflowError:  # a whole number of hundreds of digits
@@ -43,55 +43,55 @@ def real(field: str, value: Any) -> float:
 
 
 def is_infinite(value: Any) -> bool:
-    """Whether it is the number infinity, which stands for no limit."""
+    """Return True for the float infinity, which stands for no limit."""
     return isinstance(value, float) and value == math.inf
 
 
 def positive(field: str, value: Any) -> float:
-    """A finite number above zero."""
+    """Return the value as a float; it must be finite and above 0."""
     if real(field, value) <= 0.0:
         raise reject(field, "a number above 0", value)
     return float(value)
 
 
 def non_negative(field: str, value: Any) -> float:
-    """A finite number of at least zero."""
+    """Return the value as a float; it must be finite and at least 0."""
     if real(field, value) < 0.0:
         raise reject(field, "a number of at least 0", value)
     return float(value)
 
 
 def probability(field: str, value: Any) -> float:
-    """A number in [0, 1]."""
+    """Return the value as a float; it must be in [0, 1]."""
     if not 0.0 <= real(field, value) <= 1.0:
         raise reject(field, "a probability in [0, 1]", value)
     return float(value)
 
 
 def chance(field: str, value: Any) -> float:
-    """A number above 0 and below 1."""
+    """Return the value as a float; it must be above 0 and below 1."""
     if not 0.0 < real(field, value) < 1.0:
         raise reject(field, "a probability above 0 and below 1", value)
     return float(value)
 
 
 def one_of(field: str, value: Any, words: Collection[str]) -> str:
-    """One of these words."""
+    """Return the value; it must be one of these words."""
     if not isinstance(value, str) or value not in words:
         raise reject(field, f"one of {', '.join(words)}", value)
     return value
 
 
 def flag(field: str, value: Any) -> bool:
-    """True or false."""
+    """Return the value as a bool; it must be true or false."""
     if not isinstance(value, bool | np.bool_):
         raise reject(field, "true or false", value)
     return bool(value)
 
 
 def provides(value: object, protocol: Any) -> TypeGuard[Any]:
-    """Return what `isinstance` does of a protocol, in a tenth of its time before Python 3.12: for loops."""
-    for name in protocol_members(protocol):  # noqa: SIM110  # a generator is a call more a name
+    """Return what `isinstance` returns for a protocol; ten times faster before Python 3.12, for use in loops."""
+    for name in protocol_members(protocol):  # noqa: SIM110  # a generator needs one more call per name
         if getattr(value, name, None) is None:
             return False
     return True
@@ -106,14 +106,14 @@ def protocol_members(protocol: type) -> tuple[str, ...]:
 
 
 def instance(field: str, value: Any, kind: type) -> None:
-    """Raise unless `value` is of the kind, or meets that protocol."""
+    """Raise unless `value` is an instance of the class, or implements the protocol."""
     if not (provides(value, kind) if getattr(kind, "_is_protocol", False) else isinstance(value, kind)):
         article = "an" if kind.__name__[0] in "AEIOU" else "a"
         raise reject(field, f"{article} {kind.__name__}", None if value is None else type(value).__name__)
 
 
 def sequence(field: str, values: Any, expected: str) -> tuple[Any, ...]:
-    """What is in a list, tuple, array or iterator; no text and no mapping."""
+    """Return the items of a list, tuple, array or iterator; texts and mappings are rejected."""
     if isinstance(values, str | bytes | Mapping) or not isinstance(values, Iterable):
         raise reject(field, expected, values)
     if isinstance(values, np.ndarray) and values.ndim == 0:
@@ -122,9 +122,9 @@ def sequence(field: str, values: Any, expected: str) -> tuple[Any, ...]:
 
 
 def one_a_sensor(num_sensors: int, **fields: Any) -> None:
-    """Raise unless each field is a list, tuple or array of so many items."""
+    """Raise unless each field is a list, tuple or array with one item per sensor."""
     for field, values in fields.items():
-        if isinstance(values, list | tuple) and len(values) == num_sensors:  # asked at every scan
+        if isinstance(values, list | tuple) and len(values) == num_sensors:  # the fast path, at every scan
             continue
         if not isinstance(values, Sequence | np.ndarray) or isinstance(values, str | bytes):
             raise reject(field, f"{num_sensors}, one a sensor", None if values is None else type(values).__name__)
@@ -134,7 +134,7 @@ def one_a_sensor(num_sensors: int, **fields: Any) -> None:
 
 
 def dimension(field: str, value: Any) -> int:
-    """A whole number of at least one, and such as a kernel can take."""
+    """Return the value as an int; it must be a whole number from 1 to 2^62, the largest for kernels."""
     if isinstance(value, bool) or not isinstance(value, numbers.Integral) or value < 1:
         raise reject(field, "a whole number of at least 1", value)
     if int(value) > _MAX_COUNT:
@@ -143,14 +143,14 @@ def dimension(field: str, value: Any) -> int:
 
 
 def count(field: str, value: Any) -> int:
-    """A whole number of at least zero."""
+    """Return the value as an int; it must be a whole number of at least 0."""
     if isinstance(value, bool) or not isinstance(value, numbers.Integral) or value < 0:
         raise reject(field, "a whole number of at least 0", value)
     return int(value)
 
 
 def no_gaussians(state_dim: Any) -> tuple[Floats, Floats]:
-    """(0, state_dim) means and (0, state_dim, state_dim) covariances. Raises for what is no dimension of a state."""
+    """Return (0, state_dim) means and (0, state_dim, state_dim) covariances; raise for an invalid `state_dim`."""
     dim = dimension("state_dim", state_dim)
     if dim > _MOST_STATE_DIMENSIONS:
         raise reject("state_dim", f"a whole number of at most {_MOST_STATE_DIMENSIONS}", state_dim)
@@ -158,7 +158,7 @@ def no_gaussians(state_dim: Any) -> tuple[Floats, Floats]:
 
 
 def step_number(value: Any) -> int:
-    """The number of a step, from 1 on, as labels hold it."""
+    """Return the value as the number of a step; it must be a whole number from 1 on that labels can hold."""
     whole = not isinstance(value, bool) and isinstance(value, numbers.Integral)
     if not whole or not 1 <= value < 2**63:
         raise reject("step", "a whole number from 1 on, below 2^63", value)
@@ -166,17 +166,17 @@ def step_number(value: Any) -> int:
 
 
 def generator(value: Any) -> np.random.Generator:
-    """A random generator; a seed is none, since who passes it again and again gets the same numbers."""
+    """Return the random generator; a seed is rejected, because each call with it would get the same numbers."""
     if not isinstance(value, np.random.Generator):
         raise reject("rng", "a numpy.random.Generator, such as numpy.random.default_rng(1)", value)
     return value
 
 
 def as_array(field: str, values: Any, kinds: str, expected: str) -> NDArray[Any]:
-    """`values` as an array of one of these `numpy.dtype` kinds (an empty one: of any kind).
+    """Return `values` as an array of one of these `numpy.dtype` kinds (an empty array may have any kind).
 
-    Raises `InputError` for what cannot be one without losing something: masked entries, imaginary parts, booleans,
-    texts, objects, rows of several lengths.
+    Raises `InputError` for values that cannot be converted without loss: masked entries, imaginary parts, booleans,
+    texts, objects, rows of different lengths.
     """
     if type(values) is not np.ndarray and _is_masked(values):
         raise reject(field, f"{expected} without masked entries", "masked ones")
@@ -190,17 +190,17 @@ def as_array(field: str, values: Any, kinds: str, expected: str) -> NDArray[Any]
 
 
 def _is_masked(values: Any) -> bool:
-    """Whether NumPy would drop a mask: of the array, or of one in a list."""
-    masks = sys.modules.get("numpy.ma")  # where nobody has loaded it there are none
+    """Return True if NumPy would drop a mask of the array, or of an array in a list."""
+    masks = sys.modules.get("numpy.ma")  # without this module there are no masked arrays
     if masks is not None and isinstance(values, list | tuple):
         return any(_is_masked(value) for value in values if isinstance(value, list | tuple | masks.MaskedArray))
     return masks is not None and isinstance(values, masks.MaskedArray) and bool(masks.is_masked(values))
 
 
 def float_array(field: str, values: Any, shape: tuple[int | None, ...], *, finite: bool = True) -> Floats:
-    """A C-contiguous, writeable float64 copy of `values` with the given shape (None: any length).
+    """Return a C-contiguous, writeable float64 copy of `values` with the given shape (None: any length).
 
-    NaN is never accepted; infinities only where `finite` is false.
+    NaN is never accepted; infinities are accepted only if `finite` is false.
     """
     if type(values) is np.ndarray and values.dtype == np.float64:
         given = values
@@ -212,7 +212,7 @@ def float_array(field: str, values: Any, shape: tuple[int | None, ...], *, finit
     if not fits:
         raise reject(field, f"an array of shape {_shape_text(shape)}", f"shape {given.shape}")
     array = np.array(given, dtype=np.float64, order="C")
-    # Numbers are finite where the sum of their squares is: one call. Otherwise some may only be too large for that.
+    # If the sum of squares is finite, all numbers are: one call. Otherwise some may only be too large to be squared.
     lacks_none = math.isfinite(np.vdot(array, array)) if finite else not np.isnan(array).any()
     if not (lacks_none or (finite and np.isfinite(array).all())):
         raise reject(field, "finite numbers" if finite else "numbers that are not NaN", values)
@@ -224,12 +224,12 @@ def _shape_text(shape: tuple[int | None, ...]) -> str:
 
 
 def params_vector(field: str, values: Any) -> Floats:
-    """A parameter vector of a model function: any length, infinities allowed."""
+    """Return the parameter vector of a model function: any length, infinities allowed."""
     return float_array(field, values, (None,), finite=False)
 
 
 def pose_vector(field: str, values: Any) -> Floats:
-    """A sensor pose [px, py, heading_rad, ...]."""
+    """Return a sensor pose [px, py, heading_rad, ...] as an array; warn of a heading that looks like degrees."""
     pose = float_array(field, values, (None,))
     if len(pose) < 3:
         raise reject(field, "an array of shape (3 or more,)", f"shape {pose.shape}")
@@ -239,14 +239,14 @@ def pose_vector(field: str, values: Any) -> Floats:
 
 
 def tell_degrees(field: str, heading: float) -> None:
-    """Warn of a heading of a pose that is rather in degrees: a whole number from 10 to two turns of these."""
+    """Warn of a heading that looks like degrees: a whole number whose size is from 10 to 720."""
     if 10.0 <= abs(heading) <= 720.0 and heading == round(heading):
         degrees = f"{heading:g} degrees are {math.radians(heading):.4f} rad"
         warn_implausible(field, "a heading in radians", f"{heading:g}, a whole number", degrees)
 
 
 def state_table(field: str, values: Any, state_dim: int | None = None) -> Floats:
-    """(n, state_dim) states; one state may stand alone as a vector."""
+    """Return the states as an (n, state_dim) array; a single state may be given as a vector."""
     array = as_array(field, values, "fiu", "numbers, one state a row")
     if array.ndim == 1 and array.size:
         return float_array(field, array[np.newaxis], (1, state_dim))

@@ -1,4 +1,4 @@
-"""What a sensor says too much, always by the same amount."""
+"""Constant bias of a sensor's measurements, clock and position."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from vedette.kernels.base.types import Floats
 from vedette.models.arguments import reject
 from vedette.models.measurement import wrap_angles
 
-LEAST_RANGE = 1.0  # m; what is left of a range where a bias is taken off or added
+LEAST_RANGE = 1.0  # m; smallest range after a bias is subtracted or added
 
 
 @dataclass(frozen=True, slots=True)
 class Bias:
-    """What the scans of a sensor say too much.
+    """Constant bias of the scans of a sensor: the reported minus the true value of each quantity.
 
     Attributes:
-        range: m.
-        bearing: rad, in the direction in which the scans count: clockwise in a recording from the north, elsewhere
-            counter-clockwise.
-        clock: s; how far its times are ahead.
-        x, y: m; of where the sensor is said to be, or of the positions that it measures.
-        range_rate: m/s.
-        elevation: rad.
-        altitude: m.
+        range: bias of ranges in m.
+        bearing: bias of bearings in rad, positive in the direction of the scans' angles: clockwise in a recording with
+            bearings from the north, else counter-clockwise.
+        clock: time in s by which the sensor's clock is ahead.
+        x, y: bias in m of the reported position of the sensor, or of the positions that it measures.
+        range_rate: bias of range rates in m/s.
+        elevation: bias of elevations in rad.
+        altitude: bias of altitudes in m.
 
     Raises:
         InputError: a number that is not finite.
@@ -49,7 +49,7 @@ class Bias:
                 raise reject(f"Bias.{each.name}", "a finite number", value)
 
     def __sub__(self, other: Bias) -> Bias:
-        """What is left of it where another is taken off."""
+        """Return the difference of two biases, component by component."""
         return Bias(*(getattr(self, each.name) - getattr(other, each.name) for each in fields(self)))
 
 
@@ -57,9 +57,9 @@ NO_BIAS = Bias()
 
 
 def with_offsets(measured: Floats, offsets: Floats, components: Sequence[str]) -> Floats:
-    """(num, meas_dim) measurements plus (meas_dim,) offsets, angles in (-pi, pi], ranges at least `LEAST_RANGE`.
+    """Return (num, meas_dim) measurements plus (meas_dim,) offsets, angles in (-pi, pi], ranges >= `LEAST_RANGE`.
 
-    components: the quantities that are measured, of `vedette.internal.quantities.QUANTITIES`.
+    components: names of the measured quantities in `vedette.internal.quantities.QUANTITIES`.
     """
     found = measured + offsets
     for i, name in enumerate(components):

@@ -1,4 +1,4 @@
-"""Labelled multi-Bernoulli birth: at fixed sites, and where something unexplained was measured."""
+"""Labelled multi-Bernoulli birth: at fixed sites, and from unexplained measurements."""
 
 from __future__ import annotations
 
@@ -20,23 +20,24 @@ _CELLS = 16
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasurementBirth:
-    """Targets that may appear anywhere, and start a track where they are measured.
+    """Birth from measurements: targets may appear anywhere, and start a track where they are measured.
 
-    With a `region`, filters whose undetected targets are a Poisson intensity hold them as one: targets appear anywhere
-    in the region alike, and a measurement is the first detection of one with the odds of that intensity, the
-    probability of detection there and the clutter. Elsewhere a measurement that no track explains, with probability u,
-    starts a label at the next scan with existence min(max_existence, expected u / sum of all u), at rest where it was
-    measured (Reuter, Vo, Vo, Dietmayer 2014, section IV-C).
+    With a `region`, filters with a Poisson intensity of undetected targets use a uniform intensity over the region. A
+    measurement is then the first detection of a target with the odds of that intensity, the probability of detection
+    there and the clutter. Otherwise a measurement that is unexplained by tracks with probability u starts a label at
+    the next scan, with existence min(max_existence, expected u / sum of all u), at rest at the measured position
+    (Reuter, Vo, Vo, Dietmayer 2014, section IV-C).
 
     Attributes:
         expected: expected number of targets that appear between two scans, or within the `period` of the births;
-            learnt: estimated from the first detections, in filters whose undetected targets are an intensity.
+            learnt: estimated from the first detections, in filters with an intensity of undetected targets.
         max_existence: largest existence of a label that starts at the next scan, in (0, 1).
-        std: (state_dim,) standard deviation of the state of a new label; of the position about twice that of the noise.
-        region: where targets appear; None: anywhere that is measured.
+        std: (state_dim,) standard deviation of the state of a new label; for the position about twice that of the
+            noise.
+        region: region in which targets appear; None: anywhere.
 
     Raises:
-        InputError: names the field, what was expected and what came.
+        InputError: an invalid field; the message has its name, the expected and the given value.
     """
 
     expected: float | Literal["learnt"]
@@ -59,19 +60,19 @@ class MeasurementBirth:
 
     @property
     def cov(self) -> Floats:
-        """(state_dim, state_dim) covariance of a birth."""
+        """Covariance of a birth, (state_dim, state_dim)."""
         return np.diag(self.std**2)
 
     @property
     def is_learnt(self) -> bool:
-        """Whether the expected number of births is learnt."""
+        """True if the expected number of births is learnt."""
         return isinstance(self.expected, str) and self.expected == LEARNT
 
     def uniform(self, cells_a_side: int = _CELLS) -> UndetectedModel | None:
-        """The targets that appear anywhere in the region alike, on cells; None without a region.
+        """Return the model of undetected targets that is uniform over the region, on cells; None without a region.
 
-        Births of a known rate are not among them, as they may be so many a scan. Where the rate is learnt, one target
-        is expected before the first scan.
+        With a known rate, births are not included, as they may be a number per scan. With a learnt rate, one target is
+        expected before the first scan.
         """
         if self.region is None:
             return None
@@ -86,29 +87,28 @@ class MeasurementBirth:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BirthModel:
-    """Each site may give birth to one target a step; its label is (step, site index) (paper-notes 6).
+    """Labelled multi-Bernoulli birth: each site may give birth to one target per step.
 
-    With a `period` a site that gives birth within it with probability r does so within dt seconds with probability
-    1 - (1 - r)^(dt / period), so that a stretch of time brings as many targets in however many steps it is cut. The
-    first scan counts as one second after a time without targets.
+    The label of a birth is (step, site index) (paper-notes 6). With a `period`, a site of birth probability r per
+    period gives birth within dt seconds with probability 1 - (1 - r)^(dt / period), so the number of births in a time
+    span does not depend on the number of steps. The first scan counts as one second after a time without targets.
 
     Attributes:
         existence: (num_sites,) birth probability of each site, in (0, 1).
         means: (num_sites, state_dim) mean state of a birth.
-        covs: (num_sites, state_dim, state_dim) its covariance, symmetric positive definite.
+        covs: (num_sites, state_dim, state_dim) covariance of a birth, symmetric positive definite.
         steps: the filter steps at which births at the sites may happen; None: every step.
-        from_measurements: births where a tracker finds measurements that no track explains, beside the sites; None:
-            there are none.
-        anywhere: the targets that appear anywhere, where more is known of them than `from_measurements` says: how many
-            there are at first, their birth rate and where they enter. Filters whose undetected targets are an
-            intensity then hold these; None: what `from_measurements` says.
-        period: s; the stretch of time within which births have these probabilities, those from measurements too; None:
-            each step, whatever its length (the paper).
+        from_measurements: further births, from measurements that no track explains; None: no such births.
+        anywhere: model of undetected targets with more detail than `from_measurements`: initial number, birth rate and
+            places of entry. Filters with an intensity of undetected targets use it; None: they use that of
+            `from_measurements`.
+        period: time in s for which birth probabilities are given, also those from measurements; None: each step,
+            whatever its length (the paper).
         num_sites: number of birth sites.
         state_dim: length of a target's state.
 
     Raises:
-        InputError: names the field, what was expected and what came.
+        InputError: an invalid field; the message has its name, the expected and the given value.
     """
 
     existence: Floats
@@ -147,12 +147,12 @@ class BirthModel:
             object.__setattr__(self, name, size)
 
     def is_active(self, step: int) -> bool:
-        """Whether targets may be born at the sites at this filter step."""
+        """Return True if targets may be born at the sites at this filter step."""
         return self.num_sites > 0 and (self.steps is None or step in self.steps)
 
     @classmethod
     def none(cls, state_dim: int) -> BirthModel:
-        """No births ever."""
+        """Return the model without any births."""
         return cls(np.empty(0), *no_gaussians(state_dim))
 
 

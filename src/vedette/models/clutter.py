@@ -1,4 +1,4 @@
-"""Poisson clutter: the model, and clutter that is uniform in the sensor's measurement space."""
+"""Poisson clutter: the model, and clutter that is uniform in measurement space."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ from vedette.models.functions import ModelFunction, describe, model_function, nu
 from vedette.models.measurement import MeasurementModel, angular_flags, wrap_angular
 from vedette.models.probe import probe_log_intensity
 
-# Scans of clutter that a check draws and looks up in the intensity.
+# Number of clutter scans that a check draws and compares with the intensity.
 _NUM_TRIAL_SCANS = 8
 
 
 class ClutterSampler(Protocol):
-    """Draws one scan of clutter, its Poisson number included; a plain Python function or object, not compiled."""
+    """A function that draws one scan of clutter, including the Poisson number; plain Python, not compiled."""
 
     def __call__(
         self, pose: Floats, measurement: MeasurementModel, *, state_dim: int, rng: np.random.Generator
     ) -> Floats:
-        """(n, meas_dim) clutter measurements of a sensor at `pose`. `state_dim`: length of the states it observes."""
+        """Return (n, meas_dim) clutter measurements of a sensor at `pose`; `state_dim` is the length of states."""
         ...
 
 
@@ -48,12 +48,12 @@ class ClutterModel:
     """Poisson clutter of a sensor (paper: lambda_c and kappa).
 
     Attributes:
-        rate: expected number of clutter measurements a scan.
+        rate: expected number of clutter measurements per scan.
         log_intensity: model function of kind `log_clutter_intensity`; it integrates to `rate` over measurement space.
         params: its parameter vector.
-        sampler: draws a scan of clutter, see `ClutterSampler`; None where no scan is ever to be simulated.
-        meas_dim: number of measurement components that it serves; None: not known.
-        angular: which of them are angles; None: not known.
+        sampler: draws a scan of clutter, see `ClutterSampler`; None if no scans are simulated.
+        meas_dim: number of measurement components; None: not known.
+        angular: (meas_dim,) flags of the components that are angles; None: not known.
     """
 
     rate: float
@@ -77,18 +77,18 @@ class ClutterModel:
             object.__setattr__(self, "meas_dim", size)
 
     def log_intensity_at(self, measurements: ArrayLike, pose: ArrayLike) -> Floats:
-        """(n,) log intensities at (n, meas_dim) measurements."""
+        """Return the log intensities at (n, meas_dim) measurements, (n,)."""
         table, at = float_array("measurements", measurements, (None, self.meas_dim)), pose_vector("pose", pose)
         return numbers_at(self.log_intensity, table, at, self.params)
 
     def sample(
         self, pose: ArrayLike, measurement: MeasurementModel, *, state_dim: int, rng: np.random.Generator
     ) -> Floats:
-        """(n, meas_dim) clutter of one scan.
+        """Return the clutter of one scan, (n, meas_dim).
 
         Raises:
             InputError: this model has no sampler.
-            ModelError: the sampler raised, or gave something else than finite (n, meas_dim) measurements.
+            ModelError: the sampler raised, or did not return finite (n, meas_dim) measurements.
         """
         if self.sampler is None:
             raise reject("ClutterModel.sampler", "a sampler, to simulate a scan", None)
@@ -105,10 +105,10 @@ class ClutterModel:
             raise ModelError(f"{error}, at pose {at}") from None
 
     def check(self, measurements: ArrayLike, pose: ArrayLike, measurement: MeasurementModel, *, state_dim: int) -> None:
-        """Try the log intensity at each measurement and, where there is a sampler, at points that it draws.
+        """Check the log intensity at each measurement and at the points that the sampler draws, if there is one.
 
         Raises:
-            ModelError: not a log intensity, or clutter drawn where the intensity says that there is none.
+            ModelError: an invalid log intensity, or clutter drawn where the intensity is 0.
         """
         at = pose_vector("pose", pose)
         for row in float_array("measurements", measurements, (None, measurement.meas_dim)):
@@ -143,13 +143,13 @@ _LARGEST_HEIGHT = 12_000.0  # m, the default largest height of clutter
 def at_raw_measurements(clutter: ClutterModel, bias: Floats, moved: Floats) -> ClutterModel:
     """Return built-in clutter whose intensity at a corrected measurement is that at the raw one.
 
-    Biases are taken off measurements before filters see them, while false measurements are distributed as the sensor
-    gives them: at a corrected measurement z the intensity is that at z + bias from the place of the sensor + moved.
+    Biases are subtracted from measurements before filters process them, but clutter is distributed over raw
+    measurements. At a corrected measurement z, the intensity is that at z + bias from the sensor's position + moved.
 
     Args:
-        clutter: of `region_clutter`, `around_sensor` or `measurement_space_clutter`.
-        bias: (meas_dim,) what is taken off measurements [rad, m].
-        moved: (2,) what is taken off the place of the sensor [m].
+        clutter: clutter of `region_clutter`, `around_sensor` or `measurement_space_clutter`.
+        bias: (meas_dim,) offset that is subtracted from measurements [rad, m].
+        moved: (2,) offset that is subtracted from the sensor's position [m].
     """
     params = clutter.params.copy()
     if clutter.log_intensity is _box:
@@ -176,8 +176,8 @@ class _BoxSampler:
 def plane_params(kind: str, max_range_rate: float | None, max_height: float | None = None) -> Floats:
     """Return the last six params of clutter that is uniform in the plane.
 
-    These are the largest range rate (None: 300 m/s) or, of a kind that depends on heights, the largest height (None: 12
-    km), and zeros for what is added to up to three components of a measurement and to x, y of the sensor, see
+    These are the largest range rate (None: 300 m/s) or, for a kind that depends on heights, the largest height (None:
+    12 km), and zeros for the offsets of up to three measurement components and of x, y of the sensor, see
     `at_raw_measurements`. Raises `InputError` for a largest value that is not above 0.
     """
     rate = _LARGEST_RATE if max_range_rate is None else positive("max_range_rate", max_range_rate)
@@ -187,24 +187,24 @@ def plane_params(kind: str, max_range_rate: float | None, max_height: float | No
 
 @inlined
 def log_density_of_rate(measurement: Floats, params: Floats) -> float:
-    """Log density of the third component, a range rate, s/m: uniform up to the largest. params: end `plane_params`."""
+    """Log density of the third component, a range rate, in s/m: uniform. params: end with `plane_params`."""
     return -math.log(2.0 * params[-6]) if abs(measurement[2] + params[-3]) <= params[-6] else -math.inf
 
 
 def with_rates(drawn: Floats, kind: str, largest: float, rng: np.random.Generator) -> Floats:
-    """Draw the range rates of false measurements whose other components are given, where the kind has them."""
+    """Return the clutter measurements with range rates drawn uniformly, if the kind has them."""
     if is_doppler(kind):
         drawn[:, COMPONENTS[kind].index("range_rate")] = rng.uniform(-largest, largest, len(drawn))
     return drawn
 
 
 def angular_of(kind: str) -> Bools:
-    """(meas_dim,) which components of a kind of measurement are angles."""
+    """Flags of the components of a kind of measurement that are angles, (meas_dim,)."""
     return np.array([QUANTITIES[name].is_angle for name in COMPONENTS[kind]])
 
 
 def log_or_minus_infinity(value: float) -> float:
-    """log(value), -inf at zero."""
+    """Return log(value); -inf at zero."""
     return math.log(value) if value > 0.0 else -math.inf
 
 

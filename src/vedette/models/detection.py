@@ -1,4 +1,4 @@
-"""Detection models: with what probability a sensor at a pose detects a target."""
+"""Detection models: probability that a sensor at a pose detects a target."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ class DetectionModel:
     Attributes:
         function: model function of kind `prob_detection`.
         params: its parameter vector.
-        mean_function: model function of kind `mean_prob_detection` (same parameters): the mean over a Gaussian, where
-            it is known; None: it is taken by nodes, see `SensorModel.detection_at`.
-        reach: m; farther than this from the sensor the probability is known to be 0, so that who asks of many places
-            need not ask there; inf: nothing is known.
+        mean_function: model function of kind `mean_prob_detection` (same parameters): the mean over a Gaussian in
+            closed form; None: it is computed with nodes, see `SensorModel.detection_at`.
+        reach: distance in m from the sensor beyond which the probability is 0, so that evaluations there can be
+            skipped; inf: no such distance is known.
     """
 
     function: ModelFunction
@@ -46,19 +46,19 @@ class DetectionModel:
 
     @property
     def is_constant(self) -> bool:
-        """Whether it is `constant_detection`, the same everywhere."""
+        """True for `constant_detection`, which is the same everywhere."""
         return self.function is functions.constant
 
     def prob(self, states: ArrayLike, pose: ArrayLike) -> Floats:
-        """(n,) detection probabilities of (n, state_dim) states."""
+        """Return the detection probabilities of (n, state_dim) states, (n,)."""
         table, at = state_table("states", states), pose_vector("pose", pose)
         return numbers_at(self.function, table, at, self.params)
 
     def check(self, states: ArrayLike, pose: ArrayLike) -> None:
-        """Try the functions at each state (the mean: variances of 1).
+        """Check the functions at each state (the mean function with variances of 1).
 
         Raises:
-            ModelError: they do not give probabilities, or one above 0 beyond `reach`.
+            ModelError: a value that is not a probability, or is above 0 beyond `reach`.
         """
         at = pose_vector("pose", pose)
         for state in state_table("states", states):
@@ -75,7 +75,7 @@ def _guarded(prob_detection: float, field: str = "prob_detection") -> float:
 
 
 def _edge(max_range: float, outside: float) -> float:
-    """How far there is anything to detect."""
+    """Return the distance beyond which the probability of detection is 0, in m."""
     return float(max_range) if outside == 0.0 else math.inf
 
 
@@ -84,7 +84,7 @@ def constant_detection(prob_detection: Probability) -> DetectionModel:
     """The same probability of detection everywhere.
 
     Args:
-        prob_detection: probability of detection; 1 is taken as a little less, `MAX_PROB_DETECTION`.
+        prob_detection: probability of detection; 1 is replaced by `MAX_PROB_DETECTION`.
     """
     return DetectionModel(functions.constant, np.array([_guarded(prob_detection)]), functions.mean_constant)
 
@@ -94,7 +94,7 @@ def gaussian_detection(sigma: Positive = 10000.0) -> DetectionModel:
     """Probability of detection exp(-d^2 / (2 sigma^2)) at distance d (paper section IV; paper-notes 4).
 
     Args:
-        sigma: distance scale of the fall of detection; capped as others are [m].
+        sigma: length scale of the decrease with distance; the probability is capped at `MAX_PROB_DETECTION` [m].
     """
     return DetectionModel(functions.gaussian, np.array([positive("sigma", sigma)]), functions.mean_gaussian)
 
@@ -104,7 +104,7 @@ def limited_range(prob_detection: Probability, max_range: Positive, outside: Pro
     """Detection within a distance, and less or none beyond.
 
     Args:
-        prob_detection: probability of detection within `max_range`; 1 is taken as a little less, `MAX_PROB_DETECTION`.
+        prob_detection: probability of detection within `max_range`; 1 is replaced by `MAX_PROB_DETECTION`.
         max_range: greatest distance [m].
         outside: probability of detection beyond it.
     """
@@ -119,7 +119,7 @@ def limited_sector(
     """Detection within a distance and a sector (field of view) around the sensor's heading; less or none beyond.
 
     Args:
-        prob_detection: probability of detection within the sector; 1 is taken as a little less, `MAX_PROB_DETECTION`.
+        prob_detection: probability of detection within the sector; 1 is replaced by `MAX_PROB_DETECTION`.
         max_range: greatest distance [m].
         half_width_rad: greatest angle from the heading, either side, up to a half turn [rad].
         outside: probability of detection outside the sector.
@@ -150,14 +150,14 @@ def soft_sector(
     rho and the angle dtheta from the heading. A target at the sensor itself is straight ahead.
 
     Args:
-        prob_detection: probability of detection deep within the sector, p; 1 is taken as a little less,
+        prob_detection: probability of detection deep within the sector, p; 1 is replaced by
             `MAX_PROB_DETECTION`.
         max_range: distance at which half of it is left, straight ahead [m].
         half_width_rad: angle from the heading, either side, at which half of it is left; with a half turn and no
             `angle_slope` detection does not depend on the angle [rad].
         range_slope: steepness of the edge in range [1/m].
         angle_slope: steepness of the edges in angle; none: sharp ones, and at a half turn none at all [1/rad].
-        cut: whether nothing at all is detected beyond `max_range` and the half width.
+        cut: True if there is no detection beyond `max_range` and the half width.
     """
     slope = 0.0 if angle_slope is None else positive("angle_slope", angle_slope)
     if not isinstance(cut, bool):
@@ -176,11 +176,11 @@ def camera(
     The pose is [px, py, heading_rad, pointing_rad, half_width_rad], see `vedette.platforms.Pointing`.
 
     Args:
-        prob_detection: probability of detection within the field of view; 1 is taken as a little less,
+        prob_detection: probability of detection within the field of view; 1 is replaced by
             `MAX_PROB_DETECTION`.
         max_range: greatest distance [m].
-        reference_half_width_rad: where it zooms, the half width at which it sees so far; it sees as many times farther
-            as its field is narrower; none: as far at every width [rad].
+        reference_half_width_rad: half width of a zooming camera at which its range is `max_range`; the range is
+            inversely proportional to the half width; none: the same range at every width [rad].
     """
     given = reference_half_width_rad
     reference = 0.0 if given is None else half_width("reference_half_width_rad", given)

@@ -1,4 +1,4 @@
-"""The built-in detection functions, and their means over a Gaussian where these can be had."""
+"""The built-in detection functions, and their means over a Gaussian where a closed form is known."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from vedette.kernels.gaussian.position_integrals import gaussian_mean, share_in_
 from vedette.kernels.gaussian.scratch import wrap_angle
 from vedette.models.functions import model_function
 
-# The built-in models stay at or below this: certain detection would make a single missed detection impossible, and with
-# it every hypothesis that holds the target (paper-notes 4).
+# Largest value of the built-in models: with certain detection, a single missed detection would have probability 0, and
+# with it every hypothesis that contains the target (paper-notes 4).
 MAX_PROB_DETECTION = 1.0 - 1e-9
 
-# Beyond it the logistic function is 0 to the last bit, and its exponential no longer a double.
+# Beyond this exponent the logistic function is 0 to the last bit, and its exponential overflows.
 _LARGEST_EXPONENT = 700.0
 
 
@@ -27,7 +27,7 @@ def constant(state: Floats, pose: Floats, params: Floats) -> float:
 
 @model_function("mean_prob_detection")
 def mean_constant(mean: Floats, cov: Floats, pose: Floats, params: Floats) -> float:
-    """As `constant`."""
+    """params: as in `constant`."""
     return params[0]  # type: ignore[no-any-return]
 
 
@@ -40,7 +40,7 @@ def gaussian(state: Floats, pose: Floats, params: Floats) -> float:
 
 @model_function("mean_prob_detection")
 def mean_gaussian(mean: Floats, cov: Floats, pose: Floats, params: Floats) -> float:
-    """As `gaussian`; the cap is that of the mean."""
+    """params: as in `gaussian`. The cap applies to the mean."""
     dx, dy = offset_at_beam(mean, pose)
     return min(gaussian_mean(dx, dy, cov, params[0] * params[0]), MAX_PROB_DETECTION)
 
@@ -54,7 +54,7 @@ def limited_range(state: Floats, pose: Floats, params: Floats) -> float:
 
 @model_function("mean_prob_detection")
 def mean_limited_range(mean: Floats, cov: Floats, pose: Floats, params: Floats) -> float:
-    """As `limited_range`."""
+    """params: as in `limited_range`."""
     dx, dy = offset_at_beam(mean, pose)
     share = share_in_sector(dx, dy, cov, params[1], 0.0, math.pi)
     return params[2] + (params[0] - params[2]) * share  # type: ignore[no-any-return]
@@ -62,7 +62,7 @@ def mean_limited_range(mean: Floats, cov: Floats, pose: Floats, params: Floats) 
 
 @kernel
 def _in_sector(dx: float, dy: float, max_range: float, middle: float, half_width: float) -> bool:
-    """Whether (dx, dy) is within `max_range` of the origin, and of `middle` by `half_width`; the origin itself is."""
+    """Return True if (dx, dy) is within `max_range` and within `half_width` of `middle`, or is the origin."""
     square = dx * dx + dy * dy
     if square > max_range * max_range:
         return False
@@ -79,7 +79,7 @@ def limited_sector(state: Floats, pose: Floats, params: Floats) -> float:
 
 @model_function("mean_prob_detection")
 def mean_limited_sector(mean: Floats, cov: Floats, pose: Floats, params: Floats) -> float:
-    """As `limited_sector`."""
+    """params: as in `limited_sector`."""
     dx, dy = offset_at_beam(mean, pose)
     share = share_in_sector(dx, dy, cov, params[1], pose[2], params[2])
     return params[3] + (params[0] - params[3]) * share  # type: ignore[no-any-return]
@@ -97,7 +97,7 @@ def soft_sector(state: Floats, pose: Floats, params: Floats) -> float:
     distance = math.sqrt(dx * dx + dy * dy)
     if params[5] > 0.0 and distance > params[1]:
         return 0.0
-    if distance == 0.0 or (params[2] >= math.pi and params[4] == 0.0):  # no edge that an angle could be beyond
+    if distance == 0.0 or (params[2] >= math.pi and params[4] == 0.0):  # no angular edge
         off = 0.0
     else:
         off = abs(wrap_angle(math.atan2(dy, dx) - pose[2]))
@@ -110,7 +110,7 @@ def soft_sector(state: Floats, pose: Floats, params: Floats) -> float:
 
 @kernel
 def _reach(pose: Floats, params: Floats) -> float:
-    """How far a camera sees: the same pixels over a narrower field see farther."""
+    """Return the range of a camera: with a narrower field of view, the same pixels see farther."""
     if len(pose) < 5:
         raise ValueError("camera: expected a pose with pointing_rad and half_width_rad")
     return params[1] * params[2] / pose[4] if params[2] > 0.0 and pose[4] > 0.0 else params[1]  # type: ignore[no-any-return]
@@ -127,7 +127,7 @@ def camera(state: Floats, pose: Floats, params: Floats) -> float:
 
 @model_function("mean_prob_detection")
 def mean_camera(mean: Floats, cov: Floats, pose: Floats, params: Floats) -> float:
-    """As `camera`."""
+    """params: as in `camera`."""
     reach = _reach(pose, params)
     if not pose[4] > 0.0:
         return 0.0

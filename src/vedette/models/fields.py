@@ -1,4 +1,4 @@
-"""What the numbers of a part may be: types that say it once, for its constructor and for the scenario file.
+"""Types of the fields of a part, with their domains, for its constructor and for the scenario file.
 
 `num_restarts: Natural = 2` in a dataclass is a field that its constructor checks (`Checked`), and that the section of
 the same part in a scenario reads and describes (`vedette.scenarios.sections.derived`).
@@ -28,7 +28,7 @@ from vedette.models.arguments import (
 )
 
 T = TypeVar("T")
-# Of a search and the first round of a race (`vedette.control.rounds`).
+# Smallest number of samples of a search and of the first round of a race (`vedette.control.rounds`).
 _LEAST_SAMPLES = 24
 
 
@@ -45,7 +45,7 @@ def _portion(field: str, value: Any) -> float:
 
 
 def half_width(field: str, value: Any) -> float:
-    """Half the angle of a sector, rad."""
+    """Return the value as half the angle of a sector; it must be in (0, pi] rad."""
     if positive(field, value) > math.pi:
         raise reject(field, "an angle in radians, in (0, pi] (is it in degrees?)", value)
     return float(value)
@@ -77,9 +77,9 @@ Probability = Annotated[float, probability]  # [0, 1]
 Chance = Annotated[float, chance]  # (0, 1)
 Share = Annotated[float, _share]  # [0, 1)
 Portion = Annotated[float, _portion]  # (0, 1]
-L1Error = Annotated[float, _l1_error]  # of densities that each integrate to 1
-EnoughSamples = Annotated[int, _enough_samples]  # to tell candidates apart by
-Limit = Annotated[float, _limit]  # above 0, or infinite; in a file then left out
+L1Error = Annotated[float, _l1_error]  # [0, 2], for densities that integrate to 1
+EnoughSamples = Annotated[int, _enough_samples]  # enough to compare candidates
+Limit = Annotated[float, _limit]  # above 0, or infinite; left out of a file if infinite
 HalfWidth = Annotated[float, half_width]  # rad, in (0, pi]
 Reals: TypeAlias = ArrayLike  # one or more
 Positives: TypeAlias = ArrayLike  # the same, each above 0
@@ -88,10 +88,10 @@ NonNegativePair: TypeAlias = ArrayLike
 
 
 def part(kind: str, room: str, **names: str) -> Callable[[T], T]:
-    """Mark a class or a function as what a scenario's `kind` of a room, such as "search", stands for.
+    """Mark a class or a function as the part that `kind` selects in a section (`room`) of a scenario, such as "search".
 
-    names: of fields or parameters that are called otherwise in a file, key by key; where the key ends in `_deg`, an
-    angle is in degrees there.
+    names: fields or parameters with another name in a file, by their key; an angle whose key ends in `_deg` is in
+    degrees there.
     """
 
     def marked(made: T) -> T:
@@ -101,10 +101,10 @@ def part(kind: str, room: str, **names: str) -> Callable[[T], T]:
 
 
 def check_fields(made: Any, prefix: str = "") -> None:
-    """Hold the fields of a dataclass against their types; those that may be None may.
+    """Check the fields of a dataclass against their types; optional fields may be None.
 
     Raises:
-        InputError: names the field, what was expected and what came.
+        InputError: an invalid field; the message has its name, the expected and the given value.
     """
     kind: type = type(made)
     for name, field, optional, check in _checks(kind, prefix):
@@ -114,7 +114,7 @@ def check_fields(made: Any, prefix: str = "") -> None:
 
 
 class Checked:
-    """A dataclass whose constructor holds its fields against their types (`check_fields`)."""
+    """Base of dataclasses whose constructor checks their fields against their types (`check_fields`)."""
 
     __slots__ = ()
 

@@ -1,8 +1,8 @@
-"""Model functions: the decorator that compiles a plain Python function, and how it is called from Python.
+"""Model functions: the decorator that compiles a plain Python function, and calls of model functions from Python.
 
-A model function sees one state at a time and writes its result into the last argument, `out`, or returns a number;
-one of `association_marginals` (`vedette.filters.CustomMarginals`) sees all that a scan may mean, and does both.
-`out` comes with arbitrary contents: **every** entry must be written, zeros too.
+A model function receives one state at a time and writes its result into the last argument, `out`, or returns a number.
+A function of kind `association_marginals` (`vedette.filters.CustomMarginals`) receives all options of a scan, and does
+both. `out` has arbitrary contents: **every** entry must be written, zeros too.
 
 | kind | arguments | result |
 |---|---|---|
@@ -19,8 +19,8 @@ one of `association_marginals` (`vedette.filters.CustomMarginals`) sees all that
 | `association_marginals` | offsets, columns, log_weights, params, out | out: log probabilities; see `CustomMarginals` |
 | `log_clutter_intensity` | measurement, pose, params | log of the expected clutter per unit of measurement space |
 
-`state[0:2]` is always the position in metres; `pose` is [px, py, heading_rad], and further components that
-the platform has; `params` is the model's own vector.
+`state[0:2]` is always the position in metres; `pose` is [px, py, heading_rad] and further components of the
+platform; `params` is the model's parameter vector.
 """
 
 from __future__ import annotations
@@ -41,13 +41,13 @@ ModelFunction = Callable[..., Any]
 
 
 def model_function(kind: str) -> Callable[[Callable[..., Any]], ModelFunction]:
-    """Decorator that compiles a plain Python function as a model function of `kind` (table above).
+    """Return a decorator that compiles a plain Python function as a model function of `kind` (table above).
 
-    The function may use `math`, indexing, loops and other compiled functions; what Numba compiles, it may do.
+    The function may use `math`, indexing, loops, other compiled functions, and anything else that Numba compiles.
 
     Raises:
-        InputError: the kind is unknown, this is not a plain function, or its number of arguments is wrong.
-        ModelError: the body cannot be compiled; the message says where.
+        InputError: an unknown kind, an object that is not a plain function, or a wrong number of arguments.
+        ModelError: the body cannot be compiled; the message has the place.
     """
     if kind not in SIGNATURES:
         raise reject("model function kind", f"one of {', '.join(SIGNATURES)}", kind)
@@ -78,7 +78,7 @@ def require_kind(field: str, function: Any, kind: str) -> None:
 
 
 def describe(function: ModelFunction, *args: Any) -> str:
-    """Name, kind and arguments of a call, for messages."""
+    """Return the name, kind and arguments of a call, for messages."""
     kind = str(getattr(function, "kind", "model"))
     named = zip(SIGNATURES[kind][0], args, strict=False)
     given = ", ".join(f"{name} {value}" for name, value in named if name not in ("params", "out"))
@@ -86,7 +86,7 @@ def describe(function: ModelFunction, *args: Any) -> str:
 
 
 def call(function: ModelFunction, *args: Any) -> Any:
-    """Call a model function; whatever it raises comes out as `ModelError` with the function and its arguments named."""
+    """Call a model function; any exception becomes a `ModelError` that names the function and its arguments."""
     try:
         return function(*args)
     except Exception as error:
@@ -94,19 +94,19 @@ def call(function: ModelFunction, *args: Any) -> Any:
 
 
 def write_rows(function: ModelFunction, states: Floats, at: Floats | float, params: Floats, out: Floats) -> None:
-    """Call a model function that writes a result at each of (n, state_dim) states; `out` (n, ...) has one a row.
+    """Call a model function that writes a result at each of (n, state_dim) states, into the rows of `out` (n, ...).
 
-    at: a pose, or a period in seconds. Raises `ModelError` as `call`.
+    at: a pose, or a period in seconds. Raises `ModelError` like `call`.
     """
     try:
         fill_rows(function, states, at, params, out)
-    except Exception:  # which state it was is found by asking one after the other
+    except Exception:  # call one state at a time, to find the one that raised
         for state, row in zip(states, out, strict=True):
             call(function, state, at, params, row)
 
 
 def numbers_at(function: ModelFunction, states: Floats, at: Floats | float, params: Floats) -> Floats:
-    """(n,) numbers that a model function returns at (n, state_dim) states; `at` and errors as of `write_rows`."""
+    """Numbers that a model function returns at (n, state_dim) states, (n,); `at` and errors as in `write_rows`."""
     try:
         return numbers_of_rows(function, states, at, params)
     except Exception:

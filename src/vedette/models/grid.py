@@ -1,4 +1,4 @@
-"""A region cut into equal cells, and the nodes by which means over a cell are taken."""
+"""Grid of equal cells over a region, and quadrature nodes for means over a cell."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import dimension, instance, positive, reject
 from vedette.models.region import Region
 
-# A side that is a whole number of cells but for rounding is cut into that number.
+# A side that is a whole number of cells, apart from rounding, is divided into that number.
 _ROUNDING = 1e-9
 _MOST_CELLS = 10**9  # along a side
 
@@ -21,12 +21,12 @@ class CellGrid:
     """Equal rectangular cells that fill a region, numbered from the south-west corner, row after row to the north.
 
     Attributes:
-        region: what is cut.
+        region: the region.
         columns: number of cells from west to east.
         rows: number of cells from south to north.
 
     Raises:
-        InputError: names the field, what was expected and what came.
+        InputError: an invalid field; the message has its name, the expected and the given value.
     """
 
     region: Region
@@ -41,7 +41,7 @@ class CellGrid:
 
     @classmethod
     def covering(cls, region: Region, cell: float) -> CellGrid:
-        """The fewest cells of at most `cell` metres along each side. Raises `InputError` unless that is above 0."""
+        """Return the grid with the fewest cells of at most `cell` m per side; raise `InputError` unless above 0."""
         size = positive("cell", cell)
         instance("region", region, Region)
         width, height = region.x_max - region.x_min, region.y_max - region.y_min
@@ -62,18 +62,18 @@ class CellGrid:
 
     @property
     def centres(self) -> Floats:
-        """(num_cells, 2) middle of each cell in m."""
+        """Centre of each cell in m, (num_cells, 2)."""
         return self.states(2, 1)[:, 0]
 
     def states(self, state_dim: int, nodes_a_side: int = 3) -> Floats:
-        """(num_cells, num_nodes, state_dim) targets at rest at the nodes of each cell.
+        """Return states at rest at the nodes of each cell, (num_cells, num_nodes, state_dim).
 
         Args:
             state_dim: length of a state; its first two components are the position, the others 0.
-            nodes_a_side: nodes of a Gauss-Legendre rule along each side of a cell; their squares are num_nodes.
+            nodes_a_side: number of Gauss-Legendre nodes along each side of a cell; num_nodes is its square.
 
         Raises:
-            InputError: a `state_dim` below 2, or no node.
+            InputError: a `state_dim` below 2, or no nodes.
         """
         if dimension("state_dim", state_dim) < 2:
             raise reject("state_dim", "at least 2, px and py first", state_dim)
@@ -87,7 +87,7 @@ class CellGrid:
         return states.reshape(self.num_cells, nodes_a_side**2, state_dim)
 
     def cells_at(self, states: Floats) -> Ints:
-        """(n,) cells in which (n, 2 or more) states are; -1 of those outside of the region."""
+        """Return the cell of each of (n, 2 or more) states, (n,); -1 outside of the region."""
         corner, size = (self.region.x_min, self.region.y_min), np.array(self.cell_size)
         column, row = np.floor((states[:, :2] - corner) / size).astype(np.int64).T
         inside = (column >= 0) & (column < self.columns) & (row >= 0) & (row < self.rows)
@@ -95,13 +95,13 @@ class CellGrid:
 
     @staticmethod
     def node_weights(nodes_a_side: int = 3) -> Floats:
-        """(num_nodes,) weights of the nodes of `states` in a mean over a cell; they sum to 1."""
+        """Return the weights of the nodes of `states` in a mean over a cell, (num_nodes,); they sum to 1."""
         _, weights = np.polynomial.legendre.leggauss(dimension("nodes_a_side", nodes_a_side))
         return np.outer(weights, weights).ravel() / 4.0
 
     @property
     def border(self) -> Floats:
-        """(num_cells,) length of the region's border along each cell in m; 0 of those inside."""
+        """Length of the region's border along each cell in m, (num_cells,); 0 for inner cells."""
         width, height = self.cell_size
         lengths = np.zeros((self.rows, self.columns))
         for edge, length in (

@@ -21,7 +21,7 @@ from vedette.models.functions import model_function
 from vedette.models.measurement import MeasurementModel
 from vedette.models.turns import own_places
 
-ASSUMED_HEIGHT = 5000.0  # m, of a target of which only a slant range is measured
+ASSUMED_HEIGHT = 5000.0  # m, height of a target with only a slant range measured
 
 
 @inlined
@@ -128,7 +128,7 @@ def _at_altitude(measurements: Floats, pose: Floats) -> Floats:
 
 
 def _at_assumed_height(measurements: Floats, pose: Floats) -> Floats:
-    """A target nearer than the assumed height is taken to be at an elevation of 45 degrees."""
+    """Return positions at the assumed height, or at an elevation of at most 45 degrees for targets that are closer."""
     up = np.minimum(ASSUMED_HEIGHT - own_height(pose), measurements[:, 1] * math.sqrt(0.5))
     return _from_polar(measurements, pose, up)
 
@@ -141,7 +141,7 @@ def _at_position(measurements: Floats, pose: Floats) -> Floats:
 def bearing_slant_range() -> MeasurementModel:
     """z = [bearing in rad, slant range in m], of a radar without height; heights follow from two radars' ranges.
 
-    A track starts at a height of 5 km, as its first range does not tell it. States are [px, py, vx, vy, pz, vz].
+    A track starts at a height of 5 km, because one range does not determine it. States are [px, py, vx, vy, pz, vz].
     """
     functions = _bearing_slant_range, np.empty(0), _bearing_slant_range_jacobian
     return MeasurementModel(2, *functions, places=_at_assumed_height, components=("bearing", "range"))
@@ -163,6 +163,6 @@ def bearing_range_altitude() -> MeasurementModel:
 
 @part("position_altitude", "measurement")
 def position_altitude() -> MeasurementModel:
-    """z = [px, py, pz] of the target in m; the sensor's pose plays no part. States are [px, py, vx, vy, pz, vz]."""
+    """z = [px, py, pz] of the target in m; the sensor's pose has no effect. States are [px, py, vx, vy, pz, vz]."""
     functions = _position_altitude, np.empty(0), _position_altitude_jacobian
     return MeasurementModel(3, *functions, places=_at_position, is_linear=True, components=("x", "y", "altitude"))

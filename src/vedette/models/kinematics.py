@@ -1,7 +1,7 @@
-"""Built-in motions: nearly constant velocity, also in height, and the coordinated turn, for any time step.
+"""Built-in motion models: nearly constant velocity, also with height, and the coordinated turn, for any time step.
 
-States: [px, py, vx, vy] (the order of the paper's F and Q; paper-notes 1), with a turn rate in rad/s, positive to
-the left, appended for the coordinated turn, or height and vertical velocity.
+States are [px, py, vx, vy] (the order of the paper's F and Q; paper-notes 1). The coordinated turn appends a turn rate
+in rad/s, positive to the left; the model with height appends height and vertical velocity.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from vedette.models.fields import NonNegative, part
 from vedette.models.functions import model_function
 from vedette.models.motion import MotionModel
 
-# Below this turned angle the derivatives use their series: the closed forms lose digits as 1e-16 / angle^2.
+# Below this angle of turn the derivatives use their series: the closed forms have errors of about 1e-16 / angle^2.
 _SERIES_ANGLE = 0.1
 
 
 @inlined
 def _acceleration_cov(dt: float, sigma_v: float, out: Floats) -> None:
-    """Covariance of positions and velocities under an acceleration that is constant within the step; zero elsewhere."""
+    """Write the covariance of positions and velocities for an acceleration constant within the step; zero elsewhere."""
     variance = sigma_v * sigma_v
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
@@ -82,9 +82,9 @@ def constant_velocity(
 ) -> MotionModel:
     """Constant velocity with white acceleration noise. State [px, py, vx, vy].
 
-    Held within a step (paper section IV, F_k and Q_k), the noise of an axis is sigma_v^2 [[dt^4/4, dt^3/2], [dt^3/2,
-    dt^2]]; continuous in time (Bar-Shalom, Li and Kirubarajan 2001, section 6.2.2), it is sigma_v^2 [[dt^3/3, dt^2/2],
-    [dt^2/2, dt]], and two steps have the noise of one of their length.
+    For an acceleration held within a step (paper section IV, F_k and Q_k), the noise of an axis is sigma_v^2 [[dt^4/4,
+    dt^3/2], [dt^3/2, dt^2]]. For one continuous in time (Bar-Shalom, Li and Kirubarajan 2001, section 6.2.2), it is
+    sigma_v^2 [[dt^3/3, dt^2/2], [dt^2/2, dt]], and two steps have the same noise as one step of their total length.
 
     Args:
         sigma_v: standard deviation of a held acceleration (paper: 5); of a continuous one the root of its spectral
@@ -151,13 +151,13 @@ def constant_velocity_height(
 
 @kernel
 def _along(angle: float) -> float:
-    """sin(a) / a."""
+    """Return sin(a) / a."""
     return math.sin(angle) / angle if angle != 0.0 else 1.0
 
 
 @kernel
 def _across(angle: float) -> float:
-    """(1 - cos(a)) / a, without the cancellation."""
+    """Return (1 - cos(a)) / a, without cancellation."""
     half = _along(0.5 * angle)
     return 0.5 * angle * half * half
 
@@ -226,7 +226,7 @@ def coordinated_turn(
     *,
     method: str = "auto",
 ) -> MotionModel:
-    """Turn at an unknown rate, exact where it is constant within a step. State [px, py, vx, vy, turn rate in rad/s].
+    """Turn at an unknown rate, exact if it is constant within a step. State [px, py, vx, vy, turn rate in rad/s].
 
     Noise B B' with B = blkdiag([dt^2/2; dt] sigma_v, the same for the other axis, dt sigma_turn_rate).
 

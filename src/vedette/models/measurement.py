@@ -1,4 +1,4 @@
-"""Measurement and noise models: what a sensor at a pose reports of a target."""
+"""Measurement and noise models of a sensor at a pose."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ def _places(measurements: Floats, pose: Floats) -> Floats:
 
 @part("position", "measurement")
 def position() -> MeasurementModel:
-    """z = [px, py] of the target in m, in the frame of the region; the sensor's pose plays no part."""
+    """z = [px, py] of the target in m, in the frame of the region; the sensor's pose has no effect."""
     functions = _position, np.empty(0), _position_jacobian
     return MeasurementModel(2, *functions, places=_places, is_linear=True, components=("x", "y"))
 
 
 def angular_flags(name: str, angular: Sequence[bool] | Bools, meas_dim: int) -> Bools:
-    """(meas_dim,) flags of the components that are angles; empty means that none is."""
+    """Return the flags of the components that are angles, (meas_dim,); an empty `angular` means no angles."""
     flags = np.array(angular)
     if flags.size == 0:
         return np.zeros(meas_dim, np.bool_)
@@ -58,14 +58,14 @@ def angular_flags(name: str, angular: Sequence[bool] | Bools, meas_dim: int) -> 
 
 
 def wrap_angles(angles: Floats) -> Floats:
-    """The same directions in (-pi, pi]; angles already there keep every bit."""
+    """Return the angles wrapped to (-pi, pi]; angles already in it keep every bit."""
     wrapped = np.array(angles, dtype=np.float64, order="C")
     put_on_circle(wrapped.reshape(-1))
     return wrapped
 
 
 def wrap_angular(measurements: Floats, angular: Bools) -> Floats:
-    """(n, meas_dim) the same measurements with their angles in (-pi, pi]."""
+    """Return the measurements with their angles wrapped to (-pi, pi], (n, meas_dim)."""
     return np.where(angular, wrap_angles(measurements), measurements)
 
 
@@ -78,16 +78,17 @@ class MeasurementModel:
         function: model function of kind `measurement`.
         params: its parameter vector; anything array-like is converted.
         jacobian: model function of kind `measurement_jacobian` (same parameters), or None: sigma points are used.
-        angular: one boolean a component, true where it is an angle in radians; () means as `components` says, else
-            none. Residuals of angles are wrapped to (-pi, pi].
-        least: (meas_dim,) least value of each component without noise, such as 0 of a range; () means as `components`
-            says, else none.
+        angular: one boolean per component, true for an angle in radians; () means that `components` determines them,
+            else that there are no angles. Residuals of angles are wrapped to (-pi, pi].
+        least: (meas_dim,) smallest value of each component without noise, such as 0 for a range; () means that
+            `components` determines them, else that there are no limits.
         places: plain function of (n, meas_dim) measurements and a pose: the (n, 2) positions of the targets in m, or
             (n, 3) with heights for states [px, py, vx, vy, pz, vz]; None if a measurement determines no position.
             Births from measurements need it.
-        is_linear: whether measurements are linear in the state: a Jacobian then serves however wide a Gaussian is.
-        components: the quantity that each component is: "bearing", "range", "range_rate", "x" or "y" (the names of
-            `vedette.internal.quantities.QUANTITIES`, which a `Bias` has too); () where they are others.
+        is_linear: True if measurements are linear in the state: a Jacobian is then exact for Gaussians of any width.
+        components: name of the quantity of each component, such as "bearing", "range", "range_rate", "x" or "y" (the
+            names of `vedette.internal.quantities.QUANTITIES`, which are also fields of `Bias`); () for other
+            quantities.
 
     Raises:
         InputError: a function of another kind, a bad dimension or parameter, a wrong number of angular flags, an
@@ -122,7 +123,7 @@ class MeasurementModel:
         object.__setattr__(self, "angular", angular_flags("MeasurementModel.angular", angular, self.meas_dim))
 
     def measure(self, states: ArrayLike, pose: ArrayLike) -> Floats:
-        """(n, meas_dim) noise-free measurements of (n, state_dim) states.
+        """Return the noise-free measurements of (n, state_dim) states, (n, meas_dim).
 
         Raises:
             ModelError: the function raised.
@@ -136,8 +137,8 @@ class MeasurementModel:
         """Return the positions of (n, meas_dim) measurements in m, shape (n, 2), or (n, 3) with heights.
 
         Raises:
-            InputError: a model that has no `places`.
-            ModelError: its function raised, or gave something else.
+            InputError: a model without `places`.
+            ModelError: its function raised, or returned something else.
         """
         if self.places is None:
             raise reject("MeasurementModel.places", "a function, as births from measurements need a position", None)
@@ -149,7 +150,7 @@ class MeasurementModel:
             raise ModelError(f"places of measurements at pose {at}: {type(error).__name__}: {error}") from error
 
     def check(self, states: ArrayLike, pose: ArrayLike) -> None:
-        """Try the functions at each state; `ModelError` names the function, the state, the expected and the actual."""
+        """Check the functions at each state; `ModelError` has the function, the state, the expected and given value."""
         at = pose_vector("pose", pose)
         for state in state_table("states", states):
             args = (state, at, self.params)
@@ -165,9 +166,9 @@ class NoiseModel:
     Attributes:
         function: model function of kind `measurement_noise_cov`.
         params: its parameter vector.
-        meas_dim: number of measurement components that it serves; None: any, or not known.
-        least_stds: (meas_dim,) the least standard deviation of each component, by which numbers in a wrong unit are
-            told; None: not known.
+        meas_dim: number of measurement components; None: any, or not known.
+        least_stds: (meas_dim,) smallest standard deviation of each component, used to detect numbers in a wrong unit;
+            None: not known.
     """
 
     function: ModelFunction
@@ -186,14 +187,14 @@ class NoiseModel:
             )
 
     def covs(self, states: ArrayLike, pose: ArrayLike, meas_dim: int) -> Floats:
-        """(n, meas_dim, meas_dim) noise covariances at (n, state_dim) states."""
+        """Return the noise covariances at (n, state_dim) states, (n, meas_dim, meas_dim)."""
         table, at = state_table("states", states), pose_vector("pose", pose)
         out = np.empty((len(table), meas_dim, meas_dim))
         write_rows(self.function, table, at, self.params, out)
         return out
 
     def check(self, states: ArrayLike, pose: ArrayLike, meas_dim: int) -> None:
-        """Try the function at each state; `ModelError` unless it gives a positive definite covariance."""
+        """Check the function at each state; raise `ModelError` unless it gives a positive definite covariance."""
         at = pose_vector("pose", pose)
         for state in state_table("states", states):
             probe_covariance(self.function, (state, at, self.params), meas_dim, definite=True)

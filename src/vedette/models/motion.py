@@ -1,4 +1,4 @@
-"""Motion and survival models: how a target moves, and whether it goes on living."""
+"""Motion and survival models of a target."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ METHODS = {"ekf": LINEARISED, "ukf": UNSCENTED, "ckf": CUBATURE}
 
 
 def resolve_method(name: str, method: str, has_jacobian: bool, *, bends: bool = False) -> int:
-    """The kernel's number of a Gaussian method; "auto" is the EKF where there is a Jacobian, else the UKF.
+    """Return the kernel's number of a Gaussian method; "auto" is the EKF if there is a Jacobian, else the UKF.
 
-    bends: whether "auto" may linearise again at each measurement, where there is a Jacobian.
+    bends: True if "auto" may linearise again at each measurement, with a Jacobian.
 
     Raises:
-        InputError: unknown method, or "ekf" without a Jacobian.
+        InputError: an unknown method, or "ekf" without a Jacobian.
     """
     if one_of(name, method, ("auto", *METHODS)) == "auto":
         return UNSCENTED if not has_jacobian else SWITCHED if bends else LINEARISED
@@ -35,7 +35,7 @@ def resolve_method(name: str, method: str, has_jacobian: bool, *, bends: bool = 
 
 @model_function("transition_jacobian")
 def _no_transition_jacobian(state: Floats, dt: float, params: Floats, out: Floats) -> None:
-    """Fills the place of a missing Jacobian in a kernel bundle whose method never asks for one."""
+    """Placeholder for a missing Jacobian in a kernel bundle whose method never calls it."""
     raise NotImplementedError("this motion model has no Jacobian")
 
 
@@ -74,7 +74,7 @@ class MotionModel:
         resolve_method("MotionModel.method", self.method, self.transition_jacobian is not None)
 
     def propagate(self, states: ArrayLike, dt: float) -> Floats:
-        """(n, state_dim) states after `dt` seconds without process noise; one state may be given as a vector.
+        """Return the states after `dt` seconds without process noise, (n, state_dim); one state may be a vector.
 
         Raises:
             ModelError: the transition function raised.
@@ -85,11 +85,11 @@ class MotionModel:
         return out
 
     def noise_cov(self, state: ArrayLike, dt: float) -> Floats:
-        """(state_dim, state_dim) process noise covariance over `dt` seconds from `state`."""
+        """Return the process noise covariance over `dt` seconds from `state`, (state_dim, state_dim)."""
         return np.asarray(self.noise_covs(state_table("state", state, self.state_dim)[:1], dt)[0])
 
     def noise_covs(self, states: ArrayLike, dt: float) -> Floats:
-        """(n, state_dim, state_dim) process noise covariances over `dt` seconds from each of (n, state_dim) states.
+        """Return the process noise covariances over `dt` seconds from each state, (n, state_dim, state_dim).
 
         Raises:
             ModelError: the noise function raised.
@@ -100,10 +100,10 @@ class MotionModel:
         return out
 
     def check(self, states: ArrayLike, dt: float = 1.0) -> None:
-        """Try every function at each state.
+        """Check every function at each state.
 
         Raises:
-            ModelError: names the function, the state, what was expected and what came.
+            ModelError: an invalid result; the message has the function, the state, the expected and the given value.
         """
         dt = positive("dt", dt)
         shape = (self.state_dim, self.state_dim)
@@ -117,7 +117,7 @@ class MotionModel:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SurvivalModel:
-    """Probability that a target lives through a time step.
+    """Probability that a target survives a time step.
 
     Attributes:
         function: model function of kind `prob_survival`.
@@ -132,12 +132,12 @@ class SurvivalModel:
         object.__setattr__(self, "params", params_vector("SurvivalModel.params", self.params))
 
     def prob(self, states: ArrayLike, dt: float) -> Floats:
-        """(n,) survival probabilities over `dt` seconds."""
+        """Return the survival probabilities over `dt` seconds, (n,)."""
         table = state_table("states", states)
         return numbers_at(self.function, table, real("dt", dt), self.params)
 
     def check(self, states: ArrayLike, dt: float = 1.0) -> None:
-        """Try the function at each state; `ModelError` unless it gives a probability."""
+        """Check the function at each state; raise `ModelError` unless it gives a probability."""
         dt = positive("dt", dt)
         for state in state_table("states", states):
             probe_probability(self.function, (state, dt, self.params))
@@ -145,7 +145,7 @@ class SurvivalModel:
 
 @lru_cache(maxsize=1000)
 def kernel_motion(motion: MotionModel, survival: SurvivalModel) -> Motion:
-    """The bundle of functions and parameters that prediction kernels take; one for the two."""
+    """Return the functions and parameters for prediction kernels; the same object for the same two models."""
     jacobian = motion.transition_jacobian
     return Motion(
         motion.transition,
@@ -174,12 +174,12 @@ def constant_survival(prob_survival: Probability = 0.98, period: Positive | None
     """The same probability of survival everywhere.
 
     Args:
-        prob_survival: probability of living on to the next scan (paper: 0.98), or through the period; through dt
-            seconds then prob_survival^(dt / period), in however many steps.
-        period: time for which the probability is meant; none: a scan, however long after another [s].
+        prob_survival: probability of surviving until the next scan (paper: 0.98), or through the period; over dt
+            seconds it is then prob_survival^(dt / period), in any number of steps.
+        period: time to which the probability refers; none: one scan interval of any length [s].
 
     Raises:
-        InputError: no probability, or no period above 0.
+        InputError: a number that is not a probability, or a period that is not above 0.
     """
     chance = probability("prob_survival", prob_survival)
     if period is None:

@@ -1,4 +1,4 @@
-"""Built-in measurement noise: constant, and growing with the target's distance, as in the paper or axis by axis."""
+"""Built-in measurement noise: constant, or growing with the target's distance, as in the paper or axis by axis."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def _by_axis(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
 
 @part("constant", "noise", std="stds")
 def constant_noise(stds: Positives) -> NoiseModel:
-    """The same standard deviations everywhere, of independent noise.
+    """Independent noise with the same standard deviations everywhere.
 
     Args:
         stds: standard deviation of each measurement component; a bearing in radians [rad, m].
@@ -86,7 +86,7 @@ def constant_noise(stds: Positives) -> NoiseModel:
 
 @part("by_axis", "noise")
 def axis_noise(std: PositivePair, growth: NonNegativePair) -> NoiseModel:
-    """Of a position: standard deviations std + growth d^2 along each axis, d the target's offset along it.
+    """Noise of positions: standard deviations std + growth d^2 along each axis, with d the target's offset along it.
 
     Args:
         std: (2,) standard deviation along x and y at offset 0 [m].
@@ -111,10 +111,10 @@ def range_dependent_noise(
 ) -> NoiseModel:
     """Noise that grows with the distance d of the target (paper section IV; paper-notes 3).
 
-    Standard deviations sigma_range + eta_range d^2 and sigma_bearing + eta_bearing d. With only `sigma_bearing` given
-    it serves a bearing-only sensor, with only `sigma_range` a range-only one, with both [bearing, range]. With one of
-    `sigma_range_rate`, `sigma_elevation` and `sigma_altitude` it serves measurements with this third component. The
-    distance is that in the plane.
+    The standard deviations are sigma_range + eta_range d^2 and sigma_bearing + eta_bearing d. With only `sigma_bearing`
+    the model is for bearing-only sensors, with only `sigma_range` for range-only sensors, and with both for [bearing,
+    range]. One of `sigma_range_rate`, `sigma_elevation` and `sigma_altitude` adds this third component. The distance is
+    that in the plane.
 
     Args:
         sigma_range: m, above 0 (paper: 10).
@@ -149,7 +149,7 @@ def range_dependent_noise(
 
 
 def _growth(component: str, sigma: float | None, eta: float) -> list[float]:
-    """[sigma, eta] of one component; empty where the sensor does not measure it."""
+    """Return [sigma, eta] of one component; empty if the sensor does not measure it."""
     if sigma is not None:
         return [positive(f"sigma_{component}", sigma), non_negative(f"eta_{component}", eta)]
     if eta != 0.0:

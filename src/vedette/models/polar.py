@@ -2,9 +2,9 @@
 
 A bearing is atan2(dy, dx) from the +x axis in (-pi, pi] rad, not relative to the heading (paper-notes 2); a range
 is in metres. A range rate is the time derivative of the range in m/s: the component of the target's velocity relative
-to the sensor along the line of sight, positive where the target moves away. A target exactly at the sensor has no
-bearing and no line of sight: its range rate is 0 and its Jacobian rows are zero, so that such a measurement moves
-nothing.
+to the sensor along the line of sight, positive if the target moves away. A target exactly at the sensor has no
+bearing and no line of sight: its range rate is 0 and its Jacobian rows are zero, so that such a measurement has no
+effect on the state.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ def _bearing_range_rate_jacobian(state: Floats, pose: Floats, params: Floats, ou
     _range_row(dx, dy, out, 1)
     vx, vy = _relative_velocity(state, pose)
     square = dx * dx + dy * dy
-    # The velocity across the line of sight over the distance, at which the line turns.
+    # Turn rate of the line of sight: the velocity across it divided by the distance.
     turning = (dx * vy - dy * vx) / square if square > 0.0 else 0.0
     for j in range(out.shape[1]):
         out[2, j] = 0.0
@@ -132,10 +132,10 @@ def bearing_range() -> MeasurementModel:
 
 @part("bearing_range_rate", "measurement")
 def bearing_range_rate() -> MeasurementModel:
-    """z = [bearing in rad, range in m, range rate in m/s], of a Doppler radar; the range rate positive where it grows.
+    """z = [bearing in rad, range in m, range rate in m/s] of a Doppler radar; positive if the range grows.
 
-    The range rate is relative to the sensor, whose velocity in m/s are components 6 and 7 of its pose, those after the
-    components of cameras and budgets; a sensor with a shorter pose is at rest. States are [px, py, vx, vy, ...].
+    The range rate is relative to the sensor. The sensor's velocity in m/s is in components 6 and 7 of its pose, after
+    the components of cameras and budgets; a sensor with a shorter pose is at rest. States are [px, py, vx, vy, ...].
     """
     functions = _bearing_range_rate, np.empty(0), _bearing_range_rate_jacobian
     return MeasurementModel(3, *functions, places=_places, components=("bearing", "range", "range_rate"))

@@ -1,7 +1,7 @@
-"""Trial calls of model functions: does this function, at this state, give a valid value of its kind?
+"""Trial calls of model functions, to check that they give valid values of their kind.
 
-A compiled function checks no index, so a slip in a user's function can otherwise end as a plausible wrong number. The
-checks here call it once in plain Python, where an index is checked, and once compiled, on an `out` full of NaN.
+A compiled function does not check indices, so an error in a user's function could otherwise give a plausible wrong
+number. The checks call it once in plain Python, which checks indices, and once compiled, with an `out` full of NaN.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from vedette.kernels.base.compile import SIGNATURES
 from vedette.kernels.base.types import Floats
 from vedette.models.functions import ModelFunction, call, describe
 
-# Relative to the largest entry: rounding of products of matrices is far below, a forgotten term far above.
+# Relative to the largest entry: rounding in products of matrices is far smaller, a missing term far larger.
 SYMMETRY_TOLERANCE = 1e-9
 EIGENVALUE_TOLERANCE = 1e-9
 
@@ -32,7 +32,7 @@ def _copies(args: tuple[Any, ...]) -> tuple[Any, ...]:
 
 
 def _check_indices(function: ModelFunction, args: tuple[Any, ...]) -> None:
-    """Look for an index out of range. Other exceptions of plain Python do not count: compiled, 1 / 0 is inf."""
+    """Raise `ModelError` for an index out of range; ignore other exceptions, since 1 / 0 is inf in compiled code."""
     plain = getattr(function, "py_func", function)
     try:
         with np.errstate(all="ignore"):
@@ -44,7 +44,7 @@ def _check_indices(function: ModelFunction, args: tuple[Any, ...]) -> None:
 
 
 def _checked_call(function: ModelFunction, *args: Any) -> Any:
-    """The function's result, once it is known to keep to its arrays and to leave its inputs alone."""
+    """Return the function's result after checking that its indices are in range and its inputs unchanged."""
     _check_indices(function, args)
     before = _copies(args)
     result = call(function, *args)
@@ -56,7 +56,7 @@ def _checked_call(function: ModelFunction, *args: Any) -> Any:
 
 
 def probe_array(function: ModelFunction, args: tuple[Any, ...], shape: tuple[int, ...]) -> Floats:
-    """What `function(*args, out)` writes: every entry of an `out` of `shape` must be written and finite."""
+    """Return the `out` of `shape` that `function(*args, out)` writes; every entry must be written and finite."""
     out = np.full(shape, np.nan)
     _checked_call(function, *args, out)
     if not np.isfinite(out).all():
@@ -65,7 +65,7 @@ def probe_array(function: ModelFunction, args: tuple[Any, ...], shape: tuple[int
 
 
 def probe_covariance(function: ModelFunction, args: tuple[Any, ...], dim: int, *, definite: bool) -> Floats:
-    """What a covariance function writes: symmetric, and positive definite (or semidefinite)."""
+    """Return the covariance that a function writes; it must be symmetric and positive definite (or semidefinite)."""
     cov = probe_array(function, args, (dim, dim))
     scale = np.abs(cov).max()
     if np.abs(cov - cov.T).max() > SYMMETRY_TOLERANCE * scale:
@@ -73,7 +73,7 @@ def probe_covariance(function: ModelFunction, args: tuple[Any, ...], dim: int, *
     variances = np.diagonal(cov)
     if (variances <= 0.0).any() if definite else (variances < 0.0).any():
         raise _fault(function, args, f"variances {'above 0' if definite else 'of at least 0'}", variances.tolist())
-    # Eigenvalues of the correlation matrix, so that metres and radians can stand side by side.
+    # Eigenvalues of the correlation matrix, so that units such as metres and radians do not matter.
     stds = np.sqrt(np.where(variances > 0.0, variances, 1.0))
     lowest = float(np.linalg.eigvalsh(cov / np.outer(stds, stds))[0])
     if lowest <= 0.0 if definite else lowest < -EIGENVALUE_TOLERANCE:
@@ -83,7 +83,7 @@ def probe_covariance(function: ModelFunction, args: tuple[Any, ...], dim: int, *
 
 
 def probe_probability(function: ModelFunction, args: tuple[Any, ...]) -> float:
-    """What a probability function returns: a number in [0, 1]."""
+    """Return the value of a probability function; it must be in [0, 1]."""
     value = float(_checked_call(function, *args))
     if not 0.0 <= value <= 1.0:
         raise _fault(function, args, "a probability in [0, 1]", value)
@@ -91,7 +91,7 @@ def probe_probability(function: ModelFunction, args: tuple[Any, ...]) -> float:
 
 
 def probe_log_intensity(function: ModelFunction, args: tuple[Any, ...]) -> float:
-    """What a log intensity function returns: a number below +inf; -inf says that no clutter falls there."""
+    """Return the value of a log intensity function; it must be below +inf, and -inf means no clutter there."""
     value = float(_checked_call(function, *args))
     if math.isnan(value) or value == math.inf:
         raise _fault(function, args, "a log intensity below +inf", value)
@@ -99,7 +99,7 @@ def probe_log_intensity(function: ModelFunction, args: tuple[Any, ...]) -> float
 
 
 def probe_marginals(function: ModelFunction, params: Floats) -> None:
-    """What an association function writes of two rows that contend for a measurement: distributions over options."""
+    """Check an association function on two rows that share a measurement: each row must be a distribution."""
     offsets, columns = np.array([0, 3, 7]), np.array([0, MISSED, ABSENT, 1, 0, MISSED, ABSENT])
     args = (offsets, columns, np.log([4.0, 0.5, 0.1, 3.0, 2.0, 0.3, 0.2]), params)
     out = np.full(len(columns), np.nan)
@@ -115,9 +115,9 @@ def probe_marginals(function: ModelFunction, params: Floats) -> None:
 def probe_jacobian(
     function: ModelFunction, value_function: ModelFunction, args: tuple[Any, ...], shape: tuple[int, int], angular: Any
 ) -> Floats:
-    """What a Jacobian function writes, compared with central differences of `value_function`.
+    """Return the Jacobian that a function writes, after comparing it with central differences of `value_function`.
 
-    The comparison is loose (1 in 100 of the largest slope): it finds a wrong sign, place or unit, not a rounding.
+    The tolerance is wide (1 % of the largest slope): it detects a wrong sign, index or unit, but not rounding.
     """
     jacobian = probe_array(function, args, shape)
     slopes = _central_differences(value_function, args, shape, angular)

@@ -14,7 +14,7 @@ from vedette.models.fields import Real
 
 
 def tell_degrees(field: str, corners: Floats) -> None:
-    """Warn of an area whose corners are rather longitudes and latitudes."""
+    """Warn of an area whose corners look like longitudes and latitudes."""
     if look_like_degrees(corners):
         width, height = np.ptp(corners, axis=0)
         got = f"an area of {width:.3g} by {height:.3g} m at {tuple(corners[0].tolist())}"
@@ -52,20 +52,20 @@ class Region:
 
     @property
     def corners(self) -> Floats:
-        """(4, 2) in order, from the south-west one to the east."""
+        """Corners, (4, 2), counter-clockwise from the south-west."""
         x, y = (self.x_min, self.x_max, self.x_max, self.x_min), (self.y_min, self.y_min, self.y_max, self.y_max)
         return np.column_stack([x, y])
 
     @property
     def bounds(self) -> Floats:
-        """(4,) x_min, x_max, y_min, y_max."""
+        """Bounds x_min, x_max, y_min, y_max, (4,)."""
         return np.array([self.x_min, self.x_max, self.y_min, self.y_max])
 
     def contains(self, positions: ArrayLike) -> Bools:
-        """(n,) whether each of (n, 2) positions lies inside, the edge included."""
+        """Return True for each of (n, 2) positions that lies inside or on the edge, (n,)."""
         x, y = np.moveaxis(as_array("positions", positions, "fiu", "numbers"), -1, 0)
         return np.asarray((x >= self.x_min) & (x <= self.x_max) & (y >= self.y_min) & (y <= self.y_max))
 
     def sample(self, num: int, *, rng: np.random.Generator) -> Floats:
-        """(num, 2) positions drawn uniformly."""
+        """Return positions drawn uniformly, (num, 2)."""
         return generator(rng).uniform([self.x_min, self.y_min], [self.x_max, self.y_max], size=(num, 2))

@@ -1,7 +1,7 @@
 """Clutter that is uniform in the surveillance region, with the Jacobian of each kind of measurement.
 
 Uniform in x, y is not uniform in bearing and range: the intensity at (bearing, range) is rate * range / area inside the
-region and 0 outside (paper-notes 5). Bearings or ranges alone are its integrals along the ray or round the arc.
+region and 0 outside (paper-notes 5). The intensity of bearings or ranges alone is its integral along the ray or arc.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def _inside(x: float, y: float, params: Floats) -> bool:
 
 @kernel
 def _clip_ray(start: float, slope: float, low: float, high: float, near: float, far: float) -> tuple[float, float]:
-    """The part of [near, far] in which start + slope * t lies in [low, high]; empty when near > far."""
+    """Return the part of [near, far] in which start + slope * t lies in [low, high]; empty if near > far."""
     if slope == 0.0:
         return (near, far) if low <= start <= high else (1.0, 0.0)
     first, second = (low - start) / slope, (high - start) / slope
@@ -48,7 +48,7 @@ def _clip_ray(start: float, slope: float, low: float, high: float, near: float, 
 
 @kernel
 def _arc_in_quadrant(radius: float, x_low: float, x_high: float, y_low: float, y_high: float) -> float:
-    """Angle in [0, pi/2] over which radius * (cos, sin) lies in the box; both coordinates are monotone there."""
+    """Return the angle within [0, pi/2] over which radius * (cos, sin) lies in the box; both are monotone there."""
     if x_high < 0.0 or y_high < 0.0 or x_low > radius or y_low > radius:
         return 0.0
     start = max(math.acos(min(x_high / radius, 1.0)), math.asin(max(y_low / radius, 0.0)))
@@ -212,11 +212,11 @@ def region_clutter(
 ) -> ClutterModel:
     """Poisson clutter, uniform over the surveillance region (paper section IV; paper-notes 5).
 
-    It is drawn by putting uniform positions, at rest, through the sensor's measurement function. Range rates are
+    Clutter is drawn by applying the sensor's measurement function to uniform positions at rest. Range rates are
     uniform from -max_range_rate to max_range_rate, and heights from 0 to max_height.
 
     Args:
-        rate: expected number a scan (paper: 25).
+        rate: expected number per scan (paper: 25).
         region: the surveillance region.
         kind: kind of measurement, a key of `vedette.internal.quantities.COMPONENTS`. For other measurements, use a
             `ClutterModel` with a custom log intensity and sampler.

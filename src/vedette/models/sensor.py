@@ -1,4 +1,4 @@
-"""A sensor: its measurement, noise, detection and clutter together."""
+"""Sensor model: measurement, noise, detection and clutter."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from vedette.models.motion import resolve_method
 
 @model_function("measurement_jacobian")
 def _no_measurement_jacobian(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
-    """Fills the place of a missing Jacobian in a kernel bundle whose method never asks for one."""
+    """Placeholder for a missing Jacobian in a kernel bundle whose method never calls it."""
     raise NotImplementedError("this measurement model has no Jacobian")
 
 
 @model_function("mean_prob_detection")
 def _no_mean_detection(mean: Floats, cov: Floats, pose: Floats, params: Floats) -> float:
-    """Fills the place of a missing mean in a kernel bundle that never asks for one; no probability."""
+    """Placeholder for a missing mean in a kernel bundle that never calls it; returns NaN."""
     return math.nan
 
 
@@ -46,21 +46,21 @@ _PARTS: dict[str, type] = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SensorModel:
-    """All that a filter knows of a sensor, apart from where it is.
+    """Model of a sensor for filters, without its pose.
 
     Attributes:
         measurement, noise, detection, clutter: the four models.
-        method: "ekf", "ukf", "ckf", or "auto": the EKF where measurements are close to linear for their noise, else a
-            linearisation of its own for each measurement; the UKF where the measurement has no Jacobian.
-        detection_at: of a predicted Gaussian, the filters take the probability of detection at its "centre", as the
-            paper does, or its "mean" over the Gaussian, by nodes over the position. With the mean, where P_D differs
-            over the Gaussian, a miss moves the density to where it is low, and a detection has the mean P_D of the
+        method: "ekf", "ukf", "ckf", or "auto": the EKF if measurements are close to linear for their noise, else a
+            separate linearisation for each measurement; the UKF if the measurement has no Jacobian.
+        detection_at: filters evaluate the probability of detection at the "centre" of a predicted Gaussian, as in the
+            paper, or as its "mean" over the Gaussian, with nodes over the position. With the mean, if P_D varies over
+            the Gaussian, a miss moves the density to places of low P_D, and a detection has the mean P_D of the
             density after it.
         meas_dim: number of components of a measurement.
 
     Raises:
         InputError: a part of another type, parts for different numbers of measurement components or different angles,
-            noise of an angle beyond pi, "ekf" without a Jacobian.
+            a standard deviation of an angle above pi, or "ekf" without a Jacobian.
     """
 
     measurement: MeasurementModel
@@ -89,7 +89,7 @@ class SensorModel:
         self._check_bearings()
 
     def _check_bearings(self) -> None:
-        """Noise of angles that says nothing of them is in other units; so it may be long before."""
+        """Raise `InputError` for a standard deviation of an angle above pi; warn of one that looks like degrees."""
         stds = self.noise.least_stds
         if stds is None:
             return
@@ -102,9 +102,9 @@ class SensorModel:
             warn_implausible(field, expected, got, meant)
 
     def to_kernel(self, detection_at: str | None = None) -> Sensor:
-        """The bundle of functions and parameters that kernels take.
+        """Return the functions and parameters for kernels.
 
-        detection_at: instead of the sensor's own; its "mean" is then by the model's `mean_function`, where it has one.
+        detection_at: replaces the sensor's own; "mean" then uses the model's `mean_function`, if it has one.
         """
         if self.detection.is_constant or (detection_at or self.detection_at) == "centre":
             return _bundle_of(self, AT_CENTRE)
@@ -113,16 +113,16 @@ class SensorModel:
         return _bundle_of(self, BY_NODES if self.detection.mean_function is None else CLOSED_FORM)
 
     def mean_detection(self, means: ArrayLike, covs: ArrayLike, pose: ArrayLike) -> Floats:
-        """(n,) mean probability of detection over each of n Gaussians, whatever `detection_at` says.
+        """Return the mean probability of detection over each of n Gaussians, (n,), for any `detection_at`.
 
         Args:
-            means: (n, state_dim).
-            covs: (n, state_dim, state_dim), positive definite.
-            pose: (3 or more,) of the sensor.
+            means: (n, state_dim) means.
+            covs: (n, state_dim, state_dim) covariances, positive definite.
+            pose: (3 or more,) pose of the sensor.
 
         Raises:
             InputError: arrays of other shapes, or with numbers that are not finite.
-            ModelError: the detection model gave no probability.
+            ModelError: the detection model returned a value that is not a probability.
         """
         centres = float_array("means", means, (None, None))
         num, dim = centres.shape
@@ -130,13 +130,13 @@ class SensorModel:
         return detection_probabilities(self.to_kernel("mean"), at, centres, spreads)
 
     def check(self, states: ArrayLike, pose: ArrayLike) -> None:
-        """Try every function of the sensor at each of (n, state_dim) states, seen from `pose`.
+        """Check every function of the sensor at each of (n, state_dim) states, seen from `pose`.
 
-        Call it once on typical states before a long run: a function that raises, leaves part of `out` unwritten,
-        reaches outside its arrays, or gives a value not of its kind is found here rather than as a wrong number.
+        Call it once on typical states before a long run. It detects functions that raise, leave part of `out`
+        unwritten, use indices outside their arrays, or return an invalid value.
 
         Raises:
-            ModelError: names the function, the state, what was expected and what came.
+            ModelError: an invalid result; the message has the function, the state, the expected and the given value.
         """
         table, at = state_table("states", states), pose_vector("pose", pose)
         self.measurement.check(table, at)
@@ -148,7 +148,7 @@ class SensorModel:
 
 @lru_cache(maxsize=1000)
 def _bundle_of(model: SensorModel, rule: int) -> Sensor:
-    """Made once a model, as kernels know a bundle that they have met."""
+    """Return the functions and parameters of a model; cached, since kernels recognise a bundle they have seen."""
     jacobian, mean = model.measurement.jacobian, model.detection.mean_function
     return Sensor(
         model.measurement.function,

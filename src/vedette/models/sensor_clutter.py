@@ -1,7 +1,7 @@
-"""Clutter that is uniform in a figure around the sensor, and so moves and turns with it.
+"""Clutter that is uniform in a figure around the sensor, which moves and turns with it.
 
-The figure is a disc or a square, or the part of it within an angle of the heading. Per square metre the intensity is
-rate / area in it and 0 elsewhere; at (bearing, range) it has the Jacobian too, rate * range / area (paper-notes 5).
+The figure is a disc or a square, or the part of it within an angle of the heading. The intensity per square metre is
+rate / area inside and 0 outside; at (bearing, range) it includes the Jacobian, rate * range / area (paper-notes 5).
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from vedette.models.fields import HalfWidth, NonNegative, Positive, part
 from vedette.models.functions import ModelFunction, model_function
 from vedette.models.measurement import MeasurementModel
 
-# params of every function here: log rate, radius or half side, 1 of a square and 0 of a disc, half width of the sector,
-# `plane_params`
+# params of every function here: log rate, radius or half side, 1 for a square or 0 for a disc, half width of the
+# sector, `plane_params`
 
 
 @kernel
@@ -40,7 +40,7 @@ def _square_up_to(angle: float) -> float:
 
 @kernel
 def _area(heading: float, size: float, is_square: bool, half_width: float) -> float:
-    """Of the figure, m^2; that of a part of a square depends on the heading."""
+    """Return the area of the figure in m^2; for a sector of a square it depends on the heading."""
     if is_square:
         return size * size * (_square_up_to(heading + half_width) - _square_up_to(heading - half_width))
     return half_width * size * size
@@ -48,7 +48,7 @@ def _area(heading: float, size: float, is_square: bool, half_width: float) -> fl
 
 @kernel
 def _log_density(dx: float, dy: float, heading: float, params: Floats) -> float:
-    """Log of the expected number per square metre at an offset from the sensor."""
+    """Return the log of the expected number per square metre at an offset from the sensor."""
     size, is_square, half_width = params[1], params[2] > 0.0, params[3]
     reach = max(abs(dx), abs(dy)) if is_square else math.sqrt(dx * dx + dy * dy)
     if not reach <= size or (half_width < math.pi and abs(wrap_angle(math.atan2(dy, dx) - heading)) > half_width):
@@ -106,7 +106,7 @@ class _AroundSampler:
         angles = heading + self.half_width * (2.0 * share[:, 0] - 1.0)
         reach = np.full(num, self.size)
         if self.is_square:
-            # The inverse of the area up to an angle, so that equal areas are equally likely.
+            # Inverse of the area up to an angle, so that equal areas are equally likely.
             ends = [_square_up_to(heading + side * self.half_width) for side in (-1.0, 1.0)]
             quarters, rest = np.divmod(ends[0] + share[:, 0] * (ends[1] - ends[0]), 1.0)
             within = np.arctan(2.0 * rest - 1.0)
@@ -130,14 +130,14 @@ def around_sensor(
 ) -> ClutterModel:
     """Clutter uniform over a disc, a square along the axes, or a sector of either, centred on the sensor.
 
-    Points thrown over a larger figure of which only this part is kept: `rate` is then their number times the share of
-    the area that is kept, such as pi / 4 where a square is clipped to the disc in it.
+    If a simulator draws points over a larger figure and keeps only this part, `rate` is their number times the share of
+    the area that is kept, such as pi / 4 for a square that is clipped to the disc in it.
 
     Args:
-        rate: expected number a scan in the figure.
-        kind: "position", "bearing_range" or "bearing_range_rate": what the sensor measures.
-        radius: of a disc [m].
-        half_side: of a square along the axes, half its side; one of the two is to be given [m].
+        rate: expected number per scan in the figure.
+        kind: kind of the sensor's measurements: "position", "bearing_range" or "bearing_range_rate".
+        radius: radius of a disc [m].
+        half_side: half the side of a square along the axes; give either this or the radius [m].
         half_width_rad: greatest angle from the heading, either side [rad].
         max_range_rate: largest range rate of a false measurement, either way, where range rates are measured, uniform
             up to it; none: 300 [m/s].

@@ -1,4 +1,4 @@
-"""The targets as every sensor's filter knows them: how they move, live on and appear."""
+"""Target model: motion, survival and birth, shared by all filters."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ _KINDS = {"motion": MotionModel, "survival": SurvivalModel, "birth": BirthModel}
 
 @dataclass(frozen=True, slots=True)
 class TargetModel:
-    """What all sensors know of the targets; held once, and shared by every filter that tracks them.
+    """Model of the targets; one object is shared by all filters that track them.
 
-    Two are equal if they are of the very same parts.
+    Two target models are equal if their parts are the same objects.
 
     Attributes:
-        motion: how a target moves.
-        survival: whether it goes on living.
-        birth: where targets appear.
+        motion: motion model.
+        survival: survival model.
+        birth: birth model.
         state_dim: length of a target's state.
 
     Raises:

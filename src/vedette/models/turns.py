@@ -40,9 +40,9 @@ def with_beam(pose: ArrayLike, velocity: ArrayLike, bearing: float, rate: float)
     """Return the pose of a scan that is one turn of the beam; see `vedette.kernels.gaussian.beam`.
 
     Args:
-        pose: (3 or more,) of the sensor at the time of the scan, the middle of the turn.
-        velocity: (2,) of the sensor, m/s.
-        bearing: of the beam at that time, rad from east.
+        pose: (3 or more,) pose of the sensor at the time of the scan, the middle of the turn.
+        velocity: (2,) velocity of the sensor, m/s.
+        bearing: bearing of the beam at that time, rad from east.
         rate: turn rate, rad/s, counter-clockwise positive; 0: the sensor does not turn.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Targets that no sensor has found yet: how many there are at first, and where they come, go and end."""
+"""Model of undetected targets on a grid: initial number, births, motion and survival."""
 
 from __future__ import annotations
 
@@ -16,32 +16,32 @@ from vedette.models.arguments import float_array, non_negative, positive, probab
 from vedette.models.fields import NonNegative, Positive, Probability
 from vedette.models.grid import CellGrid
 
-# Standard deviations beyond which a Gaussian is taken as 0: what lies there is below the rounding of a sum.
+# Standard deviations beyond which a Gaussian is taken as 0: the mass there is below the rounding of a sum.
 _REACH = 8.5
-LEARNT: Literal["learnt"] = "learnt"  # in place of a birth rate that nobody knows
+LEARNT: Literal["learnt"] = "learnt"  # in place of an unknown birth rate
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class UndetectedModel:
-    """How the expected number of undetected targets in each cell of a grid changes with time.
+    """Model of the expected number of undetected targets in each cell of a grid over time.
 
-    Within a cell they are anywhere alike, and each moves with a velocity of its own, drawn anew at every prediction
-    from a Gaussian with mean 0. Those that leave the region are lost.
+    Targets are uniform within a cell. Each moves with its own velocity, drawn again at every prediction from a Gaussian
+    with mean 0. Targets that leave the region are lost.
 
     Attributes:
         grid: the cells.
-        expected: mean number of undetected targets in the region at the first scan, before it, spread evenly; or
-            (num_cells,) that in each cell.
-        birth_rate: mean number of targets that appear in the region in a second; learnt: estimated from the first
+        expected: mean number of undetected targets in the region just before the first scan, spread evenly; or
+            (num_cells,) mean number in each cell.
+        birth_rate: mean number of targets that appear in the region per second; learnt: estimated from the first
             detections, in beliefs that have an intensity of undetected targets [1/s].
-        enters: where they appear: anywhere alike, or along the border of the region, in the cells there.
+        enters: places of appearance: anywhere in the region, uniformly, or in the cells along its border.
         speed: standard deviation of each of the two components of the velocity [m/s].
-        survival: probability of living through a second; none: as survival says of a scan, at the middle of a cell and
-            at rest.
-        prior_rate: where the birth rate is learnt, the mean of its prior density, a gamma of shape 1/2 [1/s].
+        survival: probability of surviving one second; none: that of the survival model over a scan, for a target at
+            rest at the centre of a cell.
+        prior_rate: mean of the prior density of a learnt birth rate, a gamma density of shape 1/2 [1/s].
 
     Raises:
-        InputError: names the field, what was expected and what came.
+        InputError: an invalid field; the message has its name, the expected and the given value.
     """
 
     grid: CellGrid
@@ -73,47 +73,47 @@ class UndetectedModel:
         object.__setattr__(self, "expected", values)
 
     def initial(self) -> Floats:
-        """(num_cells,) mean number of undetected targets in each cell at the first scan, before it."""
+        """Return the mean number of undetected targets in each cell just before the first scan, (num_cells,)."""
         num = self.grid.num_cells
         return np.full(num, self.expected / num) if np.ndim(self.expected) == 0 else np.array(self.expected)
 
     @property
     def is_learnt(self) -> bool:
-        """Whether the birth rate is learnt."""
+        """True if the birth rate is learnt."""
         return isinstance(self.birth_rate, str) and self.birth_rate == LEARNT
 
     @property
     def entering(self) -> Floats:
-        """(num_cells,) in what proportion targets that appear are shared out among the cells."""
+        """Weight of each cell for targets that appear, (num_cells,); births are in proportion to it."""
         return np.ones(self.grid.num_cells) if self.enters == "anywhere" else self.grid.border
 
     @property
     def first_rate(self) -> float:
-        """Birth rate before anything was measured, 1/s."""
+        """Birth rate before any measurement, 1/s."""
         return self.prior_rate if isinstance(self.birth_rate, str) else self.birth_rate
 
     def births(self, dt: float, rate: float | None = None) -> Floats:
-        """(num_cells,) mean number of targets that appear within `dt` seconds. rate: 1/s; None: `first_rate`."""
+        """Mean number of births in each cell in `dt` seconds, (num_cells,). rate: 1/s; None: `first_rate`."""
         number, shares = (self.first_rate if rate is None else rate) * non_negative("dt", dt), self.entering
         return np.asarray(number * shares / shares.sum())
 
     def predict(self, expected: Floats, dt: float, survival: Floats | float, rate: float | None = None) -> Floats:
-        """(num_cells,) mean number of undetected targets `dt` seconds after `expected`: who lives moves, others appear.
+        """Return the mean number of undetected targets in each cell `dt` seconds later, (num_cells,).
 
         out_j = births_j + sum over cells i of P(j | i) survival_i expected_i, with P(j | i) the probability that a
-        point anywhere in cell i alike is in cell j after a Gaussian step of standard deviation speed * dt.
+        uniform point in cell i is in cell j after a Gaussian step of standard deviation speed * dt.
 
         Args:
             expected: (num_cells,) mean number in each cell.
-            dt: s, from 0.
-            survival: probability of living through `dt`: one number, or (num_cells,).
-            rate: of births, 1/s; None: `first_rate`.
+            dt: time step in s, at least 0.
+            survival: probability of surviving `dt`: one number, or (num_cells,).
+            rate: birth rate, 1/s; None: `first_rate`.
         """
         living = (expected * survival).reshape(self.grid.rows, self.grid.columns)
         return moved_in_cells(living, *self.shares(dt)).ravel() + self.births(dt, rate)
 
     def shares(self, dt: float) -> tuple[Floats, Floats]:
-        """Shares of a cell's targets that go 0, 1, 2, ... columns, and rows, to one side within `dt` seconds."""
+        """Return the shares of a cell's targets that move 0, 1, 2, ... columns, and rows, to one side in `dt` s."""
         step, grid = self.speed * non_negative("dt", dt), self.grid
         width, height = grid.cell_size
         return cell_shares(step, width, grid.columns), cell_shares(step, height, grid.rows)
@@ -121,14 +121,15 @@ class UndetectedModel:
 
 @lru_cache(maxsize=1000)
 def cell_shares(step: float, size: float, num: int) -> Floats:
-    """(num or less,) probability that a point anywhere in a cell alike lands 0, 1, 2, ... cells to one side.
+    """Probability that a uniform point in a cell moves 0, 1, 2, ... cells to one side, (num or less,).
 
-    The step is Gaussian with standard deviation `step`, cells are `size` long. With a = size / step and G the integral
-    of the standard normal distribution function Phi, G(x) = x Phi(x) + phi(x), it is the second difference
+    The step is Gaussian with standard deviation `step`, and cells are `size` long. With a = size / step and G the
+    integral of the standard normal distribution function Phi, G(x) = x Phi(x) + phi(x), the probability is the second
+    difference
 
         (G((k - 1) a) - 2 G(k a) + G((k + 1) a)) / a = (G(-(k - 1) a) - 2 G(-k a) + G(-(k + 1) a)) / a,   k > 0.
 
-    Nothing is said of cells that a step reaches with a probability below rounding.
+    Cells with a probability below rounding are left out.
     """
     if step == 0.0:
         return np.ones(1)
@@ -141,7 +142,7 @@ def cell_shares(step: float, size: float, num: int) -> Floats:
 
 
 def _integral_below(x: NDArray[np.floating]) -> Floats:
-    """G(-x) = phi(x) - x Phi(-x) for x >= 0, whose two terms are nearly equal where x is large."""
+    """Return G(-x) = phi(x) - x Phi(-x) for x >= 0; its two terms are nearly equal for large x."""
     from scipy.special import erfcx
 
     density = np.exp(-0.5 * x * x) / math.sqrt(2.0 * math.pi)
