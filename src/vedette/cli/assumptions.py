@@ -1,4 +1,4 @@
-"""What a command assumes in place of sections that a sensors file does not give."""
+"""Printing of the assumptions that replace sections missing from a sensors file."""
 
 from __future__ import annotations
 

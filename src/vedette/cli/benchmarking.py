@@ -1,4 +1,4 @@
-"""The command that puts planners and trackers beside the library's own: benchmark."""
+"""The command that compares planners and trackers with the library's own: benchmark."""
 
 from __future__ import annotations
 
@@ -71,14 +71,14 @@ def benchmark(
         entered += [entrant("tracker", each, seconds=seconds, folder=Path()) for each in trackers or ()]
     approve, num_runs = Approval(trust), runs or (_QUICK_RUNS if quick else _RUNS)
     chosen = _chosen(names, quick, entered)
-    for each in entered:  # before anything is kept
+    for each in entered:  # before any result is saved
         first = next((scene for scene in chosen if scene.role == each.role), None)
         if first is None:
             got = ", ".join(scene.name for scene in chosen)
             raise usage_error(f"expected a scene of {each.role}s for {each.name}, see --list; got {got}", "--scenes")
         check_entrant(each, campaign_of(first, each, num_runs, seed, out, approve=approve))
     for scene in chosen:
-        for own in (*(each for each in entered if each.role == scene.role), None):  # who may fail comes first
+        for own in (*(each for each in entered if each.role == scene.role), None):  # entrants that may fail come first
             folder = out / scene.name / (OWN if own is None else own.name)
             note(f"{scene.name}: {folder.name}")
             campaign = campaign_of(scene, own, num_runs, seed, out, approve=approve)

@@ -90,7 +90,7 @@ def calibrate(
 
 @contextmanager
 def _counting() -> Iterator[Callable[[], None]]:
-    """Show on a terminal how often the filter has processed the recording."""
+    """Show on a terminal how many times the filter has processed the recording."""
     from rich.progress import Progress, TextColumn, TimeElapsedColumn
 
     screen = console(stderr=True)

@@ -1,4 +1,4 @@
-"""The estimates of `calibrate`: as a table on the terminal, and as rows for `--json`."""
+"""Estimates of `calibrate`, as a table on the terminal and as rows for `--json`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _NOT_CONVERGED = (
 
 
 def calibration_document(calibration: Calibration, names: tuple[str, ...]) -> dict[str, Any]:
-    """Return a calibration as data; names: of the sensors."""
+    """Return a calibration as data. names: names of the sensors."""
     return {
         "parameters": [
             {
@@ -71,7 +71,7 @@ def print_windows(windows: list[CalibrationWindow], names: tuple[str, ...], *, p
 
 
 def _print_table(windows: list[CalibrationWindow], names: tuple[str, ...]) -> None:
-    """One row for each parameter and window."""
+    """Print the table of estimates, with one row for each parameter and window."""
     from rich.table import Table
 
     several = ["from (s)"] if len(windows) > 1 else []
@@ -95,7 +95,7 @@ def _print_table(windows: list[CalibrationWindow], names: tuple[str, ...]) -> No
 
 
 def _print_references(found: tuple[ParameterEstimate, ...], names: tuple[str, ...], position: bool) -> None:
-    """Print which estimates are relative to those of the first sensor."""
+    """Print the estimates that are relative to those of the first sensor."""
     first = {each.parameter.component for each in found if each.parameter.sensor == found[0].parameter.sensor}
     others = {each.parameter.component for each in found if each.parameter.sensor != found[0].parameter.sensor}
     name = names[found[0].parameter.sensor]
@@ -112,11 +112,11 @@ def _is_outside(each: ParameterEstimate) -> bool:
 
 
 def _ends(each: ParameterEstimate) -> tuple[str, str]:
-    """Both ends of the interval as text."""
+    """Return both ends of the interval as text."""
     return _number(each.ci_low, each), _number(each.ci_high, each)
 
 
 def _number(value: float, each: ParameterEstimate) -> str:
-    """Return a value with two significant digits of half the interval's width; with four of its own without one."""
+    """Return a value rounded to two digits of half the interval's width, or to four digits without an interval."""
     half = 0.5 * (each.ci_high - each.ci_low)
     return f"{value:.{max(0, 1 - math.floor(math.log10(half)))}f}" if half > 0.0 else f"{value:.4g}"

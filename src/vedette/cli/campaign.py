@@ -1,4 +1,4 @@
-"""The command that runs many runs, campaign, and what commands that do share."""
+"""The command that carries out many runs, campaign, and helpers of commands that do."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def campaign(
     gc.disable()
     from vedette.campaigns import load_spec, parse_shard, resolve
 
-    gc.freeze()  # before a user's code: what is loaded is searched for garbage neither now nor as the process ends
+    gc.freeze()  # before a user's code: loaded objects are not searched for garbage, now or at the end of the process
     gc.enable()
     resolved = resolve(load_spec(spec), spec.parent, approve=Approval(trust, spec))
     if runs is not None:
@@ -129,7 +129,7 @@ def _print_job(campaign: Campaign, count: int, time: str, command: list[str]) ->
 
 
 def load_workers(workers: int) -> None:
-    """Have what several workers need loaded, while this process reads what they are to do."""
+    """Start loading the modules of several workers while this process reads its input."""
     if (workers or processors()) > 1:
         load_ahead("vedette.cli")
 
@@ -137,7 +137,7 @@ def load_workers(workers: int) -> None:
 def carry_out(
     campaign: Campaign, folder: Path, workers: int, scheduler: str | None = None, redo_damaged: bool = False
 ) -> CampaignOutcome:
-    """Run a campaign with its progress shown; Ctrl-C says how to go on."""
+    """Run a campaign and show its progress; after Ctrl-C, print how to continue."""
     from vedette.campaigns import Progress, run_campaign
 
     with interruptible(f"{folder} keeps every run that is finished; the same command goes on from there"):
@@ -155,7 +155,7 @@ def carry_out(
 
 
 def report_failures(failed: tuple[FailedRun, ...]) -> None:
-    """Name runs that could not be finished, and end with status 1 if there are any."""
+    """Print the runs that failed, and exit with status 1 if there are any."""
     if not failed:
         return
     complain(f"failed: {pluralise(len(failed), 'run')}; the same command tries again:")
@@ -183,7 +183,7 @@ def _describe(campaign: Campaign) -> None:
     for cell in campaign.cells:
         say(f"  - {cell.name}")
         lines = cautions(cell.scenario)
-        if lines not in warned:  # once for all planners, filters and values of which it is true alike
+        if lines not in warned:  # once for all planners, filters and values with this warning
             warned[lines] = cell.name
             for line in lines:
                 note(f"cell {cell.name}: {line}")

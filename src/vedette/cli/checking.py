@@ -73,7 +73,7 @@ def _check_sensors(file: Path) -> dict[str, Any]:
 
 
 def code_faults(scenario: Scenario) -> list[str]:
-    """Return the faults of the code that a scenario names; a warning where others may have written it."""
+    """Return the faults of the code that a scenario names; print a warning if other users may have written it."""
     from vedette.scenarios.trust import code_of, not_own
 
     code = code_of(scenario.model)

@@ -1,6 +1,6 @@
-"""Strategies side by side, in a terminal.
+"""Comparison tables of strategies for a terminal.
 
-Labels that are too long are elided, numbers never: where they do not fit side by side they stand in lines.
+Labels that are too long are shortened. Numbers are never shortened: if they do not fit in a row, each has its own line.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ if TYPE_CHECKING:
     from vedette.campaigns.scores import StrategyScore
     from vedette.evaluation import Comparison
 
-# Of `vedette.evaluation.tables.header`, for a terminal of 80 columns; the caption under the table says the rest.
+# Short form of `vedette.evaluation.tables.header` for a terminal of 80 columns; the caption of the table explains it.
 _SHORT_HEADER = ("loc.", "card.", "difference", "95 %", "won")
 _SHORT_SCORES = ("worst", "difference", "N error", "tracked", "s", "runs")  # of `vedette.campaigns.scores.score_header`
-_LEFT_OUT = ("NEES, 95 %", "Filter steps", "Fusions", "Rewards")  # of `vedette.campaigns.leaderboard.header`
-_SHORT_STANDINGS = ("more", "95 %", "N error", "NEES", "ms", "lost", "runs")  # of the others
+_LEFT_OUT = ("NEES, 95 %", "Filter steps", "Fusions", "Rewards")  # columns of `vedette.campaigns.leaderboard.header`
+_SHORT_STANDINGS = ("more", "95 %", "N error", "NEES", "ms", "lost", "runs")  # short form of the other columns
 _LONGEST_LABEL, _SHORTEST_LABEL = 24, 8
-_MOST_DECISIONS = 6  # decision times that are printed; the tables and the report have all
+_MOST_DECISIONS = 6  # number of decision times printed; the tables and the report have all of them
 
 
 def print_comparison(comparison: Comparison, words: Sequence[str] = ()) -> None:
-    """Print the table of the strategies and what it means; with `--verbose` also its tails and the decisions.
+    """Print the table of the strategies and its legend; with `--verbose` also its tails and the decisions.
 
     Args:
-        comparison: of the strategies.
-        words: description of each strategy; empty where the strategies are not planners.
+        comparison: comparison of the strategies.
+        words: description of each strategy; empty if the strategies are not planners.
     """
     from vedette.evaluation import strategy_rows
     from vedette.evaluation.tables import heading, legend, significance
@@ -68,7 +68,7 @@ def _print_decisions(console: Console, comparison: Comparison) -> None:
 
 
 def print_scores(scores: Sequence[StrategyScore], comparison: Comparison) -> None:
-    """What strategies brought and cost, beside what is published."""
+    """Print the errors and costs of strategies next to the published ones."""
     from vedette.campaigns.scores import score_row
     from vedette.evaluation.tails import tails
 
@@ -80,7 +80,7 @@ def print_scores(scores: Sequence[StrategyScore], comparison: Comparison) -> Non
 
 
 def print_standings(table: SceneTable) -> None:
-    """How entrants stand on a scene, as far as a terminal has room; the page has the rest."""
+    """Print the ranking of entrants on a scene with the columns that fit a terminal; the page has all of them."""
     from vedette.campaigns.leaderboard import header, row
     from vedette.evaluation.tails import tail_header, tails_in_words
 
@@ -111,7 +111,7 @@ def _print_rows(
 
 
 def _width(names: tuple[str, ...], numbers: list[tuple[str, ...]], gap: int) -> int:
-    """Columns of the terminal that the numbers take, each with the gap before it."""
+    """Return the width of the numbers in columns of the terminal, each with the gap before it."""
     columns = zip(names, *numbers, strict=True)
     return sum(gap + max(map(len, column)) for column in columns)
 
@@ -132,7 +132,7 @@ def _print_table(
 def _print_lines(
     console: Console, labels: tuple[str, ...], names: tuple[str, ...], numbers: list[tuple[str, ...]]
 ) -> None:
-    """One strategy after the other, with a line for each number that it has."""
+    """Print one strategy after the other, with a line for each of its numbers."""
     widest = max(map(len, names))
     for label, row in zip(labels, numbers, strict=True):
         console.print(label)

@@ -1,4 +1,4 @@
-"""How a command shows that kernels are being compiled: a moving line on a terminal; elsewhere one at start and end."""
+"""Progress of the compilation of kernels: a moving line on a terminal; elsewhere a line at the start and the end."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def compiling() -> Iterator[None]:
-    """Say what is compiled meanwhile, how far it is and for how long; nothing, where all is there."""
+    """Show the progress of compilation inside the context; show nothing if all kernels are compiled."""
     from vedette.kernels.base.compile_progress import watched
 
     shown = _CompileProgress()
@@ -28,7 +28,7 @@ def compiling() -> Iterator[None]:
 
 
 class _CompileProgress:
-    """Hears of every function that is compiled; begins to show with the first."""
+    """Progress display that is called for every compiled function and starts with the first."""
 
     def __init__(self) -> None:
         self._began: float | None = None
@@ -36,7 +36,7 @@ class _CompileProgress:
         self._now: CompileProgress | None = None
 
     def __call__(self, state: CompileProgress | None) -> None:
-        """See `vedette.kernels.base.compile_progress.watched`."""
+        """Update the display; see `vedette.kernels.base.compile_progress.watched`."""
         if self._began is None:
             self._begin()
         if state is None:
@@ -46,7 +46,7 @@ class _CompileProgress:
         self._line.update(self._task, description=self._text())
 
     def close(self) -> None:
-        """Leave one line that says what it was."""
+        """Replace the display by one line with the number of kernels and the time."""
         if self._began is None:
             return
         self._line.stop()

@@ -1,6 +1,6 @@
-"""What a shell completes: names of scenarios, campaigns and strategies, and the files that may stand in their place.
+"""Shell completion of names of scenarios, campaigns and strategies, and of files that can replace them.
 
-Nothing here reads a scenario unless its own strategies are asked for, and nothing is ever an error.
+A scenario is read only to complete its own strategies. Completion never raises an error.
 """
 
 from __future__ import annotations
@@ -15,32 +15,32 @@ Completion = Callable[[str], list[str]]
 
 
 def scenarios(incomplete: str) -> list[str]:
-    """Built-in scenarios and files of one's own."""
+    """Return matching built-in scenarios and scenario files."""
     return _beginning(incomplete, _names("scenarios", "yaml")) + _files(incomplete, (".yaml", ".yml"))
 
 
 def built_in_scenarios(incomplete: str) -> list[str]:
-    """Built-in scenarios alone."""
+    """Return matching built-in scenarios."""
     return _beginning(incomplete, _names("scenarios", "yaml"))
 
 
 def campaigns(incomplete: str) -> list[str]:
-    """Campaigns that come with the program and files of one's own."""
+    """Return matching built-in campaigns and campaign files."""
     return _beginning(incomplete, _names("campaigns", "toml")) + _files(incomplete, (".toml",))
 
 
 def reproducible(incomplete: str) -> list[str]:
-    """What `vedette reproduce` takes."""
+    """Return matching arguments of `vedette reproduce`."""
     return _beginning(incomplete, _names("campaigns", "toml")) + scenarios(incomplete)
 
 
 def strategies(context: typer.Context, incomplete: str) -> list[str]:
-    """Strategies, with those of the scenario or yardstick that the command already names."""
+    """Return matching strategies, including those of the scenario or yardstick that the command line names."""
     return _beginning(incomplete, _strategies(_first(context)))
 
 
 def lists_of_strategies(context: typer.Context, incomplete: str) -> list[str]:
-    """The last of strategies with commas between them."""
+    """Return completions of the last strategy in a list separated by commas."""
     before, comma, last = incomplete.rpartition(",")
     given = before.split(",")
     names = (name for name in _strategies(_first(context)) if name not in given)
@@ -48,12 +48,12 @@ def lists_of_strategies(context: typer.Context, incomplete: str) -> list[str]:
 
 
 def one_of(*names: str) -> Completion:
-    """These names."""
+    """Return a function that completes these names."""
     return lambda incomplete: _beginning(incomplete, names)
 
 
 def _first(context: typer.Context) -> str | None:
-    """The argument that is there already; of a line that is not whole yet it may not be parsed."""
+    """Return the first argument on the command line, which may be incomplete and not parsed yet; None without one."""
     return next((each for each in context.args if not each.startswith("-")), None)
 
 
@@ -77,7 +77,7 @@ def _beginning(start: str, names: Iterable[str]) -> list[str]:
 
 
 def _files(start: str, endings: tuple[str, ...]) -> list[str]:
-    """Files of these endings, and folders, whose paths begin so."""
+    """Return the folders, and files with these endings, whose paths begin with `start`."""
     folder, name = start[: start.rfind("/") + 1], start[start.rfind("/") + 1 :]
     try:
         found = sorted(Path(folder or ".").iterdir())

@@ -57,7 +57,7 @@ def demo(
     for group in groups:
         _print_errors(group)
     with interruptible(f"{out} keeps every run; the same command writes the page"):
-        page = write_demo(opened, out / "demo.html", trust=True)  # what it names has just been run
+        page = write_demo(opened, out / "demo.html", trust=True)  # the code that it names has just run
     is_open = open_ and _has_windows() and webbrowser.open(page.resolve().as_uri())
     say(f"Wrote {page} and opened it in your browser." if is_open else f"Wrote {page}. Open it in a browser.")
     say(f"One run proves nothing; compare 30 runs with: vedette reproduce {scenario}")
@@ -66,7 +66,7 @@ def demo(
 
 
 def _print_errors(group: GroupComparison) -> None:
-    """Print the scene, and a line for each strategy with its mean error."""
+    """Print the scene and, for each strategy, a line with its mean error."""
     from rich.table import Table
 
     model, comparison = group.cells[0].scenario.model, group.comparison
@@ -85,7 +85,7 @@ def _print_errors(group: GroupComparison) -> None:
 
 
 def _has_windows() -> bool:
-    """Whether a browser would come in a window: in a terminal it would take the terminal."""
+    """Return True if a browser would open in a window instead of taking over the terminal."""
     if not sys.stdout.isatty():
         return False
     return sys.platform in ("darwin", "win32") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

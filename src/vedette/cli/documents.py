@@ -1,4 +1,4 @@
-"""Results as plain data, for `--json`: what the tables of the terminal show, unrounded."""
+"""Results as plain data for `--json`: the content of the terminal tables, unrounded."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def run_document(record: RunRecord, scenario: Scenario | None) -> dict[str, Any]
 
 
 def results_document(opened: CampaignResults, groups: Sequence[GroupComparison]) -> dict[str, Any]:
-    """A campaign: its strategies side by side, group by group, and what is still to be run."""
+    """Return the document of a campaign: its comparisons by group, and the runs that are missing."""
     from vedette.evaluation.tables import strategy_numbers
 
     campaign = opened.campaign

@@ -1,4 +1,4 @@
-"""How errors meet a person: the message, no traceback, and an exit status that says whose fault it was.
+"""Reporting of errors in commands: the message without a traceback, and an exit status.
 
 0: done. 1: faulty content (a scenario, a file, a computation). 2: wrong use of the command line. 130: interrupted.
 """
@@ -22,10 +22,10 @@ INTERRUPTED = 130
 
 
 class Commands(TyperGroup):
-    """The group of all commands; prints the library's own errors instead of raising them."""
+    """Group of all commands; it prints the library's own errors instead of raising them."""
 
     def main(self, *args: Any, **options: Any) -> Any:
-        """Run the program, with an output that can print every letter."""
+        """Run the program, with an output that can print every character."""
         accept_any_letter()
         return super().main(*args, **options)
 
@@ -41,10 +41,10 @@ class Commands(TyperGroup):
                 formatter.write_dl(rows)
 
     def invoke(self, ctx: Any) -> Any:
-        """Run a command; what it raises becomes a line and a status."""
+        """Run a command; print an exception as a line and convert it into an exit status."""
         try:
             result = super().invoke(ctx)
-            sys.stdout.flush()  # here, where a fault can still be told in words
+            sys.stdout.flush()  # here, where a fault can still be reported as a message
             return result
         except typer.BadParameter as error:
             error.message = _with_value(error)
@@ -58,13 +58,13 @@ class Commands(TyperGroup):
             if text:
                 complain(text)
             raise typer.Exit(1) from None
-        except KeyboardInterrupt:  # where a command has nothing to say of what it leaves
+        except KeyboardInterrupt:  # in a command that reports nothing about its partial results
             typer.echo("\ninterrupted", err=True)
             raise typer.Exit(INTERRUPTED) from None
 
 
 def _with_value(error: typer.BadParameter) -> str:
-    """The message; where it is one of pydantic's, which leaves the value out, with what came."""
+    """Return the message of an error; the given value is added to a message of pydantic, which lacks it."""
     said = getattr(error.__cause__, "errors", None)
     if said is None:
         return error.message
@@ -73,19 +73,19 @@ def _with_value(error: typer.BadParameter) -> str:
 
 
 def usage_error(message: str, option: str) -> typer.BadParameter:
-    """Wrong use of an option: exit status 2."""
+    """Return the error for wrong use of an option, which has exit status 2."""
     return typer.BadParameter(message, param_hint=option)
 
 
 def check_ending(path: Path | None, option: str, *endings: str) -> None:
-    """Raise a usage error unless the file to write, if any, has one of the endings; it then replaces no other kind."""
+    """Raise a usage error unless the output file, if any, has one of the endings; this protects other files."""
     if path is not None and path.suffix[1:].lower() not in endings:
         raise usage_error(f"expected a file ending in {', '.join(endings)}; got {path}", option)
 
 
 @contextmanager
 def named_options(options: Mapping[str, str]) -> Iterator[None]:
-    """Errors of arguments of the library's functions, by the options that give them."""
+    """Replace the names of the library's arguments in errors by the options that set them."""
     try:
         yield
     except InputError as error:

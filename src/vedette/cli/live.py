@@ -155,7 +155,7 @@ def live(
 
 
 class _Place(NamedTuple):
-    """Where lines come from: stdin, tcp or ws, and of what address."""
+    """A source of lines: stdin, tcp or ws, with its address."""
 
     kind: str
     host: str = ""
@@ -180,7 +180,7 @@ def _say(answers: Iterable[dict[str, Any]]) -> None:
 
 
 async def _listen(keeping: Keeping, screen: LiveScreen | None, places: Sequence[_Place], token: str | None) -> None:
-    """Take lines until standard input ends, or for ever where there are clients: Ctrl-C ends it, and waits for none."""
+    """Process lines until standard input ends, or until Ctrl-C if there are clients; do not wait for them."""
     import asyncio
 
     from vedette.live import Exchange, TcpServer, lines_of

@@ -1,4 +1,4 @@
-"""The command that makes one results folder of those of shards, merge."""
+"""The command that merges the results folders of shards into one: merge."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def merge(
 
 
 def _commands(merged: MergeResult) -> list[str]:
-    """What runs each share that is missing; one command where the campaign was not cut."""
+    """Return the command for each missing shard; a single command if the campaign was not divided."""
     words = ["vedette", "campaign", "SPEC", f"--runs={merged.results.campaign.num_runs}", "--out"]
     if merged.count == 1:
         return [shlex.join([*words, str(merged.results.folder)]) for _ in merged.missing]

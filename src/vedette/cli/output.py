@@ -1,4 +1,4 @@
-"""What commands print, wherever it goes: a terminal, a file, a pipe that closes, a disk that is full.
+"""Output of commands to a terminal, file or pipe; it handles closed pipes and full disks.
 
 Every command takes `--json`, `--quiet` and `--verbose` (`speaking`). All output goes through here: results by `say` and
 `console`, remarks by `note`, the document of `--json` by `publish`. Errors are always printed.
@@ -26,12 +26,12 @@ import typer
 if TYPE_CHECKING:
     from rich.console import Console
 
-FORMAT_VERSION = 1  # of the documents of `--json`; incremented where a key is renamed or removed
+FORMAT_VERSION = 1  # of the documents of `--json`; incremented when a key is renamed or removed
 _FULL = (errno.ENOSPC, errno.EIO, getattr(errno, "EDQUOT", errno.ENOSPC), errno.EFBIG)
 
 
 class Manner(NamedTuple):
-    """How a command prints: one JSON document, errors only, or details as well."""
+    """Output mode of a command: one JSON document, errors only, or with details."""
 
     as_json: bool = False
     quiet: bool = False
@@ -48,7 +48,7 @@ _OPTIONS = {
 
 
 def speaking(command: Callable[..., None]) -> Callable[..., None]:
-    """The command with the options `--json`, `--quiet` and `--verbose`."""
+    """Return the command with the options `--json`, `--quiet` and `--verbose`."""
 
     @functools.wraps(command)
     def spoken(*, as_json: bool, quiet: bool, verbose: bool, **options: Any) -> None:
@@ -72,25 +72,25 @@ def speaking(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def say(text: str = "", *, nl: bool = True, even_if_quiet: bool = False) -> None:
-    """A line of the result."""
+    """Print a line of the result."""
     manner = _manner.get()
     if not manner.as_json and (even_if_quiet or not manner.quiet):
         typer.echo(_for_terminal(text, sys.stdout), nl=nl)
 
 
 def is_verbose() -> bool:
-    """Return whether details are to be printed (`--verbose`)."""
+    """Return True if details are printed (`--verbose`)."""
     return _manner.get().verbose
 
 
 def note(text: str) -> None:
-    """A line beside the result: how far it is, what was left out, what may not be meant."""
+    """Print a remark on standard error: progress, omissions or a possible mistake in the input."""
     if not _manner.get().quiet:
         complain(text)
 
 
 def complain(text: str) -> None:
-    """A line of what went wrong."""
+    """Print an error message on standard error."""
     typer.echo(_for_terminal(text, sys.stderr), err=True)
 
 
@@ -99,9 +99,9 @@ def _for_terminal(text: str, stream: TextIO) -> str:
 
 
 def folded(text: str, width: int) -> str:
-    """A line, broken between words where it is longer than a terminal is wide.
+    """Return a line, wrapped between words if it is longer than `width`.
 
-    Several lines, and what is indented, such as a command to copy, stay as they are.
+    Several lines, and indented text such as a command to copy, are returned unchanged.
     """
     line = text.strip("\n")
     if "\n" in line or line.startswith(" ") or len(line) <= width:
@@ -123,7 +123,7 @@ def print_json(document: Any) -> None:
 def _plain(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {str(key): _plain(each) for key, each in value.items()}
-    if hasattr(value, "tolist"):  # of NumPy
+    if hasattr(value, "tolist"):  # a NumPy value
         return _plain(value.tolist())
     if isinstance(value, list | tuple):
         return [_plain(each) for each in value]
@@ -133,7 +133,7 @@ def _plain(value: Any) -> Any:
 
 
 def console(*, stderr: bool = False) -> Console:
-    """A console that takes every text for text: names may hold brackets and colons."""
+    """Return a console without markup, since names may contain brackets and colons."""
     from rich.console import Console
 
     manner = _manner.get()
@@ -142,7 +142,7 @@ def console(*, stderr: bool = False) -> Console:
 
 
 def print_names(rows: Mapping[str, str]) -> None:
-    """Names, each with what it is; where the terminal is narrow the names stand alone on their lines, whole."""
+    """Print names with their descriptions; on a narrow terminal, each name has its own line."""
     from rich.cells import cell_len
     from rich.padding import Padding
     from rich.table import Table
@@ -162,20 +162,20 @@ def print_names(rows: Mapping[str, str]) -> None:
     shown.print(table)
 
 
-_LEAST_ROOM = 30  # columns beside the names
+_LEAST_ROOM = 30  # columns for descriptions next to the names
 
 
 def accept_any_letter() -> None:
-    """Letters that the encoding of the output does not have are printed as question marks."""
+    """Print characters that the encoding of the output lacks as question marks."""
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
 
 
 def trouble_of_system(error: OSError) -> str:
-    """What to say of an error of the system that no command has explained; empty for a reader that went away.
+    """Return the message for a system error that no command has explained; empty if the reader of a pipe has gone.
 
-    Raises the error where it is neither about the output, nor about a limit of the system, nor about a file.
+    Raises the error again if it does not concern the output, a limit of the system or a file.
     """
     if error.errno == errno.EPIPE:
         return ""
@@ -189,10 +189,10 @@ def trouble_of_system(error: OSError) -> str:
 
 
 def drop_output() -> None:
-    """Let what is still buffered go nowhere, so that nothing more is said of it when the program ends."""
+    """Discard buffered output, so that it causes no error when the program ends."""
     try:
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, sys.stdout.fileno())
         os.close(nowhere)
-    except (OSError, ValueError):  # no file behind it
+    except (OSError, ValueError):  # the output is not a file
         pass

@@ -1,4 +1,4 @@
-"""A picture of a scenario: region, true tracks, sensors and birth sites (paper Fig. 2)."""
+"""Picture of a scenario: region, true tracks, sensors and birth sites (paper Fig. 2)."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ from vedette.scenarios import Scenario
 from vedette.scenarios.views import zones
 from vedette.simulation import Truth
 
-_MARGIN = 0.04  # of the drawn extent
+_MARGIN = 0.04  # share of the drawn extent
 _KILOMETRES_FROM = 4000.0  # m of extent
 
 
 @styled
 def scenario_figure(scenario: Scenario, truth: Truth) -> Figure:
-    """Region, tracks (circle: start, triangle: end), sensors (square, with the initial heading) and birth sites."""
+    """Draw region, tracks (circle: start, triangle: end), sensors (square, with initial heading) and birth sites."""
     low, high = _extent(scenario, truth)
     scale = 1e-3 if float((high - low).max()) > _KILOMETRES_FROM else 1.0
     aspect = float((high[1] - low[1]) / (high[0] - low[0]))
@@ -65,7 +65,7 @@ def scenario_figure(scenario: Scenario, truth: Truth) -> Figure:
 
 
 def _extent(scenario: Scenario, truth: Truth) -> tuple[Floats, Floats]:
-    """Corners of a box around everything."""
+    """Return the corners of a box around region, sensors and tracks, with a margin."""
     region = scenario.model.region
     corners = [[region.x_min, region.y_min], [region.x_max, region.y_max]]
     points = np.vstack([corners, [sensor.position for sensor in scenario.model.sensors], truth.states[:, :2]])
@@ -75,7 +75,7 @@ def _extent(scenario: Scenario, truth: Truth) -> tuple[Floats, Floats]:
 
 
 def _draw_births(axes: Axes, scenario: Scenario, scale: float) -> None:
-    """A cross at each site, and the ellipse of two standard deviations."""
+    """Draw a cross at each site and the ellipse of two standard deviations."""
     birth = scenario.model.birth.build(scenario.model.motion, scenario.model.region)
     for mean, cov in zip(birth.means[:, :2], birth.covs[:, :2, :2], strict=True):
         variances, axes_of = np.linalg.eigh(cov)

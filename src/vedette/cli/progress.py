@@ -1,4 +1,4 @@
-"""How a long command shows how far it is: a moving line on a terminal."""
+"""Progress of long commands: a moving line on a terminal."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from vedette.cli.output import console
 
 @contextmanager
 def bar(what: str, total: int | None = None) -> Iterator[Callable[..., None]]:
-    """A bar on a terminal, told how much is done, and of how much unless that is known."""
+    """Show a progress bar on a terminal; yields a function that receives the amount done, and the total if unknown."""
     from rich.progress import Progress
 
     screen = console(stderr=True)

@@ -104,7 +104,7 @@ def reproduce(
 
 
 def compared(scenario: str, planners: str | None, runs: int | None, seed: int, name: str = _FOLDER) -> CampaignSpec:
-    """A campaign of strategies on one scenario, by what a command line says of it; `VedetteError` for none."""
+    """Return the campaign of strategies on one scenario from the command line; raise `VedetteError` without one."""
     from vedette.campaigns import CampaignSpec
     from vedette.campaigns.published import published_comparisons
     from vedette.scenarios import list_builtin, load_scenario
@@ -120,7 +120,7 @@ def compared(scenario: str, planners: str | None, runs: int | None, seed: int, n
 
 
 def _changed(spec: CampaignSpec, planners: str | None, runs: int | None, seed: int) -> CampaignSpec:
-    """The campaign with what the command line says otherwise."""
+    """Return the campaign with the values from the command line."""
     names = _names(planners)
     if names is not None and len(set(names)) != len(names):
         raise usage_error(f"expected each strategy once; got {planners}", "--planners")
@@ -171,7 +171,7 @@ def _print_claims(claims: Sequence[CheckedClaim]) -> None:
 
 
 def _write(opened: CampaignResults, yardstick: PublishedComparison | None, folder: Path) -> Path:
-    """The report, and tables and figures beside it."""
+    """Write the report, and tables and figures next to it."""
     from vedette.campaigns.published import published_markdown
     from vedette.reports import write_figures, write_report, write_summary
 
@@ -180,8 +180,8 @@ def _write(opened: CampaignResults, yardstick: PublishedComparison | None, folde
         if yardstick is None:
             write_summary(opened, folder)
             write_figures(opened, folder / "figures")
-        else:  # of decisions at every scan, figures by the decision would be hundreds: `vedette report --figures`
+        else:  # with a decision at every scan there would be hundreds of figures: `vedette report --figures`
             write_text(folder / YARDSTICK, published_markdown(opened, yardstick))
-        write_report(opened, page := folder / "report.html", trust=True)  # what it names has just been run
+        write_report(opened, page := folder / "report.html", trust=True)  # the code that it names has just run
     say(f"Wrote {folder}. Open {page} in a browser.")
     return page

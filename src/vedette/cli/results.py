@@ -1,4 +1,4 @@
-"""The commands on what runs left behind: results (of a campaign or a single run), report and upgrade."""
+"""The commands for saved results: results (of a campaign or a single run), report and upgrade."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ Reported = tuple[Sequence[Path], Sequence[str]]
 def _report_campaign(
     folder: Path, page: Path, figures: Path | None, replays: list[tuple[str, int]] | None, trust: bool
 ) -> Reported:
-    """The figures that were written, and code that was not run."""
+    """Write the report and figures; return the figures that were written, and the code that was not run."""
     from vedette.campaigns.results import open_results
     from vedette.reports import replay_code, write_figures, write_report
 
@@ -114,7 +114,7 @@ def _figures(folder: Path | None, write: Callable[[Path], Sequence[Path]]) -> Se
 
 
 def saved_run(folder: Path) -> tuple[RunRecord, Scenario]:
-    """A saved run and its scenario. Raises `VedetteError` for a folder that does not hold both."""
+    """Return a saved run and its scenario; raise `VedetteError` for a folder without both."""
     from vedette.scenarios import load_scenario
     from vedette.simulation.storage import SCENARIO, load_run
 
@@ -226,7 +226,7 @@ def _write_tex(opened: CampaignResults, groups: Sequence[GroupComparison], path:
 
 
 def _scenario_of(folder: Path) -> Scenario | None:
-    """That of a saved run; None where it is not kept beside it, or cannot be read, which is told."""
+    """Return the scenario of a saved run; print a note and return None if it is missing or cannot be read."""
     from vedette.scenarios import load_scenario
     from vedette.simulation.storage import SCENARIO
 
@@ -238,7 +238,7 @@ def _scenario_of(folder: Path) -> Scenario | None:
 
 
 def print_failures(failed: Sequence[FailedRun | Failure], tell: Callable[[str], None] = say) -> None:
-    """The first of the runs that could not be finished, each with where it stopped."""
+    """Print the first failed runs, each with its error."""
     for result in failed[:_SHOWN_FAILURES]:
         tell(f"  cell {result.cell}, run {result.run}: {result.message}")
     if len(failed) > _SHOWN_FAILURES:
@@ -256,14 +256,14 @@ def print_results(opened: CampaignResults, groups: Sequence[GroupComparison]) ->
 
 
 def _words_of(opened: CampaignResults, group: GroupComparison) -> tuple[str, ...]:
-    """Description of each strategy of a group; empty where planners are not what is compared."""
+    """Return the description of each strategy of a group; empty if the campaign does not compare planners."""
     if opened.campaign.compare != "planner":
         return ()
     return tuple(cell.words for cell in group.cells)
 
 
 def print_progress(opened: CampaignResults) -> None:
-    """How many runs there are and how many are missing, of which cells, and why."""
+    """Print the number of finished runs, the number of missing runs of each cell, and the failed runs."""
     campaign = opened.campaign
     missing = {cell.name: len(opened.missing(cell.name)) for cell in campaign.cells}
     total = campaign.total

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from vedette.scenarios import Scenario
     from vedette.simulation.records import RunRecord
 
-_SHOWN_SECONDS = 0.005  # of a stage
+_SHOWN_SECONDS = 0.005  # shortest time of a stage that is shown
 _FEW_DECISIONS = 5  # printed without --verbose
-_LONGEST_ACTIONS = 36  # letters, beyond which --verbose alone prints actions
+_LONGEST_ACTIONS = 36  # letters; longer actions are printed only with --verbose
 
 
 def print_run(record: RunRecord, scenario: Scenario | None) -> None:
@@ -34,7 +34,7 @@ def print_run(record: RunRecord, scenario: Scenario | None) -> None:
 
 
 def _title(record: RunRecord, scenario: Scenario | None) -> str:
-    """Scenario, planner with its description, seed, run and number of scans; of a recording scenario and scans."""
+    """Return the title: scenario, planner, seed, run and number of scans; for a recording only scenario and scans."""
     from vedette.scenarios.sections.planners import strategy_words
 
     scans = pluralise(record.num_scans, "scan")
@@ -75,7 +75,7 @@ def _print_decisions(console: Console, record: RunRecord) -> None:
 
 
 def _print_facts(console: Console, record: RunRecord, scenario: Scenario | None) -> None:
-    """Print the mean error over the scans that count, where the targets are known, and the run time."""
+    """Print the mean error over the scans that count, if the targets are known, and the run time."""
     from vedette.evaluation.comparison import counted_scans
 
     unit = scenario.model.ospa.unit if scenario else ""
@@ -92,7 +92,7 @@ def _print_facts(console: Console, record: RunRecord, scenario: Scenario | None)
 
 
 def _print_diagnostics(console: Console, record: RunRecord, scenario: Scenario | None) -> None:
-    """Print the checks that may cost accuracy; with `--verbose` all that found something."""
+    """Print the diagnostics that may reduce accuracy; with `--verbose` also notes."""
     from vedette.evaluation.diagnostics import run_diagnostics
 
     found = run_diagnostics(record.health, scenario.model.sensor_names if scenario else ())

@@ -1,4 +1,4 @@
-"""The command that runs a scenario once, and what commands that simulate share."""
+"""The command that runs a scenario once, and helpers of commands that simulate."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def compile_if_cold(scenario: Scenario, planners: Sequence[str] = ("jdm",)) -> N
 
 @contextmanager
 def interruptible(advice: str) -> Iterator[None]:
-    """Ctrl-C ends with a line that says what is left behind, and the shell's usual status."""
+    """Convert Ctrl-C into a line with advice and the shell's usual exit status."""
     try:
         yield
     except KeyboardInterrupt:
@@ -49,9 +49,10 @@ def interruptible(advice: str) -> Iterator[None]:
 
 
 class Approval:
-    """Says which code a scenario runs, once, before it runs; refuses code that others may have written, unless trusted.
+    """Approval of a scenario's code: reports it once before it runs, and refuses code of others unless trusted.
 
-    With `spec`, the campaign's file must be the user's own too, as its fields can name code.
+    Code counts as that of others if other users may have written it. With `spec`, the campaign's file must be the
+    user's own too, because its fields can name code.
     """
 
     def __init__(self, trust: bool, spec: Path | None = None) -> None:
@@ -77,7 +78,7 @@ class Approval:
 
 
 def check_planner(scenario: Scenario, name: str, option: str) -> None:
-    """Wrong use of an option unless it names a strategy of the scenario."""
+    """Raise a usage error unless the option names a strategy of the scenario."""
     from vedette.scenarios.sections.planners import STRATEGIES
 
     known = (*STRATEGIES, *scenario.model.planners)
@@ -154,14 +155,14 @@ def _holds_whole_run(folder: Path | None) -> bool:
 
 
 def end_stopped(stop: RunStopped | RunInterrupted, left: str) -> NoReturn:
-    """Say where a run stopped and what is left of it; the exit status says why."""
+    """Print where a run stopped and what is left of it, and exit with a status for the reason."""
     complain(str(stop))
     complain(left)
     raise typer.Exit(INTERRUPTED if isinstance(stop, KeyboardInterrupt) else 1) from None
 
 
 def warn_of_recording(record: RunRecord, scenario: Scenario) -> tuple[str, ...]:
-    """Warn of sensors of a recording that agree on no target, and of targets too fast for its tracks; returns these."""
+    """Print and return warnings on a recording: sensors that share no target, and targets too fast for its tracks."""
     if scenario.model.recording is None:
         return ()
     from vedette.evaluation.agreement import disagreements

@@ -138,14 +138,14 @@ def crowd(
 
 
 def _write_generated(path: Path | None, name: str, text: str, overwrite: bool) -> None:
-    """Write a scene to `path`, or into that folder, or beside us, under its name."""
+    """Write a scene to `path`, or under its name into that folder or the working directory."""
     target = Path(f"{name}.yaml") if path is None else path
     target = target if target.suffix in (".yaml", ".yml") else target / f"{name}.yaml"
     _write_start({target: _with_schema(text)}, target, overwrite)
 
 
 def _write_start(files: dict[Path, str], target: Path, overwrite: bool) -> None:
-    """Write files to start from, and the schema beside `target`; `InputError` where one is there already."""
+    """Write the files, and the schema next to `target`; raise `InputError` if one already exists."""
     taken = [str(file) for file in files if file.exists()]
     if taken and not overwrite:
         raise InputError(f"{', '.join(taken)}: already there; --overwrite replaces it")
@@ -161,7 +161,7 @@ def _with_schema(text: str) -> str:
 
 
 def _starting_files(scenario: Scenario, target: Path) -> dict[Path, str]:
-    """The text of a built-in scenario for `target`; beside it its data, if it has any, and where they come from."""
+    """Return the files for a built-in scenario at `target`: its text, its data and their origin, if it has any."""
     from vedette.scenarios import list_builtin
 
     text = list_builtin()[scenario.name].read_text(encoding="utf-8")
@@ -208,7 +208,7 @@ def _schema_text() -> str:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a file whole or not at all, making its folder. Raises `InputError` where that cannot be."""
+    """Write a file completely or not at all, and make its folder; raise `InputError` if this is not possible."""
     from vedette.internal.files import write_file
 
     write_file(path, lambda file: file.write(text.encode("utf-8")), make_folder=True)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from vedette.scenarios import Scenario
     from vedette.simulation import Truth
 
-_MOST_ROWS, _FIRST_ROWS = 8, 3  # of a table; of a longer one without --verbose
+_MOST_ROWS, _FIRST_ROWS = 8, 3  # largest table shown in full; rows shown of a longer one without --verbose
 PICTURE_FORMATS = ("png", "pdf", "svg")
 
 
@@ -44,7 +44,7 @@ def show(
     if out is not None:
         require_packages("vedette show --out", "matplotlib")
     loaded = load_scenario(scenario)
-    if not resolved or out is not None:  # the targets move by its motion model
+    if not resolved or out is not None:  # the targets move by the scenario's motion model
         Approval(trust)(loaded)
     if resolved:
         from vedette.scenarios.dumping import dump_scenario
@@ -127,7 +127,7 @@ def _filled(table: Table, rows: Sequence[tuple[str | Text, ...]]) -> Table:
 
 
 def _sensing(scenario: Scenario) -> Table:
-    """What the sensors measure: once where it is the same for all."""
+    """Return a description of the sensors' measurements, once if it is the same for all."""
     from vedette.scenarios.summary import sensing
 
     north = scenario.model.north() if scenario.model.by_compass else None
@@ -155,7 +155,7 @@ def _targets(scenario: Scenario) -> Table:
 
 
 def truth_of(scenario: Scenario) -> Truth:
-    """The targets as one run has them; with process noise every run has others."""
+    """Return the true targets of one run; with process noise they differ from run to run."""
     import numpy as np
 
     from vedette.scenarios.build import build_targets

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 FORMATS = ("csv", "geojson", "parquet", "czml", "mcap")
 ON_EARTH = ("geojson", "czml", "mcap")
 _SHOWN_ROWS = 5
-_LASTING = 10  # estimates of a track that is more than a moment's
+_LASTING = 10  # smallest number of estimates of a lasting track
 
 
 def track(
@@ -85,7 +85,7 @@ def track(
     if "clutter" in assumed:
         note("`vedette calibrate` estimates clutter, noise and detection from the same scans.")
     on_earth = [name for name in formats or () if name in ON_EARTH]
-    if on_earth and scenario.model.origin is None:  # before there is a folder with a part of what was asked for
+    if on_earth and scenario.model.origin is None:  # before a folder with only a part of the output exists
         raise usage_error(f"expected an origin in {sensors}, as {on_earth[0]} has degrees; got none", "--format")
     written: list[Path] = []
     with interruptible("nothing was written"):
@@ -124,7 +124,7 @@ def _check_formats(formats: Sequence[str], out: Path | None) -> None:
 
 
 def _tracked(scenario: Scenario, recording: RecordedScans) -> RunRecord:
-    """Run the tracker over all scans; a run that stops ends the program."""
+    """Run the tracker over all scans; exit if the run stops early."""
     from vedette.evaluation.runs import track_recording
     from vedette.simulation.journal import RunInterrupted, RunStopped
 
@@ -144,7 +144,7 @@ def _save(
     *,
     overwrite: bool,
 ) -> list[Path]:
-    """Write the results folder and the tracks; returns the files of tracks."""
+    """Write the results folder and the tracks; return the files of tracks."""
     from vedette.evaluation.track_table import table_of_run, write_tracks
     from vedette.scenarios.dumping import dump_kept
     from vedette.simulation.storage import save_run
@@ -181,7 +181,7 @@ def read_recording(
 
 
 def _contents(out: Path, written: list[Path]) -> list[str]:
-    """Name what is in the folder: the files of tracks, figures, and the number of tables."""
+    """Return the contents of the folder: the files of tracks, figures, and the number of tables."""
     names = [file.relative_to(out).as_posix() for file in written]
     figures = ["figures/"] if (out / "figures").is_dir() else []
     tables = len(list(out.glob("*.arrow")))
@@ -189,7 +189,7 @@ def _contents(out: Path, written: list[Path]) -> list[str]:
 
 
 def _tracks(record: RunRecord) -> str:
-    """How many tracks there were, and how many of them lasted."""
+    """Return the number of tracks and of lasting tracks, in words."""
     seen: dict[tuple[int, ...], int] = {}
     for estimate in record.estimates:
         for label in map(tuple, estimate.labels.tolist()):
