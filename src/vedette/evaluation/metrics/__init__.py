@@ -1,4 +1,4 @@
-"""How far estimates are from the truth: distances between sets of points and of tracks, breaks, consistency."""
+"""Metrics of estimates against the truth: distances between sets of points and of tracks, breaks, consistency."""
 
 from vedette.evaluation.metrics.consistency import AverageNees, average_nees, nees, nees_interval
 from vedette.evaluation.metrics.kept import decode_metrics, encode_metrics, has_metrics

@@ -1,4 +1,4 @@
-"""Optimal assignment between two sets of points, which all distances between sets rest on."""
+"""Optimal assignment between two sets of points, the basis of all distances between sets."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models.arguments import as_array
 
 _HIGH_ORDER = 30.0
-# Distances up to which all of them are laid out; of more, those below the cutoff.
+# Largest number of distances that are stored in full; of more, only those below the cutoff are stored.
 _MOST_DISTANCES = 1_000_000
 
 
 def check_parameters(cutoff: float, order: float, *, finite: bool = False) -> None:
-    """Raise `InputError` unless cutoff > 0 and order >= 1; `finite`: and neither is infinite."""
+    """Raise `InputError` unless cutoff > 0 and order >= 1, and with `finite` both are finite."""
     if not cutoff > 0.0 or (finite and math.isinf(cutoff)):
         raise InputError(f"cutoff: expected a{' finite' * finite} distance above 0; got {cutoff}")
     if not order >= 1.0 or (finite and math.isinf(order)):
@@ -25,7 +25,7 @@ def check_parameters(cutoff: float, order: float, *, finite: bool = False) -> No
 
 
 def point_set(values: ArrayLike, name: str) -> Floats:
-    """(num, dim) finite points; an empty set of any shape is one.
+    """Return finite points, (num, dim); an empty set may have any shape.
 
     Raises `InputError`, with `name`, for anything else.
     """
@@ -40,7 +40,7 @@ def point_set(values: ArrayLike, name: str) -> Floats:
 
 
 def point_sets(estimates: ArrayLike, truths: ArrayLike) -> tuple[Floats, Floats]:
-    """Both as `point_set`; `InputError` also where they differ in dimension."""
+    """Return both sets as `point_set` does; also raise `InputError` if they differ in dimension."""
     first, second = point_set(estimates, "estimates"), point_set(truths, "truths")
     if first.size and second.size and first.shape[1] != second.shape[1]:
         raise InputError(
@@ -50,7 +50,7 @@ def point_sets(estimates: ArrayLike, truths: ArrayLike) -> tuple[Floats, Floats]
 
 
 def cut_distances(first: Floats, second: Floats, cutoff: float) -> Floats:
-    """(len(first), len(second)) Euclidean distances, none above the cutoff. Either set may be empty."""
+    """Return min(Euclidean distance, cutoff), (len(first), len(second)). Either set may be empty."""
     if not (len(first) and len(second)):
         return np.empty((len(first), len(second)))
     apart = np.sqrt(((first[:, None, :] - second[None, :, :]) ** 2).sum(axis=2))
@@ -58,11 +58,11 @@ def cut_distances(first: Floats, second: Floats, cutoff: float) -> Floats:
 
 
 def assign(distances: Floats, order: float) -> tuple[Ints, Ints]:
-    """Rows and columns, each used at most once, that pair all of the smaller set at the least cost.
+    """Return rows and columns, each used at most once, that pair all of the smaller set at the lowest cost.
 
     Args:
         distances: (num_rows, num_columns), finite, at least 0.
-        order: the cost is the sum of distance ** order; for an infinite order the largest distance.
+        order: exponent; the cost is the sum of distance ** order, or the largest distance for an infinite order.
     """
     if not distances.size:
         return np.empty(0, np.int64), np.empty(0, np.int64)
@@ -70,27 +70,28 @@ def assign(distances: Floats, order: float) -> tuple[Ints, Ints]:
         return _pairs(distances > _bottleneck(distances))
     if order == 1.0:
         return _pairs(distances)
-    # Powers of ratios: powers of metres overflow, or all vanish, at a high order. There the ratio must be to what the
-    # best assignment cannot avoid, for beside a larger distance everything that matters would vanish too.
+    # Powers of ratios, because powers of metres overflow or underflow at a high order. The ratio is then to the largest
+    # distance of the best assignment; relative to a larger one, all relevant powers would underflow too.
     scale = float(distances.max()) if order <= _HIGH_ORDER else _bottleneck(distances)
     if scale == 0.0:
         return _pairs(distances > 0.0)
-    with np.errstate(over="ignore", under="ignore"):  # an infinite cost only says: never this pair
+    with np.errstate(over="ignore", under="ignore"):  # a pair of infinite cost is never chosen
         return _pairs((distances / scale) ** order)
 
 
 def assign_points(first: Floats, second: Floats, cutoff: float, order: float) -> tuple[Ints, Ints, Floats]:
-    """Rows of the two sets, each used at most once, that pair them at the least cost, and the distances of the pairs.
+    """Return rows of the two sets, each used at most once, that pair them at the lowest cost, and their distances.
 
-    As `assign` of `cut_distances`; but of sets of more than a million distances only the pairs nearer than the cutoff
-    are given, as who is that near to nobody costs the cutoff whatever it is paired with. These are found among those
-    that share neighbours, so that time and memory grow with the number of points and not with its square.
+    The result is that of `assign` of `cut_distances`, except that for sets of more than a million distances it has only
+    the pairs closer than the cutoff: a point without such a neighbour costs the cutoff in any pair. The pairs are found
+    within groups of points that share neighbours, so that time and memory grow with the number of points and not with
+    its square.
     """
     if len(first) * len(second) <= _MOST_DISTANCES or math.isinf(cutoff) or math.isinf(order):
         apart = cut_distances(first, second, cutoff)
         rows, columns = assign(apart, order)
         return rows, columns, apart[rows, columns]
-    # Here, as large sets are rare and these take as long to import as all else here.
+    # Imported here, because large sets are rare and these imports take as long as the rest of the module.
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import KDTree
@@ -100,7 +101,7 @@ def assign_points(first: Floats, second: Floats, cutoff: float, order: float) ->
         (np.ones(len(near.row)), (near.row, near.col + len(first))), shape=(total := len(first) + len(second), total)
     )
     _, groups = connected_components(edges, directed=False)
-    # Of each group the points of the first set stand before those of the second, both in order.
+    # In each group, the points of the first set come before those of the second, both in order.
     members = np.argsort(groups, kind="stable")
     pairs = []
     for group in np.split(members, np.flatnonzero(np.diff(groups[members])) + 1):
@@ -119,17 +120,17 @@ def assign_points(first: Floats, second: Floats, cutoff: float, order: float) ->
 
 
 def power_mean(values: Floats, number: float, order: float) -> float:
-    """(sum of values ** order / number) ** (1 / order) without overflow; the largest for an infinite order.
+    """Return (sum of values ** order / number) ** (1 / order) without overflow; the largest for an infinite order.
 
     Args:
         values: (num,) at least 0.
-        number: what the sum is divided by, above 0; at least `num` for a mean, 1 for a root of the sum.
+        number: divisor of the sum, above 0; at least `num` for a mean, 1 for a root of the sum.
         order: exponent, at least 1.
     """
     scale = float(values.max()) if len(values) else 0.0
     if scale == 0.0 or math.isinf(scale) or math.isinf(order):
         return scale
-    if order == 1.0:  # the same numbers, without the powers
+    if order == 1.0:  # the same result without powers
         return float(scale * (float((values / scale).sum()) / number))
     with np.errstate(under="ignore"):
         total = float(((values / scale) ** order).sum())
@@ -137,7 +138,7 @@ def power_mean(values: Floats, number: float, order: float) -> float:
 
 
 def combine(first: float, second: float, order: float) -> float:
-    """(first ** order + second ** order) ** (1 / order) without overflow; the larger for an infinite order."""
+    """Return (first ** order + second ** order) ** (1 / order) without overflow; the larger for an infinite order."""
     scale = max(first, second)
     if order == 1.0 and 0.0 < scale < math.inf:
         return scale * (first / scale + second / scale)
@@ -152,7 +153,7 @@ def _pairs(costs: Floats | Bools) -> tuple[Ints, Ints]:
 
 
 def _bottleneck(distances: Floats) -> float:
-    """The least bound under which every point of the smaller set has a partner of its own."""
+    """Return the smallest bound on distances at which every point of the smaller set has its own partner."""
     candidates = np.unique(distances)
     low, high = 0, len(candidates) - 1
     while low < high:

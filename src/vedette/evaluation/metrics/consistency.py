@@ -1,4 +1,4 @@
-"""Whether estimates are as certain as they say: normalised estimation error squared (NEES).
+"""Consistency of estimates with their covariances: normalised estimation error squared (NEES).
 
 Y. Bar-Shalom, X.-R. Li and T. Kirubarajan, "Estimation with Applications to Tracking and Navigation", Wiley 2001,
 section 5.4.2: the error, its average over runs, and the chi-square test of both.
@@ -20,17 +20,17 @@ from vedette.simulation.truth import Truth
 
 
 def nees(errors: ArrayLike, covs: ArrayLike) -> Floats:
-    """(num,) normalised estimation error squared, e' P^-1 e.
+    """Normalised estimation error squared, e' P^-1 e, (num,).
 
     If the covariances are right and the errors Gaussian, each follows a chi-square distribution with `dim` degrees of
     freedom, whose mean is `dim`.
 
     Args:
-        errors: (num, dim) estimate minus truth.
+        errors: (num, dim) estimates minus true values.
         covs: (num, dim, dim) covariances of the estimates.
 
     Raises:
-        InputError: the shapes do not fit, or a number is not finite.
+        InputError: shapes that do not match, or a number that is not finite.
         NumericalError: a covariance is not symmetric and positive definite.
     """
     differences = float_array("errors", errors, (None, None))
@@ -42,9 +42,9 @@ def nees(errors: ArrayLike, covs: ArrayLike) -> Floats:
 
 
 def nees_of_matching(truth: Truth, matching: Matching, *, position_only: bool) -> Floats:
-    """(num_pairs,) NEES of each matched pair: of the full state, or of the position alone.
+    """NEES of each matched pair, (num_pairs,), for the full state or only the position.
 
-    NaN for the full state where estimated and true states differ in dimension, so that their difference is not defined.
+    NaN for the full state if estimated and true states differ in dimension, so that their difference is not defined.
     Raises `NumericalError` as `nees` does.
     """
     states, means, covs = truth.states[matching.truth_rows], matching.means, matching.covs
@@ -57,13 +57,13 @@ def nees_of_matching(truth: Truth, matching: Matching, *, position_only: bool) -
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AverageNees:
-    """NEES averaged over runs (ANEES), with the interval that a consistent filter's average lies in.
+    """NEES averaged over runs (ANEES), with the interval of the average of a consistent filter.
 
-    Divided by `dim` it is the ANEES of Li, Zhao and Jilkov (2001), which is 1 where the covariances are right.
+    Divided by `dim` it is the ANEES of Li, Zhao and Jilkov (2001), which is 1 if the covariances are correct.
 
     Attributes:
-        mean: (...) average over all pairs of all runs; NaN where there is none.
-        lower, upper: (...) two-sided chi-square interval of the average; NaN where there is no pair.
+        mean: (...) average over all pairs of all runs; NaN without pairs.
+        lower, upper: (...) two-sided chi-square interval of the average; NaN without pairs.
         count: (...) number of pairs.
         dim: degrees of freedom of one pair, and the expected average.
     """
@@ -76,22 +76,22 @@ class AverageNees:
 
     @property
     def consistent(self) -> Bools:
-        """(...) whether the average lies in the interval; false where there is no pair."""
+        """True where the average lies in the interval, (...); False without pairs."""
         return np.asarray((self.lower <= self.mean) & (self.mean <= self.upper))
 
 
 def average_nees(means: ArrayLike, counts: ArrayLike, *, dim: int, confidence: float = CONFIDENCE) -> AverageNees:
-    """Average NEES over runs.
+    """Return the NEES averaged over runs, with its interval.
 
     Args:
-        means: (num_runs, ...) mean over the pairs of each run, e.g. at each scan; NaN where the run has none.
+        means: (num_runs, ...) mean over the pairs of each run, for example at each scan; NaN without pairs.
         counts: (num_runs, ...) number of pairs of each mean.
         dim: dimension of the error: that of the state, or 2 for the position.
         confidence: probability that the average of a consistent filter lies in the interval, above 0 and below 1.
 
-    The interval takes pairs as independent. Runs are; pairs of the same scan nearly so, if targets are well apart; but
-    scans of one run are not: average over runs at each scan, and over time only to compare.
-    Raises `InputError` for arguments out of range, or a mean that is missing where there are pairs.
+    The interval assumes independent pairs. Runs are independent, and pairs of the same scan are nearly so if targets
+    are well separated, but scans of one run are not. Average over runs at each scan, and over time only to compare.
+    Raises `InputError` for arguments out of range, or a missing mean for a number of pairs above 0.
     """
     values = as_array("means", means, "fiu", "numbers, an entry a run").astype(np.float64)
     numbers = as_array("counts", counts, "fiu", "numbers, an entry a run")
@@ -106,10 +106,10 @@ def average_nees(means: ArrayLike, counts: ArrayLike, *, dim: int, confidence: f
 
 
 def nees_interval(counts: ArrayLike, *, dim: int, confidence: float = CONFIDENCE) -> tuple[Floats, Floats]:
-    """Bounds between which the mean of `counts` independent NEES of dimension `dim` lies with that confidence.
+    """Return the bounds of the mean of `counts` independent NEES of dimension `dim` with that confidence.
 
-    The sum of the NEES is chi-square distributed with counts * dim degrees of freedom; as much lies below the interval
-    as above. Returns two arrays in the shape of counts, NaN where it is 0.
+    The sum of the NEES is chi-square distributed with counts * dim degrees of freedom; both tails have the same
+    probability. Returns two arrays in the shape of counts, NaN where it is 0.
     Raises `InputError` for arguments out of range.
     """
     from scipy.special import gammaincinv

@@ -1,4 +1,4 @@
-"""Measures of a run as the bytes of an Arrow file, kept beside the run that they can always be computed from again."""
+"""Serialisation of a run's metrics as an Arrow file, stored next to the run; they can be computed again from it."""
 
 from __future__ import annotations
 
@@ -12,36 +12,37 @@ from vedette.internal.reading import error_summary
 from vedette.kernels.base.types import Floats
 from vedette.simulation.arrow import Kind, Layout, read_metadata, read_table, write_table
 
-_VERSION = "1"  # another wherever a built-in measure is defined otherwise
-_SET = " ".join((_VERSION, *COLUMNS))  # what this version of the program measures
+_VERSION = "1"  # changes with the definition of a built-in metric
+_SET = " ".join((_VERSION, *COLUMNS))  # built-in metrics of this version
 _LAYOUT = Layout({}, {"": Kind.NUMBER})
 
 
 def encode_metrics(metrics: RunMetrics) -> bytes:
-    """Equal measures give equal bytes."""
+    """Return the metrics as bytes; equal metrics give equal bytes."""
     columns = {name: column.astype(np.float64) for name, column in metrics.columns().items()}
-    return write_table(columns, _LAYOUT, {"built_in": _SET, "own": " ".join(metrics.own)})  # type: ignore[arg-type] # arrays alone
+    return write_table(columns, _LAYOUT, {"built_in": _SET, "own": " ".join(metrics.own)})  # type: ignore[arg-type] # arrays only
 
 
 def has_metrics(content: bytes, own: Iterable[str]) -> bool:
-    """Whether all that this version of the program measures is there, and one's own measures of these names."""
+    """Return True if the bytes have all metrics of this version, and custom metrics with these names."""
     try:
         there = read_metadata(content)
         return there["built_in"] == _SET and set(own) <= set(there["own"].split())
-    except Exception:  # damage can raise nearly anything in there
+    except Exception:  # damaged bytes can raise almost any exception
         return False
 
 
 def decode_metrics(content: bytes, num_scans: int) -> tuple[RunMetrics | None, dict[str, Floats]]:
-    """The measures back from their bytes, and those of one's own among them.
+    """Return the metrics from their bytes, and the custom ones among them.
 
-    None for those of another version of this program, which measured otherwise; one's own are there still.
+    The metrics are None if another version with other definitions wrote them; the custom ones are returned all the
+    same.
 
-    Raises `InputError` for other bytes, and measures of another number of scans.
+    Raises `InputError` for other bytes, and for metrics of another number of scans.
     """
     try:
         built_in = read_metadata(content)["built_in"]
-    except Exception as error:  # damage can raise nearly anything in there
+    except Exception as error:  # damaged bytes can raise almost any exception
         raise InputError(
             f"metrics: expected measures as an Arrow file; it is damaged: {error_summary(error)}"
         ) from error

@@ -1,4 +1,4 @@
-"""Estimates of a run paired with targets, scan by scan: what all measures of pairs and of labels start from."""
+"""Matching of a run's estimates with targets at each scan, the basis of all metrics of pairs and of labels."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from vedette.simulation.truth import Truth
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Matching:
-    """Pairs of an estimate and a target nearer than the cutoff, in order of scans.
+    """Pairs of an estimate and a target closer than the cutoff, in order of scans.
 
     Attributes:
-        num_targets: (num_scans,) targets alive at each scan.
-        num_estimates: (num_scans,) targets estimated at each scan.
-        scans: (num_pairs,) the scan of each pair, counted from 0.
+        num_targets: (num_scans,) number of targets alive at each scan.
+        num_estimates: (num_scans,) number of estimated targets at each scan.
+        scans: (num_pairs,) scan of each pair, counted from 0.
         truth_rows: (num_pairs,) row of the pair's target in `Truth.ids` and `Truth.states`.
         distances: (num_pairs,) distance of the two positions, m; below the cutoff.
         labels: (num_pairs, 2) label of the estimate.
         means: (num_pairs, state_dim) estimated states.
-        covs: (num_pairs, state_dim, state_dim) their covariances.
+        covs: (num_pairs, state_dim, state_dim) covariances of the estimates.
     """
 
     num_targets: Ints
@@ -46,50 +46,50 @@ class Matching:
 
     @property
     def num_matched(self) -> Ints:
-        """(num_scans,) pairs at each scan."""
+        """Number of pairs at each scan, (num_scans,)."""
         return np.bincount(self.scans, minlength=self.num_scans)
 
     @property
     def num_missed(self) -> Ints:
-        """(num_scans,) targets without a partner."""
+        """Number of targets without a partner at each scan, (num_scans,)."""
         return self.num_targets - self.num_matched
 
     @property
     def num_false(self) -> Ints:
-        """(num_scans,) estimates without a partner."""
+        """Number of estimates without a partner at each scan, (num_scans,)."""
         return self.num_estimates - self.num_matched
 
     def mean_by_scan(self, values: Floats) -> Floats:
-        """(num_scans,) mean of (num_pairs,) values over the pairs of each scan; NaN where there is none."""
+        """Return the mean of (num_pairs,) values over the pairs of each scan, (num_scans,); NaN without pairs."""
         counts, means = self.num_matched, np.full(self.num_scans, np.nan)
         np.divide(sum_by_scan(self.scans, values, self.num_scans), counts, out=means, where=counts > 0)
         return means
 
     def max_by_scan(self, values: Floats) -> Floats:
-        """(num_scans,) largest of (num_pairs,) values over the pairs of each scan; NaN where there is none."""
+        """Return the largest of (num_pairs,) values over the pairs of each scan, (num_scans,); NaN without pairs."""
         largest = np.full(self.num_scans, np.nan)
         np.fmax.at(largest, self.scans, values)
         return largest
 
 
 def sum_by_scan(scans: Ints, values: Floats, num_scans: int) -> Floats:
-    """(num_scans,) sum of (num,) values over the entries of each scan."""
-    return np.asarray(np.bincount(scans, weights=values, minlength=num_scans), np.float64)  # integers if there is none
+    """Return the sum of (num,) values over the entries of each scan, (num_scans,)."""
+    return np.asarray(np.bincount(scans, weights=values, minlength=num_scans), np.float64)  # no entries give integers
 
 
 def match_run(truth: Truth, estimates: Sequence[Estimate], *, cutoff: float, order: float) -> Matching:
-    """Match estimated with true positions at every scan, each scan by itself, by the assignment of OSPA and GOSPA.
+    """Match estimated with true positions, separately at every scan, by the assignment of OSPA and GOSPA.
 
-    The assignment makes the sum of min(distance, cutoff) ** order least; those of its pairs count that are nearer than
-    the cutoff. Where several assignments are equally good, one of them is taken, always the same.
+    The assignment minimises the sum of min(distance, cutoff) ** order; only pairs closer than the cutoff count. Among
+    equally good assignments, always the same one is used.
 
     Args:
         truth: the targets at every scan.
-        estimates: one a scan.
+        estimates: one per scan.
         cutoff: c > 0, m, finite.
         order: p >= 1, finite.
 
-    Raises `InputError` for a cutoff or order out of range, if there is not one estimate a scan, or for positions that
+    Raises `InputError` for a cutoff or order out of range, unless there is one estimate per scan, or for positions that
     are not finite.
     """
     check_parameters(cutoff, order, finite=True)
@@ -124,7 +124,7 @@ def match_run(truth: Truth, estimates: Sequence[Estimate], *, cutoff: float, ord
 
 
 def _stacked(estimates: Sequence[Estimate]) -> tuple[Ints, Floats, Floats]:
-    """Labels, means and covariances of all scans; those of an empty scan say nothing about the dimension."""
+    """Return the labels, means and covariances of all scans; empty scans may have any state dimension."""
     some = [estimate for estimate in estimates if estimate.num_targets] or [Estimate.empty(2)]
     dims = {estimate.means.shape[1] for estimate in some}
     if len(dims) > 1:

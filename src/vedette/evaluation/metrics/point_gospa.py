@@ -29,18 +29,18 @@ from vedette.simulation.truth import Truth
 
 @dataclass(frozen=True, slots=True)
 class GospaResult:
-    """GOSPA distance with alpha = 2, and the costs that it is made of.
+    """GOSPA distance with alpha = 2, and its costs.
 
-    The costs are p-th powers and add up: `localisation + missed + false == total ** p`. (Where c ** p exceeds the range
-    of a float they are infinite; the total is right even so.)
+    The costs are p-th powers and add up: `localisation + missed + false == total ** p`. (If c ** p exceeds the range of
+    a float, the costs are infinite; the total is still correct.)
 
     Attributes:
         total: the distance, in the unit of the points.
         localisation: sum of distance ** p over the matched pairs.
         missed: c ** p / 2 for each true point without a partner.
         false: c ** p / 2 for each estimated point without a partner.
-        num_missed: true points without a partner nearer than c.
-        num_false: estimated points without a partner nearer than c.
+        num_missed: number of true points without a partner closer than c.
+        num_false: number of estimated points without a partner closer than c.
     """
 
     total: float
@@ -53,7 +53,7 @@ class GospaResult:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GospaSeries:
-    """GOSPA scan by scan: (num_scans,) arrays, each as in `GospaResult`; total in m, costs in m ** p."""
+    """GOSPA at each scan: (num_scans,) arrays, each as in `GospaResult`; total in m, costs in m ** p."""
 
     total: Floats
     localisation: Floats
@@ -64,15 +64,15 @@ class GospaSeries:
 
 
 def gospa(estimates: ArrayLike, truths: ArrayLike, *, cutoff: float, order: float) -> GospaResult:
-    """GOSPA distance with alpha = 2, split into what was mislocated, missed and false.
+    """Return the GOSPA distance with alpha = 2, with its costs of localisation, missed and false points.
 
-    Only alpha = 2 can be split: only then does leaving two points apart cost as much as a pair at the cutoff, so that
-    every point is either matched or not (Proposition 1). For another alpha there is `gospa_distance`.
+    Only alpha = 2 has these parts: only then do two unmatched points cost as much as a pair at the cutoff, so that
+    every point is either matched or not (Proposition 1). For another alpha, use `gospa_distance`.
 
     Args:
         estimates: (num_estimates, point_dim).
         truths: (num_truths, point_dim).
-        cutoff: c > 0, finite; a pair at this distance or more is a missed and a false point.
+        cutoff: c > 0, finite; a pair at this distance or more counts as a missed and a false point.
         order: p >= 1, finite.
 
     Raises `InputError` for points that are not finite or of unequal dimension, or a cutoff or order out of range.
@@ -97,7 +97,7 @@ def gospa(estimates: ArrayLike, truths: ArrayLike, *, cutoff: float, order: floa
 def gospa_distance(
     estimates: ArrayLike, truths: ArrayLike, *, cutoff: float, order: float, alpha: float = 2.0
 ) -> float:
-    """GOSPA distance for any alpha in (0, 2]: a point too many or too few costs c ** p / alpha.
+    """Return the GOSPA distance for any alpha in (0, 2]: an extra or missing point costs c ** p / alpha.
 
     With alpha = 1 it is the OSPA distance without its division by the size of the larger set.
     Arguments and errors as in `gospa`.
@@ -113,21 +113,21 @@ def gospa_distance(
 
 
 def gospa_of_run(truth: Truth, estimates: Sequence[Estimate], *, cutoff: float, order: float) -> GospaSeries:
-    """GOSPA (alpha = 2) of the estimated positions at every scan of a run. Raises `InputError` as `match_run` does."""
+    """Return the GOSPA (alpha = 2) of the positions at every scan of a run; raise `InputError` as `match_run` does."""
     return gospa_of_matching(match_run(truth, estimates, cutoff=cutoff, order=order), cutoff, order)
 
 
 def gospa_of_matching(matching: Matching, cutoff: float, order: float) -> GospaSeries:
-    """GOSPA (alpha = 2) at every scan, of a matching that was made with the same cutoff and order."""
+    """Return the GOSPA (alpha = 2) at every scan, from a matching with the same cutoff and order."""
     return _series(matching.scans, matching.distances, matching.num_missed, matching.num_false, cutoff, order)
 
 
 def _series(
     scans: Ints, distances: Floats, num_missed: Ints, num_false: Ints, cutoff: float, order: float
 ) -> GospaSeries:
-    """`distances` are those of the matched pairs, `scans` says of which scan."""
+    """Return the series from the distances of the matched pairs and their scans."""
     num_scans, unmatched = len(num_missed), num_missed + num_false
-    # Ratios to the largest distance that counts: the root of a sum of powers of metres would overflow at high orders.
+    # Ratios to the largest relevant distance, because a sum of powers of metres would overflow at high orders.
     scale = np.where(unmatched > 0, cutoff, 0.0)
     np.maximum.at(scale, scans, distances)
     ratios = np.divide(distances, scale[scans], out=np.zeros_like(distances), where=distances > 0.0)
@@ -146,4 +146,4 @@ def _series(
 
 
 def _costs(numbers: Ints, price: float) -> Floats:
-    return np.multiply(numbers, price, out=np.zeros(len(numbers)), where=numbers > 0)  # none of an infinite price is 0
+    return np.multiply(numbers, price, out=np.zeros(len(numbers)), where=numbers > 0)  # 0 for no points at price inf

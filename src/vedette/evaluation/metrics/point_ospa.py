@@ -28,7 +28,7 @@ from vedette.kernels.base.types import HEIGHT, Floats
 from vedette.models.arguments import reject
 from vedette.simulation.truth import Truth
 
-# Components of states that count.
+# Components of states in the distance.
 _COUNTED: dict[str, Any] = {"position": slice(2), "position_and_height": [0, 1, HEIGHT], "state": slice(None)}
 _ALIKE = "position, as true states have {} components and estimated ones {}"
 
@@ -42,8 +42,8 @@ class OspaResult:
 
     Attributes:
         total: the OSPA distance.
-        localisation: the part that comes from matched points that lie apart.
-        cardinality: the part that comes from points too many or too few.
+        localisation: part from the distances of matched points.
+        cardinality: part from extra or missing points.
     """
 
     total: float
@@ -52,13 +52,13 @@ class OspaResult:
 
 
 def ospa(estimates: ArrayLike, truths: ArrayLike, *, cutoff: float, order: float) -> OspaResult:
-    """OSPA distance between two finite sets of points, by exact assignment.
+    """Return the OSPA distance between two finite sets of points, by exact assignment.
 
     Args:
         estimates: (num_estimates, point_dim).
         truths: (num_truths, point_dim).
-        cutoff: distance c > 0 at which a matched pair counts as missed; also the price of a point too many or too few.
-            May be infinite: then sets of unequal size are infinitely far apart.
+        cutoff: distance c > 0 at which a matched pair counts as missed; also the cost of an extra or missing point.
+            May be infinite: then the distance between sets of unequal size is infinite.
         order: exponent p >= 1; may be infinite.
 
     Two empty sets are at distance 0; an empty and a non-empty set at `cutoff`.
@@ -72,19 +72,19 @@ def ospa(estimates: ArrayLike, truths: ArrayLike, *, cutoff: float, order: float
 def ospa_of_run(
     truth: Truth, estimates: Sequence[Estimate], *, cutoff: float, order: float, components: str = "position"
 ) -> Floats:
-    """OSPA of the estimates at every scan of a run.
+    """Return the OSPA of the estimates at every scan of a run.
 
     Args:
         truth: the targets at every scan.
-        estimates: one a scan.
-        cutoff: c > 0, m; of whole states in no unit.
+        estimates: one per scan.
+        cutoff: c > 0, m; without a unit for full states.
         order: p >= 1.
-        components: "position", the distance in the plane; "position_and_height", that in space, of states [px, py, vx,
-            vy, pz, vz]; or "state": Euclidean distance over all components, metres, m/s and rad/s taken as numbers of
-            one kind.
+        components: "position", the distance in the plane; "position_and_height", the distance in space, for states
+            [px, py, vx, vy, pz, vz]; or "state": Euclidean distance over all components, ignoring the units m, m/s and
+            rad/s.
 
-    Returns (num_scans, 3): total, localisation and cardinality parts, m; of whole states in no unit.
-    Raises `InputError` as `ospa` does, for other components, and if there is not one estimate a scan.
+    Returns (num_scans, 3): total, localisation and cardinality parts, m; without a unit for full states.
+    Raises `InputError` as `ospa` does, for other components, and unless there is one estimate per scan.
     """
     check_parameters(cutoff, order)
     check_scans(truth, estimates)
@@ -108,13 +108,13 @@ def ospa_of_run(
 
 
 def check_scans(truth: Truth, estimates: Sequence[Estimate]) -> None:
-    """Raise `InputError` unless there is one estimate a scan."""
+    """Raise `InputError` unless there is one estimate per scan."""
     if len(estimates) != truth.num_scans:
         raise InputError(f"estimates: expected one for each of {truth.num_scans} scans; got {len(estimates)}")
 
 
 def ospa_of_distances(distances: Floats, cutoff: float, order: float) -> OspaResult:
-    """OSPA of two sets whose elements lie at these distances.
+    """Return the OSPA of two sets from the distances between their elements.
 
     Args:
         distances: (num_first, num_second), none above the cutoff; either number may be 0.
@@ -131,11 +131,11 @@ def _ospa_of_points(first: Floats, second: Floats, cutoff: float, order: float) 
 
 
 def _ospa_of_pairs(distances: Floats, numbers: tuple[int, ...], cutoff: float, order: float) -> OspaResult:
-    """Of the (min(numbers),) distances of pairs between sets of these numbers."""
+    """Return the OSPA from the distances of the matched pairs, (min(numbers),), of sets with these sizes."""
     smaller, larger = sorted(numbers)
     if larger == 0:
         return OspaResult(0.0, 0.0, 0.0)
     localisation = power_mean(distances, larger, order)
-    # An infinite order makes the share's root 1.
+    # For an infinite order, the root of the share is 1.
     cardinality = cutoff * ((larger - smaller) / larger) ** (1.0 / order) if larger > smaller else 0.0
     return OspaResult(combine(localisation, cardinality, order), localisation, cardinality)

@@ -1,4 +1,4 @@
-"""All measures of a run, scan by scan, and measures of one's own."""
+"""All metrics of a run at each scan, and custom metrics."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from vedette.simulation.tables import LAYOUTS
 
 @dataclass(frozen=True, slots=True)
 class Metric:
-    """One measure more, with a column of its own wherever there are measures.
+    """A custom metric, with its own column in all tables of metrics.
 
     Attributes:
-        name: of its column, a Python identifier; its unit, if it has one, at the end (`_m` m, `_s` s, `_rad` rad).
-        function: of the record of a run, gives (num_scans,) numbers; NaN where it has no value.
+        name: name of its column, a Python identifier; it ends with the unit, if any (`_m` m, `_s` s, `_rad` rad).
+        function: function of the record of a run that returns (num_scans,) numbers; NaN where it has no value.
 
     Raises:
-        InputError: a name that is no identifier, or that another column has.
+        InputError: a name that is not an identifier, or is that of another column.
     """
 
     name: str
@@ -44,10 +44,10 @@ class Metric:
             raise reject("metric.name", "a name that no column has", self.name)
 
     def of(self, record: RunRecord) -> Floats:
-        """(num_scans,) the measure of a run.
+        """Return the metric of a run, (num_scans,).
 
-        Raises `InputError`, with the name, for anything but one number a scan, and `VedetteError` where the function
-        itself raises.
+        Raises `InputError`, with the name, unless the function returns one number per scan, and `VedetteError` if the
+        function itself raises.
         """
         try:
             answer = self.function(record)
@@ -67,28 +67,27 @@ class Metric:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class RunMetrics(SummaryRepr):
-    """Measures of a run at each scan; every array is (num_scans,). OSPA is in the run's record.
+    """Metrics of a run at each scan; every array is (num_scans,). OSPA is in the run's record.
 
-    With c the cutoff and p the order that they were computed with, the three GOSPA costs add up to `gospa_m ** p`: for
-    p = 1 they are metres, in general m ** p. A pair is an estimate and a target matched within c.
+    With cutoff c and order p, the three GOSPA costs add up to `gospa_m ** p`; their unit is m ** p, metres for p = 1.
+    A pair is an estimate and a target matched within c.
 
     Attributes:
         gospa_m: GOSPA distance with alpha = 2, m.
-        gospa_localisation: cost of matched pairs that lie apart, m ** p.
+        gospa_localisation: cost of the distances of matched pairs, m ** p.
         gospa_missed: cost of targets without a partner, c ** p / 2 each, m ** p.
         gospa_false: cost of estimates without a partner, c ** p / 2 each, m ** p.
-        num_missed: targets without a partner.
-        num_false: estimates without a partner.
+        num_missed: number of targets without a partner.
+        num_false: number of estimates without a partner.
         ospa2_m: OSPA(2) distance over the window that ends at the scan, m.
         cardinality_error: number of estimates minus number of targets.
-        nees_mean: mean NEES of the full state over the pairs; NaN where there is none.
-        nees_count: number of pairs that `nees_mean` is over; 0 throughout where estimated and true states differ in
-            dimension.
-        position_nees_mean: mean NEES of the position over all pairs; NaN where there is none.
-        position_nees_max: the largest; NaN where there is no pair.
-        label_switches: targets matched to another label than at their last match.
-        fragmentations: targets matched again after a break.
-        own: measures of one's own, by name.
+        nees_mean: mean NEES of the full state over the pairs; NaN without pairs.
+        nees_count: number of pairs in `nees_mean`; 0 at all scans if estimated and true states differ in dimension.
+        position_nees_mean: mean NEES of the position over all pairs; NaN without pairs.
+        position_nees_max: largest NEES of the position; NaN without pairs.
+        label_switches: number of targets matched to another label than at their last match.
+        fragmentations: number of targets matched again after a break.
+        own: custom metrics by name.
     """
 
     gospa_m: Floats
@@ -113,21 +112,21 @@ class RunMetrics(SummaryRepr):
         return len(self.gospa_m)
 
     def columns(self) -> dict[str, NDArray[np.float64] | NDArray[np.int64]]:
-        """Each array under its name, in the order above: float64, or int64 for numbers of things; one's own last."""
+        """Return the arrays by name, in the order above: float64, or int64 for counts; custom metrics come last."""
         return {**{name: getattr(self, name) for name in COLUMNS}, **self.own}
 
     def with_own(self, record: RunRecord, own: Sequence[Metric]) -> RunMetrics:
-        """With measures of one's own besides, of the run's record; those that it has by the same names anew.
+        """Return the metrics with custom metrics of the run's record added; those with the same names are replaced.
 
-        Raises `InputError` or `VedetteError` as `Metric.of`.
+        Raises `InputError` or `VedetteError` as `Metric.of` does.
         """
         return replace(self, own={**self.own, **{metric.name: metric.of(record) for metric in own}})
 
     @classmethod
     def from_columns(cls, columns: Mapping[str, NDArray[np.float64] | NDArray[np.int64]]) -> RunMetrics:
-        """Of what `columns` gives, in any order.
+        """Return the metrics from the arrays that `columns` returns, in any order.
 
-        Raises `InputError` for a name missing, a type that is not the column's, or unequal lengths.
+        Raises `InputError` for a missing name, a wrong type, or unequal lengths.
         """
         if not columns.keys() >= COLUMNS.keys():
             raise reject("columns", ", ".join(COLUMNS), ", ".join(columns))
@@ -149,18 +148,18 @@ COLUMNS = {
 
 
 def measure(record: RunRecord, *, cutoff: float, order: float, window: int, own: Sequence[Metric] = ()) -> RunMetrics:
-    """All measures of a run, from one matching a scan; a matching of tracks besides for OSPA(2).
+    """Return all metrics of a run, from one matching per scan and a matching of tracks for OSPA(2).
 
     Args:
         record: the run.
         cutoff: c > 0, m, finite.
         order: p >= 1, finite.
-        window: scans of the window of OSPA(2), at least 1.
-        own: measures of one's own, each with a name of its own.
+        window: number of scans in the window of OSPA(2), at least 1.
+        own: custom metrics with different names.
 
     Raises:
-        InputError: an argument out of range, not one estimate a scan, a position that is not finite, or a measure of
-            one's own that is not one number a scan.
+        InputError: an argument out of range, a number of estimates other than one per scan, a position that is not
+            finite, or a custom metric without one number per scan.
         NumericalError: an estimate's covariance is not symmetric and positive definite.
     """
     truth = record.truth

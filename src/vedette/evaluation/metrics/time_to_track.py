@@ -1,4 +1,4 @@
-"""Time until a target that appears is first tracked: what search is for."""
+"""Time until a new target is first tracked, the metric for search."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from vedette.simulation.records import RunRecord
 
 @dataclass(frozen=True, slots=True)
 class TimeToTrack:
-    """A measure of runs: at each scan, the mean time until the targets that appear at it first have an estimate.
+    """Metric: mean time in s until the targets that appear at a scan first have an estimate.
 
-    An estimate of a target is one that is matched with it and nearer than c. A target that never has one counts with
-    the time from its first scan to its last. NaN at a scan at which none appears.
+    An estimate of a target is one that is matched with it and closer than c. A target without any estimate counts with
+    the time from its first scan to its last. NaN at scans without new targets.
 
     Attributes:
         cutoff: c > 0, m, finite.
-        order: p >= 1 of the matching, finite.
-        from_step: targets that appear at an earlier scan do not count; with 2, those that are there at first.
+        order: order p >= 1 of the matching, finite.
+        from_step: targets that appear before this scan do not count; with 2, those present at the first scan.
 
     Raises:
         InputError: an argument out of range.
@@ -38,12 +38,12 @@ class TimeToTrack:
         check_fields(self)
 
     def __call__(self, record: RunRecord) -> Floats:
-        """(num_scans,) s. Raises `InputError` as `match_run` does."""
+        """Return the metric of a run, (num_scans,), s; raise `InputError` as `match_run` does."""
         truth = record.truth
         _, first, of_row = np.unique(truth.ids, return_index=True, return_inverse=True)
         until = len(truth.ids) - 1 - np.unique(truth.ids[::-1], return_index=True)[1]
         tracked = np.sort(match_run(truth, record.estimates, cutoff=self.cutoff, order=self.order).truth_rows)[::-1]
-        until[of_row[tracked]] = tracked  # of a target's rows the first one stays, as it comes last
+        until[of_row[tracked]] = tracked  # the first of a target's rows is assigned last, and remains
         appears, waits = truth.scans[first], truth.times[truth.scans[until]] - truth.times[truth.scans[first]]
         counts = appears + 1 >= self.from_step
         number = np.bincount(appears[counts], minlength=truth.num_scans)

@@ -1,7 +1,7 @@
-"""OSPA distance between sets of tracks over a sliding window, called OSPA(2) as its base distance is itself an OSPA.
+"""OSPA distance between sets of tracks over a sliding window; OSPA(2), because its base distance is itself an OSPA.
 
 M. Beard, B.-T. Vo and B.-N. Vo, "A Solution for Large-Scale Multi-Object Tracking", IEEE Trans. Signal Processing 68,
-2020: the time-averaged OSPA as distance between tracks, and the OSPA between sets of tracks that it is the base of.
+2020: the time-averaged OSPA as distance between tracks, and the OSPA between sets of tracks with this base distance.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models.arguments import dimension
 from vedette.simulation.truth import Truth
 
-# Pairs of tracks times scans of a window, up to which distances are found once for several windows.
+# Largest product of pairs of tracks and scans of a window for which several windows share their distances.
 _MOST_AT_ONCE = 2**18
 
 
@@ -28,8 +28,8 @@ class TrackSet:
     """Tracks over the same scans; each may begin late, end early and have gaps.
 
     Attributes:
-        alive: (num_tracks, num_scans) whether the track exists at the scan.
-        positions: (num_tracks, num_scans, dim) m; finite, of no meaning where the track does not exist.
+        alive: (num_tracks, num_scans) True if the track exists at the scan.
+        positions: (num_tracks, num_scans, dim) in m; finite, without meaning where the track does not exist.
     """
 
     alive: Bools
@@ -41,7 +41,7 @@ class TrackSet:
         return int(self.alive.shape[1])
 
     def validate(self, name: str) -> None:
-        """Raise `InputError`, with `name`, unless the arrays fit together as described above."""
+        """Raise `InputError`, with `name`, unless the shapes match and the positions are finite."""
         if self.alive.ndim != 2 or self.positions.shape[:-1] != self.alive.shape:
             raise InputError(
                 f"{name}: expected one position a track and scan; got {self.positions.shape} for {self.alive.shape}"
@@ -51,13 +51,13 @@ class TrackSet:
 
     @classmethod
     def of_truth(cls, truth: Truth) -> TrackSet:
-        """One track a target, by its id."""
+        """Return one track per target, by its id."""
         tracks = np.unique(truth.ids, return_inverse=True)[1].reshape(-1)
         return cls._of_rows(tracks, np.diff(truth.offsets), truth.states)
 
     @classmethod
     def of_estimates(cls, estimates: Sequence[Estimate]) -> TrackSet:
-        """One track a label; one estimate a scan."""
+        """Return one track per label. estimates: one per scan."""
         counts = np.array([estimate.num_targets for estimate in estimates], np.int64)
         if not counts.any():
             return cls(np.empty((0, len(counts)), np.bool_), np.empty((0, len(counts), 2)))
@@ -75,27 +75,26 @@ class TrackSet:
         return cls(alive, positions)
 
     def within(self, start: int, stop: int) -> TrackSet:
-        """The tracks that exist at any of the scans `start` to `stop - 1`, over these scans."""
+        """Return the tracks that exist at any of the scans `start` to `stop - 1`, over these scans."""
         there = self.alive[:, start:stop].any(axis=1)
         return TrackSet(self.alive[there, start:stop], self.positions[there, start:stop])
 
 
 def ospa2(estimates: TrackSet, truths: TrackSet, *, cutoff: float, order: float, window: int) -> Floats:
-    """OSPA(2) over the window that ends at each scan.
+    """Return the OSPA(2) over the window that ends at each scan.
 
-    Two tracks are as far apart as they are on average over the scans of the window at which either exists: their
-    distance cut off at c, or c where only one exists. The tracks that exist in the window are the elements of the sets,
-    and OSPA with the same cutoff and order is the distance of the sets. So what a wrong label, a late start or a gap
-    costs is part of it.
+    The distance of two tracks is an average over the scans of the window at which either exists: of their distance cut
+    off at c, or of c if only one exists. The sets consist of the tracks that exist in the window, and their distance is
+    the OSPA with the same cutoff and order. It therefore includes the cost of wrong labels, late starts and gaps.
 
     Args:
         estimates: the estimated tracks.
         truths: the true ones, over the same scans.
         cutoff: c > 0, m, finite.
         order: exponent p >= 1 of the OSPA between the sets; may be infinite. (The average over time is of order 1.)
-        window: number of scans, at least 1; the first windows are cut short by the beginning.
+        window: number of scans, at least 1; the first windows are shorter, from the first scan on.
 
-    Returns (num_scans, 3): total, and the parts from matched tracks and from tracks too many or too few, m.
+    Returns (num_scans, 3): total, and the parts from matched tracks and from extra or missing tracks, m.
     Raises `InputError` for arguments out of range, positions that are not finite, or unequal numbers of scans.
     """
     check_parameters(cutoff, order)
@@ -122,13 +121,13 @@ def ospa2(estimates: TrackSet, truths: TrackSet, *, cutoff: float, order: float,
 
 
 def ospa2_of_run(truth: Truth, estimates: Sequence[Estimate], *, cutoff: float, order: float, window: int) -> Floats:
-    """OSPA(2) of the estimated positions under their labels; see `ospa2`, which gives the same and raises the same."""
+    """Return the OSPA(2) of the estimated positions, with tracks by label; values and errors as in `ospa2`."""
     check_scans(truth, estimates)
     return ospa2(TrackSet.of_estimates(estimates), TrackSet.of_truth(truth), cutoff=cutoff, order=order, window=window)
 
 
 def _costs(first: TrackSet, second: TrackSet, cutoff: float) -> tuple[Floats, Bools]:
-    """(num_first, num_second, num_scans) cut-off distances, 0 where neither exists, and whether either does."""
+    """Return cut-off distances (0 if neither exists) and flags if either exists, (num_first, num_second, num_scans)."""
     either = first.alive[:, None] | second.alive[None]
     both = first.alive[:, None] & second.alive[None]
     apart = np.sqrt(((first.positions[:, None] - second.positions[None]) ** 2).sum(axis=3))
@@ -136,5 +135,5 @@ def _costs(first: TrackSet, second: TrackSet, cutoff: float) -> tuple[Floats, Bo
 
 
 def _averages(costs: Floats, either: Bools) -> Floats:
-    """Over the scans at which either exists, of what `_costs` gives."""
+    """Return the averages of the results of `_costs` over the scans at which either track exists."""
     return np.asarray(costs.sum(axis=2) / np.maximum(either.sum(axis=2), 1))

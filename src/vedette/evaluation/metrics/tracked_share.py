@@ -1,4 +1,4 @@
-"""Share of the targets that a sensor can see that are tracked: what a fusion of different views must keep."""
+"""Share of visible targets that are tracked, the metric for fusion of different fields of view."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from vedette.simulation.truth import Truth
 
 
 def seen_targets(truth: Truth, poses: Floats, sensors: Sequence[SensorModel], *, min_detection: float) -> Bools:
-    """(total,) for each row of `Truth.states`, whether some sensor detects it with at least that probability.
+    """Return True for each row of `Truth.states` that some sensor detects with at least `min_detection`, (total,).
 
     Args:
         truth: the targets at every scan.
-        poses: (num_scans, num_sensors, pose_dim) of the sensors.
-        sensors: what each sensor sees, one a column of the poses.
-        min_detection: probability of detection, 0 to 1. Whether the sensor scans at that time does not matter.
+        poses: (num_scans, num_sensors, pose_dim) poses of the sensors.
+        sensors: model of each sensor, in the order of the poses.
+        min_detection: probability of detection, 0 to 1; it counts even if the sensor does not scan at that time.
 
     Raises `InputError` for an argument out of range, or another number of sensors than the poses have.
     """
@@ -41,15 +41,15 @@ def seen_targets(truth: Truth, poses: Floats, sensors: Sequence[SensorModel], *,
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackedShare:
-    """A measure of runs: at each scan, the share of the targets seen by some sensor that have an estimate within c.
+    """Metric: share of the targets visible to some sensor at a scan that have an estimate within c.
 
-    Estimates are matched with all targets, each at most once, as for OSPA. NaN at a scan at which none is seen.
+    Estimates are matched with all targets, each at most once, as for OSPA. NaN at scans without visible targets.
 
     Attributes:
-        sensors: what each sensor sees in truth.
+        sensors: true model of each sensor.
         cutoff: c > 0, m, finite.
-        order: p >= 1 of the matching, finite.
-        min_detection: probability of detection from which on a sensor sees a target.
+        order: order p >= 1 of the matching, finite.
+        min_detection: smallest probability of detection of a visible target.
 
     Raises:
         InputError: an argument out of range.
@@ -65,7 +65,7 @@ class TrackedShare:
         probability("min_detection", self.min_detection)
 
     def __call__(self, record: RunRecord) -> Floats:
-        """(num_scans,) the share. Raises `InputError` for a run of other sensors, and as `match_run` does."""
+        """Return the share, (num_scans,); raise `InputError` as `match_run` does, and for another number of sensors."""
         truth = record.truth
         seen = seen_targets(truth, record.poses, self.sensors, min_detection=self.min_detection)
         matching = match_run(truth, record.estimates, cutoff=self.cutoff, order=self.order)

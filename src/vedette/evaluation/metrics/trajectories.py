@@ -1,7 +1,7 @@
-"""Whether a target keeps its label, and whether it is tracked without a break.
+"""Label switches and fragmentations of the tracks of targets.
 
-In the manner of K. Bernardin and R. Stiefelhagen, "Evaluating Multiple Object Tracking Performance: The CLEAR MOT
-Metrics", EURASIP J. Image and Video Processing, 2008 (mismatches), and of Y. Li, C. Huang and R. Nevatia, "Learning to
+Similar to K. Bernardin and R. Stiefelhagen, "Evaluating Multiple Object Tracking Performance: The CLEAR MOT
+Metrics", EURASIP J. Image and Video Processing, 2008 (mismatches), and to Y. Li, C. Huang and R. Nevatia, "Learning to
 associate: HybridBoosted multi-target tracker for crowded scene", CVPR 2009 (fragments).
 """
 
@@ -20,12 +20,12 @@ from vedette.simulation.truth import Truth
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Continuity:
-    """Breaks in the tracks of targets, counted at the scan where they show.
+    """Breaks in the tracks of targets, counted at the scan of the next match.
 
     Attributes:
-        label_switches: (num_scans,) targets matched to another label than at their last match, however long ago.
-        fragmentations: (num_scans,) targets matched again after they were matched, then alive and not matched. Scans at
-            which the target does not exist are no break.
+        label_switches: (num_scans,) number of targets matched to another label than at their last match, at any time.
+        fragmentations: (num_scans,) number of targets matched again after scans at which they were alive but not
+            matched. Scans at which the target does not exist are not a break.
     """
 
     label_switches: Ints
@@ -33,27 +33,27 @@ class Continuity:
 
     @property
     def num_label_switches(self) -> int:
-        """In the whole run."""
+        """Number of label switches in the whole run."""
         return int(self.label_switches.sum())
 
     @property
     def num_fragmentations(self) -> int:
-        """In the whole run."""
+        """Number of fragmentations in the whole run."""
         return int(self.fragmentations.sum())
 
 
 def continuity_of_run(truth: Truth, estimates: Sequence[Estimate], *, cutoff: float, order: float) -> Continuity:
-    """Label switches and fragmentations of a run. Raises `InputError` as `match_run` does."""
+    """Return the label switches and fragmentations of a run; raise `InputError` as `match_run` does."""
     return continuity(truth, match_run(truth, estimates, cutoff=cutoff, order=order))
 
 
 def continuity(truth: Truth, matching: Matching) -> Continuity:
-    """Label switches and fragmentations, from the matching of the run.
+    """Return the label switches and fragmentations from the matching of a run.
 
-    Each scan is matched by itself. CLEAR MOT instead keeps a pair of the last scan as long as it is within the cutoff,
-    and so counts fewer switches among targets nearer to each other than that. A target that was never matched before,
-    or never again, has neither switch nor fragmentation: a late start and an early end are missed targets. A first
-    match after a return under the same id is compared with the last match before.
+    Each scan is matched separately. CLEAR MOT instead keeps a pair of the last scan as long as it is within the cutoff,
+    and so counts fewer switches among targets closer to each other than that. The first match of a target, and a target
+    that is not matched again, count as neither: a late start and an early end are missed targets. The first match after
+    a return under the same id is compared with the last match before it.
     """
     ids = truth.ids[matching.truth_rows]
     by_target = np.argsort(ids, kind="stable")  # pairs come in order of scans
@@ -69,7 +69,7 @@ def continuity(truth: Truth, matching: Matching) -> Continuity:
 
 
 def _ages(truth: Truth) -> Ints:
-    """(total,) at how many earlier scans the target of each row existed."""
+    """Number of earlier scans at which the target of each row existed, (total,)."""
     by_target = np.argsort(truth.ids, kind="stable")
     _, starts, counts = np.unique(truth.ids[by_target], return_index=True, return_counts=True)
     ages = np.empty(len(by_target), np.int64)
