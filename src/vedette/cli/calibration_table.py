@@ -40,7 +40,7 @@ def calibration_document(calibration: Calibration, names: tuple[str, ...]) -> di
 
 
 def print_windows(windows: list[CalibrationWindow], names: tuple[str, ...], *, position: bool) -> None:
-    """Print the estimates of each window, what they are relative to, warnings and likelihoods."""
+    """Print the estimates of each window, their reference sensor, warnings and likelihoods."""
     _print_table(windows, names)
     if any(_is_outside(each) for window in windows for each in window.calibration.estimates):
         say("* the assumed value lies outside the interval")

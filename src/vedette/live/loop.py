@@ -1,4 +1,4 @@
-"""The live loop: a pure function from (state, line) to (state, answers)."""
+"""The live loop: a function from (state, line) to (state, answers), without other input or output."""
 
 from __future__ import annotations
 

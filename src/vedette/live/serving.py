@@ -42,7 +42,7 @@ def is_loopback(address: str) -> bool:
 
 
 def check_address(host: str, token: str | None) -> None:
-    """Raise `InputError` for an unknown address, a token that is too short, or a public address without a token."""
+    """Raise `InputError` for an unknown address, a short token, or no token at an address that others can reach."""
     if token is not None and len(token.strip()) < LEAST_TOKEN:
         raise InputError(f"--token: expected at least {LEAST_TOKEN} letters; got {len(token.strip())}")
     try:

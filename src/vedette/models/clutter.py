@@ -215,7 +215,7 @@ def measurement_space_clutter(
     """Poisson clutter, uniform over a box of the sensor's measurement space: intensity rate / volume inside, 0 outside.
 
     Args:
-        rate: expected number a scan.
+        rate: expected number per scan.
         low: (meas_dim,) lowest value of each measurement component; a bearing in radians [rad, m].
         high: (meas_dim,) highest value of each measurement component; a bearing in radians [rad, m].
         angular: (meas_dim,) which components are angles. Their bounds may then lie anywhere on the circle, such as

@@ -139,7 +139,7 @@ def _at_position(measurements: Floats, pose: Floats) -> Floats:
 
 @part("bearing_slant_range", "measurement")
 def bearing_slant_range() -> MeasurementModel:
-    """z = [bearing in rad, slant range in m], of a radar without height; heights follow from two radars' ranges.
+    """z = [bearing in rad, slant range in m] of a radar that measures no heights; two radars' ranges determine them.
 
     A track starts at a height of 5 km, because one range does not determine it. States are [px, py, vx, vy, pz, vz].
     """
