@@ -109,7 +109,7 @@ LABELS = ("{kind: cm_delta_glmb, weights: [0.5, 0.5]}", "{kind: clmb, matching: 
                 ("{kind: m_delta_glmb}", own("Filter")),
                 LMB[1],
             ),
-            "19:34: filter.function: expected own_parts.py:Filter to give a TwoStepFilter, with predict() and "
+            "19:34: filter.function: expected own_parts.py:Filter to give a PredictUpdateFilter, with predict() and "
             "update(), as it must predict without a scan, got a Filter",
         ),
         (

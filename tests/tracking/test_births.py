@@ -170,7 +170,7 @@ def test_targets_are_found_without_any_site(kind: Any) -> None:
 def test_a_birth_needs_labels_and_a_fusion_that_matches_them() -> None:
     with pytest.raises(InputError, match="expected one that matches labels"):
         Distributed(filters(WORLD, SENSORS), Clmb((0.5, 0.5)))
-    with pytest.raises(InputError, match=r"expected a TwoStepFilter.*as targets are born of measurements"):
+    with pytest.raises(InputError, match=r"expected a PredictUpdateFilter.*as targets are born of measurements"):
         Distributed((PhdFilter(WORLD, SENSORS[0]),))
     placeless = replace(SENSORS[0], measurement=replace(SENSORS[0].measurement, places=None))
     wanted = r"sensors\[1\]\.measurement: expected a measurement with `places`, as targets are born of measurements"
@@ -224,7 +224,7 @@ def test_scans_at_different_times() -> None:
         assert len(info.filters) == 3
     plain = Distributed((Plain(local[0]),))
     with pytest.raises(
-        InputError, match=r"a TwoStepFilter, with predict\(\) and update\(\), as it must predict without"
+        InputError, match=r"a PredictUpdateFilter, with predict\(\) and update\(\), as it must predict without"
     ):
         plain.step(plain.initial(), [None], POSES[:1], 1.0, rngs=rngs(1))
 

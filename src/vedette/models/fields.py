@@ -28,7 +28,7 @@ from vedette.models.arguments import (
 )
 
 T = TypeVar("T")
-# Smallest number of samples of a search and of the first round of a race (`vedette.control.rounds`).
+# Smallest number of samples of a search and of the first round of a race (`vedette.control.racing`).
 _LEAST_SAMPLES = 24
 
 

@@ -135,5 +135,5 @@ class LocalFilters:
         if provides(own, PredictUpdateFilter):
             found: PredictUpdateFilter = own
             return found
-        expected = f"a TwoStepFilter, with predict() and update(), as {why}"
+        expected = f"a PredictUpdateFilter, with predict() and update(), as {why}"
         raise reject(f"filters[{s}]", expected, type(own).__name__)

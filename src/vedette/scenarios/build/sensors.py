@@ -100,7 +100,7 @@ def _check_own(scenario: Scenario, section: Sensor, sensor: SensorModel, local: 
     waits = waits or section.switchable or (model.network is not None and model.network.delay)
     if isinstance(model.filter, CustomFilter) and (born or waits) and not isinstance(local, PredictUpdateFilter):
         why = "targets are born of measurements" if born else "it must predict without a scan"
-        wanted = f"{model.filter.function} to give a TwoStepFilter, with predict() and update(), as {why}"
+        wanted = f"{model.filter.function} to give a PredictUpdateFilter, with predict() and update(), as {why}"
         raise NotGiven(model.filter, "function", wanted, f"a {type(local).__name__}")
 
 
