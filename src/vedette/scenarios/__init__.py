@@ -1,6 +1,6 @@
-"""Named scenarios as data: the schema of their YAML files, their faults by line and column.
+"""Named scenarios as data: the schema of their YAML files, and their faults by line and column.
 
-What is built of them is in `vedette.scenarios.build`.
+`vedette.scenarios.build` builds filters, planners and simulations from them.
 """
 
 from vedette.scenarios.generated import GeneratedScene, scene_text

@@ -15,19 +15,19 @@ from vedette.recorded import RecordedScans
 from vedette.recorded.extents import places_of
 from vedette.scenarios.sections import ScenarioModel
 
-_FASTER = 1.5  # times the speed that targets hardly exceed, which still count as neighbours
+_FASTER = 1.5  # a neighbour may move at up to this number of times the speed that targets hardly exceed
 _NEAR = 2.5 * math.sqrt(2.0)  # noise stds between two measurements of a target that stands still
 _WIDER = 3.0  # times the radius of a neighbourhood, up to which chance neighbours are counted
 _WORST = 0.25  # standard error of the share of measurements that are of targets, at most
 _ESTIMATED = "estimated from the measurements without a neighbour in the scans before and after"
 _HALF = "half of the measurements, as the recording is too short, or has no positions, to estimate it"
-_LEAST = 0.1  # a scan; the least rate that is assumed
+_LEAST = 0.1  # per scan; the lowest rate that is assumed
 
 
 class Look(NamedTuple):
     """A scan as places.
 
-    time: s. places: (num, 2) m. stds: (num,) m, the noise of each. detection: (num,) probability of detection there.
+    time: s. places: (num, 2) m. stds: (num,) noise of each place, m. detection: (num,) probability of detection there.
     """
 
     time: float
@@ -37,16 +37,16 @@ class Look(NamedTuple):
 
 
 def target_share(looks: Sequence[Look], speed: float) -> float:
-    """Return the share of a sensor's measurements that are of targets; NaN where the recording shows too little.
+    """Return the share of a sensor's measurements that come from targets; NaN if the recording has too little evidence.
 
     A target that is detected at one scan has a neighbour at the next with the probability of detection; a false
-    measurement has one by chance only. Let h_i say whether measurement i has a neighbour in an adjacent scan, and q_i
-    be the probability that it has no chance neighbour. Over measurements and adjacent scans, the mean of
-    a_i = h_i - 1 + q_i over that of q_i is the share times P_D. The product of a_i for the scan before and that for
-    the scan after gives the share times P_D^2 in the same way, and so P_D itself, which counts where it exceeds what
-    the file gives. Each q_i is estimated from the ring around the neighbourhood, (1 - 1/8)^n with n measurements in
-    it, which is unbiased for a Poisson number of uniform density there. Measurements whose ring is wider than where
-    measurements lie are left out.
+    measurement has one only by chance. Let h_i be 1 if measurement i has a neighbour in an adjacent scan, else 0, and
+    let q_i be the probability that it has no chance neighbour. The mean of a_i = h_i - 1 + q_i over measurements and
+    adjacent scans, divided by the mean of q_i, is the share times P_D. The product of a_i for the scan before and that
+    for the scan after gives the share times P_D^2 in the same way, and so P_D itself, which is used if it exceeds the
+    given one. Each q_i is estimated from the ring around the neighbourhood as (1 - 1/8)^n with n measurements in the
+    ring, which is unbiased for a Poisson number of uniform density there. Measurements are left out if their ring is
+    wider than the area of all measurements.
 
     Args:
         looks: the sensor's scans, in order of time.
@@ -75,15 +75,15 @@ def target_share(looks: Sequence[Look], speed: float) -> float:
 
 
 def _widest(looks: Sequence[Look]) -> float:
-    """m, half the side of the square as large as the box around all places."""
+    """Half the side of the square that is as large as the box around all places, m."""
     places = np.concatenate([np.empty((0, 2)), *(look.places.reshape(-1, 2) for look in looks)])
     return 0.5 * math.sqrt(np.prod(np.ptp(places, axis=0))) if len(places) else 0.0
 
 
 def _terms(own: Look, other: Any, moved: float, widest: float) -> Floats:
-    """(2, num) of each measurement a_i and q_i with the places of an adjacent scan, between which targets moved, m.
+    """Return a_i and q_i of each measurement, shape (2, num), with the places of an adjacent scan.
 
-    Zeros where the ring is wider than `widest`, m.
+    Zeros if the ring is wider than `widest`, m. moved: how far targets move between the two scans, m.
     """
     radii = _NEAR * own.stds + _FASTER * moved
     near, wide = (other.query_ball_point(own.places, scale * radii, return_length=True) for scale in (1.0, _WIDER))
@@ -92,7 +92,7 @@ def _terms(own: Look, other: Any, moved: float, widest: float) -> Floats:
 
 
 def place_stds(kind: str, stds: Floats, scan: Floats) -> Floats:
-    """(num,) larger standard deviation of each place that a scan measured, m; none where it measures no places."""
+    """Return the larger standard deviation of each measured place, shape (num,), m; empty if it measures no places."""
     if kind not in PLACED:
         return np.empty(0)
     if is_position(kind):
@@ -108,7 +108,7 @@ def assumed_clutter(
     speed: float,
     words: dict[str, str],
 ) -> dict[str, Any]:
-    """Return the section `sensors`, with a clutter rate where none is given; adds to `words` how it was found."""
+    """Return the section `sensors`, with a clutter rate where none is given; adds to `words` how it was estimated."""
     defaults = said.get("sensor_defaults")
     shared = isinstance(defaults, Mapping) and "clutter" in defaults
     sensors, rates = [], dict[str, list[str]]()
@@ -126,7 +126,7 @@ def assumed_clutter(
 
 
 def _largest(kind: str, recording: RecordedScans, s: int) -> dict[str, float]:
-    """Return the largest range rate or height of false measurements, a tenth above the largest of the recording."""
+    """Return the limit of range rate or height of clutter: a tenth above the largest value in the recording."""
     component = next((name for name in COMPONENTS[kind] if name in ("range_rate", "altitude")), None)
     if component is None:
         return {}
@@ -137,7 +137,7 @@ def _largest(kind: str, recording: RecordedScans, s: int) -> dict[str, float]:
 
 
 def _rate(model: ScenarioModel, recording: RecordedScans, s: int, folder: FilePath, speed: float) -> tuple[float, str]:
-    """Return the clutter rate of a sensor, per scan, and how it was found."""
+    """Return the clutter rate of a sensor, per scan, and how it was estimated."""
     counts = [len(scan) for scans in recording.scans if (scan := scans[s]) is not None]
     if not counts:
         return 1.0, "no scan in the recording"
@@ -148,7 +148,7 @@ def _rate(model: ScenarioModel, recording: RecordedScans, s: int, folder: FilePa
 
 
 def _looks(model: ScenarioModel, recording: RecordedScans, s: int, folder: FilePath) -> list[Look]:
-    """The scans of a sensor as places; none where it measures no places or its noise is not known."""
+    """Return the scans of a sensor as places; none if it measures no places or its noise is unknown."""
     section = model.sensors[s]
     sensor = section.build(model.region.build(), model.filter.gaussian_method, folder, model.filter.detection_taken_at)
     kind, stds, found = section.measurement.kind, sensor.noise.least_stds, list[Look]()

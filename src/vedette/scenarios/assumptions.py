@@ -20,7 +20,7 @@ from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sensors_file import EXPECTED_BIRTHS, HEIGHT_STD, measured_birth, measures_heights
 
 _LOST_PER_SECOND = 0.001
-_BIRTH_STDS = 2.0  # of the noise across, where most was measured
+_BIRTH_STDS = 2.0  # times the noise across the line of sight, where most measurements are
 
 
 def assumed_sections(
@@ -31,7 +31,7 @@ def assumed_sections(
     speed: float,
     words: dict[str, str],
 ) -> dict[str, Any]:
-    """Return the sections that are not given, by the scans; adds to `words` a description of each."""
+    """Return the sections that are not given, from the scans; adds to `words` a description of each."""
     found: dict[str, Any] = {"time": _time(recording)}
     if "region" not in given:
         found["region"] = region = measured_region(model, recording)
@@ -49,7 +49,7 @@ def assumed_sections(
 
 
 def _turns(model: ScenarioModel, recording: RecordedScans) -> str:
-    """Describe the turns that were found in the rows, not given; empty if there are none."""
+    """Describe the turns that were found from the rows and not given; empty if there are none."""
     texts = []
     for s, (name, sensor) in enumerate(zip(model.sensor_names, model.sensors, strict=True)):
         own = [poses[s] for scans, poses in zip(recording.scans, recording.poses, strict=True) if scans[s] is not None]
@@ -62,10 +62,10 @@ def _turns(model: ScenarioModel, recording: RecordedScans) -> str:
 
 
 def assumed_motion(given: Mapping[str, Any], speed: float, words: dict[str, str]) -> dict[str, Any]:
-    """Return the motion and the survival of targets, of these what is not given."""
+    """Return the motion and survival of targets, as far as they are not given."""
     found: dict[str, Any] = {}
     if "motion" not in given:
-        # Held over the times between scans of several sensors, it would be the less the more often some of them scans.
+        # Held over the times between scans of several sensors, it would spread targets less with more scans.
         has_height = measures_heights(given)
         kind = "constant_velocity_height" if has_height else "constant_velocity"
         found["motion"] = {"kind": kind, "sigma_v": speed / 20.0}
@@ -94,14 +94,14 @@ def assumed_birth(
 
 
 def _time(recording: RecordedScans) -> dict[str, Any]:
-    """A regular time that says as much of the recording's as one can."""
+    """Return a regular time section that matches the times of the recording as closely as possible."""
     gaps = np.diff(recording.times)
     period = float(np.median(gaps)) if len(gaps) else 1.0
     return {"num_steps": len(recording.times), "step_period": period, "start": float(recording.times[0])}
 
 
 def _spread(model: ScenarioModel, measured: Sequence[Sequence[Floats]], folder: FilePath) -> float:
-    """Standard deviation of where was measured, m: the upper quartile over all measurements that say a place."""
+    """Return the standard deviation of measured places, m: the upper quartile over all measured places."""
     region, method = model.region.build(), model.filter.gaussian_method
     found = list[Floats]()
     for section, scans in zip(model.sensors, measured, strict=True):
@@ -110,7 +110,7 @@ def _spread(model: ScenarioModel, measured: Sequence[Sequence[Floats]], folder: 
             continue
         kind, scan = section.measurement.kind, np.concatenate(scans)
         own = place_stds(kind, stds, scan)
-        if kind == "bearing_slant_range":  # the ground range goes by the height
+        if kind == "bearing_slant_range":  # the ground range depends on the height
             up = np.minimum(ASSUMED_HEIGHT, scan[:, 1] * math.sqrt(0.5))
             own = np.hypot(own, 0.5 * HEIGHT_STD * up / np.sqrt(scan[:, 1] ** 2 - up**2))
         found.append(own)

@@ -29,26 +29,26 @@ from vedette.scenarios.yaml_reader import MOST_BYTES, read_yaml
 from vedette.tracking import Central, Tracker
 
 _LIMITS = Limits(min_existence=1e-3)
-# A standard deviation from which on nothing is known: of clocks, s; of logarithms, of log-odds.
+# Standard deviations at and above which a parameter counts as unknown: of clocks, s; of logarithms, of log-odds.
 _UNKNOWN_CLOCK, _UNKNOWN_LOG, _UNKNOWN_ODDS = 5.0, 1.0, 4.0
 _WIDER = 3.0  # times the region, along each axis: noise at its edge stays in it
-_BUILT_IN = ("region", "around_sensor", "measurement_space")  # clutter that can be had at the raw measurement
+_BUILT_IN = ("region", "around_sensor", "measurement_space")  # clutter that can be evaluated at the raw measurement
 _NOT_CONVERGED = "# The optimiser stopped before it converged: these values may be inaccurate."
 _LEAST_RATE, _SUREST = 0.01, 0.98  # to start from
 
 
 def problem_of(scenario: Scenario, *, position: bool = False, bearings: Bearings | None = None) -> Problem:
-    """The sensors of a recording as parameters to be found.
+    """Return the calibration problem of a recording: its sensors' parameters, to be estimated.
 
-    Biases of range, bearing and clock, noise, probability of detection and rate of clutter: what each sensor has of
-    these. The clock of the first sensor is what those of the others are compared with; of sensors that all measure
-    positions, what it measures is; where places are asked for, its place and bearing are. The likelihood is that of an
-    LMB filter that takes the scans in turn, with the motion, survival and births of the scenario.
+    The parameters are biases of range, bearing and clock, noise, probability of detection and clutter rate, as far as
+    each sensor has them. Clocks are relative to that of the first sensor. The measurement of the first sensor is the
+    reference if all sensors measure positions; with `position`, so are its place and bearing. The likelihood is that
+    of an LMB filter with sequential updates, with the motion, survival and births of the scenario.
 
     Args:
-        scenario: as of `vedette.scenarios.of_recording`; of sensors alone, as for scans that are to come, it has none.
-        position: whether biases of the other sensors' own places are asked for, too.
-        bearings: in which direction the biases of bearings count, where there is no recording.
+        scenario: from `vedette.scenarios.of_recording`; one of sensors alone, for future scans, has no recording.
+        position: True to estimate biases of the other sensors' own places, too.
+        bearings: in which direction the biases of bearings count if there is no recording.
     """
     model, folder = scenario.model, scenario.folder
     sites = tuple(sites_of(model))
@@ -90,9 +90,9 @@ def problem_of(scenario: Scenario, *, position: bool = False, bearings: Bearings
 
 
 def _born_at_once(targets: TargetModel, times: Floats) -> TargetModel:
-    """The targets, with as many births from measurements as their period has, whenever the next scan comes.
+    """Return the targets with the expected births of an average scan interval at every scan, whenever it comes.
 
-    Of births within a period there are the more the later it comes, and it would make clocks likelier for that.
+    Births that count per period become more the later a scan comes, which would make later clocks more likely.
     """
     birth = targets.birth
     measured = birth.from_measurements
@@ -104,10 +104,10 @@ def _born_at_once(targets: TargetModel, times: Floats) -> TargetModel:
 
 
 def _wider_clutter(sensor: Sensor) -> dict[str, float]:
-    """What makes the clutter of a sensor reach farther, at the same density.
+    """Return fields that make the clutter of a sensor reach farther, at the same density.
 
-    It must not end where noise at the edge of what is seen may take a measurement: there it would be certain that no
-    clutter is, and the likelihood would jump.
+    Clutter must not end where noise at the edge of the view may take a measurement: no clutter would be possible there,
+    and the likelihood would jump.
     """
     clutter = sensor.clutter
     if clutter.kind == "region":
@@ -116,13 +116,13 @@ def _wider_clutter(sensor: Sensor) -> dict[str, float]:
         return {}
     size = "radius" if clutter.radius is not None else "half_side"
     wider = {"rate": _WIDER**2 * clutter.rate, size: _WIDER * getattr(clutter, size)}
-    if size == "radius":  # of a part of a square the area hangs on the heading
+    if size == "radius":  # the area of a sector of a square depends on the heading
         wider |= {"rate": wider["rate"] * 180.0 / clutter.half_width_deg, "half_width_deg": 180.0}
     return wider
 
 
 def _widened(region: Region) -> Region:
-    """The region with the same middle."""
+    """Return the region widened about its middle."""
     sides = []
     for low, high in ((region.x_min, region.x_max), (region.y_min, region.y_max)):
         middle, reach = 0.5 * (low + high), 0.5 * _WIDER * (high - low)
@@ -133,10 +133,10 @@ def _widened(region: Region) -> Region:
 def _biases(
     s: int, sensor: Sensor, said: Bias, clockwise: bool, position: bool, only_positions: bool
 ) -> Iterator[Parameter]:
-    """Of what a sensor measures, of its clock, and where asked of its place."""
+    """Return the biases of a sensor: of its measurement, its clock and, with `position`, its place."""
     components = COMPONENTS[sensor.measurement.kind]
     asked = [*components]
-    if s > 0:  # a shift in time of all changes nothing, nor does one in space, nor a turn
+    if s > 0:  # a common shift in time, shift in space or turn of all sensors changes nothing
         asked += ["clock", *(("x", "y") if position and "x" not in components else ())]
     elif only_positions:
         asked = []
@@ -153,7 +153,7 @@ def _biases(
 
 
 def _of_models(s: int, sensor: Sensor) -> Iterator[Parameter]:
-    """Of noise, detection and clutter what the sections have numbers for."""
+    """Return the parameters of noise, detection and clutter that the sections give as numbers."""
     noise, components = sensor.noise, COMPONENTS[sensor.measurement.kind]
     for i, component in enumerate(components):
         known = QUANTITIES[component]
@@ -176,7 +176,7 @@ def _of_models(s: int, sensor: Sensor) -> Iterator[Parameter]:
 def _with_values(
     sensors: Sequence[Sensor], parameters: Sequence[Parameter], values: Sequence[float]
 ) -> tuple[Sensor, ...]:
-    """The sections of the sensors with these values of what is not a bias."""
+    """Return the sections of the sensors with these values of the parameters that are not biases."""
     found = list(sensors)
     for each, value in zip(parameters, values, strict=True):
         if each.kind != "bias":
@@ -197,9 +197,9 @@ def calibrated_text(scenario: Scenario, sensors: FilePath, calibration: Calibrat
 
     Args:
         scenario: of the recording.
-        sensors: the file that it was made with.
-        calibration: what was found.
-        folder: where the new file is to stand; elsewhere than the old one, files that it names get absolute paths.
+        sensors: the sensors file that the scenario was made with.
+        calibration: the estimates.
+        folder: of the new file; if it is not that of the old one, files that it names get absolute paths.
     """
     said = dict(read_yaml(read_text(sensors, "sensors file", MOST_BYTES), str(sensors)).data)
     biases = [sensor.bias.model_dump(exclude_defaults=True) for sensor in scenario.model.sensors]

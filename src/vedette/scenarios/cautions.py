@@ -1,4 +1,4 @@
-"""What is valid in a scenario but costs accuracy, or may not be meant: warnings, not faults."""
+"""Warnings of valid settings in a scenario that cost accuracy or are probably mistakes."""
 
 from __future__ import annotations
 
@@ -33,19 +33,20 @@ from vedette.scenarios.sections.tracking import LABELS_CAPPED, Filter
 from vedette.scenarios.sections.world import grouped_order
 from vedette.scenarios.start_cautions import start_cautions
 
-# Sensors whose probabilities of detection of one place differ by more than this do not see the same.
+# Sensors have different views if their probabilities of detection of one place differ by more than this.
 MAX_DIFFERENCE = 0.5
-# Of more sensors than these, what a rule that sends densities leaves unused costs much (docs/networks.md).
+# With more sensors than this, rules that send densities lose much information (docs/networks.md).
 HANDFUL = 4
-# Births nearer to each other than so many standard deviations of their difference may be taken for each other: of 40
-# layouts drawn at random GCI lost 5 m and more to cardinality in 7 of the 17 below, and in one of the 23 above.
+# Birth sites that are nearer to each other than this number of standard deviations of their difference may be confused.
+# Of 40 random layouts, GCI lost 5 m and more to cardinality in 7 of the 17 below this distance and in one of the 23
+# above.
 NEAR_SITES = 4.0
 _POINTS_A_SIDE = 21
 _MOST_WORTH = 20.0  # of an undetected target, as a share of what a missed one costs
 
 
 def cautions(scenario: Scenario, further: Iterable[tuple[Path, str]] = ()) -> tuple[str, ...]:
-    """Warnings of a valid scenario, one line each, with file, line and column where it was read from a file.
+    """Return warnings of a valid scenario, one line each, with file, line and column if it was read from a file.
 
     further: places and texts of other warnings, which come last.
     """
@@ -67,13 +68,13 @@ def cautions(scenario: Scenario, further: Iterable[tuple[Path, str]] = ()) -> tu
 
 def _records(scenario: Scenario) -> Iterator[tuple[Path, str]]:
     if isinstance(scenario.model.targets, RecordedTargets) or scenario.model.recording is not None:
-        from vedette.scenarios.record_cautions import record_cautions  # with it comes what takes long to import
+        from vedette.scenarios.record_cautions import record_cautions  # slow to import
 
         yield from record_cautions(scenario)
 
 
 def _fusion_by_label(model: ScenarioModel) -> Fusion | None:
-    """The fusion of several sensors' own beliefs by their labels; None where there is no such."""
+    """Return the fusion by label of several sensors' local beliefs; None if the scenario has none."""
     fusion = model.fusion
     return fusion if isinstance(fusion, Fusion) and fusion.kind in BY_LABEL and len(model.sensors) > 1 else None
 
@@ -96,7 +97,7 @@ def _births(scenario: Scenario) -> Iterator[tuple[Path, str]]:
 
 
 def _near_births(scenario: Scenario, fusion: Fusion) -> Iterator[tuple[Path, str]]:
-    """Sites between which a sensor may take a target of the one for one of the other."""
+    """Yield a warning of the first two sites so close that a sensor may confuse their targets."""
     order = grouped_order(scenario.model.motion)[:2]
     for (i, one), (j, other) in combinations(enumerate(scenario.model.birth.sites), 2):
         between = (np.array(one.mean) - other.mean)[order]
@@ -127,7 +128,7 @@ def _late_beliefs(scenario: Scenario) -> Iterator[tuple[Path, str]]:
 
 
 def _many_sensors(scenario: Scenario) -> Iterator[tuple[Path, str]]:
-    """Densities of more sensors than those at which rules that send them lose little."""
+    """Yield a warning if densities of more than `HANDFUL` sensors are fused by a rule that then loses much."""
     model = scenario.model
     fusion, num = model.fusion, len(model.sensors)
     if not isinstance(fusion, Fusion) or num <= HANDFUL:
@@ -170,7 +171,7 @@ def _cells(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
 
 
 def _worth(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
-    """A worth of undetected targets that is taken for a number of metres."""
+    """Yield a warning if the worth of undetected targets was probably given in metres."""
     worth = model.control.undetected_worth
     if worth is not None and worth > _MOST_WORTH and model.control.reward.kind in ("expected_loss", "expected_gospa"):
         yield (
@@ -194,7 +195,7 @@ def _labels(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
 
 
 def _undetected_births(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
-    """Births that a cap on hypotheses cuts where sensors hardly see the sites."""
+    """Yield a warning if a cap on hypotheses cuts births because sensors hardly see the sites."""
     most, order = most_hypotheses(model), grouped_order(model.motion)[:2]
     if most is None:
         return
@@ -247,7 +248,7 @@ def _rule(fusion: Fusion) -> str:
 
 
 def _unlike(names: list[str], table: Floats, grid: Floats, fusion: Fusion) -> str:
-    """How much (num_sensors, num_places) probabilities of detection differ, and where most."""
+    """Describe how much the probabilities of detection differ, and where most; table: (num_sensors, num_places)."""
     spread = table.max(axis=0) - table.min(axis=0)
     worst = int(spread.argmax())
     chances = ", ".join(f"{name} {chance:.2g}" for name, chance in zip(names, table[:, worst], strict=True))
@@ -260,7 +261,7 @@ def _unlike(names: list[str], table: Floats, grid: Floats, fusion: Fusion) -> st
 
 
 def _limited_and_moving(scenario: Scenario, fusion: Fusion) -> Iterator[tuple[Path, str]]:
-    """Sensors that see alike where they start, and need not once they have moved."""
+    """Yield a warning of sensors with equal views at the start that may differ once they have moved."""
     model, region = scenario.model, scenario.model.region
     across = math.hypot(region.x_max - region.x_min, region.y_max - region.y_min)
     for i, sensor in enumerate(model.sensors):
@@ -276,7 +277,7 @@ def _limited_and_moving(scenario: Scenario, fusion: Fusion) -> Iterator[tuple[Pa
 
 
 def prob_detection(sensor: Sensor, points: Floats) -> Floats | None:
-    """(n,) probabilities of detection at (n, 2) places by a sensor where it starts; None for a model of the user's own.
+    """Return the (n,) probabilities of detection at (n, 2) places from a sensor's start; None for a custom model.
 
     In plain NumPy, so that a check compiles nothing: the models are those of `vedette.models.detection`.
     """
@@ -300,7 +301,10 @@ def prob_detection(sensor: Sensor, points: Floats) -> Floats | None:
 
 
 def _soft(section: Detection, beyond_range: Floats, beyond_angle: Floats, seen: Bools) -> Floats:
-    """(n,) probabilities of detection of a soft sector, by how far places lie beyond its edges in m and rad."""
+    """Return the probabilities of detection of a soft sector, shape (n,).
+
+    beyond_range, beyond_angle: how far each place lies beyond its edges, in m and rad.
+    """
     detected = section.probability * _logistic(section.range_slope * beyond_range)
     if section.angle_slope is not None:
         detected = detected * _logistic(section.angle_slope * beyond_angle)

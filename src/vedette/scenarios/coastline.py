@@ -1,4 +1,4 @@
-"""The coastline that pictures show: lines out of a GeoJSON file, cut to about what a picture shows."""
+"""The coastline in figures: lines from a GeoJSON file, cut to about the area that a figure shows."""
 
 from __future__ import annotations
 
@@ -16,19 +16,20 @@ from vedette.scenarios.faults import Finding, Path, describe
 from vedette.scenarios.geojson import geometries, listed
 from vedette.scenarios.sections import ScenarioModel
 
-if TYPE_CHECKING:  # with it come the filters, which a check does without
+if TYPE_CHECKING:  # importing it imports the filters, which a check does not need
     from vedette.recorded import Origin
 
 Line: TypeAlias = tuple[tuple[float, float], ...]
 _FINEST = 1e-4  # of the extent: points nearer than that are one
 _MOST_POINTS = 10_000  # of all lines; a finer coastline is drawn more coarsely
-_FARTHEST_DEG = 60.0  # from the origin: what is beyond does not lie in its plane
+_FARTHEST_DEG = 60.0  # from the origin: places beyond this do not lie in its plane
 
 
 def coastline(model: ScenarioModel, folder: FilePath) -> tuple[Line, ...]:
-    """Lines in the plane, m: what is at most the region's larger side away from region and sensors.
+    """Return the lines of the coastline in the plane, m, as far as they are near the region and the sensors.
 
-    folder: what the file is relative to. Raises `InputError` for a file that cannot be read.
+    Near means at most the larger side of the region away from them. folder: to which the file is relative. Raises
+    `InputError` for a file that cannot be read.
     """
     if model.coastline is None:
         return ()
@@ -65,7 +66,7 @@ def _read(
 
 
 def _lines(geometry: Any) -> list[Any]:
-    """The lines of a geometry, or the rings of its polygons; of points there are none."""
+    """Return the lines of a geometry, or the rings of its polygons; none for points."""
     coordinates: list[Any] = geometry["coordinates"]
     several = {"LineString": [coordinates], "MultiLineString": coordinates, "Polygon": coordinates}
     if geometry["type"] == "MultiPolygon":
@@ -74,20 +75,20 @@ def _lines(geometry: Any) -> list[Any]:
 
 
 def _degrees(line: Any, name: str) -> Floats:
-    """(n, 2) longitudes and latitudes."""
+    """Longitudes and latitudes, shape (n, 2)."""
     try:
         found = np.array([[float(place[0]), float(place[1])] for place in line], np.float64).reshape(-1, 2)
     except (TypeError, ValueError, IndexError, KeyError):
         found = np.empty((0, 2))
     if len(found) < 2:
         raise InputError(f"{describe(name)}: a line whose places are not several [longitude, latitude]")
-    if not (np.abs(found) <= [360.0, 90.0]).all():  # no number is, either
+    if not (np.abs(found) <= [360.0, 90.0]).all():  # also False for NaN
         raise InputError(f"{describe(name)}: places that are no degrees of longitude and latitude")
     return found
 
 
 def _in_plane(degrees: Floats, origin: Origin) -> Iterator[Floats]:
-    """Of a line its parts that lie in the plane, m."""
+    """Yield the parts of a line that lie in the plane of the origin, m."""
     lon, lat = np.radians(degrees.T)
     lon0, lat0 = np.radians([origin.longitude_deg, origin.latitude_deg])
     cosines = np.sin(lat) * np.sin(lat0) + np.cos(lat) * np.cos(lat0) * np.cos(lon - lon0)
@@ -97,13 +98,13 @@ def _in_plane(degrees: Floats, origin: Origin) -> Iterator[Floats]:
 
 
 def _near(line: Floats, low: Floats, high: Floats) -> Bools:
-    """(n - 1,) whether the box around a segment meets another box."""
+    """Return True for each segment whose bounding box meets the given box, shape (n - 1,)."""
     least, most = np.minimum(line[:-1], line[1:]), np.maximum(line[:-1], line[1:])
     return np.asarray((most >= low).all(axis=1) & (least <= high).all(axis=1))
 
 
 def _runs(points: Floats, kept: Bools) -> Iterator[Floats]:
-    """The lines of the segments that are kept."""
+    """Yield the lines that the retained segments form."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], kept, [False]]).astype(np.int8)))
     for first, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         yield points[first : end + 1]
@@ -114,7 +115,7 @@ def _size(line: Floats) -> float:
 
 
 def _thinned(line: Floats, least: float) -> Floats:
-    """A line without points that are nearer to the last one than that; its ends stay."""
+    """Return a line without points nearer than `least` to the last retained one; its ends stay."""
     kept = [0]
     for i in range(1, len(line) - 1):
         if np.abs(line[i] - line[kept[-1]]).max() >= least:
@@ -123,7 +124,7 @@ def _thinned(line: Floats, least: float) -> Floats:
 
 
 def coastline_findings(model: ScenarioModel, folder: FilePath) -> Iterator[Finding]:
-    """What is wrong with the file of the coastline."""
+    """Yield a fault if the coastline file cannot be read."""
     try:
         coastline(model, folder)
     except InputError as error:
@@ -131,7 +132,7 @@ def coastline_findings(model: ScenarioModel, folder: FilePath) -> Iterator[Findi
 
 
 def coastline_cautions(model: ScenarioModel, folder: FilePath) -> Iterator[tuple[Path, str]]:
-    """That a file says nothing of where the region is, which may not be meant."""
+    """Yield a warning if no line of the coastline is near the region, which is probably a mistake."""
     if model.coastline is not None and not coastline(model, folder):
         meant = "are longitudes and latitudes exchanged?"
         yield ("coastline",), f"coastline: nothing of it is near region and sensors, and none is drawn ({meant})"

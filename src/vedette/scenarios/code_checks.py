@@ -1,4 +1,4 @@
-"""Checks of the code of the user's own that a scenario names, by importing and making it."""
+"""Checks of the custom code that a scenario names: import it and build its parts."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from vedette.scenarios.sections.custom import NotGiven, customs
 from vedette.simulation.journal import RunStopped, error_cause
 from vedette.simulation.loop import simulate
 
-_SCANS = 3  # that are tried: enough for one that is missing, and one after births
-# These are made of other parts, and so as parts of the whole.
+_SCANS = 3  # scans that are tried: enough for a missing one, and one after births
+# These are made of other parts and are built together with the whole scenario.
 _MADE_OF_PARTS = ("filter", "fusion", "central", "planner")
 
 
 def code_faults(scenario: Scenario) -> list[str]:
-    """What the code that a scenario names lacks of what it is to give, with file, line and column, in file order.
+    """Return the faults of the custom code that a scenario names, with file, line and column, in file order.
 
-    Imports and runs that code: makes what it gives, and where all of it can be had, tracks for two or three scans.
+    Imports and runs that code: builds its parts and, if all parts can be built, tracks for two or three scans.
     """
     found = list(dict.fromkeys(_faults(scenario)))
     document = document_of(scenario)
@@ -53,7 +53,7 @@ def _faults(scenario: Scenario) -> Iterator[Told]:
 
 
 def _plan(scenario: Scenario) -> None:
-    """Make the planners that the section about control is for."""
+    """Build the planners that use the section `control`."""
     build_planner(scenario, "random")
     if has_labels(build_sensors(scenario)[0].filter):
         build_planner(scenario, "jdm")
@@ -62,7 +62,7 @@ def _plan(scenario: Scenario) -> None:
 
 
 def _track(scenario: Scenario) -> None:
-    """Go through the first scans without decisions; where sensors may be out of touch, first as if all were in."""
+    """Run the first scans without decisions; if sensors may be out of contact, first with all in contact."""
     network, tried = scenario.model.network, [scenario]
     if network is not None:
         every = {"radio_range": None, "hops": None, "loss": 0.0, "delay": 0}

@@ -1,4 +1,4 @@
-"""Whether the sensors of a recording can see a place in common, as far as their coverage is given."""
+"""Warnings of sensors of a recording whose given coverages have no place in common."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _POINTS_A_SIDE = 21
 
 
 def coverage_cautions(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
-    """Sensors of a recording that share no place with any other, as far as their coverage is given."""
+    """Yield a warning of each sensor of a recording whose given coverage meets that of no other sensor."""
     views = [field_of_view(sensor) for sensor in model.sensors]
     if model.recording is None or len(views) < 2:
         return
@@ -31,7 +31,7 @@ def coverage_cautions(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
             f"{rest} see no place in common, as far as positions, headings and ranges of detection say: check units, "
             "north and places",
         )
-        if len(names) == 2:  # the other one has none in common with this one either
+        if len(names) == 2:  # the warning holds for the other sensor, too
             return
 
 
@@ -40,7 +40,7 @@ def _may_move(sensor: Sensor) -> bool:
 
 
 def _share_places(one: Sensor, own: FieldOfView, other: Sensor, view: FieldOfView | None) -> bool:
-    """Whether two sensors see a place in common where they start; one that moves or has no edge may."""
+    """Return True if two sensors see a common place from their start, or if the other one moves or has no edge."""
     if view is None or _may_move(other):
         return True
     shares = np.linspace(0.0, 1.0, _POINTS_A_SIDE)

@@ -1,4 +1,4 @@
-"""What a warning tells to take instead: only what the scenario as it stands is accepted with."""
+"""Alternatives that a warning recommends: only those with which the scenario is valid."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from vedette.scenarios.sections.fusion import Fusion
 
 
 def fusions_instead(scenario: Scenario, fusion: Fusion, *, by_views: bool) -> str:
-    """Fusions that lose less, each as it is to be written and where it can be had; empty where there is none.
+    """Return a text with fusions that lose less, as they are written in the file, and where each applies; may be empty.
 
-    by_views: whether one of the sensors' own densities by views is among them.
+    by_views: True to include fusion of the sensors' local densities by views.
     """
     found = list(_fusions(scenario, fusion, by_views))
     return f"; take {'; '.join(found)}" if found else ""
 
 
 def accepted(scenario: Scenario, fields: Mapping[str, Any]) -> bool:
-    """Whether the scenario is valid with these fields changed."""
+    """Return True if the scenario is valid with these fields changed."""
     try:
         with_fields(scenario, fields)
     except ScenarioError:
@@ -30,7 +30,7 @@ def accepted(scenario: Scenario, fields: Mapping[str, Any]) -> bool:
 
 
 def _fusions(scenario: Scenario, fusion: Fusion, by_views: bool) -> Iterator[str]:
-    own_filter = scenario.model.filter.kind == "custom"  # of one sensor, and of a kind that is not known
+    own_filter = scenario.model.filter.kind == "custom"  # takes one sensor; density unknown
     if not own_filter:
         for kind, where in (("sequential", "where scans can be sent"), ("parallel", "where only densities can")):
             if kind != fusion.kind and accepted(scenario, {"fusion": {"kind": kind}}):
@@ -46,7 +46,7 @@ def _fusions(scenario: Scenario, fusion: Fusion, by_views: bool) -> Iterator[str
 
 
 def _ways(scenario: Scenario, fusion: Fusion) -> tuple[dict[str, Any], ...]:
-    """With feedback or without and labels matched or not: what is nearest to the scenario first."""
+    """Return the options with or without feedback and matching, those nearest to the scenario first."""
     birth = scenario.model.birth
     later = birth.from_measurements is not None or birth.steps == "every" or max(birth.steps, default=1) > 1
     plain: dict[str, Any] = {}
@@ -57,7 +57,7 @@ def _ways(scenario: Scenario, fusion: Fusion) -> tuple[dict[str, Any], ...]:
 
 
 def with_own_labels(scenario: Scenario, fusion: Fusion) -> str:
-    """What keeps a target that sensors take up at different steps, under labels of their own."""
+    """Return a text with settings that keep a target that sensors start at different steps under different labels."""
     found = [
         f"{name}: {value}"
         for name, value, given in (

@@ -1,4 +1,4 @@
-"""Faults of a configuration's data: what its sections object to, in the words and at the paths of the file."""
+"""Faults of a configuration's data: the errors of its sections, with the words and paths of the file."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from vedette.scenarios.sections.courses import COURSES
 
 S = TypeVar("S", bound=Section)
 
-# pydantic's error types and what was expected; `{}` takes a value of the error's context.
+# What is expected, by pydantic's error type; `{}` takes a value of the error's context.
 _EXPECTED = {
     "int_type": "a whole number",
     "int_from_float": "a whole number",
@@ -44,7 +44,7 @@ _LONGEST_WORD = 100  # comparing words takes the product of their lengths
 
 
 def read_section(section: type[S], data: Mapping[str, Any]) -> tuple[S, list[Told]]:
-    """The section in the data and what is wrong with it; where that is anything, the section is one in part."""
+    """Return the section in the data and its faults; if there are any, the section is incomplete."""
     data = section.in_metres(data)
     try:
         return section.model_validate(data), []
@@ -54,7 +54,7 @@ def read_section(section: type[S], data: Mapping[str, Any]) -> tuple[S, list[Tol
 
 
 def _faults(value: Any, annotation: Any, data: Any, path: Path) -> Iterator[Told]:
-    """All that is wrong with a value of a section in part, section by section."""
+    """Yield all faults of a value of an incomplete section, section by section."""
     if isinstance(value, Unread):
         errors = (error for error in value.errors if not _is_echo(error))
         yield from _merge_alternatives([_translate(error, annotation, path) for error in errors])
@@ -77,7 +77,7 @@ def _faults(value: Any, annotation: Any, data: Any, path: Path) -> Iterator[Told
 
 
 def options(annotation: Any) -> Iterator[Any]:
-    """The types that an annotation allows, without `Annotated` and unions around them."""
+    """Yield the types that an annotation allows, without `Annotated` and unions around them."""
     origin = get_origin(annotation)
     if origin is Annotated:
         yield from options(get_args(annotation)[0])
@@ -89,7 +89,7 @@ def options(annotation: Any) -> Iterator[Any]:
 
 
 def kinds_of(model: type[BaseModel]) -> list[str]:
-    """The values of `kind` that select a model; none where it is not one of several."""
+    """Return the values of `kind` that select a model; none if it is not one of several."""
     field = model.model_fields.get("kind")
     return [] if field is None else _literals(field.annotation)
 
@@ -107,7 +107,7 @@ def _entry(annotation: Any) -> Any:
 
 
 def suggestion(word: str, known: list[str]) -> str:
-    """`did you mean ...?`, or empty where nothing is near."""
+    """Return `did you mean ...?` with the closest known word; empty if none is close."""
     if len(word) > _LONGEST_WORD:
         return ""
     near = difflib.get_close_matches(word, known, n=1, cutoff=0.66)
@@ -172,7 +172,7 @@ def _length_fault(error: ErrorDetails, annotation: Any) -> tuple[str, str]:
 
 
 def _inside(loc: tuple[str | int, ...], annotation: Any) -> tuple[Path, Any]:
-    """Path in a field of one of pydantic's locations, which also name the members of unions, and what stands there."""
+    """Return the path in a field, and the type there, of a pydantic location, which also names members of unions."""
     path: Path = ()
     for part in loc:
         if isinstance(part, int):
@@ -183,7 +183,7 @@ def _inside(loc: tuple[str | int, ...], annotation: Any) -> tuple[Path, Any]:
 
 
 def _translate(error: ErrorDetails, annotation: Any, path: Path) -> Told:
-    """One error of pydantic's with the field at `path`."""
+    """Return the fault for one of pydantic's errors in the field at `path`."""
     inside, inner = _inside(error["loc"], annotation)
     path = (*path, *inside)
     match error["type"]:
@@ -210,12 +210,12 @@ def _translate(error: ErrorDetails, annotation: Any, path: Path) -> Told:
 
 
 def _is_echo(error: ErrorDetails) -> bool:
-    """Whether pydantic counts a list as too short because items of it are faulty."""
+    """Return True if pydantic reports a list as too short only because some of its items are faulty."""
     return error["type"] == "too_short" and len(error["input"]) >= error["ctx"]["min_length"]
 
 
 def _merge_alternatives(found: list[Told]) -> list[Told]:
-    """One entry for each path: the members of a union each say what they expected, unless one got further inside."""
+    """Return one fault for each path; combines what the members of a union expected, unless one got further inside."""
     around = {path[:length] for path, *_ in found for length in range(len(path))}
     merged: dict[tuple[Path, str], tuple[list[str], str]] = {}
     for path, wanted, got, hint in found:

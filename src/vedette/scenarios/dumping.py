@@ -24,22 +24,22 @@ if TYPE_CHECKING:
 
 _LONGEST_LINE = 100
 _NUMBERS = float | int | None
-# What stays without quotes: words of letters, digits, dots and dashes that YAML 1.2 takes for nothing else.
+# Text without quotes: words of letters, digits, dots and dashes that YAML 1.2 reads as nothing else.
 _PLAIN = re.compile(r"[A-Za-z][\w.-]*( [A-Za-z0-9][\w.-]*)*")
 
 
 def dump_scenario(model: ScenarioModel, *, folder: Path | None = None) -> str:
-    """YAML text of a scenario with every default written out; it reads back as the same scenario.
+    """Return the YAML text of a scenario with every default written out; it reads back as the same scenario.
 
     Args:
         model: its sections.
-        folder: what the files that it names are relative to; with it, the text can be kept anywhere.
+        folder: to which the files that it names are relative; with it, the text can be stored anywhere.
     """
     return dump_data(model.model_dump(mode="json"), folder)
 
 
 def dump_kept(scenario: Scenario) -> str:
-    """YAML text of a scenario that is kept beside its run: with the SHA-256 of its recordings, which may be changed."""
+    """Return the YAML text of a scenario that is stored with its run, with the SHA-256 of its recordings."""
     model, folder = scenario.model, scenario.folder
     data = _anchored(model.model_dump(mode="json"), folder.resolve())
     if model.recording is not None:
@@ -50,7 +50,7 @@ def dump_kept(scenario: Scenario) -> str:
 
 
 def dump_data(data: Any, folder: Path | None = None) -> str:
-    """YAML text of plain data of a scenario, of which nothing is checked; folder: as of `dump_scenario`."""
+    """Return the YAML text of plain data of a scenario, without checks; folder: see `dump_scenario`."""
     yaml = YAML(typ="rt", pure=True)
     yaml.width = 10_000
     yaml.indent(mapping=2, sequence=4, offset=2)
@@ -60,21 +60,21 @@ def dump_data(data: Any, folder: Path | None = None) -> str:
 
 
 def files_of(model: ScenarioModel, folder: Path) -> tuple[Path, ...]:
-    """The files beside the scenario that decide what it means: recorded targets, custom Python files, programs."""
+    """Return the files that a scenario depends on: recorded targets and scans, custom Python files, programs."""
     beside = folder.resolve()
     found = [beside / name for _, section in sections_in(model) for name in _files(section, beside)]
     return tuple(dict.fromkeys(found))
 
 
 def _files(section: Section, folder: Path) -> tuple[str, ...]:
-    """The files that a section itself names."""
+    """Return the files that a section itself names."""
     if isinstance(section, RecordedTargets | RecordingSection):
         return (section.path,)
     return section.files(folder) if isinstance(section, Custom | ProgramSection) else ()
 
 
 def _anchored(value: dict[str, Any] | list[Any], folder: Path) -> Any:
-    """The data with the files of recorded targets, custom models, programs and coastlines as absolute paths."""
+    """Return the data with absolute paths of the files and folders that they name."""
     if isinstance(value, list):
         return [_anchored(item, folder) if isinstance(item, dict | list) else item for item in value]
     anchored = {key: _anchored(item, folder) if isinstance(item, dict | list) else item for key, item in value.items()}
@@ -90,7 +90,7 @@ def _anchored(value: dict[str, Any] | list[Any], folder: Path) -> Any:
 
 
 def _laid_out(value: Any) -> Any:
-    """The data with small collections on one line."""
+    """Return the data with small collections on one line."""
     if isinstance(value, str):
         return value if _PLAIN.fullmatch(value) and plain_scalar(value) == value else DoubleQuotedScalarString(value)
     if isinstance(value, dict):

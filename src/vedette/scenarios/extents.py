@@ -1,4 +1,4 @@
-"""The region of a recording and of scans that are to come: where its sensors measure, as far as they reach."""
+"""The region of recorded or future scans, from the measurements or from the sensors' ranges."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.field_of_view import field_of_view
 from vedette.scenarios.sections.sensors import Sensor
 
-_NAMED = 3  # measurements beyond the region, in a warning
+_NAMED = 3  # measurements beyond the region that a warning lists
 
 
 def measured_region(model: ScenarioModel, recording: RecordedScans) -> dict[str, float]:
-    """The rectangle around the sensors and all that they measured.
+    """Return the rectangle around the sensors and all their measurements.
 
-    Raises `InputError` where their measurements are no places, or lie beyond the plane of the scenario's origin.
+    Raises `InputError` if the measurements give no places, or lie beyond the plane of the scenario's origin.
     """
     measured = list(_measured(model, recording))
     for k, s, own in measured if model.origin is not None else ():
@@ -42,7 +42,7 @@ def measured_region(model: ScenarioModel, recording: RecordedScans) -> dict[str,
 
 
 def reached_region(model: ScenarioModel, sensors: FilePath) -> dict[str, float]:
-    """The rectangle of what the sensors reach from where they start; raises where nothing says how far."""
+    """Return the rectangle that the sensors reach from their start; raises `InputError` if a sensor gives no range."""
     corners = list[Floats]()
     for name, sensor in zip(model.sensor_names, model.sensors, strict=True):
         reach = _reach(sensor)
@@ -56,7 +56,7 @@ def reached_region(model: ScenarioModel, sensors: FilePath) -> dict[str, float]:
 
 
 def beyond_region(model: ScenarioModel, recording: RecordedScans) -> Iterator[tuple[Path, str]]:
-    """A warning of the measurements that lie beyond the region: how many there are, and the first of them."""
+    """Yield a warning if measurements lie beyond the region, with their number and the first of them."""
     region, named, num = model.region.build(), list[str](), 0
     for k, s, places in _measured(model, recording):
         for place in places[~region.contains(places)]:
@@ -75,12 +75,12 @@ def beyond_region(model: ScenarioModel, recording: RecordedScans) -> Iterator[tu
 
 
 def region_in_words(region: Mapping[str, float]) -> str:
-    """Its edges, with units."""
+    """Return the edges of the region, with units."""
     return "x {x_min:g} to {x_max:g} m, y {y_min:g} to {y_max:g} m".format(**region)
 
 
 def _measured(model: ScenarioModel, recording: RecordedScans) -> Iterator[tuple[int, int, Floats]]:
-    """Instant and sensor of each scan, and the (num, 2) places that it measured."""
+    """Yield instant and sensor of each scan, and the (num, 2) places that it measured."""
     for k, (scans, poses) in enumerate(zip(recording.scans, recording.poses, strict=True)):
         for s, (scan, pose, sensor) in enumerate(zip(scans, poses, model.sensors, strict=True)):
             if scan is not None:
@@ -88,7 +88,7 @@ def _measured(model: ScenarioModel, recording: RecordedScans) -> Iterator[tuple[
 
 
 def _reach(sensor: Sensor) -> float | None:
-    """m that a sensor sees, where its detection or its clutter has an edge."""
+    """Return the range of a sensor, m, from its detection or its clutter; None if neither has an edge."""
     view, clutter = field_of_view(sensor), sensor.clutter
     if view is not None:
         return view.reach
@@ -96,6 +96,6 @@ def _reach(sensor: Sensor) -> float | None:
 
 
 def _edges(box: Floats) -> dict[str, float]:
-    """The region of a box, in whole metres."""
+    """Return the region of a box, in whole metres."""
     (x_min, y_min), (x_max, y_max) = np.floor(box[0]).tolist(), np.ceil(box[1]).tolist()
     return {"x_min": x_min, "x_max": x_max, "y_min": y_min, "y_max": y_max}

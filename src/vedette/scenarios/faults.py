@@ -12,12 +12,12 @@ Path = tuple[str | int, ...]
 Place = tuple[int, int]  # line and column, from 1
 Finding = tuple[Path, str, str]  # path, expected, got
 
-MISSING = "no such key"  # what a fault got where a required key is missing
+MISSING = "no such key"  # `got` of a fault if a required key is missing
 _LONGEST = 60
 
 
 class Told(NamedTuple):
-    """What is wrong with the data: the path in them, what was expected, what came, and how to mend it, or empty."""
+    """A fault of the data: its path, the expected and the given value in words, and a hint on the correction or ""."""
 
     path: Path
     expected: str
@@ -33,7 +33,7 @@ class Told(NamedTuple):
 
 
 class Fault(NamedTuple):
-    """What is wrong with a file, and where: line and column, from 1."""
+    """A fault of a file, and its place: line and column, from 1."""
 
     place: Place
     told: Told
@@ -44,7 +44,7 @@ class Fault(NamedTuple):
 
 
 def format_path(path: Path) -> str:
-    """`("sensors", 0, "noise")` as `sensors[0].noise`; keys that no screen shows or that are long, as `named`."""
+    """Return `("sensors", 0, "noise")` as `sensors[0].noise`; long or unprintable keys as by `named`."""
     text = ""
     for part in path:
         text += f"[{part}]" if isinstance(part, int) else f".{named(part)}" if text else named(part)
@@ -52,12 +52,12 @@ def format_path(path: Path) -> str:
 
 
 def named(word: str) -> str:
-    """A word of the file in a message: in printable letters, and not long."""
+    """Return a word of the file for a message: in printable letters, and shortened."""
     return elided(printable(word), _LONGEST)
 
 
 def describe(value: Any) -> str:
-    """A value of the file in a few words."""
+    """Return a value of the file in a few words."""
     if value is None:
         return "nothing"
     if isinstance(value, date | time):

@@ -1,4 +1,4 @@
-"""Checks of what a scenario names outside of itself: files of recorded targets, and models of the user's own."""
+"""Checks of the files that a scenario names: recorded targets, and custom models."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def _absent(file: str) -> str:
 
 
 def recorded_findings(model: ScenarioModel, folder: FilePath) -> Iterator[Finding]:
-    """What is wrong with the file of recorded targets: all that a run would refuse."""
+    """Yield the faults of the file of recorded targets that a run would refuse."""
     recorded = model.targets
     if not isinstance(recorded, RecordedTargets):
         return
@@ -41,7 +41,7 @@ def recorded_findings(model: ScenarioModel, folder: FilePath) -> Iterator[Findin
     if file.suffix.lower() not in ENDINGS:
         wanted = f"a file that ends with {', '.join(ENDINGS)}"
         yield ("targets", "path"), wanted, describe(recorded.path)
-    elif not os.path.isfile(file):  # a name can be too long, or hold what no name can: for pathlib, an error
+    elif not os.path.isfile(file):  # pathlib raises for a name that is too long or has forbidden characters
         yield ("targets", "path"), "a file, relative to the scenario file", _absent(recorded.path)
     else:
         if not any(recorded.columns.findings()):
@@ -49,9 +49,9 @@ def recorded_findings(model: ScenarioModel, folder: FilePath) -> Iterator[Findin
 
 
 def _content(recorded: RecordedTargets, model: ScenarioModel, folder: FilePath) -> Iterator[Finding]:
-    """What is wrong with the columns or rows, or with the scans or the region for them.
+    """Yield faults of the columns or rows, or of the scans or the region for them.
 
-    Where scans or region are faulty, the columns alone are looked at.
+    If scans or region are faulty, only the columns are checked.
     """
     found = list[Finding]()
     if all(map(is_whole, (recorded, model.region, model.time))):
@@ -64,7 +64,7 @@ def _content(recorded: RecordedTargets, model: ScenarioModel, folder: FilePath) 
 
 
 def _columns(recorded: RecordedTargets, file: FilePath) -> Iterator[Finding]:
-    """Names of columns that a CSV file does not have."""
+    """Yield names of columns that a CSV file does not have."""
     if file.suffix.lower() != ".csv":
         return
     from vedette.recorded.tables import column_names, header_of
@@ -98,15 +98,15 @@ def _columns(recorded: RecordedTargets, file: FilePath) -> Iterator[Finding]:
 def _is_findable(package: str) -> bool:
     try:
         return importlib.util.find_spec(package) is not None
-    except ValueError:  # of a module without a specification, such as the running program
+    except ValueError:  # raised for a module without a specification, such as the running program
         return False
 
 
 def _unnamed(file: FilePath, name: str) -> tuple[str, str] | None:
-    """What is wrong where a file is no Python, or does not define the name; nothing of it is run."""
+    """Return a fault if a file is not valid Python or does not define the name; the file is not run."""
     try:
-        with warnings.catch_warnings(action="ignore"):  # of the user's style; a run tells them
-            with tokenize.open(file) as text:  # in the encoding that it says it has
+        with warnings.catch_warnings(action="ignore"):  # warnings of the user's style; a run shows them
+            with tokenize.open(file) as text:  # in the encoding that the file declares
                 code = text.read()
             tree, symbols = ast.parse(code), symtable.symtable(code, str(file), "exec").get_symbols()
     except (OSError, SyntaxError, ValueError, RecursionError, MemoryError) as error:
@@ -120,7 +120,7 @@ def _unnamed(file: FilePath, name: str) -> tuple[str, str] | None:
 
 
 def reference_findings(model: ScenarioModel, folder: FilePath) -> Iterator[Finding]:
-    """Which code of the user's own is not there. Nothing is imported."""
+    """Yield faults of custom code that cannot be found. Nothing is imported."""
     for path, custom in customs(model):
         yield from attempt(_reference(path, custom, folder))
 

@@ -1,4 +1,4 @@
-"""Scenes of any number of sensors, made from a seed: who decides how, asked of many sensors and many targets alike."""
+"""Generated scenes: any number of sensors and targets, made from a seed by the same rules."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ VIEWS = ("full", "limited")
 _MOST_SENSORS, _MOST_TARGETS = 1000, 2000
 
 NUM_STEPS = 60
-_USUAL_LABELS = 200  # of a filter whose file says nothing
-_SIDE = 500.0  # m, of the square that each sensor adds
-_GROUP = 4  # targets that start, or end, at one place
+_USUAL_LABELS = 200  # default of a filter whose file gives none
+_SIDE = 500.0  # m, side of the square that each sensor adds
+_GROUP = 4  # targets that start or end at one place
 _SPEEDS = (3.0, 8.0)  # m/s
 # Additive recurrence of least discrepancy in two dimensions (M. Roberts, 2018), the plastic number's first two powers.
 _PLASTIC = 1.3247179572447460
@@ -26,7 +26,7 @@ _STRIDE = (1.0 / _PLASTIC, 1.0 / _PLASTIC**2)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GeneratedScene:
-    """What a generated scene is made from; equal settings give the same file.
+    """Settings of a generated scene; equal settings give the same file.
 
     Every sensor adds a square of 500 m, so that density, speeds and ranges are the same for two sensors and for a
     hundred. Targets move at 3 to 8 m/s for 60 scans of 1 s in groups of up to four: `spread` groups start at one place
@@ -37,13 +37,13 @@ class GeneratedScene:
     Attributes:
         num_sensors: 1 to 1000.
         pattern: "spread" or "crowd".
-        view: "full": every sensor sees everything, the worse the farther it is; "limited": 250 m, with a soft edge.
-        num_targets: 1 to 2000; None: two a sensor.
-        decide_every: scans between decisions, 1 to 59; the horizon goes to the next one, or to the last scan.
+        view: "full": every sensor sees everything, less accurately with distance; "limited": 250 m, with a soft edge.
+        num_targets: 1 to 2000; None: two per sensor.
+        decide_every: scans between decisions, 1 to 59; the horizon ends at the next decision, or at the last scan.
         seed: of places and courses, at least 0.
 
     Raises:
-        InputError: names the field, what was expected and what came.
+        InputError: names the field, and the expected and given values.
     """
 
     num_sensors: int
@@ -77,18 +77,18 @@ class GeneratedScene:
 
     @property
     def max_labels(self) -> int | None:
-        """That a filter needs: for each target, and for what two scans of clutter leave; None: no more than usual."""
+        """Number of labels that a filter needs for targets and two scans of clutter; None if the default is enough."""
         needed = self.total_targets + 2 * self.num_sensors
         return needed if needed > _USUAL_LABELS else None
 
     @property
     def side(self) -> float:
-        """Of the square in which sensors and groups are, m."""
+        """Side of the square of sensors and groups, m."""
         return _SIDE * math.sqrt(self.num_sensors)
 
     @property
     def name(self) -> str:
-        """Such as `crowd-limited-8`; what is not as usual is added."""
+        """Name such as `crowd-limited-8`; settings that are not the default are appended."""
         parts = [self.pattern, self.view, str(self.num_sensors)]
         parts += [] if self.num_targets is None else [f"targets-{self.num_targets}"]
         parts += [] if self.decide_every == 1 else [f"every-{self.decide_every}"]
@@ -96,7 +96,7 @@ class GeneratedScene:
         return "-".join(parts)
 
     def places(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """(num_sensors, 2) where the sensors start, m, and (num_targets, 4) mean first states [px, py, vx, vy]."""
+        """Return the sensors' starts, (num_sensors, 2) m, and mean first states [px, py, vx, vy], (num_targets, 4)."""
         rng = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(self.num_sensors, self.total_targets)))
         sensors = self._spread_out(self.num_sensors, rng)
         num = self.total_targets
@@ -110,18 +110,18 @@ class GeneratedScene:
         return sensors, np.hstack([centres[groups] + (NUM_STEPS - 1) * velocities, -velocities])
 
     def _spread_out(self, num: int, rng: np.random.Generator) -> NDArray[np.float64]:
-        """(num, 2) places spread evenly over the square."""
+        """Return places spread evenly over the square, shape (num, 2)."""
         shares = (rng.uniform(size=2) + np.arange(num)[:, None] * np.array(_STRIDE)) % 1.0
         return np.asarray((shares - 0.5) * self.side)
 
 
 _SENSOR_SPEED = 20.0  # m/s
-_MARGIN = 500.0  # m, of the region around the square: about as far as a target goes
+_MARGIN = 500.0  # m, from the square to the edge of the region: about as far as a target moves
 _NUMBERS_A_LINE = 25
 
 
 def scene_text(scene: GeneratedScene) -> str:
-    """The scenario file of a scene, with comments."""
+    """Return the scenario file of a scene, with comments."""
     sensors, states = scene.places()
     states_of_targets = [_row(state) for state in states]
     reach = round(0.5 * scene.side + _MARGIN)
@@ -163,7 +163,7 @@ def _row(values: NDArray[np.float64]) -> str:
 
 
 def _folded(numbers: range) -> str:
-    """A list over as many lines as it takes."""
+    """Return a list as text, over as many lines as it needs."""
     lines = [", ".join(map(str, numbers[i : i + _NUMBERS_A_LINE])) for i in range(0, len(numbers), _NUMBERS_A_LINE)]
     return f"[{lines[0]}]" if len(lines) == 1 else "[\n    " + ",\n    ".join(lines) + "\n  ]"
 
@@ -183,7 +183,7 @@ _SENSING = {
   clutter: {kind: around_sensor, rate: 1.0, radius: 300.0}""",
 }
 
-# What all generated scenes have in common.
+# The sections that all generated scenes share.
 WORLD = """\
 # Units: metres, seconds, m/s; angles in degrees where a key ends in _deg, else radians; x to the east, y to the north,
 # headings counter-clockwise from east. `vedette schema` describes every key; a key left out has its default.

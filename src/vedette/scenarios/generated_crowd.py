@@ -1,4 +1,4 @@
-"""Crowds of any number of targets before one sensor, of a given density: who decides how, asked of targets."""
+"""Generated crowds: any number of targets, of a given density, before one sensor."""
 
 from __future__ import annotations
 
@@ -11,28 +11,28 @@ from vedette.scenarios.generated import WORLD
 
 MEASURED = ("position", "bearing_range")
 MOST_TARGETS = 100_000
-DENSITIES = (1e-3, 1e6)  # targets a km^2
+DENSITIES = (1e-3, 1e6)  # targets per km^2
 _SQUARE_KM = 1e6  # m^2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GeneratedCrowd:
-    """What a crowd is made from; equal settings give the same file, and a run's seed the same targets and scans.
+    """Settings of a crowd; equal settings give the same file, and equal seeds of runs the same targets and scans.
 
     Targets are spread evenly over a square whose area grows with their number, so that crowds of ten and of ten
-    thousand are equally hard and differ in size alone. They move at about 4 m/s; from scan to scan of 1 s one in a
-    hundred dies, and as many are born. One still sensor sees each with probability 0.95, to 5 m, among false
-    measurements.
+    thousand are equally hard and differ only in size. They move at about 4 m/s; from one scan to the next (1 s) one in
+    a hundred dies, and as many are born. One still sensor detects each with probability 0.95, with noise of 5 m,
+    among false measurements.
 
     Attributes:
         num_targets: 1 to 100,000, at the first scan and on average.
-        density: targets a km^2, 0.001 to 1,000,000; at 25 the next target is 100 m off on average.
-        clutter: false measurements a target and scan, 0 to 100.
+        density: targets per km^2, 0.001 to 1,000,000; at 25 the next target is 100 m away on average.
+        clutter: false measurements per target and scan, 0 to 100.
         measured: "position", or "bearing_range" from outside the square.
         num_steps: scans, 1 to 10,000.
 
     Raises:
-        InputError: names the field, what was expected and what came.
+        InputError: names the field, and the expected and given values.
     """
 
     num_targets: int = 100
@@ -53,12 +53,12 @@ class GeneratedCrowd:
 
     @property
     def side(self) -> float:
-        """Of the square, m."""
+        """Side of the square, m."""
         return math.sqrt(self.num_targets / self.density * _SQUARE_KM)
 
     @property
     def name(self) -> str:
-        """Such as `crowd-1000`; what is not as usual is added."""
+        """Name such as `crowd-1000`; settings that are not the default are appended."""
         usual, parts = GeneratedCrowd(), ["crowd", str(self.num_targets)]
         parts += [] if self.density == usual.density else [f"density-{self.density:g}"]
         parts += [] if self.clutter == usual.clutter else [f"clutter-{self.clutter:g}"]
@@ -72,16 +72,16 @@ def _whole(name: str, value: Any, most: int) -> None:
         raise InputError(f"{name}: expected a whole number from 1 to {most}; got {value!r}")
 
 
-_STD = 5.0  # m, of a measurement
-_DEATHS = 0.01  # a target and scan
-# More than deaths, for the births that make up for them and for who enters at the edges.
+_STD = 5.0  # m, standard deviation of a measurement
+_DEATHS = 0.01  # probability per target and scan
+# More than the deaths: births replace them, and other targets enter at the edges.
 _BIRTHS = 0.02
-# Births from measurements stay for some scans each, nearly all of them of clutter; most at the first scans.
+# Births from measurements, nearly all from clutter, remain for some scans each; most are at the first scans.
 _LABELS_A_MEASUREMENT, _MORE_LABELS = 4, 200
 
 
 def crowd_text(crowd: GeneratedCrowd) -> str:
-    """The scenario file of a crowd, with comments. It lists no target, so that it is as short for 10,000 as for ten."""
+    """Return the scenario file of a crowd, with comments. It lists no targets, so it is short for any number."""
     half = 0.5 * crowd.side
     return _TEMPLATE.format(
         summary=_summary(crowd),

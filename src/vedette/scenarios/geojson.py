@@ -1,4 +1,4 @@
-"""Zones out of GeoJSON files: every polygon of one becomes a zone of its own, its corners in metres."""
+"""Zones from GeoJSON files: each polygon becomes a separate zone, with corners in metres."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from vedette.internal.reading import parse_json, read_text
 from vedette.scenarios.faults import Path, Told, describe
 from vedette.scenarios.sections.places import OriginSection
 
-if TYPE_CHECKING:  # with it come the filters, which a check does without
+if TYPE_CHECKING:  # importing it imports the filters, which a check does not need
     from vedette.recorded import Origin
 
 _MOST_BYTES = 20_000_000
-_MOST_CORNERS = 50_000  # of all zones of a file: each is looked at for every course of every sensor
+_MOST_CORNERS = 50_000  # of all zones of a file: each corner is checked for every course of every sensor
 
 _SIMPLE = ("Point", "MultiPoint", "LineString", "MultiLineString", "Polygon", "MultiPolygon")
 
@@ -24,10 +24,10 @@ Ring = list[list[float]]
 
 
 def with_zones(data: Mapping[str, Any], folder: FilePath) -> tuple[Mapping[str, Any], list[Told]]:
-    """A scenario's data with the polygons of the GeoJSON files that its zones name, and what is wrong with these.
+    """Return a scenario's data with the polygons of its zones' GeoJSON files, and the faults of these files.
 
-    The first polygon of a file takes the place of the zone that named it; others come after all constraints, so that
-    every other constraint keeps its place.
+    The first polygon of a file replaces the zone that named it; the others come after all constraints, so that every
+    other constraint keeps its index.
     """
     control = data.get("control")
     constraints = control.get("constraints") if isinstance(control, Mapping) else None
@@ -65,7 +65,7 @@ def _origin(data: Mapping[str, Any]) -> Origin:
 
 
 def _read(constraint: Mapping[str, Any], origin: Origin, folder: FilePath) -> list[list[Ring]]:
-    """The outer ring of each polygon and then its holes, m."""
+    """Return the outer ring of each polygon and then its holes, m."""
     name = constraint["geojson"]
     polygons = (
         polygon
@@ -82,9 +82,9 @@ def _read(constraint: Mapping[str, Any], origin: Origin, folder: FilePath) -> li
 
 
 def geometries(name: Any, folder: FilePath) -> Iterator[Mapping[str, Any]]:
-    """The points, lines and polygons of a GeoJSON file, wherever in it they are, with lists of coordinates.
+    """Yield the points, lines and polygons of a GeoJSON file, at any depth, with lists of coordinates.
 
-    Raises `InputError` for a name that is none, a file that is not there, or one that is no GeoJSON.
+    Raises `InputError` for a name that is not text, a file that does not exist, or one that is not GeoJSON.
     """
     if not isinstance(name, str) or not os.path.isfile(folder / name):
         raise InputError(f"{describe(name)}: no such file")
@@ -96,7 +96,7 @@ def geometries(name: Any, folder: FilePath) -> Iterator[Mapping[str, Any]]:
 
 
 def listed(value: Any) -> list[Any]:
-    """What should be a list; of anything else nothing."""
+    """Return the value if it is a list, else an empty list."""
     return value if isinstance(value, list) else []
 
 
@@ -118,7 +118,7 @@ def _within(content: Any, name: str) -> Iterator[Mapping[str, Any]]:
 
 
 def _in_metres(ring: Any, origin: Origin, name: str) -> Ring:
-    """A ring without its last corner, which repeats the first."""
+    """Return a ring in metres, without its last corner, which repeats the first."""
     try:
         degrees = [(float(corner[0]), float(corner[1])) for corner in ring]
     except (TypeError, ValueError, IndexError, KeyError):

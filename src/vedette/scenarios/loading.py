@@ -31,8 +31,8 @@ class Scenario(SummaryRepr):
     """A valid scenario.
 
     Attributes:
-        model: its sections (`vedette.scenarios.sections`), defaults filled in.
-        path: the file it was read from; the paths in it are relative to that file's folder.
+        model: its sections (`vedette.scenarios.sections`), with defaults.
+        path: the file it was read from, or None; the paths in it are relative to that file's folder.
     """
 
     model: ScenarioModel
@@ -40,12 +40,12 @@ class Scenario(SummaryRepr):
 
     @property
     def name(self) -> str:
-        """Name that the scenario gives itself."""
+        """Name given in the scenario."""
         return self.model.name
 
     @property
     def folder(self) -> FilePath:
-        """What paths in the scenario are relative to."""
+        """Folder to which paths in the scenario are relative."""
         return FilePath() if self.path is None else self.path.parent
 
     def _summary(self) -> str:
@@ -57,12 +57,12 @@ class Scenario(SummaryRepr):
 
 
 def list_builtin() -> dict[str, FilePath]:
-    """Names of the scenarios that come with the library, and their files."""
+    """Return the names of the scenarios that come with the library, and their files."""
     return {file.stem: file for file in sorted(BUILTIN_FOLDER.glob("*.yaml"), key=lambda file: file.stem)}
 
 
 def place_fault(document: Document, told: Told) -> Fault:
-    """The fault at the place in the file where it says what stands at the data's path."""
+    """Return the fault with the place in the file where the value at its path is written."""
     written = as_written(_written_path(told.path, document.data), document.data)
     at_key = told.got == UNKNOWN or written not in document.value_places
     place = document.place(written) if at_key else document.value_place(written)
@@ -70,7 +70,7 @@ def place_fault(document: Document, told: Told) -> Fault:
 
 
 def _written_path(path: Path, data: Any) -> Path:
-    """Where the file says what stands at `path`: a sensor's value may come from `sensor_defaults`."""
+    """Return the path where the value at `path` is written: a sensor's value may come from `sensor_defaults`."""
     if len(path) < 3 or path[0] != "sensors" or not isinstance(data, Mapping):
         return path
     sensors, defaults = data.get("sensors"), data.get("sensor_defaults")
@@ -81,12 +81,12 @@ def _written_path(path: Path, data: Any) -> Path:
 
 
 def _unique(faults: list[Fault]) -> list[Fault]:
-    """In file order, each once: what sensors share is read once a sensor; one cause a field is enough."""
+    """Return the faults in file order, each once: faults of shared sensor settings are found once for each sensor."""
     return sorted(dict.fromkeys(faults), key=lambda fault: fault.place)
 
 
 def diagnose(document: Document, folder: FilePath | None) -> tuple[ScenarioModel | None, list[Fault]]:
-    """The scenario in a document, or else everything that is wrong with it, in file order."""
+    """Return the scenario in a document, or None and all its faults, in file order."""
     faults = list(document.faults)
     if not isinstance(document.data, Mapping):
         if not faults:
@@ -106,7 +106,7 @@ def diagnose(document: Document, folder: FilePath | None) -> tuple[ScenarioModel
 
 
 def parse_scenario(text: str, file: str = "<text>", folder: FilePath | None = None) -> ScenarioModel:
-    """Read a scenario from YAML text; `file` is what messages call it, `folder` what its paths are relative to.
+    """Read a scenario from YAML text; `file` is its name in messages, and its paths are relative to `folder`.
 
     Raises:
         ScenarioError: with every fault, in file order.
@@ -118,7 +118,7 @@ def parse_scenario(text: str, file: str = "<text>", folder: FilePath | None = No
 
 
 def missing_scenario(name: str, more: str, builtin: list[str]) -> InputError:
-    """What to say where there is neither a file nor a built-in scenario of that name, nor any of `more`."""
+    """Return the error for a name that is neither a file nor a built-in scenario, nor any of `more`."""
     trouble = "a folder" if os.path.isdir(name) else "no such file"
     near = suggestion(name, builtin)
     expected = f"{more}a YAML file or one of {', '.join(builtin)}{f' ({near})' if near else ''}"
@@ -126,7 +126,7 @@ def missing_scenario(name: str, more: str, builtin: list[str]) -> InputError:
 
 
 def load_scenario(name_or_path: str | FilePath) -> Scenario:
-    """Load a built-in scenario by name, or one of your own from its YAML file.
+    """Load a built-in scenario by name, or a custom one from its YAML file.
 
     Raises:
         InputError: there is neither such a name nor such a file, or the file cannot be read.
@@ -134,7 +134,7 @@ def load_scenario(name_or_path: str | FilePath) -> Scenario:
     """
     builtin = list_builtin()
     path = builtin.get(str(name_or_path), FilePath(name_or_path))
-    # By `os.path`: a name can be too long, or hold what no name can, which for pathlib is an error.
+    # With `os.path`: pathlib raises for a name that is too long or has forbidden characters.
     if os.path.isdir(path) or not os.path.exists(path):
         raise missing_scenario(str(name_or_path), "", list(builtin))
     if path.suffix.lower() == ".toml":
@@ -146,7 +146,7 @@ def load_scenario(name_or_path: str | FilePath) -> Scenario:
 
 
 def document_of(scenario: Scenario) -> Document | None:
-    """The file that a scenario was read from, for places in it; None where there is none any more."""
+    """Return the file that a scenario was read from, for places in it; None if there is none or it cannot be read."""
     try:
         text = None if scenario.path is None else read_text(scenario.path, "scenario file", MOST_BYTES)
     except InputError:
@@ -155,6 +155,6 @@ def document_of(scenario: Scenario) -> Document | None:
 
 
 def json_schema() -> dict[str, Any]:
-    """JSON schema of scenario files, for editors."""
+    """Return the JSON schema of scenario files, for editors."""
     schema = ScenarioModel.model_json_schema()
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "Vedette scenario"}

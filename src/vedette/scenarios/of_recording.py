@@ -1,4 +1,4 @@
-"""Scenarios of recorded scans and of scans to come: a sensors file, and what it does not give from the scans."""
+"""Scenarios of recorded or future scans: a sensors file, completed from the scans."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from vedette.scenarios.sensors_file import (
     stand_ins,
 )
 
-_MOST_STEPS = 100  # of a horizon
+_MOST_STEPS = 100  # steps of a horizon
 
 
 class OfRecording(NamedTuple):
     """A scenario of a recording.
 
-    scenario: which a run tracks. recording: its scans. assumed: a description of each section that the
-    sensors file does not give, by its name.
+    scenario: that a run tracks. recording: its scans. assumed: a description of each section that the sensors file does
+    not give, by its name.
     """
 
     scenario: Scenario
@@ -39,18 +39,18 @@ class OfRecording(NamedTuple):
 def scenario_of_recording(
     sensors: FilePath, scans: FilePath, truth: FilePath | None = None, *, speed: float = 10.0, bad_rows: str = "refuse"
 ) -> OfRecording:
-    """The scenario of scans that were recorded.
+    """Return the scenario of recorded scans.
 
     Args:
-        sensors: a YAML file with `sensors`, and whatever else of a scenario is known: `origin`, `recording` (columns,
+        sensors: a YAML file with `sensors`, and any other known section of a scenario: `origin`, `recording` (columns,
             units, conventions), `motion`, `survival`, `birth`, `filter`, `fusion`, ...; of `control` the constraints.
         scans: the CSV or Parquet file of the scans.
         truth: the file of the targets' own reports; None: as in the sensors file, or unknown.
-        speed: m/s that targets hardly exceed; motion and births go by it where nothing is said of them.
+        speed: m/s that targets hardly exceed; motion and births are derived from it unless they are given.
         bad_rows: "refuse" or "skip", see `vedette.recorded.Conventions`.
 
     Raises:
-        InputError: a file that is not there, or rows that cannot be read.
+        InputError: a file that does not exist, or rows that cannot be read.
         ScenarioError: with every fault of the sensors file.
     """
     for file, what in ((scans, "scans"), (truth, "the targets' reports")):
@@ -87,9 +87,9 @@ def scenario_of_recording(
 
 
 class OfSensors(NamedTuple):
-    """A scenario of scans that are to come.
+    """A scenario of future scans.
 
-    scenario: which a loop takes scans by. conventions: of the scans. assumed: see `OfRecording`.
+    scenario: by which a loop takes scans. conventions: of the scans. assumed: see `OfRecording`.
     """
 
     scenario: Scenario
@@ -100,19 +100,18 @@ class OfSensors(NamedTuple):
 def scenario_of_sensors(
     sensors: FilePath, *, speed: float = 10.0, decide_every: float | None = None, plan_within: float | None = None
 ) -> OfSensors:
-    """The scenario of scans that are to come.
+    """Return the scenario of future scans.
 
     Args:
-        sensors: a YAML file as of `scenario_of_recording`, or a whole scenario. Of `recording` the units and bearings
-            count, and of `targets` nothing. Without `region` it is as far as the sensors see.
-        speed: m/s, likewise.
-        decide_every: s from one decision to the next, in place of the times that `control` says; the horizon is as
-            long, unless `control` says another.
+        sensors: a YAML file as in `scenario_of_recording`, or a whole scenario. Only the units and bearings of
+            `recording` are used, and `targets` is ignored. Without `region`, the region covers the sensors' ranges.
+        speed: m/s that targets hardly exceed.
+        decide_every: s from one decision to the next, in place of the times in `control`; the horizon has the same
+            length, unless `control` gives another.
         plan_within: s after which the search of a decision ends, in place of `control.max_seconds`.
 
     Raises:
-        InputError: a file that is not there, units or bearings that are none, no region where nothing says how far
-            a sensor sees.
+        InputError: a file that does not exist, invalid units or bearings, or no region if a sensor gives no range.
         ScenarioError: with every fault of the file.
     """
     document = read_sensors_file(sensors)
@@ -120,7 +119,7 @@ def scenario_of_sensors(
     own = document.data.get("recording")
     own = own if isinstance(own, Mapping) else {}
     conventions = Conventions({}, own.get("units") or {}, own.get("bearings"))
-    if conventions.bearings == "north":  # who counts from north is answered so; units stay what they would be
+    if conventions.bearings == "north":  # answers count from north, too; units keep their default
         conventions = replace(conventions, units={"bearing": "rad", **conventions.units})
         said["sensors"] = _with_compass(said)
     words = dict[str, str]()
@@ -145,7 +144,7 @@ def scenario_of_sensors(
 
 
 def _with_compass(said: Mapping[str, Any]) -> Any:
-    """The sensors, those with bearings that say nothing else with a compass."""
+    """Return the sensors, with a compass for those that do not set `compass`, except for custom measurements."""
     defaults, sensors = said.get("sensor_defaults"), said.get("sensors")
     shared = defaults if isinstance(defaults, Mapping) else {}
     if "compass" in shared or not isinstance(sensors, list):
@@ -159,7 +158,7 @@ def _with_compass(said: Mapping[str, Any]) -> Any:
 
 
 def _endless(said: Mapping[str, Any], decide_every: float) -> dict[str, Any]:
-    """Time and decisions of a scenario that decides for as long as scans come."""
+    """Return time and control of a scenario that decides as long as scans come."""
     time = said["time"] if isinstance(said["time"], Mapping) else {}
     own = said.get("control")
     control = {key: value for key, value in own.items() if not key.startswith("decision_")} if own else {}

@@ -17,16 +17,16 @@ _INDEX = re.compile(r"[0-9]{1,9}")
 
 
 def with_fields(scenario: Scenario, fields: Mapping[str, Any]) -> Scenario:
-    """The scenario with other values at some fields, checked as a whole as if its file had said so.
+    """Return the scenario with other values at some fields, checked as a whole like a file.
 
     Args:
-        scenario: what is changed; it stays as it is.
+        scenario: to be changed; it stays as it is.
         fields: values by path. A path is the keys that lead to a field, joined by dots; a number counts the items of a
-            list from 0, and `*` stands for each of them. A value may be a whole section. Sensors hold what
-            `sensor_defaults` gave them, so what they share is set by `sensors.*`.
+            list from 0, and `*` stands for each of them. A value may be a whole section. Sensors contain the values
+            from `sensor_defaults`, so shared values are set by `sensors.*`.
 
     Raises:
-        ScenarioError: a path that leads nowhere, or everything that is wrong with the scenario that would result.
+        ScenarioError: a path that leads nowhere, or all faults of the resulting scenario.
     """
     if not fields:
         return scenario
@@ -42,7 +42,7 @@ def with_fields(scenario: Scenario, fields: Mapping[str, Any]) -> Scenario:
 
 
 def _set(data: Any, said: Any, path: str, value: Any) -> Iterator[str]:
-    """Set the value everywhere the path leads, in place; what is wrong with the path. said: what is no default."""
+    """Set the value everywhere the path leads, in place; yields faults of the path. said: without defaults."""
     *parents, last = path.split(".")
     places: list[tuple[Path, Any]] = [((), data)]
     for part in parents:
@@ -72,7 +72,7 @@ def _set(data: Any, said: Any, path: str, value: Any) -> Iterator[str]:
 
 
 def _at(path: Path, said: Any) -> Any:
-    """What stands at a path; None where it is left at its default."""
+    """Return the value at a path; None if it is the default."""
     for part in path:
         if isinstance(said, dict):
             said = said.get(part)
@@ -82,9 +82,9 @@ def _at(path: Path, said: Any) -> Any:
 
 
 def _left_out(present: Any, value: Any) -> list[str]:
-    """Keys of a section without which a new one would fall back on defaults unseen; one of another kind may.
+    """Return the keys of a section that a new one would silently reset to defaults; none if the new one gives a kind.
 
-    present: the section, of what is no default. What is null falls back on nothing.
+    present: the section, without defaults. Keys with the value None are not counted.
     """
     if not isinstance(present, dict) or not isinstance(value, dict) or "kind" in value:
         return []
@@ -92,7 +92,7 @@ def _left_out(present: Any, value: Any) -> list[str]:
 
 
 def _keys(holder: Any, place: Path, part: str, path: str) -> tuple[list[Any], str]:
-    """The keys or indices that one part of a path means inside a mapping or list, or else what is wrong with it."""
+    """Return the keys or indices that one part of a path means in a mapping or list, or else the fault of the path."""
     where = format_path(place) or "the scenario"
     if isinstance(holder, list):
         if part == EVERY:

@@ -1,4 +1,4 @@
-"""What a scenario says that is valid but can hardly be meant: other units, numbers exchanged, spreads squared."""
+"""Warnings of valid but implausible settings: wrong units, exchanged numbers, squared standard deviations."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from vedette.scenarios.sections.sensing import Measurement, Noise, components
 from vedette.scenarios.sections.targets import ScriptedTargets
 from vedette.scenarios.sections.world import RegionSection, grouped_order
 
-# Standard deviations from every birth site at which a target begins that filters never find.
+# Filters never find a target that begins this number of standard deviations or more from every birth site.
 _FAR_FROM_SITES = 8.0
-# Biases beyond which a radar is no radar, by field; degrees, s.
+# Largest plausible biases, by field; degrees, s.
 _MOST_BIAS = {"bearing_deg": 90.0, "clock": 3600.0}
 # Scans in a period of the horizon; the paper's scenarios have 2.
 _MANY_SCANS = 3.0
 
 
 def implausible(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
-    """Where in a scenario, and what was expected, came and was probably meant."""
+    """Yield places in the scenario and texts with what was expected, what was given and the probable mistake."""
     yield from _bearings(model)
     yield from _biases(model)
     yield from _areas(model)
@@ -36,8 +36,8 @@ def implausible(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
 
 
 def _bearings(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
-    """Noise of bearings that leaves little of them."""
-    told: list[Noise] = []  # what sensors share once
+    """Yield warnings of noise so large that bearings carry little information."""
+    told: list[Noise] = []  # noise that sensors share is reported once
     for s, sensor in enumerate(model.sensors):
         true = None if sensor.truth is None else sensor.truth.noise
         for where, noise in ((("noise",), sensor.noise), (("truth", "noise"), true)):
@@ -47,7 +47,7 @@ def _bearings(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
 
 
 def _biases(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
-    """Biases that can hardly be meant."""
+    """Yield warnings of implausibly large biases."""
     for s, sensor in enumerate(model.sensors):
         true = None if sensor.truth is None else sensor.truth.bias
         for where, bias in ((("bias",), sensor.bias), (("truth", "bias"), true)):
@@ -74,7 +74,7 @@ def _degrees(angle: float) -> str:
 
 
 def _areas(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
-    """Areas that are too small, too far away, to be in metres."""
+    """Yield warnings of areas that are too small and too far away to be in metres."""
     for path, corners in _corners(model):
         if look_like_degrees(corners):
             width, height = np.ptp(corners, axis=0)
@@ -98,7 +98,7 @@ def _corners(model: ScenarioModel) -> Iterator[tuple[Path, Floats]]:
 
 
 def _beyond_sites(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
-    """Targets that begin where no site has any."""
+    """Yield warnings of targets that begin far from all birth sites."""
     targets, birth = model.targets, model.birth
     if not isinstance(targets, ScriptedTargets) or birth.from_measurements is not None or not birth.sites:
         return
@@ -116,13 +116,13 @@ def _beyond_sites(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
 
 
 def _distance(start: Floats, site: BirthSite, order: list[int]) -> float:
-    """Of a position from a site, in its standard deviations."""
+    """Distance of a position from a site, in its standard deviations."""
     off = start - np.array(site.mean)[order]
     return math.sqrt(float(off @ np.linalg.solve(site.covariance()[np.ix_(order, order)], off)))
 
 
 def _per_scan(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
-    """Probabilities a scan, where a sensor does not scan at every step: they count at every step all the same."""
+    """Yield warnings of probabilities per step if a sensor does not scan at every step: they apply at every step."""
     every, name = max(
         (own.scans.steps(model.time.step_period)[0], name)
         for own, name in zip(model.sensors, model.sensor_names, strict=True)
@@ -141,7 +141,7 @@ def _per_scan(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
 
 
 def _held(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
-    """Accelerations that are held over steps of any length, by which targets spread less the shorter these are."""
+    """Yield warnings of accelerations that are held over steps of varying length: shorter steps spread targets less."""
     motion, scans = model.motion, model.horizon[1] / model.time.step_period
     if getattr(motion, "acceleration", "continuous") != "held" or not getattr(motion, "sigma_v", 0.0):
         return

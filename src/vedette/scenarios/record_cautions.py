@@ -1,4 +1,4 @@
-"""What looks odd in the recorded targets and scans of a scenario, though a run accepts it."""
+"""Warnings of oddities in the recorded targets and scans of a scenario that a run accepts."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.targets import RecordedTargets
 from vedette.scenarios.sections.world import Time
 
-_NEAR = 1000.0  # m; what is nearer than this to the targets is not called far
+_NEAR = 1000.0  # m; sensors nearer than this to the targets are not called far
 
 
 def record_cautions(scenario: Scenario) -> Iterator[tuple[Path, str]]:
-    """What a run accepts of recorded data but may not be meant: where in the scenario, and what it is."""
+    """Yield the places in the scenario and texts of warnings of recorded data that are probably mistakes."""
     model, folder = scenario.model, scenario.folder
     if model.recording is not None:
         recording = model.recording.build(model, folder)
@@ -53,14 +53,14 @@ def record_cautions(scenario: Scenario) -> Iterator[tuple[Path, str]]:
 
 
 def _unused(path: Path, file: str, columns: tuple[str, ...]) -> Iterator[tuple[Path, str]]:
-    """Columns that are there and not read."""
+    """Yield a warning of columns that are not read."""
     if columns:
         names = column_names(columns)
         yield path, f"{'.'.join(map(str, path))}: {file}: not used: {pluralise(len(columns), 'column')} ({names})"
 
 
 def _single_reports(section: RecordedTargets, source: RecordedSource) -> Iterator[tuple[Path, str]]:
-    """Targets with one report, which have no course."""
+    """Yield a warning of targets with one report, which have no course."""
     numbers = np.bincount(source.reports.tracks, minlength=len(source.reports.names))
     single = [name for name, number in zip(source.reports.names, numbers.tolist(), strict=True) if number == 1]
     if single:
@@ -69,7 +69,7 @@ def _single_reports(section: RecordedTargets, source: RecordedSource) -> Iterato
 
 
 def _several_a_target(model: ScenarioModel, recording: RecordedScans) -> Iterator[tuple[Path, str]]:
-    """Measurements that come so close together that one target seems to have several."""
+    """Yield warnings of measurements so close together that one target seems to give several."""
     stds = [noise_stds(sensor) for sensor in model.sensors]
     for site, num, scans in crowded(recording, sites_of(model), stds):
         yield (
@@ -81,7 +81,7 @@ def _several_a_target(model: ScenarioModel, recording: RecordedScans) -> Iterato
 
 
 def _far_apart(model: ScenarioModel, recording: RecordedScans) -> Iterator[tuple[Path, str]]:
-    """Rows that are gathered into one scan although targets move by more than the noise between them."""
+    """Yield warnings of rows gathered into one scan although targets move by more than the noise between them."""
     births = model.birth.from_measurements
     if births is None or len(births.std) < 4:
         return
@@ -111,7 +111,7 @@ def _repeats(section: RecordedTargets, source: RecordedSource) -> Iterator[tuple
 
 
 def _is_geographic(sensor: Sensor, source: RecordedSource) -> bool:
-    """Whether the position of a sensor would lie among the reports if it were in degrees."""
+    """Return True if the position of a sensor, taken as degrees, would lie among the reports."""
     bounds = source.reports.bounds_deg
     if bounds is None:
         return False
@@ -121,7 +121,10 @@ def _is_geographic(sensor: Sensor, source: RecordedSource) -> bool:
 
 
 def _distance(sensor: Sensor, source: RecordedSource, time: Time) -> float | None:
-    """m to the nearest position of a track, where that is beyond the extent of all and what the sensor can travel."""
+    """Return the distance to the nearest track position, m; None if it is within a limit.
+
+    The limit is the extent of all tracks, at least 1 km, plus the distance that the sensor can travel.
+    """
     positions = np.concatenate([track.positions for track in source.tracks])
     extent = float(np.hypot(*np.ptp(positions, axis=0)))
     reach = max(extent, _NEAR) + sensor.platform.top_speed * time.step_period * time.num_steps

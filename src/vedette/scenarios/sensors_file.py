@@ -24,11 +24,11 @@ _STAND_INS: dict[str, Any] = {
     "time": {"num_steps": 1},
     "region": {"x_min": -1e6, "x_max": 1e6, "y_min": -1e6, "y_max": 1e6},
 }
-EXPECTED_BIRTHS = 0.5  # births from measurements, in the region between two scans
-_EXISTENCE = 0.03  # of a birth where something was measured
-HEIGHT_STD, _CLIMB_STD = 4000.0, 10.0  # m and m/s, of a birth
-ENDLESS = 1_000_000  # steps, the most of a scenario
-_NAMED = 5  # sensors, in a summary
+EXPECTED_BIRTHS = 0.5  # expected births from measurements in the region between two scans
+_EXISTENCE = 0.03  # largest existence probability of a birth from a measurement
+HEIGHT_STD, _CLIMB_STD = 4000.0, 10.0  # m and m/s, standard deviations of a birth
+ENDLESS = 1_000_000  # steps, the maximum of a scenario
+_NAMED = 5  # sensors that a summary names
 _ASSUMED = ("region", "motion", "survival", "birth")  # each is assumed from the scans unless it is given
 
 
@@ -45,7 +45,7 @@ class SensorsFile(NamedTuple):
 
     @property
     def summary(self) -> str:
-        """`2 sensors (Calshot, boat), bearing and range`."""
+        """Summary such as `2 sensors (Calshot, boat), bearing and range`."""
         named = ", ".join(self.names[:_NAMED]) + (", ..." if len(self.names) > _NAMED else "")
         return f"{pluralise(len(self.names), 'sensor')} ({named}), {' and '.join(self.quantities)}"
 
@@ -81,7 +81,7 @@ def check_sensors_file(path: FilePath) -> SensorsFile:
 
 
 def stand_ins(given: Mapping[str, Any], speed: float) -> dict[str, Any]:
-    """Return sections that a sensors file does not give, before scans tell more; speed: std of velocities, m/s."""
+    """Return sections that a sensors file does not give, before scans are read; speed: std of velocities, m/s."""
     motion = given.get("motion")
     kind, dim = (motion.get("kind"), motion.get("state_dim")) if isinstance(motion, Mapping) else (None, None)
     has_height = measures_heights(given)
@@ -91,7 +91,7 @@ def stand_ins(given: Mapping[str, Any], speed: float) -> dict[str, Any]:
 
 
 def measures_heights(given: Mapping[str, Any]) -> bool:
-    """Return True if a sensor of a file measures what depends on the height of a target."""
+    """Return True if a sensor of a file has a measurement that depends on the height of a target."""
     sensors, defaults = given.get("sensors"), given.get("sensor_defaults")
     sections = [defaults, *(sensors if isinstance(sensors, list) else ())]
     measured = [section.get("measurement") for section in sections if isinstance(section, Mapping)]
@@ -118,14 +118,14 @@ def _quantities(model: ScenarioModel) -> tuple[str, ...]:
 
 
 def _not_given(given: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the sections that are assumed; clutter is if any sensor has none."""
+    """Return the sections that are assumed; clutter is one of them if any sensor has none."""
     shared = given.get("sensor_defaults") or {}
     has_clutter = "clutter" in shared or all("clutter" in sensor for sensor in given["sensors"])
     return (*(name for name in _ASSUMED if name not in given), *(() if has_clutter else ("clutter",)))
 
 
 def read_sensors_file(sensors: FilePath) -> Document:
-    """Read a sensors file; raises `InputError` if it is no mapping."""
+    """Read a sensors file; raises `InputError` if it is not a mapping."""
     document = read_yaml(read_text(sensors, "sensors file", MOST_BYTES), str(sensors))
     if not isinstance(document.data, Mapping):
         raise InputError(f"{sensors}: expected a mapping with `sensors`; got {describe(document.data)}")

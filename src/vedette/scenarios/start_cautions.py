@@ -1,4 +1,4 @@
-"""Warnings of moving sensors that start where the constraints do not let them be."""
+"""Warnings of moving sensors that start at a place that the constraints forbid."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def start_cautions(scenario: Scenario) -> Iterator[tuple[Path, str]]:
 
 
 def _misplaced(place: tuple[float, float], areas: Sequence[tuple[str, Sequence[tuple[float, float]]]]) -> str:
-    """Where a place is that a moving sensor should not start at, and what follows; "" where it may.
+    """Describe where a place lies if a moving sensor should not start there, and the consequence; "" if it may.
 
     The edges of `keep_out` and of its holes are forbidden, that of `stay_inside` is not.
     """
@@ -46,7 +46,7 @@ def _misplaced(place: tuple[float, float], areas: Sequence[tuple[str, Sequence[t
 
 
 def _moves(sensor: Sensor) -> bool:
-    """Whether the platform, or the carrier of a camera, can move."""
+    """Return True if the platform, or the carrier of a camera, can move."""
     platform = sensor.platform
     if platform.kind == "camera":
         platform = getattr(platform, "carrier", None) or platform
@@ -54,7 +54,7 @@ def _moves(sensor: Sensor) -> bool:
 
 
 def _is_inside(x: float, y: float, corners: Sequence[tuple[float, float]]) -> bool:
-    """Whether a ray to the east crosses the edges of a polygon an odd number of times."""
+    """Return True if a ray to the east crosses the edges of a polygon an odd number of times."""
     (x1, y1), (x2, y2) = np.array(corners).T, np.roll(np.array(corners), -1, axis=0).T
     spans = (y1 > y) != (y2 > y)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -63,7 +63,7 @@ def _is_inside(x: float, y: float, corners: Sequence[tuple[float, float]]) -> bo
 
 
 def _is_on_edge(x: float, y: float, corners: Sequence[tuple[float, float]]) -> bool:
-    """Whether a place is on an edge of a polygon, to within rounding."""
+    """Return True if a place is on an edge of a polygon, to within rounding."""
     starts = np.array(corners)
     along, off = np.roll(starts, -1, axis=0) - starts, np.array([x, y]) - starts
     lengths = np.maximum((along**2).sum(axis=1), np.finfo(np.float64).tiny)

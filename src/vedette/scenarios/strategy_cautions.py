@@ -1,4 +1,4 @@
-"""Warnings of strategies that every scenario has and a run of this one refuses."""
+"""Warnings of strategies that a run of this scenario refuses."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from vedette.scenarios.trust import code_of, not_own
 
 
 def strategy_cautions(scenario: Scenario) -> Iterator[tuple[Path, str]]:
-    """A warning for each reason why strategies are refused, with their names and what would do.
+    """Yield a warning for each reason why strategies are refused, with their names and the requirement.
 
-    Planners are made for it where the scenario names code of the user's own, which nothing else can tell of.
+    If the scenario names custom code, planners are built as well, as nothing else can detect its faults.
     """
     refused: dict[str, list[str]] = {}
     makes = bool(code_of(scenario.model)) and not not_own(scenario)
@@ -27,7 +27,7 @@ def strategy_cautions(scenario: Scenario) -> Iterator[tuple[Path, str]]:
 
 
 def _fault_of_planner(scenario: Scenario, name: str) -> str:
-    """What making the planner of a strategy expects instead; "" where it can be made."""
+    """Return what building the planner of a strategy expects instead; "" if it can be built."""
     from vedette.scenarios.build import build_planner  # with it comes the compiler
 
     try:

@@ -1,4 +1,4 @@
-"""A scenario in a few words, for people."""
+"""A scenario in a few words."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 def one_line(scenario: Scenario) -> str:
-    """The scenario on one line: `40 scans, 4 targets, 2 sensors; filter delta_glmb, fusion ...`."""
+    """Return the scenario on one line: `40 scans, 4 targets, 2 sensors; filter delta_glmb, fusion ...`."""
     model = scenario.model
     targets = model.targets
     what = pluralise(len(targets.tracks), "target") if targets.kind == "scripted" else f"{targets.kind} targets"
@@ -38,7 +38,7 @@ def one_line(scenario: Scenario) -> str:
 
 
 def facts(model: ScenarioModel) -> list[tuple[str, str]]:
-    """What holds for the whole scenario: name of the section and its settings."""
+    """Return the settings of the whole scenario: name of each section and its settings."""
     region, time, control = model.region, model.time, model.control
     end = time.start + (time.num_steps - 1) * time.step_period
     return [
@@ -71,7 +71,7 @@ def facts(model: ScenarioModel) -> list[tuple[str, str]]:
 
 
 def _motion(section: Section) -> str:
-    """Its settings; the root of a spectral density has another unit than an acceleration."""
+    """Return its settings; the root of a spectral density has another unit than an acceleration."""
     continuous = getattr(section, "acceleration", "") == "continuous"
     return settings(section).replace("m/s^2", "m/s^1.5") if continuous else settings(section)
 
@@ -84,7 +84,7 @@ def moves_from(model: ScenarioModel) -> str | None:
 
 
 def _objective(control: Control) -> str:
-    """The reward as `expected loss (cutoff 100 m, order 1; no sampling)`."""
+    """Return the reward as `expected loss (cutoff 100 m, order 1; no sampling)`."""
     values = "; ".join(filter(None, (", ".join(plain_values(control.reward)), _samples(control))))
     return f"{in_words(control.reward.kind)} ({values})"
 
@@ -104,7 +104,7 @@ def _bounds(region: RegionSection) -> str:
 
 
 def _constraint(section: Section) -> str:
-    """Its settings; of an area where it is, or how many corners it has."""
+    """Return its settings; for an area its bounds, or its number of corners."""
     area, polygon = getattr(section, "region", None), getattr(section, "polygon", None)
     words = settings(section if polygon is None else section.model_copy(update={"polygon": (), "holes": ()}))
     if polygon is not None:
@@ -166,7 +166,7 @@ def _steps(steps: Literal["every"] | Sequence[int]) -> str:
 
 
 def sensing(sensor: Sensor, north: Compass | None = None) -> list[tuple[str, str]]:
-    """What carries a sensor, what it measures, and how well; its directions by a compass where there is one."""
+    """Return a sensor's platform, measurement and models; directions are compass courses if `north` is given."""
     carriers = [section for section in (sensor.platform, getattr(sensor.platform, "carrier", None)) if section]
     words = [_platform(one, None if north is None else as_courses(one, north, sensor.position)) for one in carriers]
     truth = _in_truth(sensor)
@@ -189,7 +189,7 @@ def _platform(section: Section, replaced: Mapping[str, tuple[str, object]] | Non
 
 
 def _noise(section: Section, measured: str) -> str:
-    """Its settings; a standard deviation for each component has the component's name and unit."""
+    """Return its settings; a standard deviation for each component has the component's name and unit."""
     stds, components = getattr(section, "std", ()), COMPONENTS.get(measured, ())
     if not isinstance(stds, tuple) or len(stds) != len(components):
         return settings(section)
@@ -201,13 +201,13 @@ def _noise(section: Section, measured: str) -> str:
 
 
 def _bias(section: BiasSection) -> str:
-    """Return its values that are not 0."""
+    """Return its values other than 0."""
     none = [name for name in BiasSection.model_fields if getattr(section, name) == 0.0]
     return settings(section, {name: (name, None) for name in none}) or "none"
 
 
 def _in_truth(sensor: Sensor) -> list[tuple[str, str]]:
-    """Its bias, where it is not what the filters take it for, and when it scans if not at every step."""
+    """Return its bias if not 0, its true models if given, and its scan times if it does not scan at every step."""
     found, truth = [], sensor.truth
     if sensor.bias != BiasSection():
         found.append(("bias", _bias(sensor.bias)))

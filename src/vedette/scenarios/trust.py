@@ -1,4 +1,4 @@
-"""Code that a scenario names: which it is, and whether it is the user's own."""
+"""The code that a scenario names, and whether other users may have changed it."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from vedette.scenarios.sections.program import ProgramSection
 
 
 def code_of(section: Section) -> tuple[str, ...]:
-    """What of the user's own a scenario, or a section of one, has imported, called or started, each once, in order."""
+    """Return the custom code that a scenario or a section imports, calls or starts, each once, in order."""
     return tuple(dict.fromkeys(own.code for own in _own(section)))
 
 
 def _own(section: Section) -> Iterator[Custom | ProgramSection]:
-    """What is named that is not the library's."""
+    """Return the sections whose code does not belong to the library."""
     found = (each for _, each in sections_in(section) if isinstance(each, Custom | ProgramSection))
     return (each for each in found if not each.code.startswith("vedette."))
 
 
 def not_own(scenario: Scenario) -> str:
-    """Why the code that a scenario names may be somebody else's, in words; empty where there is no reason.
+    """Return the reason why other users may have changed the code that a scenario names; empty if there is none.
 
-    It is the user's own where the scenario file, the Python files and programs that it names, and the folders that
-    these are in belong to the user or to the system's administrator, and nobody else may write to them. Systems without
-    owners of files give no reason.
+    Code is trusted if the scenario file, the Python files and programs that it names, and their folders belong to the
+    user or to the system's administrator, and no other user may write to them. Systems without owners of files give no
+    reason.
     """
     files = [] if scenario.path is None else [scenario.path]
     files += [scenario.folder / name for own in _own(scenario.model) for name in own.files(scenario.folder)]
@@ -39,14 +39,14 @@ def not_own(scenario: Scenario) -> str:
 
 
 def others_may_change(file: Path) -> str:
-    """Who else than the user decides what is in a file, in words; empty where nobody does, or there is no such file."""
+    """Return the reason why other users may change a file; empty if there is none, or if the file does not exist."""
     if not hasattr(os, "getuid"):
         return ""
     real = file.resolve()
     for path in (real, real.parent):
         try:
             found = path.stat()
-        except OSError:  # is said where it is opened
+        except OSError:  # reported when it is opened
             return ""
         if found.st_uid not in (os.getuid(), 0):
             return f"{path} belongs to another user"

@@ -14,9 +14,9 @@ COAST = "coastline"
 
 
 class Zone(NamedTuple):
-    """A part of the plane, such as where no sensor may go: what it is, and its corners in order, m.
+    """A part of the plane, such as a no-go zone: its kind, and its corners in order, m.
 
-    Of a coastline they are a line, which ends where it ends.
+    The corners of a coastline are a line, which may be open.
     """
 
     kind: str
@@ -24,7 +24,7 @@ class Zone(NamedTuple):
 
 
 def zones(scenario: Scenario) -> tuple[Zone, ...]:
-    """The coastline, the region, and what constraints say of where sensors may be."""
+    """Return the coastline, the region, and the areas of the constraints on sensor positions."""
     model = scenario.model
     found = [Zone(COAST, line) for line in coastline(model, scenario.folder)]
     found.append(Zone(REGION, _corners(model.region)))

@@ -1,4 +1,4 @@
-"""Sections of a scenario in a few words, for people: `limited range, probability 0.9, range 5000 m`."""
+"""Sections of a scenario in a few words: `limited range, probability 0.9, range 5000 m`."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def settings(section: Section, replaced: Mapping[str, tuple[str, object]] | None
 
 
 def plain_values(section: Section, replaced: Mapping[str, tuple[str, object]] | None = None) -> list[str]:
-    """Return each plain value of a section in words, without the kind; what is off or empty is left out."""
+    """Return each plain value of a section in words, without the kind; disabled and empty ones are left out."""
     found = list[str]()
     for name, field in type(section).model_fields.items():
         name, value = (replaced or {}).get(name, (name, getattr(section, name)))

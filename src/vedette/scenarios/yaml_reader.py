@@ -1,7 +1,7 @@
 """YAML 1.2 (core schema) read into plain data, with the place of every key and value.
 
-Only mappings, lists, words, numbers, true/false and null come out; a tag never makes an object. Anchors and aliases
-work. Everything that is wrong but leaves the text readable (a key twice, a foreign tag) is reported together.
+The result has only mappings, lists, words, numbers, true/false and null; a tag never makes an object. Anchors and
+aliases work. All faults that leave the text readable (a repeated key, a foreign tag) are reported together.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from vedette.scenarios.faults import Fault, Path, Place, Told, describe
 _MAX_DEPTH = 50
 _MAX_NODES = 100_000  # aliases of aliases can stand for any number of nodes
 MOST_BYTES = 2_000_000
-_MAX_DIGITS = 300  # thousands of digits are no number of ours, and Python refuses to convert them
+_MAX_DIGITS = 300  # longer numbers are read as words; Python refuses to convert thousands of digits
 _CORE_TAGS = {f"tag:yaml.org,2002:{name}" for name in ("null", "bool", "int", "float", "str", "seq", "map")}
 _STR_TAGS = ("tag:yaml.org,2002:str", "!")
 _INTEGER = re.compile(r"[-+]?[0-9]+")
@@ -42,7 +42,7 @@ _WORDS |= {text: True for text in ("true", "True", "TRUE")} | {text: False for t
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """Plain data of a file, where each thing stands, and what was wrong with the text."""
+    """Plain data of a file, the place of each key and value, and the faults of the text."""
 
     file: str
     data: Any
@@ -51,7 +51,7 @@ class Document:
     faults: list[Fault]
 
     def place(self, path: Path) -> Place:
-        """Place of the key (or list item) at `path`, or of the nearest thing around it that stands in the file."""
+        """Return the place of the key (or list item) at `path`, or of the nearest key or value around it."""
         for length in range(len(path), 0, -1):
             found = self.key_places.get(path[:length]) or self.value_places.get(path[:length])
             if found:
@@ -59,12 +59,12 @@ class Document:
         return self.value_places.get((), (1, 1))
 
     def value_place(self, path: Path) -> Place:
-        """Place of the value at `path`, or else of what is nearest around it."""
+        """Return the place of the value at `path`, or of the nearest one around it."""
         return self.value_places.get(path) or self.place(path)
 
 
 def plain_scalar(text: str) -> Any:
-    """Value of an unquoted scalar under the core schema of YAML 1.2: `1e3` is a number, `no` and `1_000` are words."""
+    """Return the value of an unquoted scalar in the core schema: `1e3` is a number, `no` and `1_000` are words."""
     if text in _WORDS:
         return _WORDS[text]
     if _INTEGER.fullmatch(text):
@@ -78,7 +78,7 @@ def plain_scalar(text: str) -> Any:
 
 @dataclass(slots=True)
 class _Anchor:
-    """A node that aliases can name: its value, its path, and which of the places read so far are inside it."""
+    """A node that aliases can name: its value, its path, and the range of recorded places inside it."""
 
     value: Any
     path: Path
@@ -93,10 +93,10 @@ class _Reader:
     values: dict[Path, Place] = field(default_factory=dict)
     faults: list[Fault] = field(default_factory=list)
     anchors: dict[str, _Anchor] = field(default_factory=dict)
-    read: list[tuple[Path, Place, bool]] = field(default_factory=list)  # every place in turn, and whether of a key
+    read: list[tuple[Path, Place, bool]] = field(default_factory=list)  # every place in order, and True for a key
 
     def record(self, path: Path, place: Place, *, is_key: bool) -> None:
-        """Keep the place of a key or value."""
+        """Record the place of a key or value."""
         if len(self.read) >= 2 * _MAX_NODES:
             raise _Unreadable(Fault(place, Told((), f"at most {_MAX_NODES} values", "more, aliases and keys counted")))
         self.read.append((path, place, is_key))
@@ -131,7 +131,7 @@ class _Reader:
         return self.text(event, path) if quoted_or_text else plain_scalar(event.value)
 
     def text(self, event: Any, path: Path) -> str:
-        """Quoted text; two escapes that are halves of one letter, as JSON writes it, become that letter."""
+        """Return quoted text; two escapes that are halves of one letter, as JSON writes it, become that letter."""
         value = str(event.value)
         joined = value.encode("utf-16-le", "surrogatepass").decode("utf-16-le", "replace")
         if joined != value and "\ufffd" in joined:
@@ -182,7 +182,7 @@ class _Reader:
 
 
 class _Unreadable(Exception):
-    """The text cannot be read further."""
+    """A fault after which the text cannot be read further."""
 
     def __init__(self, fault: Fault) -> None:
         super().__init__(str(fault))
@@ -199,7 +199,7 @@ def _syntax(place: Place, problem: str) -> Fault:
 
 
 def _document_start(events: Iterator[Any]) -> Any:
-    """Skip to the first node; `None` if there is none."""
+    """Skip to the first node; return None if there is none."""
     for event in events:
         if isinstance(event, DocumentStartEvent):
             if event.version is not None and tuple(event.version) != (1, 2):
@@ -212,7 +212,7 @@ def _document_start(events: Iterator[Any]) -> Any:
 
 
 def _place_of_escape(text: str) -> Place:
-    """The first escape beyond the last letter there is, U+10FFFF."""
+    """Return the place of the first escape beyond the last Unicode letter, U+10FFFF."""
     found = _NO_LETTER.search(text)
     before = text[: found.start()] if found else ""
     return before.count("\n") + 1, len(before) - before.rfind("\n")
@@ -231,7 +231,7 @@ def _read(reader: _Reader) -> Any:
 
 
 def read_yaml(text: str, file: str) -> Document:
-    """Read YAML 1.2 text. Never raises for what is in the text: the faults are in the result."""
+    """Read YAML 1.2 text. Never raises for faults of the text: they are in the result."""
     if len(text) > MOST_BYTES:
         fault = Fault((1, 1), Told((), f"a file of at most {MOST_BYTES} letters", f"{len(text)}"))
         return Document(file, None, {}, {}, [fault])
@@ -247,6 +247,6 @@ def read_yaml(text: str, file: str) -> Document:
         reader.faults.append(_syntax(place, str(error.problem or error.context)))
     except YAMLError as error:
         reader.faults.append(_syntax((1, 1), str(error).splitlines()[0]))
-    except (ValueError, OverflowError):  # what the scanner makes of an escape such as "\U00110000"
+    except (ValueError, OverflowError):  # the scanner raises these for an escape such as "\U00110000"
         reader.faults.append(_syntax(_place_of_escape(text), "an escape of what is no letter"))
     return Document(file, data, reader.keys, reader.values, reader.faults)

@@ -1,4 +1,4 @@
-"""What a scenario describes, as the objects that filters, planners and simulations take.
+"""Builders of the filters, planners and simulations that a scenario describes.
 
 Each section builds its own part (`vedette.scenarios.sections`); here they are put together.
 """

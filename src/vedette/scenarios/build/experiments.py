@@ -1,4 +1,4 @@
-"""What a scenario describes as a run: an experiment to be simulated, or a recording to be tracked."""
+"""Builders of runs: an experiment to be simulated, or a recording to be tracked."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from vedette.simulation.truth import TargetSource
 
 
 def build_experiment(scenario: Scenario) -> Experiment:
-    """Everything a run needs but a planner and a seed.
+    """Return the experiment: everything that a run needs except a planner and a seed.
 
     Raises:
-        InputError: a custom model or a recorded file that cannot be had, parts that do not fit together, or a scenario
-            of recorded scans.
+        InputError: a custom model or a recorded file that cannot be loaded, parts that do not fit together, or a
+            scenario of recorded scans.
     """
     model = scenario.model
     if model.recording is not None:
@@ -48,7 +48,7 @@ def build_experiment(scenario: Scenario) -> Experiment:
         estimate=model.estimates_by.build(scenario.folder),
         decision_steps=model.decision_steps,
         explain=model.control.explain,
-        # Where they are what the tracker takes them for, a tracker of other sensors may stand in for this one.
+        # Empty if all match the tracker's models, so that a tracker of other sensors may replace this one.
         true_sensors=build_true_sensors(scenario, known) if any(sensor.truth for sensor in model.sensors) else (),
         scans_at=None if times.all() else times,
         drop_out=drop_outs(scenario),
@@ -56,9 +56,9 @@ def build_experiment(scenario: Scenario) -> Experiment:
 
 
 def build_tracking(scenario: Scenario, recording: RecordedScans | None = None) -> Tracking:
-    """The recording of a scenario (None: it is read) with its tracker.
+    """Return the recording of a scenario with its tracker; recording: None to read it from the file.
 
-    Raises `InputError` as `build_experiment`, or for a scenario whose scans are simulated.
+    Raises `InputError` like `build_experiment`, or for a scenario with simulated scans.
     """
     model, folder = scenario.model, scenario.folder
     if model.recording is None:
@@ -70,6 +70,6 @@ def build_tracking(scenario: Scenario, recording: RecordedScans | None = None) -
 
 
 def build_targets(scenario: Scenario) -> TargetSource:
-    """The true targets. Raises `InputError` for a custom motion or a recorded file that cannot be had."""
+    """Return the true targets. Raises `InputError` for a custom motion or a recorded file that cannot be loaded."""
     model, folder = scenario.model, scenario.folder
     return model.targets.build(model, model.motion.build(folder), folder)

@@ -21,20 +21,21 @@ from vedette.tracking import Network
 
 
 def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planner | None:
-    """The planner of a strategy: `jdm` (joint), `idm` (independent), `lookahead` (joint, over several decisions),
-    `nearest`, `assigned`, `centroid` (rules of thumb), `oracle` and `told` (which know the targets), `random`,
-    `fixed` (sensors keep their first course), or one of the scenario's own; None for `still`, where the sensors are
-    never under way.
+    """Return the planner of a strategy; None for `still`, with which the sensors never move.
+
+    The strategies are `jdm` (joint), `idm` (independent), `lookahead` (joint, over several decisions), `nearest`,
+    `assigned`, `centroid` (rules of thumb), `oracle` and `told` (which know the targets), `random`, `fixed` (sensors
+    keep their first course), and the scenario's own planners.
 
     Args:
-        scenario: with the sensors that it steers.
+        scenario: with the sensors that the planner controls.
         name: of the strategy.
-        num_threads: share a decision; 0: one a processor.
+        num_threads: of a decision; 0: one per processor.
 
     Raises:
-        InputError: another name, joint or independent decisions with filters that have no labels, planners that
-            know the targets where these are unknown or lack components of the motion's states, or a custom part that
-            cannot be had.
+        InputError: an unknown name, joint or independent decisions with filters that have no labels, planners that
+            know the targets if these are unknown or lack components of the motion's states, or a custom part that
+            cannot be loaded.
     """
     model, folder = scenario.model, scenario.folder
     if name not in (*STRATEGIES, *model.planners):
@@ -55,9 +56,7 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
 def build_parts(
     scenario: Scenario, sensors: tuple[MobileSensor, ...], strategy: Strategy, num_threads: int = 0
 ) -> Parts:
-    """What the planner of a strategy is made of, the sensors as of `build_sensors`. Raises `InputError` as
-    `build_planner`.
-    """
+    """Return the parts of a strategy's planner, with sensors from `build_sensors`; raises like `build_planner`."""
     model, folder = scenario.model, scenario.folder
     control, fusion = model.control, _fusion_of_decisions(scenario, sensors[0].filter)
     return Parts(
@@ -78,7 +77,7 @@ def build_parts(
 
 
 def _schedule(scenario: Scenario) -> Schedule:
-    """When the sensors scan and decide, and how what they say becomes one, for an oracle."""
+    """Return when the sensors scan and decide, and how their scans are fused, for an oracle."""
     model, num = scenario.model, len(scenario.model.sensors)
     section, powers = model.fusion, (1.0,) * num
     shared = section.kind in ONE_BELIEF or isinstance(section, CustomFusion) or section.feeds_back
@@ -92,7 +91,7 @@ def _schedule(scenario: Scenario) -> Schedule:
 
 
 def _notes_of_decisions(scenario: Scenario, fusion: Fusion, strategy: Strategy) -> tuple[str, ...]:
-    """What the decisions of a strategy say of their fusion, where the tracks are fused in another way, and of radio."""
+    """Return notes on decisions that assume another fusion than the tracks', or ignore limits of the network."""
     model, section = scenario.model, scenario.model.fusion
     reward = getattr(strategy, "reward", None) or model.control.reward
     alone = isinstance(strategy, NamedIndependent) and (strategy.others or model.control.others) == "absent"
@@ -107,7 +106,7 @@ def _notes_of_decisions(scenario: Scenario, fusion: Fusion, strategy: Strategy) 
 
 
 def _fusion_of_decisions(scenario: Scenario, local: Filter) -> Fusion:
-    """A user's own; otherwise as the section says."""
+    """Return the custom fusion if there is one; otherwise the fusion of decisions that the section gives."""
     section, num_sensors = scenario.model.fusion, len(scenario.model.sensors)
     if isinstance(section, CustomFusion):
         return section.build(num_sensors, scenario.folder)

@@ -31,10 +31,10 @@ from vedette.simulation.true_sensors import TrueSensor
 
 
 def build_sensors(scenario: Scenario) -> tuple[MobileSensor, ...]:
-    """The sensors as planners steer them, each with its filter; the filters share the models of the targets.
+    """Return the sensors as planners control them, each with its filter; the filters share the models of the targets.
 
     Raises:
-        InputError: a custom model that cannot be had, or parts that do not fit together.
+        InputError: a custom model that cannot be loaded, or parts that do not fit together.
     """
     model, folder = scenario.model, scenario.folder
     method, region = model.filter.gaussian_method, model.region.build()
@@ -54,7 +54,7 @@ def build_sensors(scenario: Scenario) -> tuple[MobileSensor, ...]:
 
 
 def _platform(model: ScenarioModel, sensor: Sensor, folder: Path) -> Platform:
-    """What carries a sensor, with its prices and switch; with an origin or a compass its actions are courses."""
+    """Return the platform of a sensor with prices and switch; its actions are courses with an origin or a compass."""
     section, price = sensor.platform, sensor.price
     platform: Platform = section.build(folder)
     if model.by_compass and platform.columns:
@@ -78,7 +78,7 @@ def _platform(model: ScenarioModel, sensor: Sensor, folder: Path) -> Platform:
 
 
 def _scan_times(model: ScenarioModel, sensor: Sensor) -> Floats | None:
-    """s of the scans of a sensor, as far as decisions look ahead, past the last step too; None: at every step."""
+    """Return the times of a sensor's scans, s, to the end of the last horizon; None if it scans at every step."""
     if sensor.scans.steps(model.time.step_period)[0] == 1:
         return None
     lookahead, horizon = model.control.lookahead or Lookahead(), math.prod(model.horizon)
@@ -90,7 +90,7 @@ def _scan_times(model: ScenarioModel, sensor: Sensor) -> Floats | None:
 
 
 def _check_own(scenario: Scenario, section: Sensor, sensor: SensorModel, local: Filter) -> None:
-    """`NotGiven` where the user's own measurement or filter has less than the scenario asks of it."""
+    """Raise `NotGiven` if a custom measurement or filter lacks a method or attribute that the scenario needs."""
     model, measured = scenario.model, section.measurement
     born = model.birth.from_measurements is not None
     if born and sensor.measurement.places is None and isinstance(measured, Custom):
@@ -105,7 +105,7 @@ def _check_own(scenario: Scenario, section: Sensor, sensor: SensorModel, local: 
 
 
 def build_true_sensors(scenario: Scenario, known: Sequence[SensorModel]) -> tuple[TrueSensor, ...]:
-    """The sensors as they are, beside what the filters know of them; errors as of `build_sensors`."""
+    """Return the true sensors for those that the filters assume; raises like `build_sensors`."""
     model = scenario.model
     region = model.region.build()
     places = zip(model.sensors, known, strict=True)
@@ -113,19 +113,19 @@ def build_true_sensors(scenario: Scenario, known: Sequence[SensorModel]) -> tupl
 
 
 def drop_outs(scenario: Scenario) -> tuple[float, ...]:
-    """Probability of each sensor that a scan does not take place; () where all do."""
+    """Return the probability of each sensor that a scan does not take place; () if all are 0."""
     found = tuple(sensor.scans.drop_out or 0.0 for sensor in scenario.model.sensors)
     return found if any(found) else ()
 
 
 def build_scan_times(scenario: Scenario) -> Bools:
-    """(num_sensors, num_steps) whether each sensor scans then."""
+    """Return True for each sensor and step with a scan, shape (num_sensors, num_steps)."""
     model = scenario.model
     return np.array([sensor.scans.build(model.time) for sensor in model.sensors])
 
 
 def build_poses(scenario: Scenario) -> Floats:
-    """(num_sensors, pose_dim) where they start, all as long as the longest; what is not a sensor's own is 0."""
+    """Return the poses at the start, (num_sensors, pose_dim), padded with zeros to the longest."""
     sensors, visits = scenario.model.sensors, revisited(scenario.model)
     poses = [sensor.pose if scenario.model.recording else sensor.turning_pose for sensor in sensors]
     longest = max(map(len, poses)) if visits is None else CLOCKS
@@ -137,7 +137,7 @@ def build_poses(scenario: Scenario) -> Floats:
 
 
 def first_actions(scenario: Scenario, sensors: tuple[MobileSensor, ...]) -> tuple[Actions, ...]:
-    """What each sensor does where nothing decides: its course at the start, or the first of its actions."""
+    """Return the action of each sensor before any decision: its course at the start, or the first of its actions."""
     found = []
     places = zip(scenario.model.sensors, sensors, build_poses(scenario), strict=True)
     for s, (section, sensor, pose) in enumerate(places):

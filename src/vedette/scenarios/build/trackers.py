@@ -25,7 +25,7 @@ from vedette.tracking import (
 
 
 def build_tracker(scenario: Scenario, filters: tuple[Filter, ...]) -> Tracker:
-    """What follows the targets that are found, and those that are not where the filter's belief does not have them."""
+    """Return the tracker of detected targets, and of undetected ones if the filter's belief does not include them."""
     section, found = scenario.model.undetected, _tracker_of_found(scenario, filters)
     lates = {s: sensor.scans.late.build() for s, sensor in enumerate(scenario.model.sensors) if sensor.scans.late}
     if lates:
@@ -36,7 +36,7 @@ def build_tracker(scenario: Scenario, filters: tuple[Filter, ...]) -> Tracker:
 
 
 def _tracker_of_found(scenario: Scenario, filters: tuple[Filter, ...]) -> Tracker:
-    """The filters and their fusion, or one filter for all sensors; over a network, where there is one."""
+    """Return the filters and their fusion, or one filter for all sensors, with the network if there is one."""
     model, fusion = scenario.model, scenario.model.fusion.build(len(filters), scenario.folder)
     central = _central_filter(scenario, filters)
     if model.network is None:
@@ -51,16 +51,16 @@ def _tracker_of_found(scenario: Scenario, filters: tuple[Filter, ...]) -> Tracke
 
 
 def keeps_lmbs(local: Filter) -> bool:
-    """Whether the beliefs of a filter are labelled multi-Bernoulli densities."""
+    """Return True if the beliefs of a filter are labelled multi-Bernoulli densities."""
     initial = local.initial()
     return isinstance(initial, LabelledDensity) and initial.is_lmb
 
 
 def _merging(num_sensors: int, *, of_lmbs: bool, own_labels: bool) -> Fusion:
-    """The fusion of what sensors of a network believe after different pasts: covariance intersection.
+    """Return the fusion of beliefs of a network's sensors that have received different scans: covariance intersection.
 
-    of_lmbs: whether the filters keep LMBs, of which those count at a label that see it, and labels are matched.
-    own_labels: whether sensors make labels of their own, so that those of GLMBs are matched as well.
+    of_lmbs: True if the filters keep LMBs; then a label is fused by the sensors that see it, and labels are matched.
+    own_labels: True if sensors create their own labels, so that those of GLMBs are matched as well.
     """
     equal = (1.0 / num_sensors,) * num_sensors
     if of_lmbs:
@@ -69,7 +69,7 @@ def _merging(num_sensors: int, *, of_lmbs: bool, own_labels: bool) -> Fusion:
 
 
 def _central_filter(scenario: Scenario, filters: tuple[Filter, ...]) -> CentralFilter | None:
-    """The filter of all sensors' scans; None where each has its own."""
+    """Return the filter of all sensors' scans; None if each sensor has its own."""
     model = scenario.model
     if model.fusion.kind not in OF_SCANS or not isinstance(model.filter, FilterSection):
         return None
@@ -83,12 +83,12 @@ def _central_filter(scenario: Scenario, filters: tuple[Filter, ...]) -> CentralF
     return model.filter.build_central(targets, sensors, scenario.folder, in_turn=in_turn)
 
 
-# What programs are told; the true targets, and what sensors are in truth, are not among it.
+# Sections that programs receive; they exclude the true targets and the sensors' true models.
 _TOLD = {"name", "time", "region", "motion", "survival", "birth", "control", "ospa"}
 
 
 def told_of(scenario: Scenario) -> dict[str, Any]:
-    """What a program is told of a scenario: its sections as plain data, and the horizon."""
+    """Return the data of a scenario that a program receives: its sections as plain data, and the horizon."""
     model, (horizon_steps, horizon_period) = scenario.model, scenario.model.horizon
     told = model.model_dump(mode="json", include=_TOLD)
     told["sensors"] = [sensor.model_dump(mode="json", exclude={"truth"}) for sensor in model.sensors]
