@@ -1,4 +1,4 @@
-"""Runs of scenarios and how good they were: metrics, statistics over paired runs, tables.
+"""Runs of scenarios and their evaluation: metrics, statistics over paired runs, tables.
 
 Figures are in `vedette.evaluation.figures`.
 """

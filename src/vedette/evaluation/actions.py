@@ -1,4 +1,4 @@
-"""Actions for readers: in words, and as an axis of a figure."""
+"""Actions in words, and as an axis of a figure."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from vedette.kernels.base.types import Floats
 from vedette.platforms import Actions
 from vedette.platforms.base import switch_words
 
-# What one sensor was sent to do, rounded for counting: name and number of each column.
+# The action of one sensor, rounded for counting: name and number of each column.
 Row: TypeAlias = tuple[tuple[str, float], ...]
 
 _UNITS = {"_deg": ("deg", "°"), "_rad": ("rad", " rad"), "_m": ("m", " m"), "_mps": ("m/s", " m/s")}
@@ -23,9 +23,9 @@ _AZIMUTHS = ("course_deg", "azimuth_deg")
 class ActionAxis(NamedTuple):
     """The actions of a sensor along an axis.
 
-    name: what is on it, `heading`, or the columns one after the other; unit: `deg`, or nothing. places: (num_actions,)
-    where each action is. ticks: the numbers alone. labels: in words. is_numeric: whether places are the numbers of a
-    column; otherwise they count actions from 1.
+    name: of the axis: `heading`, or the names of all columns; unit: `deg`, or empty. places: (num_actions,) position of
+    each action. ticks: the numbers alone. labels: in words. is_numeric: True if places are the numbers of a column;
+    otherwise they count actions from 1.
     """
 
     name: str
@@ -36,19 +36,19 @@ class ActionAxis(NamedTuple):
     is_numeric: bool
 
     def title(self, sensor: str = "") -> str:
-        """`Heading (deg)`; of a sensor that is named, `Heading of sensor 1 (deg)`."""
+        """Return the title `Heading (deg)`, or for a named sensor `Heading of sensor 1 (deg)`."""
         of = f" of {sensor}" if sensor else ""
         return self.name[:1].upper() + self.name[1:] + of + (f" ({self.unit})" if self.unit else "")
 
     def counted(self) -> ActionAxis:
-        """The actions one after the other, whatever their numbers."""
+        """Return the axis with the actions side by side, regardless of their numbers."""
         return self._replace(places=np.arange(1.0, len(self.places) + 1), is_numeric=False)
 
 
 def action_axis(actions: Actions) -> ActionAxis:
-    """The axis of a lone column in its numbers; of several columns the actions one after the other.
+    """Return the axis of actions: the numbers of a single column, or for several columns the actions side by side.
 
-    A speed that all courses have is no column of them.
+    A speed that all courses share does not count as a column.
     """
     actions = _without_speed(actions)
     rows = [rounded(actions.columns, row) for row in actions.values]
@@ -74,7 +74,7 @@ def _without_speed(actions: Actions) -> Actions:
 
 
 def rounded(columns: Sequence[str], row: Floats) -> Row:
-    """A row to whole degrees and four digits of all else."""
+    """Return a row with angles rounded to whole degrees and all else to four digits."""
     found = []
     for name, number in zip(columns, row.tolist(), strict=True):
         if not name.endswith("_deg"):
@@ -86,7 +86,7 @@ def rounded(columns: Sequence[str], row: Floats) -> Row:
 
 
 def angle_of(row: Mapping[str, float], heading: str = "heading_deg", azimuth: str = "course_deg") -> float | None:
-    """The direction of an action for a drawing, deg counter-clockwise from east; None of an action without one.
+    """Return the direction of an action for a drawing, deg counter-clockwise from east; None if it has none.
 
     True north is drawn upwards, wherever the sensor is.
     """
@@ -96,7 +96,7 @@ def angle_of(row: Mapping[str, float], heading: str = "heading_deg", azimuth: st
 
 
 def row_words(row: Row) -> str:
-    """`-30°` of a heading or course, `heading -30°, speed 5, off` of more columns, `still` of none."""
+    """Return a row in words: `-30°` for a lone heading or course, else `heading -30°, speed 5, off`, or `still`."""
     if len(row) == 1 and row[0][0] in ("heading_deg", "course_deg"):
         return f"{row[0][1]:g}°"
     return ", ".join([switch_words(column, x) or _number_words(column, x) for column, x in row]) or "still"
@@ -108,12 +108,12 @@ def _number_words(column: str, number: float) -> str:
 
 
 def choice_words(rows: Sequence[Row]) -> str:
-    """What all sensors do: `-30°, 60°`."""
+    """Return the actions of all sensors in words: `-30°, 60°`."""
     return ("; " if any(len(row) > 1 for row in rows) else ", ").join(map(row_words, rows))
 
 
 def _parts(column: str) -> tuple[str, str, str]:
-    """Name in words, unit, and sign after a number: `heading_deg` is `heading`, `deg`, `°`."""
+    """Return name in words, unit, and sign after a number: `heading_deg` gives `heading`, `deg`, `°`."""
     end = next(filter(column.endswith, _UNITS), "")
     name = column.removesuffix(end).replace("_", " ")
     return (name, *_UNITS[end]) if end else (name, "", "")

@@ -1,4 +1,4 @@
-"""Whether the sensors of a recording agree on targets, for the errors of units, north and places that filters bear."""
+"""Warnings of sensors of a recording that agree on no target, because of wrong units, north or places."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from vedette.scenarios.sections.sensors import Sensor
 from vedette.simulation.records import RunRecord
 
 _GATE = 4.0  # standard deviations between an estimate and a measurement of it
-_LASTING = 10  # estimates of a track that counts
-_LEAST, _SHARE = 3, 0.25  # scans, and their share, at which a sensor has measured a track that is its own
-_FEWEST_PAIRS, _CHANCE = 10, 0.1  # so many pairs tell something; at most this share of them agrees by chance
-_STEADY = 0.25  # of an offset between two tracks: how much it may vary
-_BESIDE = 0.1  # of the distance from a sensor, at most: an offset beyond is of no bias
-_SEEN = 0.3  # probability of detection from which on a scan should have the target
+_LASTING = 10  # estimates of a track, at least, for it to count
+_LEAST, _SHARE = 3, 0.25  # scans, and their share, at which a sensor must have measured a track
+_FEWEST_PAIRS, _CHANCE = 10, 0.1  # fewest pairs for a result, and the largest share that agrees by chance
+_STEADY = 0.25  # largest variation of an offset between two tracks, as a share of it
+_BESIDE = 0.1  # largest offset that a bias explains, as a share of the distance from a sensor
+_SEEN = 0.3  # lowest probability of detection at which a scan should contain the target
 
 Label: TypeAlias = tuple[int, ...]
 
 
 class _Life(NamedTuple):
-    """A track: its estimates by scan, means and variances of position, and at which scans a sensor did measure it.
+    """A track: its mean positions by scan, and the scans at which each sensor measured it.
 
-    looks: for each sensor, whether each of its scans of what it sees had a measurement of the track.
+    looks: for each sensor, True for each of its scans in view of the track that has a measurement of it.
     """
 
     means: dict[int, Floats]
@@ -45,8 +45,8 @@ class _Life(NamedTuple):
 def disagreements(record: RunRecord, scenario: Scenario) -> tuple[str, ...]:
     """Return warnings of sensors of a recording that agree on no target, and of tracks that run side by side.
 
-    A pair is a track that one of two sensors measures and a scan of the other that should have seen it. Sensors that
-    measure no places in the plane are left out. Raises `VedetteError` for a recording that cannot be read.
+    A pair is a track that one of two sensors measures and a scan of the other that should contain it. Sensors whose
+    measurements give no places in the plane are left out. Raises `VedetteError` for a recording that cannot be read.
     """
     model = scenario.model
     kinds = [sensor.measurement.kind for sensor in model.sensors]
@@ -75,7 +75,7 @@ def disagreements(record: RunRecord, scenario: Scenario) -> tuple[str, ...]:
 
 
 def _lives(record: RunRecord, scenario: Scenario, scans: Scans, placed: list[int]) -> dict[Label, _Life]:
-    """The tracks that last, by label."""
+    """Return the tracks with at least `_LASTING` estimates, by label."""
     sensors, stds = scenario.model.sensors, noise_stds(scenario, placed)
     lives: dict[Label, _Life] = {}
     for k, estimate in enumerate(record.estimates):
@@ -93,7 +93,7 @@ def _lives(record: RunRecord, scenario: Scenario, scans: Scans, placed: list[int
 
 
 def measured_by(scan: Floats, kind: str, stds: Floats, pose: Floats, mean: Floats, cov: Floats) -> Bools:
-    """(num,) whether each measurement of a scan lies within the gate of an estimate, by its place."""
+    """Return True for each measurement of a scan within the gate of an estimate, by its place, shape (num,)."""
     if kind == "position":
         off, turn = scan - mean, np.eye(2)
     else:
@@ -108,7 +108,7 @@ def measured_by(scan: Floats, kind: str, stds: Floats, pose: Floats, mean: Float
 
 
 def noise_stds(scenario: Scenario, placed: list[int]) -> dict[int, Floats]:
-    """For each sensor the least standard deviations of a place's two components; 0 where a custom noise gives none."""
+    """Return for each sensor the lowest standard deviations of its two components; 0 if a custom noise gives none."""
     model = scenario.model
     region, method, found = model.region.build(), model.filter.gaussian_method, {}
     for s in placed:
@@ -118,7 +118,7 @@ def noise_stds(scenario: Scenario, placed: list[int]) -> dict[int, Floats]:
 
 
 def _sees(sensor: Sensor, pose: Floats, mean: Floats) -> bool:
-    """Whether a sensor at a pose should see a place, as far as its detection says."""
+    """Return True if a sensor at a pose should see a place according to its detection model."""
     ahead = mean[:2] - pose[:2]
     distance = float(np.hypot(*ahead))
     if sensor.detection.kind == "constant":
@@ -135,9 +135,9 @@ def _sees(sensor: Sensor, pose: Floats, mean: Floats) -> bool:
 def _side_by_side(
     lives: Mapping[Label, _Life], pair: tuple[int, int], names: tuple[str, str], places: Floats
 ) -> Iterator[str]:
-    """Tracks of one sensor that keep a small distance from one of the other, as two of one target do.
+    """Yield a warning if tracks of one sensor keep a small offset from tracks of the other, as two of one target do.
 
-    places: (2, 2) m, of the two sensors.
+    places: (2, 2) positions of the two sensors, m.
     """
     first, second = (
         [life for life in lives.values() if life.measured_by(one) and not life.measured_by(other)]
@@ -151,7 +151,7 @@ def _side_by_side(
 
 
 def _nearest(life: _Life, others: list[_Life], places: Floats) -> float | None:
-    """m to the nearest of other tracks that keeps its distance; None where none does, or none that is near enough."""
+    """Return the distance to the nearest other track with a constant offset, m; None if there is none near enough."""
     found: float | None = None
     mean = np.mean(list(life.means.values()), axis=0)
     most = _BESIDE * float(np.hypot(*(mean - places).T).min())

@@ -8,7 +8,7 @@ from vedette.control.plan import Plan
 
 
 def lead_words(plan: Plan) -> str:
-    """Return the lead in mean reward over the runner-up, `0.071 (3.3 std. errors)`; empty where it is not kept."""
+    """Return the lead in mean reward over the runner-up, `0.071 (3.3 std. errors)`; empty if it is not recorded."""
     second = None if plan.explanation is None else plan.explanation.runner_up
     if second is None:
         return ""

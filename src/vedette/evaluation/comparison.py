@@ -1,4 +1,4 @@
-"""Strategies side by side, over runs that share their random numbers."""
+"""Comparison of strategies, over runs that share their random numbers."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ class Comparison(SummaryRepr):
     A `part` is "total", "localisation" or "cardinality", of OSPA, or the name of a measure.
 
     Attributes:
-        strategies: their names, the one to compare the others with first.
-        ensembles: of each strategy its runs; the n-th runs of all share their random numbers.
+        strategies: their names; the others are compared with the first.
+        ensembles: the runs of each strategy; the n-th runs of all share their random numbers.
         since, until: scans after `since` (s) and up to `until` (s) count in the mean over time.
-        unit: of OSPA: "m", or none ("") where it compares whole states.
+        unit: of OSPA: "m", or none ("") if it compares whole states.
     """
 
     strategies: tuple[str, ...]
@@ -60,12 +60,12 @@ class Comparison(SummaryRepr):
 
     @property
     def times(self) -> Floats:
-        """(num_scans,) s."""
+        """Times of the scans, (num_scans,) s."""
         return self.ensembles[0].times
 
     @property
     def decision_times(self) -> Floats:
-        """(num_decisions,) s, of all strategies together."""
+        """Times of the decisions of all strategies together, (num_decisions,) s."""
         return np.unique(np.concatenate([ensemble.decision_times for ensemble in self.ensembles]))
 
     @property
@@ -76,40 +76,40 @@ class Comparison(SummaryRepr):
 
     @property
     def counted(self) -> Bools:
-        """(num_scans,) whether a scan counts in the mean over time."""
+        """True for each scan that counts in the mean over time, (num_scans,)."""
         return np.asarray((self.times > self.since) & (self.times <= self.until))
 
     def run_means(self, strategy: str, part: str = "total") -> Floats:
-        """(num_runs,) mean over the counted scans of each run that have a value; NaN where none has one."""
+        """Return the mean of each run over the counted scans that have a value, (num_runs,); NaN if none has one."""
         return mean_of_known(self.values(strategy, part)[:, self.counted])
 
     def summary(self, strategy: str, part: str = "total") -> Summary:
-        """Mean over runs of `run_means`."""
+        """Return the mean over runs of `run_means`."""
         return summarise(self.run_means(strategy, part))
 
     def curve(self, strategy: str, part: str = "total") -> Summary:
-        """Mean over runs at each scan: arrays of shape (num_scans,)."""
+        """Return the mean over runs at each scan: arrays of shape (num_scans,)."""
         return summarise(self.values(strategy, part))
 
     def difference(self, strategy: str, reference: str | None = None, part: str = "total") -> PairedDifference:
-        """How much more a strategy has than the reference (the first strategy unless named), run by run."""
+        """Return the difference of a strategy from the reference (default: the first strategy), run by run."""
         return paired_difference(self.run_means(strategy, part), self.run_means(reference or self.strategies[0], part))
 
     def p_values(self) -> Floats:
-        """(num_strategies,) of each strategy's `difference` from the first, by Holm's method for all together.
+        """Return p-values of each strategy's `difference` from the first, (num_strategies,), by Holm's method.
 
-        NaN for the first strategy, and of single runs.
+        NaN for the first strategy, and for single runs.
         """
         alone = [self.difference(strategy).p_value for strategy in self.strategies[1:]]
         return np.concatenate([[np.nan], holm(np.array(alone, np.float64))])
 
     def decision_shares(self, strategy: str, decision: int) -> dict[Choice, float]:
-        """Share of the runs in which each combination of actions was chosen; the most frequent first."""
+        """Return the share of the runs in which each combination of actions was chosen; the most frequent first."""
         chosen = Counter(run[decision] for run in self._ensemble(strategy).choices if decision < len(run))
         return {choice: count / self.num_runs for choice, count in chosen.most_common()}
 
     def values(self, strategy: str, part: str = "total") -> Floats:
-        """(num_runs, num_scans) of a strategy."""
+        """Return the values of a strategy, (num_runs, num_scans)."""
         if part not in (*PARTS, *self.measures):
             raise InputError(f"part: expected one of {', '.join((*PARTS, *self.measures))}; got {part!r}")
         return self._ensemble(strategy).values(part)
@@ -128,15 +128,15 @@ def compare(
     until: float = np.inf,
     unit: str = "m",
 ) -> Comparison:
-    """Put the runs of several strategies side by side.
+    """Compare the runs of several strategies.
 
     Args:
-        runs: for each strategy its runs; the n-th runs of all must be of the same scenario, seed and run number.
-        metrics: measures of the same runs, to be compared, too.
+        runs: for each strategy its runs; the n-th runs of all must have the same scenario, seed and run number.
+        metrics: measures of the same runs, to be compared as well.
         since: only scans after this time (s) count in the mean over time; by default the time of the first decision,
-            before which all strategies are alike, and every scan if none was made before the last.
+            before which all strategies are alike, and every scan if no decision was made before the last scan.
         until: only scans up to this time (s) count.
-        unit: of OSPA; none ("") where it compares whole states.
+        unit: of OSPA; none ("") if it compares whole states.
 
     Raises `InputError` if there is no run, or the runs are not paired.
     """
@@ -153,7 +153,7 @@ def compare(
 def compare_ensembles(
     ensembles: Mapping[str, Ensemble], *, since: float | None = None, until: float = np.inf, unit: str = "m"
 ) -> Comparison:
-    """As `compare`, of runs that are gathered already, with the measures that all of them have."""
+    """Compare ensembles like `compare`, with the measures that all runs have."""
     strategies, reference = tuple(ensembles), next(iter(ensembles.values()))
     for name, ensemble in ensembles.items():
         _check_paired(name, ensemble, strategies[0], reference)
@@ -168,10 +168,10 @@ def compare_ensembles(
 
 
 def scored(scenario: Scenario, ensembles: Mapping[str, Ensemble]) -> Comparison:
-    """The comparison over the scans that the scenario counts."""
+    """Return the comparison over the scans that the scenario counts."""
     window, times = scenario.model.ospa, next(iter(ensembles.values())).times
     since, until = None, np.inf
-    if window.from_step is not None:  # a run that stopped before has no such scan
+    if window.from_step is not None:  # a run that stopped earlier has no such scan
         since = np.inf if window.from_step > len(times) else float(np.nextafter(times[window.from_step - 1], -np.inf))
     if window.to_step is not None:
         until = float(times[min(window.to_step, len(times)) - 1])
@@ -181,8 +181,8 @@ def scored(scenario: Scenario, ensembles: Mapping[str, Ensemble]) -> Comparison:
 def counted_scans(record: RunRecord, scenario: Scenario | None) -> Bools:
     """Return whether each scan of a run counts in its mean error, (num_scans,).
 
-    The scans are those that `scored` counts; without a scenario, those after the first decision. All count where the
-    run stopped before the first of them.
+    The scans are those that `scored` counts; without a scenario, those after the first decision. All count if the run
+    stopped before the first of them.
     """
     runs = {record.planner: ensemble_of([(record.summary(), None)])}
     try:
@@ -192,7 +192,7 @@ def counted_scans(record: RunRecord, scenario: Scenario | None) -> Bools:
 
 
 def mean_of_known(values: Floats) -> Floats:
-    """(num_runs,) mean of each row over its numbers; NaN where it has none."""
+    """Return the mean of each row over its numbers, (num_runs,); NaN if it has none."""
     known = ~np.isnan(values)
     if known.all():
         return np.asarray(values.mean(axis=1))
@@ -201,13 +201,13 @@ def mean_of_known(values: Floats) -> Floats:
 
 
 def typical_run(comparison: Comparison, strategy: str) -> int:
-    """Of the runs of a strategy, the place of the one whose mean OSPA is the median (of an even number, the better)."""
+    """Return the index of a strategy's run with the median mean OSPA (for an even number, the better of two)."""
     means = comparison.run_means(strategy)
     return int(np.argsort(means, kind="stable")[(len(means) - 1) // 2])
 
 
 def choices_of(record: RunRecord) -> tuple[Choice, ...]:
-    """What each decision of a run chose, rounded."""
+    """Return the choices of all decisions of a run, rounded."""
     return tuple(choice_of(decision.plan) for decision in record.decisions)
 
 

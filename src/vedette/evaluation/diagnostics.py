@@ -1,4 +1,4 @@
-"""Diagnostics of a run or several: what filters and fusion truncated, dropped or lost, and if it matters."""
+"""Diagnostics of one or more runs: what filters and fusion truncated, dropped or lost, and whether it matters."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from vedette.kernels.labelled.set_fusion import LOST, SURE
 from vedette.simulation.health import Health
 
 Level = Literal["ok", "note", "check"]
-_MUCH = 0.01  # share or number above which a truncation is to be checked
+_MUCH = 0.01  # share or number above which a truncation should be checked
 
 
 class Diagnostic(NamedTuple):
-    """One check of a run or several.
+    """One check of one or more runs.
 
     Attributes:
         name: what is checked.
@@ -35,12 +35,12 @@ class Diagnostic(NamedTuple):
 
 
 def run_diagnostics(health: Health, sensors: Sequence[str] = ()) -> tuple[Diagnostic, ...]:
-    """Return every diagnostic of one run, whose sensors are called `sensors`."""
+    """Return every diagnostic of one run; sensors: their names."""
     return diagnostics(summarise_health(health_sums([health]), sensors))
 
 
 def diagnostics_line(found: Sequence[Diagnostic]) -> str:
-    """Return the diagnostics that are not `ok` in one line; `no limit reached, nothing truncated` where all are."""
+    """Return the diagnostics that are not `ok` in one line; `no limit reached, nothing truncated` if all are."""
     shown = [f"{each.name[0].lower()}{each.name[1:]}: {each.text}" for each in found if each.level != "ok"]
     return "; ".join(shown) or "no limit reached, nothing truncated"
 
@@ -51,7 +51,7 @@ def diagnostics(health: HealthSummary) -> tuple[Diagnostic, ...]:
 
 
 def _level(value: float, much: float = 0.0) -> Level:
-    """`check` above `much`, `note` above 0; with `much` infinite never `check`."""
+    """Return `check` above `much`, `note` above 0; with infinite `much` never `check`."""
     return "check" if value > much else "note" if value > 0.0 else "ok"
 
 
@@ -60,7 +60,7 @@ def _scans(share: float) -> str:
 
 
 def _bound(share: float) -> str:
-    """An upper bound on a share."""
+    """Return an upper bound on a share in words."""
     return "less than 1 %" if share < 0.01 else f"at most {percent(share)}"
 
 

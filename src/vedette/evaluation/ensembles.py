@@ -1,4 +1,4 @@
-"""The runs of one strategy as arrays over runs and scans: what is compared and reported of them."""
+"""The runs of one strategy as arrays over runs and scans, for comparisons and reports."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from vedette.kernels.base.types import Floats, Ints
 from vedette.simulation.records import RunSummary
 
 PARTS = ("total", "localisation", "cardinality")
-# What was chosen at one decision, one row a sensor.
+# The choice at one decision, one row for each sensor.
 Choice: TypeAlias = tuple[Row, ...]
 # A run with its measures, if it has any.
 Measured: TypeAlias = tuple[RunSummary, RunMetrics | None]
 
-# Runs that are held as they come, and entries of their tables of rewards.
+# Largest numbers of runs, and of entries of their reward tables, that are in memory at once.
 TOGETHER, _MOST_REWARDS = 256, 2**22
 
 
@@ -36,19 +36,19 @@ class Ensemble(SummaryRepr):
 
     Attributes:
         scenario: name of the scenario.
-        seeds, runs: (num_runs,) of each run its seed and number.
+        seeds, runs: (num_runs,) seed and number of each run.
         times: (num_scans,) s.
         ospa: (num_runs, num_scans, 3) total, localisation and cardinality parts.
-        num_targets: (num_runs, num_scans) number of true targets, in as few bytes as hold it.
-        measures: (num_runs, num_scans) of each measure that all runs have, by the name of its column; whole numbers in
-            as few bytes as hold them: `values` gives them as numbers to compute with.
-        choices: for each run, what each of its decisions chose; equal ones are one object.
+        num_targets: (num_runs, num_scans) number of true targets, in the smallest type that holds it.
+        measures: (num_runs, num_scans) for each measure that all runs have, by the name of its column; whole numbers in
+            the smallest type that holds them: `values` returns them as floats.
+        choices: for each run, the choices of its decisions; equal ones are one object.
         decision_times: (num_decisions,) s, of all runs together, increasing.
-        health: what filters and fusion reported, added up.
-        rewards: of each decision, in order, the rewards added up.
-        seconds: of each stage, the wall time at all scans of all runs, s, in single precision; of `planning` at the
-            decisions alone.
-        counts: of each thing that plans count, its number in every decision that has it.
+        health: sums of the reports of filters and fusion.
+        rewards: for each decision, in order, sums of the rewards.
+        seconds: for each stage, the wall time at all scans of all runs, s, in single precision; `planning` only at the
+            decisions.
+        counts: for each count of the plans, its number in every decision that has it.
     """
 
     scenario: str
@@ -77,7 +77,7 @@ class Ensemble(SummaryRepr):
         return len(self.runs)
 
     def values(self, part: str) -> Floats:
-        """(num_runs, num_scans) of a part of OSPA or a measure. Raises `InputError` for a name that is none."""
+        """Return a part of OSPA or a measure, (num_runs, num_scans). Raises `InputError` for an unknown name."""
         if part in PARTS:
             return np.asarray(self.ospa[:, :, PARTS.index(part)])
         if part not in self.measures:
@@ -85,14 +85,14 @@ class Ensemble(SummaryRepr):
         return np.asarray(self.measures[part], np.float64)
 
     def num_pairs(self) -> Ints:
-        """(num_runs, num_scans) number of targets that have an estimate within the cutoff."""
+        """Return the number of targets that have an estimate within the cutoff, (num_runs, num_scans)."""
         return np.asarray(self.num_targets.astype(np.int64) - self.measures["num_missed"])
 
 
 def ensemble_of(runs: Iterable[Measured]) -> Ensemble:
-    """What is compared and reported of some runs, with their measures where they have any.
+    """Return the ensemble of some runs, with their measures if they have any.
 
-    Runs may come from a stream: no more than a few hundred are held at a time.
+    Runs may come from a stream: at most a few hundred are in memory at a time.
 
     Raises `InputError` for no run, and for runs of other scenarios or scan times than the first.
     """
@@ -100,7 +100,7 @@ def ensemble_of(runs: Iterable[Measured]) -> Ensemble:
 
 
 def joined(parts: Sequence[Ensemble]) -> Ensemble:
-    """The runs of several ensembles, one after the other; raises as `ensemble_of`."""
+    """Return the runs of several ensembles, one after the other; raises like `ensemble_of`."""
     if not parts:
         raise InputError("runs: expected at least one run of each of one or more strategies")
     if len(parts) == 1:
@@ -128,7 +128,7 @@ def joined(parts: Sequence[Ensemble]) -> Ensemble:
 
 
 def choice_of(plan: Plan) -> Choice:
-    """What a plan chose, rounded."""
+    """Return the choice of a plan, rounded."""
     return tuple(rounded(own.columns, row) for own, row in zip(plan.actions, plan.chosen_actions, strict=True))
 
 
@@ -169,7 +169,7 @@ def _of_few(runs: Sequence[Measured]) -> Ensemble:
 
 
 def _columns(rows: Sequence[Sequence[Any]]) -> list[list[Any]]:
-    """The n-th entries of all rows that have so many, for every n."""
+    """Return, for every n, the n-th entries of all rows that have one."""
     return [[row[n] for row in rows if n < len(row)] for n in range(max(map(len, rows)))]
 
 
@@ -181,14 +181,14 @@ def _check_alike(scenario: str, times: Floats, other: str, other_times: Floats, 
 
 
 def _in_few_bytes(values: NDArray[Any]) -> NDArray[Any]:
-    """Whole numbers in the smallest type with a sign that holds them."""
+    """Return whole numbers in the smallest signed type that holds them; other arrays unchanged."""
     if values.dtype != np.int64:
         return values
     return values.astype(np.min_scalar_type(-1 - int(np.abs(values).max(initial=0))))
 
 
 def _by_name(parts: Sequence[Mapping[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
-    """The arrays of each name, one after the other."""
+    """Return the arrays of each name, concatenated."""
     names = dict.fromkeys(name for part in parts for name in part)
     return {name: np.concatenate([part[name] for part in parts if name in part]) for name in names}
 

@@ -1,4 +1,4 @@
-"""Likelihood ratios of gaps: whether a label that begins is the target of one that ended, or a target just born."""
+"""Likelihood ratios of gaps: whether a new label is the target of one that ended, or a newborn target."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from vedette.evaluation.watch import Watch, births_at, births_found, undetected_
 from vedette.kernels.base.types import Floats, Ints, Mixture
 from vedette.kernels.gaussian.components import components_of, joined_components, taken_components
 
-# Estimates of a new label that are compared with the motion of one that ended: more say little about the gap.
+# Estimates of a new label that are compared with the motion of an ended one: later ones add little information.
 _FIRST_ESTIMATES = 10
-# Share of a variance below which a scan is taken to have said nothing in that direction.
+# Share of a variance below which a scan counts as uninformative in that direction.
 _LEAST_INFORMATION = 1e-6
 _MOST_CERTAIN = 1.0 - 1e-12
-# Scans after which a label that ended is forgotten.
+# Scans after which an ended label is no candidate.
 _LONGEST_GAP = 200
 
 
 class _Information(NamedTuple):
-    """What scans say about a state: exp(linear'u - u'matrix u / 2) with u = state - reference, up to a factor."""
+    """Information of scans about a state: exp(linear'u - u'matrix u / 2) with u = state - reference, up to a factor."""
 
     scan: int
     reference: Floats  # (dim,)
@@ -34,7 +34,7 @@ class _Information(NamedTuple):
 
 @dataclass(slots=True)
 class _Lost:
-    """The labels that have ended so far: their targets' densities if they live, and what the scans since say.
+    """The labels that have ended so far: densities of their targets if alive, and the evidence of the scans since.
 
     Log weights are of the probability that the target existed at the last estimate and has survived until now.
     """
@@ -42,7 +42,7 @@ class _Lost:
     tracks: list[int]
     num_scans: Floats  # (num,) since the last estimate
     mixture: Mixture
-    log_missed: Floats  # (num,) that all scans since have missed it where it was predicted
+    log_missed: Floats  # (num,) log probability that all scans since have missed it at its predicted place
     detected: Floats  # (num,) probability that a scan since would have detected it
 
     def add(self, track: int, history: TrackHistory) -> None:
@@ -56,14 +56,14 @@ class _Lost:
         )
 
     def keep(self, places: Ints) -> None:
-        """Keep the labels at `places` alone."""
+        """Keep only the labels at the indices `places`."""
         self.tracks = [self.tracks[place] for place in places.tolist()]
         self.mixture = taken_components(self.mixture, places)
         self.num_scans = self.num_scans[places]
         self.log_missed, self.detected = self.log_missed[places], self.detected[places]
 
     def thin(self, watch: Watch, scan: int) -> None:
-        """Take note of a scan at which none of them was detected."""
+        """Update by a scan that detected none of them."""
         log_missed = np.zeros(len(self.tracks))
         with np.errstate(divide="ignore"):
             for s in np.flatnonzero(watch.scanned[scan]).tolist():
@@ -73,39 +73,39 @@ class _Lost:
         self.log_missed = self.log_missed + log_missed
 
     def log_unseen(self, prob_hidden: float) -> Floats:
-        """(num,) log probability that all scans since have missed the target and this one may not, if it lives."""
+        """Return the log probability of no detection until now and a possible one at this scan, if alive, (num,)."""
         with np.errstate(divide="ignore"):
             hidden = np.log(prob_hidden / self.num_scans)
             return np.asarray(np.logaddexp(hidden, np.log1p(-prob_hidden) + self.log_missed))
 
     def log_gone(self, prob_hidden: float) -> Floats:
-        """(num,) log probability that no scan since has detected the target, alive or not."""
+        """Return the log probability that no scan since has detected the target, alive or not, shape (num,)."""
         return np.asarray(np.log1p(-(1.0 - prob_hidden) * np.minimum(self.detected, _MOST_CERTAIN)))
 
 
 def gap_log_ratios(histories: Sequence[TrackHistory], watch: Watch) -> Floats:
-    """Return, for each pair of labels, the log likelihood ratio of one target with a gap against all else.
+    """Return, for each pair of labels, the log likelihood ratio of one target with a gap against all alternatives.
 
     Label i ended with existence r and density N(m, P) at its last estimate; the first of label j is n scans later. With
-    P_S(n) the probability of surviving to then, U = h / n + (1 - h) * product of 1 - P_D over the scans between (h is
-    `prob_hidden`), p_i the density N(m, P) moved to then, L_j the likelihood of the first scans of j, D the intensity
-    of undetected targets there, G the probability that target i, which may have died, is detected by no scan until the
-    last of these, b the number of births that the record shows in terms of those expected (`births_found`), and e the
-    existence of j at that scan, as j may be clutter:
+    P_S(n) the probability of surviving until then, U = h / n + (1 - h) * product of 1 - P_D over the scans between (h
+    is `prob_hidden`), p_i the density N(m, P) predicted to that time, L_j the likelihood of the first scans of j, D the
+    intensity of undetected targets there, G the probability that target i, which may have died, is detected by no scan
+    until the last of these, b the number of births in the record divided by the expected number (`births_found`), and e
+    the existence of j at that scan, as j may be clutter:
 
         ratio(i, j) = r P_S(n) U * integral p_i(x) L_j(x) dx / (G * (b + (1 - e) / e) * integral D(x) L_j(x) dx).
 
-    That is exact for linear Gaussian models and a probability of detection that is the same everywhere, where the first
-    estimate of j is of the scan that began it. D is the intensity that the default filter has of targets no scan has
-    detected. L_j is the product of the information that each estimate of j adds to the one before, moved to its time;
-    the first estimate is divided by the component of D that it began from, so that this prior counts in D alone.
+    This is exact for linear Gaussian models and a probability of detection that is the same everywhere, if the first
+    estimate of j is from the scan that began it. D is the default filter's intensity of targets that no scan has
+    detected. L_j is the product of the information that each estimate of j adds to the previous one, predicted to its
+    time; the first estimate is divided by the component of D that it began from, so that this prior counts only in D.
 
     Args:
         histories: of all labels, see `track_histories`.
         watch: models, times and poses.
 
     Returns:
-        (num_labels, num_labels) of the row's label going on as the column's; -inf where it cannot.
+        (num_labels, num_labels) log ratio of the row's label continuing as the column's; -inf if it cannot.
     """
     num, dim = len(histories), watch.targets.state_dim
     ratios = np.full((num, num), -np.inf)
@@ -121,7 +121,7 @@ def gap_log_ratios(histories: Sequence[TrackHistory], watch: Watch) -> Floats:
         for j in [j for j, begin in enumerate(begins) if begin == scan and lost.tracks]:
             prior = births_at(undetected, histories[j], watch)
             if not (prior.log_weights > -np.inf).any():
-                continue  # the models say that no target is born then, and nothing of how the label began
+                continue  # the models exclude births then and do not explain how the label began
             told = list(_told(histories[j], prior, watch))
             same = lost.mixture._replace(log_weights=lost.mixture.log_weights + lost.log_unseen(watch.prob_hidden))
             fits, born = (_log_fits(mixture, scan, told, watch) for mixture in (same, prior))
@@ -141,7 +141,7 @@ def gap_log_ratios(histories: Sequence[TrackHistory], watch: Watch) -> Floats:
 
 
 def _told(history: TrackHistory, prior: Mixture, watch: Watch) -> Iterator[_Information]:
-    """What the scans of each of the first estimates say. prior: of births, before the first of these."""
+    """Yield the information in the scans of each of the first estimates; prior: of births, before the first."""
     scans = (history.steps[:_FIRST_ESTIMATES] - 1).tolist()
     fits = prior.log_weights + _log_densities(prior, history.means[0], history.covs[0])
     before = taken_components(prior, np.array([int(np.argmax(fits))]))
@@ -152,17 +152,17 @@ def _told(history: TrackHistory, prior: Mixture, watch: Watch) -> Iterator[_Info
 
 
 def _log_densities(mixture: Mixture, mean: Floats, cov: Floats) -> Floats:
-    """(num,) log of the integrals of N(x; mean, cov) times each component without its weight, up to a constant."""
+    """Return the log integrals of N(x; mean, cov) times each unweighted component, (num,), up to a constant."""
     spread, apart = mixture.covs + cov, mixture.means - mean
     squared = (apart * np.linalg.solve(spread, apart[..., np.newaxis])[..., 0]).sum(axis=-1)
     return np.asarray(-0.5 * (squared + np.linalg.slogdet(spread)[1]))
 
 
 def _information(scan: int, before: Mixture, mean: Floats, cov: Floats) -> _Information:
-    """The quotient of N(mean, cov) and the Gaussian before the scan, where that is wider.
+    """Return the quotient of N(mean, cov) and the Gaussian before the scan, in the directions in which that is wider.
 
-    With cov = R R' and the eigenvectors of 1 - R' P^-1 R, P the covariance before, what the scan said in each direction
-    is the eigenvalue, from 0 (nothing) to 1 (all that is known).
+    With cov = R R' and the eigenvectors of 1 - R' P^-1 R, P the covariance before, the information of the scan in each
+    direction is the eigenvalue, from 0 (none) to 1 (all that is known).
     """
     root, precision = np.linalg.cholesky(cov), np.linalg.inv(before.covs[0])
     values, axes = np.linalg.eigh(np.eye(len(mean)) - root.T @ precision @ root)
@@ -173,7 +173,7 @@ def _information(scan: int, before: Mixture, mean: Floats, cov: Floats) -> _Info
 
 
 def _log_fits(mixture: Mixture, scan: int, told: Sequence[_Information], watch: Watch) -> Floats:
-    """(num,) log of weight times likelihood of what scans say, for each component of a mixture at `scan`.
+    """Return the log of weight times likelihood of the information, (num,), for each component of a mixture at `scan`.
 
     The integral of N(x; m, P) exp(y'u - u'Yu / 2) with u = x - c, d = m - c, g = y - Y d is
     |1 + P Y|^(-1/2) exp(y'd - d'Yd / 2 + g'(1 + P Y)^-1 P g / 2).

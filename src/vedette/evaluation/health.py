@@ -14,9 +14,9 @@ from vedette.simulation.health import Health
 
 
 class HealthSums(NamedTuple):
-    """What filters and fusion reported over all scans of some runs: numbers of scans, sums, and the worst of all.
+    """Reports of filters and fusion over all scans of some runs: numbers of scans, sums, and worst values.
 
-    A scan counts once where it happened at any sensor. What is worst of no number is -inf.
+    A scan counts once if the event happened at any sensor. The worst of no value is -inf.
     """
 
     num_scans: int
@@ -42,7 +42,7 @@ class HealthSums(NamedTuple):
 
 
 def health_sums(healths: Sequence[Health]) -> HealthSums:
-    """Of runs with the same sensors; raises `InputError` for no run or other numbers of sensors."""
+    """Return the sums of runs with the same sensors; raises `InputError` for no run or different numbers of sensors."""
     if len({health.num_tracks.shape[1] for health in healths}) != 1:
         raise InputError("records: expected one run or more, of equally many sensors")
 
@@ -81,7 +81,7 @@ def _sum_and_worst(values: Floats) -> tuple[float, int, float]:
 
 
 def added(parts: Sequence[HealthSums]) -> HealthSums:
-    """Of all the runs of these; raises as `health_sums`."""
+    """Return the sums over all runs of several sums; raises like `health_sums`."""
     if len({part.unknown_labels.shape for part in parts}) != 1:
         raise InputError("records: expected one run or more, of equally many sensors")
     columns = dict(zip(HealthSums._fields, zip(*parts, strict=True), strict=True))
@@ -90,25 +90,25 @@ def added(parts: Sequence[HealthSums]) -> HealthSums:
 
 @dataclass(frozen=True, slots=True)
 class HealthSummary:
-    """Over all scans of some runs; a share of scans counts a scan at which it happened at any sensor.
+    """Summary over all scans of some runs; a scan counts in a share if the event happened at any sensor.
 
     Attributes:
         num_scans: of all runs.
-        cap_met, search_cut, inexact: share of the scans at which a filter held as much as it may, its ranking search
-            was cut short, an LMB cluster was not summed exactly.
-        mean_discarded, worst_discarded: upper bound on the share of a filter's weight that was cut off; NaN where it is
-            not known.
-        mean_factoring, worst_factoring: upper bound on the L1 error that a factored filter made by taking labels as
-            independent; NaN where it is not known.
+        cap_met, search_cut, inexact: share of the scans at which a filter reached a limit, its ranking search was cut
+            short, an LMB cluster was not summed exactly.
+        mean_discarded, worst_discarded: upper bound on the share of a filter's weight that was truncated; NaN if
+            unknown.
+        mean_factoring, worst_factoring: upper bound on the L1 error of a factored filter from treating labels as
+            independent; NaN if unknown.
         worst_dropped: expected number of targets in labels that a filter dropped at one scan.
-        duplicates, clutter_raised: measurements in all.
+        duplicates, clutter_raised: total numbers of measurements.
         missing_sets: (num_sensors,) share of the fused label sets (CLMB: labels) that the sensor lacks.
         unknown_labels: (num_sensors,) share of the scans at which the sensor lacks a label that another one has.
         lost: share of the scans at which the fusion lost a label that a sensor was sure of.
         worst_lost: most such labels at a scan.
         disjoint: share of the scans at which no label set is held by every sensor.
-        worst_fusion_discarded: most weight that the fusion cut off.
-        sensors: what they are called.
+        worst_fusion_discarded: most weight that the fusion truncated.
+        sensors: their names.
     """
 
     num_scans: int
@@ -132,7 +132,7 @@ class HealthSummary:
 
 
 def summarise_health(sums: HealthSums, sensors: Sequence[str] = ()) -> HealthSummary:
-    """The reports of runs, whose sensors are called `sensors`, or else `sensor 1` and so on."""
+    """Return the summary of runs; sensors: their names, by default `sensor 1` and so on."""
 
     def mean(total: float, number: int) -> float:
         return total / number if number else np.nan
@@ -161,7 +161,7 @@ def summarise_health(sums: HealthSums, sensors: Sequence[str] = ()) -> HealthSum
 
 
 def percent(share: float) -> str:
-    """A share as a whole number of percent; no share but 0 and 1 is written as 0 % or 100 %."""
+    """Return a share as a whole number of percent; only 0 and 1 become 0 % and 100 %."""
     if 0.0 < share < 0.01:
         return "<1 %"
     if 0.99 < share < 1.0:

@@ -1,4 +1,4 @@
-"""Joined tracks: labels that end and begin again across a gap are one track where the likelihood of the gap says so."""
+"""Joined tracks: an ended label and a new one become one track if the likelihood of the gap supports it."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_sensors
 from vedette.simulation.records import RunRecord
 
-# Chosen by the scenes 0 to 39 of benchmarks/joined_tracks.py; more of the one has the effect of less of the other.
+# Chosen on scenes 0 to 39 of benchmarks/joined_tracks.py; raising one has the effect of lowering the other.
 PROB_HIDDEN, THRESHOLD = 0.5, 0.95
 Label = tuple[int, int]
 
 
 class Join(NamedTuple):
-    """Label `ended` goes on as label `began` (birth step and index each), with this probability."""
+    """Label `began` continues label `ended` (birth step and index each), with this probability."""
 
     ended: Label
     began: Label
@@ -37,9 +37,9 @@ def joins_of_run(
 ) -> tuple[Join, ...]:
     """Return the joins of a run's labels by the models of its scenario, in the order of `began`.
 
-    There are none of filters whose targets have no labels.
+    There are none for filters whose targets have no labels.
 
-    prob_hidden: see `Watch`. threshold: the least probability of a join. Raises `InputError` for numbers that are no
+    prob_hidden: see `Watch`. threshold: the lowest probability of a join. Raises `InputError` for numbers that are not
     probabilities, and `VedetteError` for models or a recording that cannot be built.
     """
     filters = tuple(sensor.filter for sensor in build_sensors(scenario))
@@ -52,7 +52,10 @@ def joins_of_run(
 
 
 def joins_of(estimates: Sequence[Estimate], watch: Watch, *, threshold: float = THRESHOLD) -> tuple[Join, ...]:
-    """As `joins_of_run`, of estimates of successive scans. Raises `InputError` for another number of scans."""
+    """Return the joins like `joins_of_run`, for estimates of successive scans.
+
+    Raises `InputError` for another number of scans.
+    """
     probability("threshold", threshold)
     histories = track_histories(estimates, watch.times)
     log_ratios = gap_log_ratios(histories, watch)
@@ -66,9 +69,9 @@ def joins_of(estimates: Sequence[Estimate], watch: Watch, *, threshold: float = 
 
 
 def _shares(log_ratios: Floats) -> Floats:
-    """(num, num) probability of each join among those of either of its labels, and none.
+    """Return the probability of each join among those of either of its labels, and none, shape (num, num).
 
-    Exact where one of the two has no other; else somewhat low, as a rival may itself be joined elsewhere.
+    Exact if one of the two has no other; else a little low, as a rival may itself be joined elsewhere.
     """
     rows, columns = (np.logaddexp.reduce(log_ratios, axis=axis, initial=-np.inf) for axis in (1, 0))
     others = np.logaddexp(rows[:, np.newaxis], columns)
@@ -78,7 +81,7 @@ def _shares(log_ratios: Floats) -> Floats:
 
 
 def _assigned(log_ratios: Floats) -> tuple[list[int], list[int]]:
-    """Rows and columns of the joins of the largest summed log ratio, each row and column at most once."""
+    """Return rows and columns of the joins with the largest summed log ratio, each row and column at most once."""
     from scipy.optimize import linear_sum_assignment
 
     gains = np.maximum(log_ratios, 0.0)

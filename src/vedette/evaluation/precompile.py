@@ -1,4 +1,4 @@
-"""The first start: what a run needs is compiled by two processes at once, each through a small example of its own."""
+"""Compilation before the first run, by two processes in parallel, each with a small example."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from vedette.simulation.experiment import Experiment
 from vedette.simulation.loop import run_stream
 from vedette.tracking import State
 
-# Of a decision that is made to be compiled.
+# Settings of a decision that is made only to compile the planner.
 _QUICK: dict[str, Any] = {"num_samples": 2, "horizon_steps": 1, "num_threads": 1, "confidence": None}
 
 
@@ -28,12 +28,12 @@ def precompile(scenario: Scenario, planners: Sequence[str] = ("jdm",)) -> None:
     """Compile the tracker of a scenario and its joint planners, in this process and another one at the same time.
 
     The other process compiles the fusion and the last of the joint planners, this one the tracker and the others. Each
-    finds in the cache what the other has already compiled. Whatever the other process does not get done (it may be
-    forbidden, or fail) is compiled where it is first used; no result depends on it.
+    finds in the cache the code that the other has already compiled. Code that the other process does not compile (it
+    may be forbidden, or fail) is compiled at its first use; no result depends on it.
 
     Args:
-        scenario: with birth sites, where targets are placed for the example; without, the tracker alone is compiled.
-        planners: names of strategies; those that are no joint decisions are left out.
+        scenario: with birth sites, at which targets are placed for the example; without, only the tracker is compiled.
+        planners: names of strategies; those without joint decisions are left out.
     """
     experiment = build_experiment(scenario)
     labelled = isinstance(experiment.tracker.initial().fused, LabelledDensity)
@@ -54,7 +54,7 @@ def precompile(scenario: Scenario, planners: Sequence[str] = ("jdm",)) -> None:
 
 
 def _joint_planner(scenario: Scenario, name: str) -> JointPlanner | None:
-    """The planner of that name; None where it is not a joint one."""
+    """Return the planner of that name; None if it is not a joint one."""
     planner = build_planner(scenario, name)
     planner = planner.planner if isinstance(planner, Named) else planner
     return planner if isinstance(planner, JointPlanner) else None
@@ -72,7 +72,7 @@ def _compile_elsewhere(scenario: Scenario, name: str) -> None:
 
 
 def _compile_planning(scenario: Scenario, name: str) -> None:
-    """Fuse, estimate and plan as if every birth site held a target, one of which a single sensor knows."""
+    """Fuse, estimate and plan as if every birth site held a target, one of them in the belief of only one sensor."""
     experiment = build_experiment(scenario)
     planner = _joint_planner(scenario, name)
     assert planner is not None
@@ -86,7 +86,7 @@ def _compile_planning(scenario: Scenario, name: str) -> None:
 
 
 def _belief(experiment: Experiment, num_targets: int) -> LabelledDensity:
-    """One target at each of the first birth sites, in the kind of density that the filter keeps."""
+    """Return one target at each of the first birth sites, in the filter's kind of density."""
     birth, labels = experiment.tracker.targets.birth, [(1, site) for site in range(num_targets)]
     sites = slice(num_targets)
     belief = LMB.from_bernoullis(labels, birth.existence[sites], birth.means[sites], birth.covs[sites])

@@ -24,10 +24,10 @@ class MeanRewards:
 
     Attributes:
         time: s.
-        actions: for each sensor its actions; where every run came with another heading, `turn_deg` from it in the place
-            of `heading_deg`, and `turn_right_deg` in the place of `course_deg`.
-        tables: as those of a plan, averaged over the runs that evaluated an entry; the standard error is over the runs
-            (0 for a single one), and entries that no run evaluated are NaN.
+        actions: for each sensor its actions; if headings differ between runs, `turn_deg` from the heading in place of
+            `heading_deg`, and `turn_right_deg` in place of `course_deg`.
+        tables: like those of a plan, averaged over the runs that evaluated an entry; the standard error is over the
+            runs (0 for a single one), and entries that no run evaluated are NaN.
         shares: for each table, the share of the runs in which each of its entries was chosen.
         num_runs: runs that made this decision.
     """
@@ -40,11 +40,11 @@ class MeanRewards:
 
 
 class RewardSums(NamedTuple):
-    """The rewards of one decision, added up over runs: of each entry of a table the mean and the squares about it.
+    """The rewards of one decision, summed over runs: for each entry of a table the mean and the squares about it.
 
-    first: what the other runs are held against. faults: why no mean can be had, the first decides; empty: it can.
-    counts, means, squares, chosen: for each table, arrays of its shape. is_absolute, is_relative: whether all runs had
-    the actions of the first, or the turns from their headings.
+    first: decision with which the other runs are compared. faults: reasons why there is no mean (the first is
+    reported), or empty. counts, means, squares, chosen: for each table, arrays of its shape. is_absolute,
+    is_relative: True if all runs had the actions of the first, or the same turns from their headings.
     """
 
     first: Decision
@@ -59,7 +59,7 @@ class RewardSums(NamedTuple):
 
     @classmethod
     def of(cls, decision: int, made: Sequence[Decision]) -> RewardSums:
-        """Of runs that made the decision of that index."""
+        """Return the sums of runs that made the decision of that index."""
         first, tables = made[0], [each.plan.tables for each in made]
         shapes = [tuple(table.mean.shape for table in of_run) for of_run in tables]
         faults = []
@@ -75,14 +75,14 @@ class RewardSums(NamedTuple):
 
     @staticmethod
     def added(parts: Sequence[RewardSums]) -> RewardSums:
-        """Of all the runs of these."""
+        """Return the sums over all runs of several sums."""
         total = parts[0]
         for part in parts[1:]:
             total = total._with(part)
         return total
 
     def _with(self, other: RewardSums) -> RewardSums:
-        """By T. Chan, G. Golub and R. LeVeque, "Updating formulae and a pairwise algorithm", 1979, eq. 2.1."""
+        """Add by T. Chan, G. Golub and R. LeVeque, "Updating formulae and a pairwise algorithm", 1979, eq. 2.1."""
         faults, num_runs = self.faults + other.faults, self.num_runs + other.num_runs
         if not faults and [each.shape for each in self.means] != [each.shape for each in other.means]:
             faults = ("records: expected tables of one shape; got several",)
@@ -110,7 +110,7 @@ class RewardSums(NamedTuple):
         return list(zip(self.counts, self.means, self.squares, strict=True))
 
     def mean(self) -> MeanRewards:
-        """Raises `InputError` where a run weighed no actions, or runs had other actions to choose from."""
+        """Return the means; raises `InputError` if a run evaluated no actions, or runs had different actions."""
         if self.faults:
             raise InputError(self.faults[0])
         if not self.is_absolute and not self.is_relative:
@@ -131,7 +131,7 @@ class RewardSums(NamedTuple):
 def mean_rewards(records: Sequence[RunRecord], decision: int) -> MeanRewards:
     """Average the reward tables of one decision, given by its index, over the runs that made it.
 
-    Raises `InputError` where no run made it, the planner weighs no actions, or runs had other actions to choose from.
+    Raises `InputError` if no run made it, the planner evaluates no actions, or runs had different actions.
     """
     made = [record.decisions[decision] for record in records if decision < len(record.decisions)]
     if not made:
@@ -140,7 +140,7 @@ def mean_rewards(records: Sequence[RunRecord], decision: int) -> MeanRewards:
 
 
 def _summed(place: int, made: Sequence[Decision]) -> tuple[Floats, Floats, Floats, Floats]:
-    """Of one table: number of runs that evaluated each entry, mean and squares about it, number that chose it."""
+    """Return for one table the number of runs with each entry, mean and squares about it, and number that chose it."""
     values = np.array([each.plan.tables[place].mean for each in made])
     known = np.isfinite(values)
     count = known.sum(axis=0).astype(np.float64)
@@ -169,13 +169,13 @@ def _as_turns(actions: Actions, heading: float) -> Actions:
 
 
 def _head_alike(made: Sequence[Decision]) -> bool:
-    """Whether all sensors had the headings of the first run, up to rounding and full turns."""
+    """Return True if all sensors had the headings of the first run, up to rounding and full turns."""
     headings = np.array([each.poses[:, 2] for each in made])
     return bool(np.abs(wrap_angles(headings - headings[0])).max(initial=0.0) < np.radians(_ALIKE))
 
 
 def _all_alike(actions: Sequence[tuple[Actions, ...]]) -> bool:
-    """Whether all runs had the same actions, up to rounding and full turns."""
+    """Return True if all runs had the same actions, up to rounding and full turns."""
     return all(
         mine.columns == first.columns
         and len(mine) == len(first)

@@ -31,19 +31,19 @@ def run_scenario(
     num_threads: int = 0,
     watch: Callable[[int], None] | None = None,
 ) -> RunRecord:
-    """One run of a scenario under a strategy.
+    """Run a scenario once under a strategy and return the record.
 
     Args:
-        scenario: as `vedette.scenarios.load_scenario` reads it, or the name or file that it is read by.
+        scenario: from `vedette.scenarios.load_scenario`, or the name or file that it reads.
         planner: "jdm" (joint), "idm" (independent), "lookahead" (joint, over several decisions), "nearest", "assigned"
             or "centroid" (rules of thumb), "oracle" and "told" (which know the targets), "random", "fixed", "still",
-            or one of the scenario's own; not used if the scans are recorded.
+            or one of the scenario's own planners; not used if the scans are recorded.
         seed, run: fix every random number; runs with equal seed and number are paired across strategies.
-        num_threads: share a decision (0: one a processor) and change no result.
-        watch: told the number of every scan that is done.
+        num_threads: of a decision (0: one per processor); changes no result.
+        watch: called with the number of every finished scan.
 
     Raises:
-        VedetteError: the scenario's models, filters or planner cannot do what is asked.
+        VedetteError: the scenario's models, filters or planner do not support the request.
     """
     if not isinstance(scenario, Scenario):
         scenario = load_scenario(scenario)
@@ -65,11 +65,11 @@ def track_recording(
 
     Args:
         scenario: such as that of `vedette.scenarios.of_recording.scenario_of_recording`.
-        recording: its scans; None: they are read.
-        seed, run, watch: as of `vedette.recorded.Tracking.run`.
+        recording: its scans; None: read from the file.
+        seed, run, watch: see `vedette.recorded.Tracking.run`.
 
     Raises:
-        VedetteError: scans that are not recorded, or models and filters that cannot do what is asked.
+        VedetteError: scans that are not recorded, or models and filters that do not support the request.
     """
     return build_tracking(scenario, recording).run(score_of(scenario), seed=seed, run=run, watch=watch)
 
@@ -83,7 +83,7 @@ def score_of(scenario: Scenario) -> Score | None:
 
 
 def own_metrics(scenario: Scenario) -> tuple[Metric, ...]:
-    """The measures that a scenario names beside the built-in ones. Raises `InputError` for one that cannot be had."""
+    """Return the metrics that a scenario adds to the built-in ones; raises `InputError` if one cannot be loaded."""
     return tuple(Metric(name, _measure_of(scenario, section)) for name, section in scenario.model.metrics.items())
 
 
@@ -95,6 +95,6 @@ def _measure_of(scenario: Scenario, section: AnyMetric) -> Measure:
 
 
 def measure_run(record: RunRecord, scenario: Scenario, own: Sequence[Metric] = ()) -> RunMetrics:
-    """All measures of a run under the cutoff, order and window of its scenario; raises as `measure`."""
+    """Return all measures of a run by its scenario's cutoff, order and window; raises like `measure`."""
     ospa = scenario.model.ospa
     return measure(record, cutoff=ospa.cutoff, order=ospa.order, window=ospa.window, own=own)

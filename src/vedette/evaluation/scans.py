@@ -1,4 +1,4 @@
-"""The scans of a run that is kept, to be shown: drawn again from its seed, or those of its recording."""
+"""The scans of a recorded run, for display: drawn again from its seed, or read from its recording."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from vedette.simulation.scans import Scan
 from vedette.simulation.true_sensors import sensors_at_step
 
 UNKNOWN = -2  # origin of a measurement that was recorded
-# How the measurements of a kind lie in the plane; of other kinds they do not.
+# Shape of the measurements of a kind in the plane; other kinds have none.
 LIE: dict[str, str] = {
     "bearing_range": "point",
     "bearing_range_rate": "point",
@@ -43,7 +43,7 @@ Scans: TypeAlias = tuple[tuple[Scan | None, ...], ...]
 
 
 def code_of_sensors(scenario: Scenario) -> tuple[str, ...]:
-    """Code that drawing the measurements of a scenario would run."""
+    """Return the code that drawing the measurements of a scenario would run."""
     if scenario.model.recording is not None:
         return ()
     return tuple(
@@ -58,10 +58,10 @@ def code_of_sensors(scenario: Scenario) -> tuple[str, ...]:
 
 
 def scans_of_record(record: RunRecord, scenario: Scenario) -> Scans:
-    """For each step one scan a sensor, or None where it did not scan; of recorded scans all origins are `UNKNOWN`.
+    """Return for each step one scan per sensor, or None if it did not scan; origins of recorded scans are `UNKNOWN`.
 
     Raises:
-        VedetteError: models or a recording that cannot be had, or a recording of other scans.
+        VedetteError: models or a recording that cannot be loaded, or a recording of other scans.
     """
     model = scenario.model
     if model.recording is not None:
@@ -84,17 +84,17 @@ def _recorded(record: RunRecord, section: RecordingSection, scenario: Scenario) 
 
 
 def scan_table(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
-    """The scans of a run by columns, a row a measurement, as `vedette.recorded.parse_scans` reads them.
+    """Return the scans of a run by columns, one row per measurement, as `vedette.recorded.parse_scans` reads them.
 
-    `time` (for a turning radar, the time at which its beam passed), `sensor`, the measured quantities (`bearing_deg`,
-    `range_m`, `range_rate_mps`, `x_m`, `y_m`), and where the sensors were (`own_x_m`, `own_y_m`, `own_heading_deg`;
-    with range rates also `own_vx_mps`, `own_vy_mps`).
-    Angles are degrees clockwise from true north where every sensor with a bearing has a compass; else they are
-    `bearing_rad` and `own_heading_rad` from the east, which a reader must be told (`bearings: east`). What biases the
-    scenario knows of are taken off.
+    Columns are `time` (for a turning radar, the time at which its beam passed), `sensor`, the measured quantities
+    (`bearing_deg`, `range_m`, `range_rate_mps`, `x_m`, `y_m`), and the sensor poses (`own_x_m`, `own_y_m`,
+    `own_heading_deg`; with range rates also `own_vx_mps`, `own_vy_mps`).
+    Angles are degrees clockwise from true north if every sensor with a bearing has a compass; else they are
+    `bearing_rad` and `own_heading_rad` from the east, for which a reader needs `bearings: east`. Biases in the scenario
+    are removed.
 
     Raises:
-        VedetteError: as of `scans_of_record`, or measurements of a kind that rows cannot tell.
+        VedetteError: like `scans_of_record`, or measurements of a kind that rows cannot represent.
     """
     sites = sites_of(scenario.model)
     for site in sites:
@@ -137,5 +137,5 @@ def scan_table(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
 
 
 def in_plane(measurements: Floats, kind: str, pose: Floats) -> Floats:
-    """(n, 2) where measurements of a kind of `LIE` lie, m; of rays (n, 1) bearings in rad, of circles (n, 1) radii."""
+    """Return places of measurements of a kind of `LIE`, (n, 2) m; for rays bearings, (n, 1) rad, for circles radii."""
     return places_of(measurements, pose, kind) if kind in PLACED else measurements[:, :1]

@@ -13,10 +13,10 @@ from vedette.kernels.base.types import Floats
 from vedette.models.arguments import as_array
 
 CONFIDENCE = 0.95
-_RESAMPLES, _BLOCK = 9999, 10_000_000  # of the bootstrap; numbers drawn at once
-# Where more than this falls out of a tail of Student's interval, to first order, for the skewness of what is averaged.
+_RESAMPLES, _BLOCK = 9999, 10_000_000  # samples of the bootstrap; numbers drawn at once
+# Largest error of a tail of Student's interval, to first order in the skewness of the values.
 _MOST_MISPLACED = 0.01
-_FEWEST = 8  # runs, below which a sample says nothing of its skewness
+_FEWEST = 8  # runs, below which the skewness cannot be estimated
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,15 +39,15 @@ class Summary:
 
 @dataclass(frozen=True, slots=True)
 class PairedDifference:
-    """How much more one strategy costs than another, run by run.
+    """Difference in cost between two strategies, run by run.
 
     Attributes:
-        summary: of the differences, first minus second; positive where the second is better. Its interval is a
-            bootstrap's where `is_skewed`.
+        summary: of the differences, first minus second; positive if the second is better. Its interval is from a
+            bootstrap if `is_skewed`.
         share_won: share of the runs in which the second is better (strictly lower).
         share_tied: share of the runs in which both are equal.
         p_value: two-sided, of a mean difference of 0, by the same method as the interval; NaN for a single run.
-        is_skewed: whether the differences are too skewed, for their number, for Student's t.
+        is_skewed: True if the differences are too skewed, for their number, for Student's t.
     """
 
     summary: Summary
@@ -58,10 +58,10 @@ class PairedDifference:
 
 
 def summarise(values: ArrayLike) -> Summary:
-    """Mean, standard error and 95 % interval over the first axis.
+    """Return mean, standard error and 95 % interval over the first axis.
 
     Args:
-        values: (num_runs, ...) one entry a run.
+        values: (num_runs, ...) one entry for each run.
 
     Raises `InputError` for no run, or a value that is not finite.
     """
@@ -100,12 +100,12 @@ def paired_difference(first: ArrayLike, second: ArrayLike) -> PairedDifference:
 
 
 def holm(p_values: ArrayLike) -> Floats:
-    """p-values corrected for their number: those below 0.05 hold all at once with 95 % confidence (Holm, 1979).
+    """Return p-values corrected for their number: those below 0.05 hold together with 95 % confidence (Holm, 1979).
 
     Args:
         p_values: (num_tests,); NaN stays, and counts as no test.
 
-    Raises `InputError` for what are no probabilities.
+    Raises `InputError` for values that are not probabilities.
     """
     given = as_array("p_values", p_values, "fiu", "numbers, one a test").astype(np.float64)
     known = ~np.isnan(given)
@@ -118,7 +118,7 @@ def holm(p_values: ArrayLike) -> Floats:
 
 
 def _tested(differences: Floats) -> tuple[Summary, float, bool]:
-    """Mean with its interval, the p-value of a mean of 0, and whether both are a bootstrap's."""
+    """Return mean with its interval, the p-value of a mean of 0, and True if both are from a bootstrap."""
     from scipy.special import stdtr
 
     summary = summarise(differences)
@@ -129,7 +129,7 @@ def _tested(differences: Floats) -> tuple[Summary, float, bool]:
         return summary, float(mean == 0.0), False
     if summary.num_runs >= _FEWEST and _misplaced(differences) > _MOST_MISPLACED:
         drawn = _studentised(tuple(differences.tolist()))
-        with np.errstate(invalid="ignore"):  # samples of one value only are infinite: then it is Student's
+        with np.errstate(invalid="ignore"):  # samples of one value only are infinite: then use Student's t
             low, high = np.quantile(drawn, ((1.0 + CONFIDENCE) / 2.0, (1.0 - CONFIDENCE) / 2.0))
         if np.isfinite(low) and np.isfinite(high):
             tail = min((drawn >= mean / error).sum(), (drawn <= mean / error).sum())
@@ -139,7 +139,7 @@ def _tested(differences: Floats) -> tuple[Summary, float, bool]:
 
 
 def _misplaced(values: Floats) -> float:
-    """What a tail of Student's interval lacks for the skewness of the values: the first term of Edgeworth's expansion.
+    """Return the error of a tail of Student's interval due to skewness: the first term of Edgeworth's expansion.
 
     P(T <= z) = Phi(z) + (2 z^2 + 1) phi(z) skewness / (6 sqrt(n)) (P. Hall, The Bootstrap and Edgeworth Expansion,
     1992, chapter 2).
@@ -151,11 +151,11 @@ def _misplaced(values: Floats) -> float:
     return float(abs(skewness) * (2.0 * z * z + 1.0) * density / (6.0 * np.sqrt(len(values))))
 
 
-@lru_cache(maxsize=32)  # each table, claim and caption of a comparison asks for the same
+@lru_cache(maxsize=32)  # each table, claim and caption of a comparison uses the same result
 def _studentised(differences: tuple[float, ...]) -> Floats:
-    """(resamples,) (mean* - mean) / error* of samples drawn from the values; infinite where a sample is of one value.
+    """Return (mean* - mean) / error* of samples drawn from the values, shape (resamples,).
 
-    The same draws for the same number of values, so that a table is the same whenever it is made.
+    Infinite if a sample is of one value. The same number of values has the same draws, so that tables are reproducible.
     """
     values = np.array(differences)
     rng, number = np.random.default_rng(0), len(values)

@@ -1,4 +1,4 @@
-"""The comparison of strategies as a table, in the forms that a terminal, a paper and a program want."""
+"""Tables that compare strategies, as text, Markdown, LaTeX and CSV."""
 
 from __future__ import annotations
 
@@ -26,26 +26,27 @@ _ESCAPED = str.maketrans(
         "\N{MINUS SIGN}": "-",
     }
 )
-_NUMBER = re.compile(r"(?<![\w.])[+-][0-9.]+")  # with a sign, which text would set as a hyphen
+_NUMBER = re.compile(r"(?<![\w.])[+-][0-9.]+")  # with a sign, which LaTeX text would print as a hyphen
 _ERRORS = ("OSPA", "Localisation", "Cardinality", "Difference")
 
 
 def header(comparison: Comparison) -> tuple[str, ...]:
-    """Of the columns of `strategy_rows`."""
+    """Return the names of the columns of `strategy_rows`."""
     return ("Strategy", *(named_in(name, comparison.unit) for name in _ERRORS), "95 % interval", "Runs won")
 
 
 def strategy_rows(comparison: Comparison) -> list[tuple[str, ...]]:
-    """One row a strategy, under `header`: mean OSPA with standard error, its parts, and the paired difference.
+    """Return one row for each strategy: mean OSPA with standard error, its parts, and the paired difference.
 
-    The difference is strategy minus the first strategy, so positive where the first is better; "Runs won" is the share
-    of runs that the first strategy wins, and the share of ties if there are any. The first row has no difference.
+    The columns are those of `header`. The difference is strategy minus the first strategy, so positive if the first is
+    better; "Runs won" is the share of runs that the first strategy wins, and the share of ties if there are any. The
+    first row has no difference.
     """
     return [_row(comparison, strategy) for strategy in comparison.strategies]
 
 
 def decision_rows(comparison: Comparison, strategy: str, *, at_most: int = 3) -> list[tuple[str, str]]:
-    """For each decision that a strategy took: its time, and the most frequent combinations of actions with shares."""
+    """Return for each decision of a strategy its time, and the most frequent combinations of actions with shares."""
     rows = []
     for decision, time in enumerate(comparison.decision_times):
         shares = list(comparison.decision_shares(strategy, decision).items())[:at_most]
@@ -56,13 +57,13 @@ def decision_rows(comparison: Comparison, strategy: str, *, at_most: int = 3) ->
 
 
 def strategy_markdown(comparison: Comparison) -> str:
-    """The table as Markdown, with a line that says what was averaged."""
+    """Return the table as Markdown, with its caption below."""
     table = markdown_table(header(comparison), strategy_rows(comparison))
     return "\n".join([table, *filter(None, (caption(comparison), tails(comparison))), ""])
 
 
 def strategy_latex(comparison: Comparison) -> str:
-    """The table as LaTeX (package booktabs), with its caption; an environment `table` of its own."""
+    """Return the table as LaTeX (package booktabs) with its caption, in an environment `table`."""
     rows = [tuple(map(_latex, row)) for row in (header(comparison), *strategy_rows(comparison))]
     lines = [f"{' & '.join(row)} \\\\" for row in rows]
     told = " ".join(filter(None, (caption(comparison), tails(comparison))))
@@ -74,7 +75,7 @@ def strategy_latex(comparison: Comparison) -> str:
 
 
 def _latex(text: str) -> str:
-    """Text as LaTeX sets it: what is a command is escaped, signs of arithmetic are in mathematics."""
+    """Return text for LaTeX: special characters escaped, signed numbers and signs of arithmetic in mathematics."""
     return _NUMBER.sub(lambda found: f"${found[0]}$", text.translate(_ESCAPED)).replace("±", "$\\pm$")
 
 
@@ -95,7 +96,7 @@ def significance(comparison: Comparison) -> str:
 
 
 def decisions_markdown(comparison: Comparison) -> str:
-    """What each strategy decided, and how often, as Markdown."""
+    """Return the decisions of each strategy and their frequencies, as Markdown."""
     rows = [
         (strategy, time, shares)
         for strategy in comparison.strategies
@@ -105,7 +106,7 @@ def decisions_markdown(comparison: Comparison) -> str:
 
 
 def strategy_csv(comparisons: Mapping[str, Comparison] | Comparison) -> str:
-    """The numbers behind the table, unrounded, one row a strategy; of several comparisons with their names in front."""
+    """Return the unrounded numbers of the table as CSV, one row per strategy; several comparisons with their names."""
     if isinstance(comparisons, Comparison):
         rows = [strategy_numbers(comparisons, strategy) for strategy in comparisons.strategies]
     else:
@@ -124,7 +125,7 @@ def strategy_csv(comparisons: Mapping[str, Comparison] | Comparison) -> str:
 
 
 def strategy_numbers(comparison: Comparison, strategy: str) -> dict[str, str | float]:
-    """The numbers of a strategy by name, unrounded: errors, the paired difference, measures."""
+    """Return the unrounded numbers of a strategy by name: errors, the paired difference, measures."""
     difference = comparison.difference(strategy)
     paired = difference.summary
     parts = [_means(comparison, strategy, part, f"{part}_mean_m", f"{part}_se_m") for part in PARTS]
@@ -150,7 +151,7 @@ def strategy_numbers(comparison: Comparison, strategy: str) -> dict[str, str | f
 
 
 def _means(comparison: Comparison, strategy: str, part: str, *names: str) -> list[tuple[str, float]]:
-    """Mean over the runs that have a value, and its standard error, under these names."""
+    """Return the mean over the runs that have a value, and its standard error, under these names."""
     means = comparison.run_means(strategy, part)
     known = means[~np.isnan(means)]
     summary = summarise(known) if len(known) else None
@@ -172,7 +173,7 @@ def heading(comparison: Comparison) -> str:
 
 
 def legend(comparison: Comparison) -> str:
-    """Return what the columns of the table mean, in sentences; empty for one run of one strategy."""
+    """Return the meaning of the table's columns, in sentences; empty for one run of one strategy."""
     first, several = comparison.strategies[0], comparison.num_runs > 1
     parts = ["± is one standard error."] if several else []
     if len(comparison.strategies) > 1:

@@ -1,4 +1,4 @@
-"""What a mean over runs hides: the median and the worst run, and the share of runs that end with a lost target."""
+"""Tails of runs: the median and the worst run, and the share of runs that end with a lost target."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from vedette.kernels.base.types import Floats
 class Tail(NamedTuple):
     """Mean OSPA of the median and of the worst run, and the share of runs that end with a lost target.
 
-    A target is lost at the end where it has no estimate within the cutoff at the last scan that counts. NaN: not known.
+    A target is lost at the end if it has no estimate within the cutoff at the last scan that counts. NaN: unknown.
     """
 
     median: float
@@ -24,20 +24,20 @@ class Tail(NamedTuple):
     lost: float
 
     def cells(self) -> tuple[str, str, str]:
-        """The three as text, empty where they are not known."""
+        """Return the three values as text, empty if unknown."""
         numbers = ["" if np.isnan(each) else f"{each:.2f}" for each in (self.median, self.worst)]
         return (numbers[0], numbers[1], "" if np.isnan(self.lost) else f"{100.0 * self.lost:.0f} %")
 
 
 def tail_header(unit: str) -> tuple[str, str, str]:
-    """Of the columns of `Tail.cells`."""
+    """Return the names of the columns of `Tail.cells`."""
     return named_in("Median run", unit), named_in("Worst run", unit), "Runs that end with a lost target"
 
 
 def tail(means: ArrayLike, lost: ArrayLike = ()) -> Tail:
-    """Tail of runs by the mean OSPA of each, and by whether it ends with a lost target (1 or 0).
+    """Return the tail of runs from the mean OSPA of each, and whether each ends with a lost target (1 or 0).
 
-    NaN stands for a mean that is not known; lost is empty where that is not known.
+    NaN stands for an unknown mean; lost is empty if unknown.
     """
     known, ended = np.asarray(means, np.float64), np.asarray(lost, np.float64)
     known = known[~np.isnan(known)]
@@ -46,12 +46,12 @@ def tail(means: ArrayLike, lost: ArrayLike = ()) -> Tail:
 
 
 def tail_of(comparison: Comparison, strategy: str) -> Tail:
-    """Tail of the runs of a strategy."""
+    """Return the tail of the runs of a strategy."""
     return tail(comparison.run_means(strategy), lost_at_end(comparison, strategy))
 
 
 def lost_at_end(comparison: Comparison, strategy: str) -> Floats:
-    """(num_runs,) 1 for a run that ends with a lost target, else 0; (0,) where runs have no such measure."""
+    """Return 1 for each run that ends with a lost target, else 0, (num_runs,); empty if runs have no such measure."""
     if "num_missed" not in comparison.measures:
         return np.empty(0)
     last = int(np.flatnonzero(comparison.counted)[-1])
@@ -59,14 +59,14 @@ def lost_at_end(comparison: Comparison, strategy: str) -> Floats:
 
 
 def tails(comparison: Comparison) -> str:
-    """The tails of all strategies in a sentence; empty of a single run."""
+    """Return the tails of all strategies in a sentence; empty for a single run."""
     if comparison.num_runs == 1:
         return ""
     return tails_in_words({name: tail_of(comparison, name) for name in comparison.strategies}, comparison.unit)
 
 
 def tails_in_words(found: Mapping[str, Tail], unit: str) -> str:
-    """Tails by strategy in a sentence. unit: of OSPA."""
+    """Return tails by strategy in a sentence. unit: of OSPA."""
     told = [f"{name} {', '.join(filter(None, tail.cells()))}" for name, tail in found.items()]
     known = any(not np.isnan(tail.lost) for tail in found.values())
     lost = ", share of runs that end with a lost target" if known else ""

@@ -1,4 +1,4 @@
-"""What a recording says of the clock of a run and of the names of its targets."""
+"""Clock of a run and names of its targets, from the recordings of its scenario."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from vedette.simulation.records import RunRecord
 class Told(NamedTuple):
     """Clock and names.
 
-    start: s, to be added to times of the run. is_utc: whether they are since 1970 then. names: of the targets, by id;
-    none where they were not recorded.
+    start: s, to be added to times of the run. is_utc: True if the sums are seconds since 1970 UTC. names: of the
+    targets, by id; empty if they were not recorded.
     """
 
     start: float
@@ -23,9 +23,9 @@ class Told(NamedTuple):
 
 
 def told_by(record: RunRecord, scenario: Scenario) -> Told:
-    """What the recordings of a run's scenario say; of another recording than the run's no clock.
+    """Return clock and names from the recordings of a run's scenario; no clock if the scans are not those of the run.
 
-    Raises `InputError` where they cannot be read.
+    Raises `InputError` if they cannot be read.
     """
     model = scenario.model
     start, is_utc, names = 0.0, False, tuple[str, ...]()

@@ -1,4 +1,4 @@
-"""Whole tracks in the formats of programs that draw maps and globes and replay logs: GeoJSON, CZML, MCAP."""
+"""Whole tracks in formats of maps, globes and log viewers: GeoJSON, CZML, MCAP."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from vedette.errors import InputError
 
 Table: TypeAlias = Mapping[str, Sequence[Any]]
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
-_DIGITS = 7  # of a degree: a centimetre
-# As Foxglove's map takes it; covariances are of east, north and up, row by row.
+_DIGITS = 7  # decimals of a degree: a centimetre
+# In the form that Foxglove's map reads; covariances are of east, north and up, row by row.
 _FIX = {
     "type": "object",
     "properties": {
@@ -32,11 +32,11 @@ _FIX = {
         "existence": {"type": "number"},
     },
 }
-_DIAGONAL_KNOWN = 2  # a kind of covariance: of these, what is on the diagonal counts
+_DIAGONAL_KNOWN = 2  # type of covariance: only the diagonal is known
 
 
 def geojson(table: Table) -> bytes:
-    """A feature a track, a line through its places (a point where there is one), with times and existence by place.
+    """Return one GeoJSON feature per track: a line through its places (or a point), with times and existence by place.
 
     `label` is the first label of a track; `labels` has all.
     """
@@ -58,9 +58,9 @@ def geojson(table: Table) -> bytes:
 
 
 def czml(table: Table) -> bytes:
-    """A packet a track, for a globe: a point with its path, at its height or 0, named by its target or first label.
+    """Return one CZML packet per track, for a globe: a point with its path, at its height or 0.
 
-    Times that are no dates are taken as seconds since 1970.
+    It has the name of its target or its first label. Times that are not dates count as seconds since 1970.
     """
     packets: list[dict[str, Any]] = []
     for label, rows in _tracks("CZML", table).items():
@@ -87,7 +87,7 @@ def czml(table: Table) -> bytes:
 
 
 def mcap(table: Table) -> bytes:
-    """A channel a track, `/tracks/LABEL`, of messages `foxglove.LocationFix` in JSON, with the existence beside."""
+    """Return an MCAP log with one channel `/tracks/LABEL` per track: JSON of `foxglove.LocationFix` and existence."""
     tracks = _tracks("MCAP", table)
     from mcap.writer import Writer
 
@@ -121,7 +121,7 @@ def mcap(table: Table) -> bytes:
 
 
 def _tracks(kind: str, table: Table) -> dict[str, list[int]]:
-    """Rows of every track, for a format of places on the Earth."""
+    """Return the rows of every track, for a format of places on the Earth."""
     if "lon_deg" not in table:
         raise InputError(f"{kind}: expected tracks in longitude and latitude, by an origin of the scenario; got metres")
     tracks = defaultdict(list)
@@ -131,7 +131,7 @@ def _tracks(kind: str, table: Table) -> dict[str, list[int]]:
 
 
 def utc_text(time: float) -> str:
-    """Seconds since 1970 as ISO 8601, to the millisecond. Raises `InputError` for what is in no year of four digits."""
+    """Return seconds since 1970 as ISO 8601, to the millisecond; raises `InputError` beyond years of four digits."""
     try:
         moment = _EPOCH + timedelta(seconds=time)
     except OverflowError:

@@ -1,4 +1,4 @@
-"""Estimated tracks for the programs of others: named columns, longitude and latitude, UTC; in files of five formats."""
+"""Estimated tracks for other programs: named columns, longitude and latitude, UTC; in files of five formats."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ def track_table(
     joins: Sequence[Join] = (),
     has_height: bool = False,
 ) -> dict[str, list[Any]]:
-    """One row an estimate, by columns.
+    """Return the estimates by columns, one row for each.
 
-    `time_s` is that of the record plus `start`; `utc` where that is since 1970. `label` is `birth step.index`; `track`
-    the first label of its track, another than `label` after a gap that `joins` close; `x_m`,
-    `y_m`, `vx_mps`, `vy_mps` the estimate, `std_...` its standard deviations (velocities only where the state goes on
-    with them: four components or more; with `has_height` also `z_m`, `vz_mps`), `existence` the probability that it is
-    there. `lon_deg`, `lat_deg` with an origin; with a compass `course_deg`, clockwise from true north, and `speed_mps`.
-    `target` names the true target that OSPA's assignment gives it, nearer than `cutoff` (m); None: none.
+    `time_s` is that of the record plus `start`; `utc` if that is since 1970. `label` is `birth step.index`; `track` is
+    the first label of its track, different from `label` after a gap that `joins` close; `x_m`, `y_m`, `vx_mps`,
+    `vy_mps` are the estimate, `std_...` its standard deviations (velocities only if the state has them: four components
+    or more; with `has_height` also `z_m`, `vz_mps`), `existence` is the existence probability. `lon_deg`, `lat_deg`
+    need an origin; `course_deg`, clockwise from true north, and `speed_mps` need a compass. `target` is the name of the
+    true target that OSPA's assignment gives it, nearer than `cutoff` (m), or None.
 
     names: of the true targets, by their ids; else `id + 1`. joins: see `vedette.evaluation.joining`.
     """
@@ -85,7 +85,7 @@ def track_table(
 
 
 def table_of_run(record: RunRecord, scenario: Scenario, joins: Sequence[Join] = ()) -> dict[str, list[Any]]:
-    """As `track_table`, with what the run's scenario says of place, time and targets."""
+    """Return the `track_table` of a run, with origin, times and names of targets from its scenario."""
     model = scenario.model
     origin = None if model.origin is None else model.origin.build()
     start, is_utc, names = told_by(record, scenario)
@@ -103,14 +103,14 @@ def table_of_run(record: RunRecord, scenario: Scenario, joins: Sequence[Join] = 
 
 
 def write_tracks(path: Path, table: Mapping[str, Sequence[Any]]) -> None:
-    """Write a track table as its file's ending says: .csv, .parquet, .geojson, .czml or .mcap.
+    """Write a track table in the format of its file's ending: .csv, .parquet, .geojson, .czml or .mcap.
 
-    It appears whole or not at all; what the last three have is in `vedette.evaluation.track_formats`. A table of scans
-    can be written, too, as .csv or .parquet.
+    The file appears whole or not at all; the contents of the last three are in `vedette.evaluation.track_formats`. A
+    table of scans can be written, too, as .csv or .parquet.
 
     Raises:
         InputError: another ending, a file that cannot be written, or tracks without longitudes in the last three.
-        MissingPackageError: what writes the format is not installed.
+        MissingPackageError: the package that writes the format is not installed.
     """
     check_format(path)
     content = _MAKERS[path.suffix.lower()](table)

@@ -1,4 +1,4 @@
-"""Measurements of a recording that no track explains and that lie on straight courses: targets faster than assumed."""
+"""Unexplained measurements of a recording on straight courses: targets faster than assumed."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from vedette.recorded.extents import places_of
 from vedette.scenarios import Scenario
 from vedette.simulation.records import RunRecord
 
-_GATE = 4.0  # standard deviations of what a course of two measurements predicts of the third
+_GATE = 4.0  # standard deviations of the third measurement as predicted from two
 _FASTEST = 1500.0  # m/s
 _FASTER = 1.5  # times the speed that births assume; faster courses are reported
 _SHORTEST = 5  # measurements of a course
-_BY_CHANCE = 0.01  # courses of a recording that may be
-_MOST = 100  # unexplained measurements of a scan, of more of which nothing can be told
+_BY_CHANCE = 0.01  # expected number of courses by chance in a recording
+_MOST = 100  # unexplained measurements of a scan; with more there is no result
 _COURSES = 20
 
 
@@ -35,7 +35,7 @@ class _Left(NamedTuple):
 
 
 class _Course(NamedTuple):
-    """First and last time in s and place in m, the number of measurements, and the mean speed in m/s."""
+    """A course: first and last time in s, first place in m, number of measurements, and mean speed in m/s."""
 
     begin: float
     end: float
@@ -47,10 +47,10 @@ class _Course(NamedTuple):
 def unexplained(record: RunRecord, scenario: Scenario) -> tuple[str, ...]:
     """Return a warning for each sensor whose unexplained measurements follow each other on straight courses.
 
-    A measurement is unexplained where no estimate of its scan lies within four standard deviations. Three of scans one
-    after another are of one course where the difference of the last two is that of the first two, within the noise. Of
-    courses by chance a hundredth is expected. Only courses faster than births assume count. Raises `VedetteError` for a
-    recording that cannot be read.
+    A measurement is unexplained if no estimate of its scan lies within four standard deviations. Three measurements of
+    successive scans are on one course if the difference of the last two equals that of the first two, within the noise.
+    The expected number of courses by chance is a hundredth. Only courses faster than births assume count. Raises
+    `VedetteError` for a recording that cannot be read.
     """
     model = scenario.model
     births = model.birth.from_measurements
@@ -80,7 +80,7 @@ def _told(found: list[_Course], name: str, place: Floats, assumed: float) -> str
 
 
 def _left(record: RunRecord, scenario: Scenario, placed: list[int]) -> dict[int, list[_Left]]:
-    """For each sensor the scans, with what no estimate explains."""
+    """Return for each sensor its scans, with only the measurements that no estimate explains."""
     sensors, stds = scenario.model.sensors, noise_stds(scenario, placed)
     left: dict[int, list[_Left]] = {s: [] for s in placed}
     for k, (scans, estimate) in enumerate(zip(scans_of_record(record, scenario), record.estimates, strict=True)):
@@ -100,12 +100,12 @@ def _left(record: RunRecord, scenario: Scenario, placed: list[int]) -> dict[int,
 
 
 def _courses(scans: list[_Left], slowest: float, area: float) -> list[_Course]:
-    """The courses faster than this, the longest first, each without the measurements of those before it."""
+    """Return the courses faster than `slowest`, the longest first, each without the measurements of those before it."""
     sizes = [len(scan.places) for scan in scans]
     if len(scans) < _SHORTEST or max(sizes) > _MOST or not any(sizes):
         return []
     spread = float(np.quantile(np.concatenate([scan.stds for scan in scans]), 0.75))
-    # Of a pair by chance the next scan has so many that go on, also by chance.
+    # Expected number of measurements in the next scan that continue a pair by chance.
     goes_on = max(sizes) * 6.0 * math.pi * (_GATE * spread) ** 2 / area
     if not 0.0 < goes_on < 0.5:
         return []
@@ -123,7 +123,7 @@ def _courses(scans: list[_Left], slowest: float, area: float) -> list[_Course]:
 
 
 def _longest(scans: list[_Left], free: list[Bools], slowest: float) -> list[tuple[int, int]]:
-    """The longest course as (scan, measurement), among those that are free."""
+    """Return the longest course of free measurements as pairs (scan, measurement)."""
     best: list[tuple[int, int]] = []
     courses: dict[tuple[int, int], list[tuple[int, int]]] = {}  # by the last two measurements, of the scan before
     for k in range(1, len(scans)):

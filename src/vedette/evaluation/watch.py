@@ -1,4 +1,4 @@
-"""How targets were watched, and the births that may begin the labels of a record."""
+"""Observation of targets: models, times and poses; and the births that may begin the labels of a record."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from vedette.models import SensorModel, TargetModel
 from vedette.models.arguments import probability
 from vedette.models.motion import kernel_motion
 
-# Estimates from which on a label counts as a birth, and the shape of the prior of their number.
+# Number of estimates at which a label counts as a birth, and the shape of the prior of the number of births.
 _LASTING, _SHAPE = 3, 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Watch:
-    """What is known of the targets, and how they were watched.
+    """Models of the targets, and the scans that observed them.
 
     Attributes:
-        targets: motion, survival and births, as the filters have them; births at sites or anywhere in a region.
-        sensors: one a sensor.
+        targets: motion, survival and births, as in the filters; births at sites or anywhere in a region.
+        sensors: model of each sensor.
         times: (num_scans,) of the scans, s.
         poses: (num_scans, num_sensors, 3 or more) of the sensors.
-        scanned: (num_scans, num_sensors) whether each sensor scanned.
-        prob_hidden: probability that a target which exists, and is not detected for a while, is out of sight although
-            the detection models do not say so: behind an island, or silent; after n scans it then reappears with
+        scanned: (num_scans, num_sensors) True if the sensor scanned.
+        prob_hidden: probability that an existing target that is not detected for a while is out of sight, although the
+            detection models do not include it: behind an island, or silent; after n scans it then reappears with
             probability 1 / n. 0: scans miss a target independently, as filters assume, and 12 misses at a probability
             of detection of .95 are next to impossible.
 
@@ -59,11 +59,11 @@ class Watch:
             raise InputError("targets.birth.from_measurements: expected births in a region; got none")
 
     def step(self, scan: int) -> float:
-        """Seconds since the scan before; the first counts as one second after it."""
+        """Return the seconds since the previous scan; 1 for the first."""
         return float(self.times[scan] - self.times[scan - 1]) if scan else 1.0
 
     def moved(self, mixture: Mixture, first: int, last: int) -> Mixture:
-        """A mixture at scan `first`, after survival and motion to scan `last`."""
+        """Return a mixture at scan `first`, after survival and motion to scan `last`."""
         motion = kernel_motion(self.targets.motion, self.targets.survival)
         for scan in range(first + 1, last + 1):
             mixture = moved(mixture, motion, self.step(scan))
@@ -73,8 +73,9 @@ class Watch:
 def births_found(histories: Sequence[TrackHistory], watch: Watch) -> float:
     """Return the number of births that a record shows, divided by the number that the models expect.
 
-    It is the posterior mean for a gamma prior of shape 1/2, as where a birth rate is learnt: (1/2 + number of labels of
-    three estimates and more) / (1/2 + expected number). 1 where the rate of births anywhere is learnt or given apart.
+    It is the posterior mean for a gamma prior of shape 1/2, as for a learnt birth rate: (1/2 + number of labels with
+    three or more estimates) / (1/2 + expected number). It is 1 if the rate of births anywhere is learnt or given
+    separately.
     """
     birth = watch.targets.birth
     measured = birth.from_measurements
@@ -90,9 +91,9 @@ def births_found(histories: Sequence[TrackHistory], watch: Watch) -> float:
 
 
 def undetected_before(watch: Watch, begins: Sequence[int]) -> Iterator[FactoredGLMB]:
-    """At each scan the belief before it of a filter without detections: the undetected targets are those of any filter.
+    """Yield at each scan the prior of a filter without detections: its undetected targets are those of any filter.
 
-    begins: scan of each label's first estimate, by which a birth rate is learnt.
+    begins: scan of each label's first estimate, from which a birth rate is learnt.
     """
     filters = [FactoredGlmbFilter(watch.targets, sensor) for sensor in watch.sensors]
     belief, rng = filters[0].initial(), np.random.default_rng(0)
@@ -110,7 +111,7 @@ def undetected_before(watch: Watch, begins: Sequence[int]) -> Iterator[FactoredG
 
 
 def births_at(belief: FactoredGLMB, history: TrackHistory, watch: Watch) -> Mixture:
-    """The intensity of undetected targets where a label began, those that appeared anywhere as one wide Gaussian."""
+    """Return the intensity of undetected targets where a label began; births anywhere are one wide Gaussian."""
     undetected, labels, birth = belief.undetected, as_lmb(belief), watch.targets.birth
     assert isinstance(undetected, UndetectedTargets)
     at_sites = labels.tracks.to_kernel().components._replace(log_weights=np.log(labels.existence))

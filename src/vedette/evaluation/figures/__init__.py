@@ -1,4 +1,4 @@
-"""The paper's figures, drawn with Matplotlib objects alone: no display, no global state.
+"""The paper's figures, drawn only with Matplotlib objects: no display, no global state.
 
 Every function returns a `matplotlib.figure.Figure`; `save_figure` writes it as PDF, SVG and PNG.
 `write_video` shows a run scan by scan.

@@ -1,4 +1,4 @@
-"""Whether the estimates are as certain as they say, over time."""
+"""Figure of the consistency of estimates with their covariances, over time."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ from vedette.kernels.base.types import Floats
 
 @styled
 def consistency_figure(times: Floats, position: Mapping[str, AverageNees]) -> Figure:
-    """Average NEES over the runs, divided by its dimension, against time.
+    """Return a figure of the average NEES over the runs, divided by its dimension, against time.
 
-    A consistent filter is at 1; of the scans, 95 % then lie in the interval, drawn as a band (that of the first
-    strategy: its width follows from the number of pairs). Above it, estimates are worse than their covariances say.
+    A consistent filter is at 1; 95 % of its scans then lie in the interval, drawn as a band (that of the first
+    strategy: its width follows from the number of pairs). Above the band, estimates are worse than their covariances.
 
     Args:
         times: (num_scans,) s.

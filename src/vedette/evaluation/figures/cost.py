@@ -1,4 +1,4 @@
-"""What the strategies cost in time."""
+"""Figure of the computing time of the strategies."""
 
 from __future__ import annotations
 
@@ -14,19 +14,20 @@ from vedette.errors import InputError
 from vedette.evaluation.figures.labels import short_labels
 from vedette.evaluation.figures.style import MARKERS, colour, legend_columns, new_figure, styled
 
-MIN_FOR_TAILS = 20  # values, below which their 5th and 95th percentile are but the outermost ones
+MIN_FOR_TAILS = 20  # number of values below which their 5th and 95th percentiles are only the extremes
 
 
 @styled
 def cost_figure(seconds: Mapping[str, Mapping[str, NDArray[np.floating]]]) -> Figure:
-    """Time of each stage: the median, and from 20 values on a line from the 5th to the 95th percentile, in ms.
+    """Return a figure of the time of each stage: the median, and a line from the 5th to the 95th percentile, in ms.
 
-    Beside each stage stands of how many values (of several strategies, the most).
+    The line needs 20 values or more. The number of values stands next to each stage (of several strategies, the
+    largest).
 
     Args:
-        seconds: for each strategy, for each stage (such as "filter, a scan"), one number a scan or a decision, s.
+        seconds: for each strategy and stage (such as "filter, a scan"), one number for each scan or decision, s.
 
-    Raises `InputError` where nothing was timed.
+    Raises `InputError` if nothing was timed.
     """
     stages = list(dict.fromkeys(stage for spent in seconds.values() for stage in spent))
     if not stages:
@@ -57,7 +58,7 @@ def cost_figure(seconds: Mapping[str, Mapping[str, NDArray[np.floating]]]) -> Fi
 
 
 def _label_times(axes: Axes) -> None:
-    """Labels that do not meet: decades, or within two decades 1, 2 and 5; a decade at least is shown."""
+    """Set labels that do not overlap: decades, or within two decades 1, 2 and 5; the axis spans at least a decade."""
     low, high = axes.get_xlim()
     if high < 10.0 * low:
         middle = float(np.sqrt(low * high))
@@ -70,6 +71,6 @@ def _label_times(axes: Axes) -> None:
 
 
 def _quantiles(values: NDArray[np.floating]) -> tuple[float, float, float]:
-    """5 %, median and 95 %; the median alone, three times, where there are too few values for the others."""
+    """Return 5 %, median and 95 %; three times the median if there are too few values for the others."""
     low, middle, high = np.quantile(values, (0.05, 0.5, 0.95)).tolist()
     return (low, middle, high) if len(values) >= MIN_FOR_TAILS else (middle, middle, middle)

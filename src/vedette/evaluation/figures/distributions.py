@@ -1,4 +1,4 @@
-"""How the error spreads over the runs, strategy by strategy, and run by run against the first strategy."""
+"""Figure of the error of each run by strategy, and of its paired difference from the first strategy."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from vedette.evaluation.statistics import Summary, paired_difference
 from vedette.internal.text import named_in
 from vedette.kernels.base.types import Floats
 
-MOST_DOTS = 2000  # in a row: more are one blot
+MOST_DOTS = 2000  # in a row: more would merge into one blot
 _ROW = 0.36  # inches
 _SHORT, _ONE_LINE = 8, 20  # letters
 _GOLDEN = 0.6180339887498949
@@ -22,11 +22,11 @@ _GOLDEN = 0.6180339887498949
 
 @styled
 def distributions_figure(comparison: Comparison) -> Figure:
-    """The mean OSPA of every run, and below it every paired difference from the first strategy.
+    """Return a figure of the mean OSPA of every run, and below it of every paired difference from the first strategy.
 
-    A dot is a run, of more than `MOST_DOTS` one of the first; the box holds the middle half of the runs and its line is
-    their median; the diamond is the mean, with its 95 % confidence interval in the lower panel, where an interval that
-    holds 0 tells nothing apart.
+    Each dot is a run; of more than `MOST_DOTS` runs, the first are drawn. The box contains the middle half of the runs
+    and its line is their median. The diamond is the mean, in the lower panel with its 95 % confidence interval; if the
+    interval contains 0, the difference is not significant.
     """
     strategies = comparison.strategies
     others = strategies[1:]
@@ -54,20 +54,20 @@ def _draw_differences(axes: Axes, comparison: Comparison) -> None:
         _draw_mean(axes, paired_difference(means, first).summary, row)
     name, *names = short_labels(comparison.strategies)
     _name_rows(axes, [_minus(other, name) for other in names])
-    # The whole sentence where it fits; the names of the rows say the same.
+    # The whole sentence if it fits; the names of the rows have the same meaning.
     are_short = cell_len(name) <= _SHORT and max(map(cell_len, names)) <= _ONE_LINE - _SHORT
     better = f", right of 0: {name} better" if are_short else ""
     axes.set_xlabel(f"{named_in('Paired difference', comparison.unit)}{better}")
 
 
 def _minus(name: str, reference: str) -> str:
-    """A difference in words, on two lines where one would leave little room to draw."""
+    """Return the name of a difference, on two lines if one would leave little room to draw."""
     between = "\n" if cell_len(name + reference) > _ONE_LINE else " "
     return f"{name}{between}\N{MINUS SIGN} {reference}"
 
 
 def _draw_runs(axes: Axes, values: Floats, row: int, shade: str) -> None:
-    """Dots of the first runs, spread over half the height of the row, so that equal values can be told apart."""
+    """Draw dots of the first runs, spread over half the height of the row, so that equal values are distinguishable."""
     shown = values[:MOST_DOTS]
     spread = (np.arange(1, len(shown) + 1) * _GOLDEN) % 1.0 - 0.5
     axes.plot(

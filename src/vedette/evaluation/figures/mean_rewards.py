@@ -1,4 +1,4 @@
-"""The rewards that a strategy decided on, averaged over its runs."""
+"""Figure of a strategy's rewards at its decisions, averaged over its runs."""
 
 from __future__ import annotations
 
@@ -35,22 +35,22 @@ from vedette.evaluation.rewards import MeanRewards
 from vedette.kernels.base.types import Floats
 
 _COLUMNS = 3
-_LARGEST_MARK = 60.0  # points squared, of a choice made in every run
-_LEVELS = 48  # of colour, which a vector file holds one by one
+_LARGEST_MARK = 60.0  # points squared, area of the mark of a choice made in every run
+_LEVELS = 48  # colour levels, which a vector file stores separately
 
 
 @styled
 def mean_rewards_figure(decisions: Sequence[MeanRewards], scene: Scene | None = None) -> Figure:
-    """Mean reward over the runs of one strategy against action, a panel a decision, with how often each was chosen.
+    """Return a figure of the mean reward over the runs of a strategy against action, and how often each was chosen.
 
-    Independent decisions: one curve a sensor with a band of one standard error over the runs. Joint decisions: a heat
-    map over the first two sensors with a choice, the largest over the others where there are more; where the joint
-    table was too large to keep, curves with the other sensors at their choice. The area of a mark is the share of the
-    runs that chose the action. A sensor that has but one action has no curve; of more than six, those have one whose
-    choice makes the most difference.
+    One panel for each decision. Independent decisions: one curve for each sensor with a band of one standard error over
+    the runs. Joint decisions: a heat map over the first two sensors with a choice, the maximum over any others; if the
+    joint table was too large to store, curves with the other sensors at their choice. The area of a mark is the share
+    of the runs that chose the action. A sensor with only one action has no curve; of more than six sensors, those whose
+    choice makes the most difference have one.
 
     Args:
-        decisions: that are shown, in order; `vedette.evaluation.mean_rewards` gives those of runs.
+        decisions: to be shown, in order; `vedette.evaluation.mean_rewards` computes those of runs.
         scene: names of sensors and reward; None: numbers.
 
     Raises `InputError` for no decision, or none with a choice.
@@ -169,11 +169,11 @@ def _draw_joint(figure: Figure, axes: Axes, rewards: MeanRewards, pair: tuple[in
     bar.ax.tick_params(labelsize=6)
     bar.ax.set_title("reward", fontsize=6, pad=4)
     assert bar.solids is not None
-    bar.solids.set(edgecolor="face", rasterized=False)  # a page would have to load the picture
+    bar.solids.set(edgecolor="face", rasterized=False)  # otherwise a page would have to load a separate image
 
 
 def _pair_share(table: RewardTable, share: Floats, pair: tuple[int, int]) -> Floats:
-    """Share of the runs that chose each pair of actions, whatever the other sensors did."""
+    """Return the share of the runs that chose each pair of actions, summed over the other sensors' actions."""
     positions = [table.sensors.index(sensor) for sensor in pair]
     summed = share.sum(axis=tuple(axis for axis in range(share.ndim) if axis not in positions))
     return np.asarray(summed if positions[0] < positions[1] else summed.T)

@@ -1,4 +1,4 @@
-"""How the error of the strategies goes over time (paper Fig. 5)."""
+"""Figures of the error of the strategies over time (paper Fig. 5)."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ from vedette.kernels.base.types import Bools, Floats
 
 @dataclass(frozen=True, slots=True)
 class Shared:
-    """A stretch over which several curves are one.
+    """An interval over which several curves are equal.
 
     Attributes:
-        members: which curves, increasing.
-        shown: (num_points,) the points of the stretch; it may have gaps.
+        members: indices of the curves, increasing.
+        shown: (num_points,) True for the points of the interval; it may have gaps.
     """
 
     members: tuple[int, ...]
@@ -41,7 +41,7 @@ class Shared:
 
 
 def shared_stretches(curves: Floats) -> tuple[Shared, ...]:
-    """Every set of curves that are equal over one or more steps, with the points of those steps.
+    """Return every set of curves that are equal over one or more steps, with the points of those steps.
 
     Args:
         curves: (num_curves, num_points).
@@ -58,7 +58,7 @@ def shared_stretches(curves: Floats) -> tuple[Shared, ...]:
 
 
 def own_points(curves: Floats) -> Bools:
-    """(num_curves, num_points) ends of the steps over which a curve is equal to no other; all of a single one."""
+    """Return True at ends of steps over which a curve equals no other, (num_curves, num_points); all for one."""
     num_curves, num_points = curves.shape
     if num_curves == 1:
         return np.ones((1, num_points), bool)
@@ -71,13 +71,15 @@ def own_points(curves: Floats) -> Bools:
 
 
 _LABELS = {"total": "OSPA", "localisation": "Localisation", "cardinality": "Cardinality"}
-_FAR = 2.0  # times the second largest difference, beyond which the largest leaves the axis
-_DASH = 4.5  # line widths, of curves that lie on one another
+_FAR = 2.0  # times the second largest difference; a larger one leaves the axis
+_DASH = 4.5  # line widths, dashes of curves that coincide
 
 
 @styled
 def ospa_figure(comparison: Comparison, *, parts: Sequence[str] = ("total",)) -> Figure:
-    """Mean OSPA of each strategy against time, with bands of one standard error over the runs; decisions are marked.
+    """Return a figure of the mean OSPA of each strategy against time, with bands of one standard error over the runs.
+
+    Decisions are marked.
 
     Args:
         comparison: from `vedette.evaluation.comparison.compare`.
@@ -101,10 +103,10 @@ def ospa_figure(comparison: Comparison, *, parts: Sequence[str] = ("total",)) ->
 
 @styled
 def differences_figure(comparison: Comparison) -> Figure:
-    """What the decisions brought: mean OSPA from the first one on, close up, and the paired differences against time.
+    """Return a figure of the decisions' effect over time: mean OSPA and paired differences from the first one on.
 
-    Above, bands of one standard error. Below, each strategy minus the first, run by run: the mean with its 95 %
-    confidence interval at each scan by itself, above 0 where the first strategy is better.
+    Upper panel: bands of one standard error. Lower panel: each strategy minus the first, run by run: the mean with its
+    pointwise 95 % confidence interval at each scan, above 0 if the first strategy is better.
 
     Raises `InputError` for one strategy, or one run.
     """
@@ -126,7 +128,7 @@ def differences_figure(comparison: Comparison) -> Figure:
 
 
 def since_first_decision(comparison: Comparison) -> Bools:
-    """Return which scans are at the first decision or later, (num_scans,); all where fewer than two are."""
+    """Return True for each scan at or after the first decision, (num_scans,); all if fewer than two are."""
     shown = comparison.times >= (comparison.decision_times[:1].min(initial=np.inf))
     return shown if shown.sum() >= 2 else np.ones(len(shown), bool)
 
@@ -134,7 +136,7 @@ def since_first_decision(comparison: Comparison) -> Bools:
 def draw_differences(axes: Axes, comparison: Comparison) -> None:
     """Draw the paired difference of each strategy to the first against time, with 95 % confidence bands.
 
-    A strategy that is much worse than all others leaves the axis at the top, so that the others can be told apart.
+    A strategy that is much worse than all others leaves the axis at the top, so that the others are distinguishable.
     """
     shown = since_first_decision(comparison)
     reaches: dict[str, float] = {}
@@ -156,7 +158,7 @@ def draw_differences(axes: Axes, comparison: Comparison) -> None:
 
 
 def _leave_out_the_worst(axes: Axes, reaches: dict[str, float]) -> None:
-    """End the axis above the second largest difference where the largest is far beyond it, and say so."""
+    """End the axis above the second largest difference if the largest is far beyond it, with a note in the figure."""
     *_, second, worst = [("", 0.0), *sorted(reaches.items(), key=lambda each: each[1])]
     if worst[1] > _FAR * second[1] > 0.0:
         axes.set_ylim(axes.get_ylim()[0], 1.15 * second[1])
@@ -166,7 +168,7 @@ def _leave_out_the_worst(axes: Axes, reaches: dict[str, float]) -> None:
 
 
 def _close_up(axes: Axes, comparison: Comparison, shown: Bools) -> None:
-    """Let the height of the axes be that of the curves with their bands at these scans."""
+    """Limit the height of the axes to the curves with their bands at these scans."""
     curves = [comparison.curve(strategy) for strategy in comparison.strategies]
     low = min(float((curve.mean - curve.standard_error)[shown].min()) for curve in curves)
     high = max(float((curve.mean + curve.standard_error)[shown].max()) for curve in curves)
@@ -175,7 +177,7 @@ def _close_up(axes: Axes, comparison: Comparison, shown: Bools) -> None:
 
 
 def draw_ospa(axes: Axes, comparison: Comparison, part: str) -> None:
-    """Draw one part of the OSPA of every strategy into axes; curves that are one have dashes of all their colours."""
+    """Draw one part of the OSPA of every strategy into axes; curves that coincide have dashes of all their colours."""
     times = comparison.times
     curves = [comparison.curve(strategy, part) for strategy in comparison.strategies]
     means = np.array([curve.mean for curve in curves])
@@ -206,12 +208,12 @@ def _mark_decisions(axes: Axes, comparison: Comparison) -> None:
 
 
 def _draw_band(axes: Axes, times: Floats, curve: Summary, shown: Bools, shade: str) -> None:
-    """One standard error to either side."""
+    """Draw a band of one standard error to either side."""
     _fill(axes, times, curve.mean - curve.standard_error, curve.mean + curve.standard_error, shown, shade)
 
 
 def _fill(axes: Axes, times: Floats, low: Floats, high: Floats, shown: Bools, shade: str) -> None:
-    """Faint, with a thin outline that tells one band from another."""
+    """Fill a band faintly, with a thin outline that separates it from others."""
     axes.fill_between(
         times, low, high, where=shown.tolist(), facecolor=(shade, 0.12), edgecolor=(shade, 0.45), linewidth=0.35
     )

@@ -1,4 +1,4 @@
-"""The reward of each action at one decision (paper Fig. 4)."""
+"""Figure of the reward of each action at one decision (paper Fig. 4)."""
 
 from __future__ import annotations
 
@@ -33,19 +33,19 @@ _PANEL_WIDTH = 2.4  # inches, within the labels of a column
 
 @styled
 def reward_figure(plan: Plan, *, pair: tuple[int, int] | None = None, scene: Scene | None = None) -> Figure:
-    """Reward against action, one curve a sensor, the choice marked, with bands of one standard error over the samples.
+    """Return a figure of reward against action, one curve for each sensor, with the choice marked.
 
-    Actions of one column lie at its number, and others side by side; sensors of other columns have panels of their own.
-    A plan made independently has its curves as they are. A joint plan has above them a heat map of the joint table with
-    the chosen actions framed; its curves are the most that a sensor's action can bring with the best actions of the
-    others. With more than two sensors the heat map is likewise the maximum over the sensors outside `pair`. What a
-    search did not evaluate is left blank. A sensor that has but one action has no curve; of more than six, those have
-    one whose choice makes the most difference.
+    Bands are one standard error over the samples. Actions of one column lie at its number, and others side by side;
+    sensors with other columns have separate panels. An independent plan shows its curves unchanged. A joint plan has
+    above them a heat map of the joint table with the chosen actions framed; its curves are the largest reward of each
+    of a sensor's actions over the others' actions. With more than two sensors, the heat map is the maximum over the
+    sensors outside `pair`. Entries that a search did not evaluate are blank. A sensor with only one action has no
+    curve; of more than six sensors, those whose choice makes the most difference have one.
 
     Args:
         plan: with reward tables.
-        pair: the sensors on the axes of the heat map; else the first two that have a choice.
-        scene: what sensors and rewards are called.
+        pair: the sensors on the axes of the heat map; None: the first two that have a choice.
+        scene: names of sensors and rewards.
 
     Raises `InputError` for a plan without tables (random or fixed control) or without a choice, or a pair that is not
     two of its sensors.
@@ -75,7 +75,7 @@ def reward_figure(plan: Plan, *, pair: tuple[int, int] | None = None, scene: Sce
 
 
 def choosing(decided: Sequence[tuple[Sequence[RewardTable], Sequence[Actions]]]) -> tuple[int, ...]:
-    """The sensors with more than one action in any of some decisions, of which tables and actions are given.
+    """Return the sensors with more than one action in any of the decisions, given by their tables and actions.
 
     Of more than six, the six whose choice makes the most difference to the reward.
     """
@@ -91,14 +91,14 @@ def choosing(decided: Sequence[tuple[Sequence[RewardTable], Sequence[Actions]]])
 
 
 def first_pair(tables: Sequence[RewardTable], actions: Sequence[Actions]) -> tuple[int, int] | None:
-    """The first two sensors with a choice of a joint table; None where there are none."""
+    """Return the first two sensors with a choice in a joint table; None if there are none."""
     joint = [table.sensors for table in tables if len(table.sensors) > 1]
     with_choice = [sensor for sensors in joint[:1] for sensor in sensors if len(actions[sensor]) > 1]
     return (with_choice[0], with_choice[1]) if len(with_choice) > 1 else None
 
 
 def alike(along: Mapping[int, ActionAxis], sensors: Sequence[int]) -> list[list[int]]:
-    """The sensors, gathered by what can be drawn along one axis; along: that of each sensor's actions."""
+    """Return groups of sensors whose actions can be drawn along one axis; along: the axis of each sensor's actions."""
     groups: dict[Any, list[int]] = {}
     for sensor in sensors:
         axis = along[sensor]
@@ -117,13 +117,13 @@ def _draw_curves(
     joint = any(len(table.sensors) > 1 for table in plan.tables)
     mark_actions(axes, next(iter(along.values())))
     axes.set_ylabel(scene.reward_title("Largest joint reward" if joint else "Reward").replace(" (", "\n("))
-    # Above the panel: wherever a legend would lie inside, some curve passes.
+    # Above the panel: inside it, a legend would cover a curve.
     columns = legend_columns([str(each) for each in axes.get_legend_handles_labels()[1]], width=_PANEL_WIDTH)
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns, frameon=False, handlelength=1.8)
 
 
 def _draw_curve(axes: Axes, axis: ActionAxis, mean: Floats, error: Floats, choice: int, name: str, looks: Any) -> None:
-    # Changes of heading come in another order than the headings that they lead to.
+    # Changes of heading have another order than the resulting headings.
     order = np.argsort(axis.places, kind="stable")
     places, mean, error = axis.places[order], mean[order], error[order]
     chosen = int(np.flatnonzero(order == choice)[0])
@@ -147,7 +147,7 @@ def _draw_curve(axes: Axes, axis: ActionAxis, mean: Floats, error: Floats, choic
 
 
 def mark_actions(axes: Axes, along: ActionAxis, every: int = 60) -> None:
-    """Title and ticks of an axis of actions: `every` so many degrees, or each action in words."""
+    """Set title and ticks of an axis of actions: one tick every `every` degrees, or each action in words."""
     axes.set_xlabel(along.title())
     low, high = axes.get_xlim()
     if not along.is_numeric:
@@ -157,14 +157,14 @@ def mark_actions(axes: Axes, along: ActionAxis, every: int = 60) -> None:
 
 
 def map_ticks(axis: Any, along: ActionAxis, most: int) -> None:
-    """Ticks of one side of a map of joint actions, at most so many."""
+    """Set at most `most` ticks on one side of a map of joint actions."""
     every = max(1, -(-len(along.places) // most))
     style = {} if along.is_numeric or axis.axis_name == "y" else {"rotation": 90}
     axis.set_ticks(range(0, len(along.ticks), every), along.ticks[::every], **style)
 
 
 def best_over_others(table: RewardTable, axis: int) -> tuple[Floats, Floats]:
-    """For each action on `axis`, the largest mean over all other axes, and the standard error of that entry."""
+    """Return, for each action on `axis`, the largest mean over all other axes, and the standard error of that entry."""
     mean = np.moveaxis(table.mean, axis, 0).reshape(table.mean.shape[axis], -1)
     error = np.moveaxis(table.standard_error, axis, 0).reshape(mean.shape)
     best = np.where(np.isnan(mean), -np.inf, mean).argmax(axis=1)
@@ -173,9 +173,10 @@ def best_over_others(table: RewardTable, axis: int) -> tuple[Floats, Floats]:
 
 
 def best_over_pair(table: RewardTable, pair: tuple[int, int]) -> Floats:
-    """(num_actions of pair[0], num_actions of pair[1]) largest mean over the actions of all other sensors.
+    """Return the largest mean over the actions of all other sensors.
 
-    Raises `InputError` for what is not two sensors of the table.
+    Shape (num_actions of pair[0], num_actions of pair[1]). Raises `InputError` if `pair` is not two sensors of the
+    table.
     """
     if pair[0] == pair[1] or not set(pair) <= set(table.sensors):
         raise InputError(f"pair: expected two of the sensors {table.sensors}; got {pair}")

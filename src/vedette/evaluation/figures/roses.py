@@ -1,4 +1,4 @@
-"""Which way the sensors were sent, and how often: one rose a strategy and a decision."""
+"""Figure of the chosen headings or actions and their frequencies: one rose for each strategy and decision."""
 
 from __future__ import annotations
 
@@ -30,21 +30,22 @@ from vedette.internal.text import with_minus
 from vedette.kernels.base.types import Floats, Ints
 
 _SIZE = 1.5  # inches of a rose
-_MOST_BARS = 4  # of a sensor
-_SECTORS = 24  # that headings which are no fixed set are counted in
+_MOST_BARS = 4  # for each sensor
+_SECTORS = 24  # in which headings without a fixed grid are counted
 
 
 @styled
 def roses_figure(comparison: Comparison, scene: Scene | None = None) -> Figure:
-    """Shares of the runs in which each action was chosen: a row a strategy that decides, a column a decision.
+    """Return a figure of the shares of the runs in which each action was chosen, by strategy and decision.
 
-    A rose where every sensor was sent on a heading or a course, and bars of the actions in words elsewhere. Headings
-    are counter-clockwise from east (0), courses clockwise from north (0, upwards). Sensors stand side by side within
-    the sector of a heading. The area of a bar of a rose is in proportion to the share: the radius goes with its square
-    root. Sensors that never had anything to do but stand are left out, and more than six are taken together. Of many
-    decisions at most six are shown, evenly spread, the first and the last among them.
+    Each row is a strategy that decides, each column a decision. A panel is a rose if every action has a heading or a
+    course; otherwise it has bars of the actions in words. Headings are counter-clockwise from east (0), courses
+    clockwise from north (0, upwards). Sensors are side by side within the sector of a heading. The area of a bar of a
+    rose is proportional to the share: the radius is proportional to its square root. Sensors that always stand still
+    are left out, and more than six are combined. Of many decisions at most six are shown, evenly spread, with the first
+    and the last.
 
-    Raises `InputError` where no strategy made a decision, or no sensor had a choice.
+    Raises `InputError` if no strategy made a decision, or no sensor had a choice.
     """
     rows = [index for index, each in enumerate(comparison.ensembles) if any(each.choices)]
     if not rows:
@@ -84,7 +85,7 @@ def roses_figure(comparison: Comparison, scene: Scene | None = None) -> Figure:
 
 
 def _movers(comparison: Comparison) -> list[int]:
-    """The sensors that may do more than stand."""
+    """Return the sensors that can do more than stand still."""
     of_sensors: list[tuple[Row, ...]] = list(zip(*_all_choices(comparison), strict=True))
     found = [sensor for sensor, chosen in enumerate(of_sensors) if any(chosen)]
     if not found:
@@ -97,13 +98,13 @@ def _all_choices(comparison: Comparison) -> list[Choice]:
 
 
 def _headings(chosen: list[Choice], angle: str) -> Ints:
-    """(num_runs, num_sensors) headings or courses in whole degrees."""
+    """Headings or courses in whole degrees, (num_runs, num_sensors)."""
     degrees = [[dict(row)[angle] for row in choice] for choice in chosen]
     return np.array(degrees, np.int64).reshape(len(chosen), -1) % 360
 
 
 def _draw_bars(axes: Any, chosen: list[Choice], shades: Sequence[str]) -> None:
-    """One bar a sensor and action that was chosen, the most frequent of each sensor on top."""
+    """Draw one bar for each sensor and chosen action, the most frequent of each sensor on top."""
     place, ticks = 0, []
     for shade, rows in zip(shades, zip(*chosen, strict=True), strict=False):
         for row, count in Counter(rows).most_common(_MOST_BARS):
@@ -122,7 +123,7 @@ def _draw_rose(axes: Any, chosen: Ints, shades: Sequence[str]) -> None:
     share = width / len(shades) * 0.9
     for place, shade in enumerate(shades):
         counts = _shares(chosen[:, place], centres, width)
-        # The first sensor lies first counter-clockwise, so that overlapping choices of all sensors stay visible.
+        # Bars of the sensors are side by side, counter-clockwise, so that equal choices of all stay visible.
         places = centres + (place - (len(shades) - 1) / 2.0) * share
         shown = counts > 0.0
         axes.bar(places[shown], np.sqrt(counts[shown]), width=share, color=shade)
@@ -137,7 +138,7 @@ def _draw_rose(axes: Any, chosen: Ints, shades: Sequence[str]) -> None:
 
 
 def _sectors(chosen: Ints) -> tuple[Floats, float]:
-    """Centres (rad) and the width of the sectors: of the grid that the headings lie on, or else of equal ones."""
+    """Return centres (rad) and width of the sectors: from the grid of the headings, or else of equal width."""
     step = int(np.gcd.reduce(np.append(chosen.ravel(), 360)))
     if 360 // step > 2 * _SECTORS:
         step = 360 // _SECTORS

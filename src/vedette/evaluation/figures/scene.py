@@ -1,4 +1,4 @@
-"""What is drawn around a run: the sensors' names, the region and the zones, and what its rewards are."""
+"""Scene of a figure: names of the sensors, region and zones, meaning of the rewards."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ from vedette.scenarios.views import COAST, HOLE, INSIDE, NO_GO, REGION, Zone, zo
 if TYPE_CHECKING:
     from vedette.recorded import Origin
 
-_POINTS_ACROSS, _LETTER = 200.0, 4.2  # points of a column's axes, and of a letter of a name
-# Where a name may stand, the preferred side first: offset in points, and alignment.
+_POINTS_ACROSS, _LETTER = 200.0, 4.2  # points: width of a column's axes, and of a letter of a name
+# Possible places of a name, the preferred side first: offset in points, and alignment.
 _SIDES: tuple[tuple[tuple[float, float], dict[str, str]], ...] = (
     ((0.0, 7.0), {"ha": "center", "va": "bottom"}),
     ((0.0, -7.0), {"ha": "center", "va": "top"}),
@@ -49,14 +49,14 @@ _ZONES: dict[str, dict[str, Any]] = {
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """What figures say of a scenario; without any, sensors are numbered and rewards are rewards.
+    """Parts of a scenario that figures show; by default, sensors are numbered and rewards have no name.
 
     Attributes:
         names: of the sensors.
-        reward: what the rewards are, with their unit, such as "CS divergence"; nothing where it is not known.
+        reward: name of the rewards, with their unit, such as "CS divergence"; empty if unknown.
         zones: of the plane.
-        sensors: what they see.
-        origin: where (0, 0) is on the Earth; None: nobody knows.
+        sensors: for their fields of view.
+        origin: of the plane on the Earth; None if unknown.
     """
 
     names: tuple[str, ...] = ()
@@ -66,20 +66,20 @@ class Scene:
     origin: Origin | None = None
 
     def name(self, sensor: int) -> str:
-        """What a sensor is called in a figure."""
+        """Return the name of a sensor in a figure."""
         return drawn_text(elided(self.names[sensor], 20)) if self.names else f"sensor {sensor + 1}"
 
     def field(self, sensor: int, pose: Floats) -> FieldOfView | None:
-        """What a sensor sees at a pose; None where that has no edge, or nobody knows."""
+        """Return the field of view of a sensor at a pose; None if it has no edge or is unknown."""
         return bounded_field(self.sensors[sensor], pose) if sensor < len(self.sensors) else None
 
     def reward_title(self, of: str = "Reward") -> str:
-        """`Reward (CS divergence)`."""
+        """Return the title `Reward (CS divergence)`."""
         return f"{of} ({self.reward})" if self.reward else of
 
     @property
     def corners(self) -> Floats:
-        """(num, 2) corners of the no-go zones, those beyond the region moved to its edge, m."""
+        """Corners of the no-go zones, (num, 2) m; corners beyond the region are moved to its edge."""
         of_region = [zone.corners for zone in self.zones if zone.kind == REGION]
         found = [np.array(zone.corners) for zone in self.zones if zone.kind == NO_GO]
         if not found or not of_region:
@@ -89,9 +89,9 @@ class Scene:
 
 
 def scene_of(scenario: Scenario, planner: str) -> Scene:
-    """What figures of runs of a scenario under a strategy say."""
+    """Return the scene for figures of runs of a scenario under a strategy."""
     model = scenario.model
-    own, words = model.planners.get(planner), ""  # a planner of the user's own may weigh anything
+    own, words = model.planners.get(planner), ""  # a custom planner may use any reward
     if isinstance(own, NamedJoint | NamedIndependent | NamedLookahead):
         words = (own.reward or model.control.reward).words
     elif planner in STRATEGIES:
@@ -101,20 +101,20 @@ def scene_of(scenario: Scenario, planner: str) -> Scene:
 
 
 class NamePlace(NamedTuple):
-    """Where a name stands: arguments of `Axes.annotate`, and whether it covers another name there."""
+    """Place of a name: arguments of `Axes.annotate`, and True if it covers another name there."""
 
     arguments: dict[str, Any]
     covers_name: bool
 
 
 def place_names(names: Sequence[str], places: Floats, bounds: Floats, marks: Floats) -> list[NamePlace]:
-    """Return where names stand: at the side of their place that is within the axes and covers no name and few marks.
+    """Return the places of names: at the side that is within the axes and covers no name and the fewest marks.
 
     Args:
         names: the more important ones first.
-        places: (num, 2) what is named, m.
+        places: (num, 2) of the named things, m.
         bounds: (2, 2) lower left and upper right corner of the axes, m.
-        marks: (n, 2) what names should not cover, such as targets and paths, m.
+        marks: (n, 2) points that names should not cover, such as targets and paths, m.
     """
     point = float((bounds[1] - bounds[0]).max()) / _POINTS_ACROSS
     corners = np.array([[x, y] for x in np.linspace(-1.0, 1.0, 9) for y in (-1.0, 0.0, 1.0)])
@@ -144,7 +144,7 @@ def _inside(points: Floats, centre: Floats, half: Floats) -> int:
 
 
 def draw_zones(axes: Axes, drawn: Sequence[Zone], scale: float) -> None:
-    """Draw zones into axes, in metres times `scale`; holes are cut out of the zones that they follow."""
+    """Draw zones into axes, in metres times `scale`; holes are cut out of the zones that precede them."""
     shown: list[tuple[str, list[Path]]] = []
     coast = [scale * np.array(zone.corners) for zone in drawn if zone.kind == COAST]
     style = {"colors": _ZONES[COAST]["edgecolor"], "linewidths": _ZONES[COAST]["linewidth"], "zorder": 1.2}
@@ -162,29 +162,29 @@ def draw_zones(axes: Axes, drawn: Sequence[Zone], scale: float) -> None:
 
 
 def _turning(corners: Sequence[tuple[float, float]], *, left: bool) -> Floats:
-    """Corners in an order that goes round to the left, or to the right, closed: a hole turns against its zone."""
+    """Return a closed ring of corners, counter-clockwise (`left`) or clockwise: a hole turns against its zone."""
     ring = np.array([*corners, corners[0]])
     area = float((ring[:-1, 0] * ring[1:, 1] - ring[1:, 0] * ring[:-1, 1]).sum())
     return np.asarray(ring if (area > 0.0) == left else ring[::-1])
 
 
 def bounded_field(sensor: Sensor, pose: Floats | None = None) -> FieldOfView | None:
-    """What a sensor sees at a pose, or where it starts; None where that has no edge."""
+    """Return the field of view of a sensor at a pose, or at its start; None if it has no edge."""
     field = field_of_view(sensor, None if pose is None else pose.tolist())
     return field if field is not None and np.isfinite(field.reach) else None
 
 
 def draw_field(axes: Axes, place: tuple[float, float], field: FieldOfView, scale: float) -> Patch:
-    """Shade what a sensor sees, at a place that is in metres times `scale` already."""
+    """Shade the field of view of a sensor, at a place that is already in metres times `scale`."""
     sides = np.degrees([field.middle - field.half_width, field.middle + field.half_width])
     wedge = Wedge(place, field.reach * scale, *sides, facecolor=GREY, alpha=0.15, linewidth=0, zorder=1)
     return axes.add_patch(wedge)
 
 
 def label_axes(axes: Axes, scale: float, origin: Origin | None) -> None:
-    """Say what the axes are; with an origin, longitude and latitude stand at the other sides.
+    """Label the axes; with an origin, longitude and latitude are at the other sides.
 
-    These are those along lines through the middle of the axes, whose limits must be set.
+    These are exact along lines through the middle of the axes, whose limits must be set before.
     """
     unit = "m" if scale == 1.0 else "km"
     axes.set_xlabel(f"x ({unit})")
@@ -197,7 +197,7 @@ def label_axes(axes: Axes, scale: float, origin: Origin | None) -> None:
         ends = np.array([middle, middle])
         ends[:, k] = limits[k]
         degrees = origin.to_degrees(ends / scale)[:, k]
-        if not degrees[0] < degrees[1]:  # over a pole, or where longitudes begin anew
+        if not degrees[0] < degrees[1]:  # over a pole, or where longitudes wrap around
             continue
         there, back = _line(limits[k], degrees), _line(degrees, limits[k])
         functions = (there, back)
@@ -217,13 +217,13 @@ def _line(start: Floats, end: Floats) -> Callable[[Any], Any]:
 
 
 def field_handles(sensors: Sequence[Sensor], when: str = "") -> Iterator[Patch]:
-    """What the shade of `draw_field` means, for a legend, if a sensor's view has an edge."""
+    """Yield the legend entry of the shade of `draw_field`, if a sensor's view has an edge."""
     if any(bounded_field(sensor) is not None for sensor in sensors):
         yield Patch(color=GREY, alpha=0.15, linewidth=0, label=f"field of view{when}")
 
 
 def zone_handles(drawn: Sequence[Zone]) -> Iterator[Patch | Line2D]:
-    """What the zones and the coastline mean, for a legend."""
+    """Yield the legend entries of the zones and the coastline."""
     for kind in dict.fromkeys(zone.kind for zone in drawn if zone.kind != HOLE):
         if kind == COAST:
             yield Line2D([], [], color=_ZONES[kind]["edgecolor"], linewidth=1.0, label=kind)

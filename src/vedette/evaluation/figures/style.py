@@ -1,4 +1,4 @@
-"""One look for all figures: a paper's column wide, 8 pt, colours that survive colour blindness and grey print."""
+"""Common style of all figures: as wide as a paper's column, 8 pt, colours safe for colour blindness and grey print."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ _R = TypeVar("_R")
 COLUMN_WIDTH = 3.5  # inches, of an IEEE column
 TEXT_WIDTH = 7.16  # inches, of both columns
 
-# M. Okabe and K. Ito, "Color Universal Design" (2008), without the yellow that is lost on white; darkest last.
+# M. Okabe and K. Ito, "Color Universal Design" (2008), without the yellow that is invisible on white; darkest last.
 BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION = "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00"
 COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
-# Of sensors, none of them a strategy's: P. Tol's "muted" ones that are farthest from those, and two darker.
+# Colours of sensors, different from those of strategies: P. Tol's "muted" ones that are farthest, and two darker.
 SENSOR_COLOURS = ("#332288", "#999933", "#882255", "#7A5C3E", "#1B4D3E", "#44AA99")
 GREY = "#6E6E6E"
 INK = "#222222"
@@ -55,22 +55,22 @@ _OTHER_FONTS = (
     "Noto Sans SC", "Noto Sans JP", "Noto Sans KR", "Droid Sans Fallback", "IPAGothic", "SimHei", "Malgun Gothic",
     "Arial Unicode MS", "Segoe UI Symbol", "Noto Emoji", "Symbola",
 )  # fmt: skip
-# Of the drawing of names, not of the results: a letter without a font is drawn as a box, a crowded figure as it is.
+# Warnings about layout, not results: letters without a font are drawn as boxes, crowded figures unchanged.
 _UNTOLD = ("Glyph .* missing from", "constrained_layout not applied", "Tight layout not applied")
 
 with resources.as_file(resources.files("vedette") / "paper.mplstyle") as _file:
     _SETTINGS: Any = dict(matplotlib.rc_params_from_file(_file, use_default_template=False))
-for _name in ("axes.prop_cycle", "figure.figsize"):  # figures here have their own
+for _name in ("axes.prop_cycle", "figure.figsize"):  # figures here set these themselves
     del _SETTINGS[_name]
 _FORMATS = ("pdf", "svg", "png")
 _DOTS_PER_INCH = 300
 _POINTS_PER_INCH = 72.0
-_AROUND_LABEL = 0.52  # inches, of the handle of an entry of a legend and the gaps beside it
+_AROUND_LABEL = 0.52  # inches, width of a legend handle and the gaps next to it
 _UNDATED: dict[str, dict[str, None]] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
 
 
 def styled(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Run `function` under the settings of these figures and leave Matplotlib's own as they were."""
+    """Run `function` with the settings of these figures and leave Matplotlib's own settings unchanged."""
 
     @wraps(function)
     def wrapper(*args: _P.args, **kwargs: _P.kwargs) -> _R:
@@ -88,7 +88,7 @@ def _other_fonts() -> tuple[str, ...]:
 
 @contextmanager
 def _untold() -> Iterator[None]:
-    """Draw without Matplotlib's warnings of letters that no font has and of crowded layouts."""
+    """Draw without Matplotlib's warnings of missing letters and of crowded layouts."""
     with warnings.catch_warnings():
         for message in _UNTOLD:
             warnings.filterwarnings("ignore", message, UserWarning)
@@ -96,7 +96,7 @@ def _untold() -> Iterator[None]:
 
 
 def new_figure(height: float, *, width: float = COLUMN_WIDTH) -> Figure:
-    """An empty figure, in inches, that keeps its labels within its edges."""
+    """Return an empty figure that keeps its labels within its edges; sizes in inches."""
     return Figure(figsize=(width, height), layout="constrained")
 
 
@@ -127,17 +127,17 @@ _LABELS = {
 
 
 def strategy_label(name: str) -> str:
-    """The name of a planner, a filter or a fusion as papers write it; any other name as it is."""
+    """Return the name of a planner, a filter or a fusion as papers write it; any other name unchanged."""
     return _LABELS.get(name, name)
 
 
 def degrees_label(value: float) -> str:
-    """A number of degrees with the minus sign that Matplotlib's own ticks have."""
+    """Return a number of degrees with the minus sign of Matplotlib's ticks."""
     return with_minus(f"{value:.0f}")
 
 
 def legend_columns(labels: Sequence[str], *, width: float = COLUMN_WIDTH) -> int:
-    """How many entries of a legend stand side by side within a width in inches: at least one, at most six."""
+    """Return the number of legend entries that fit next to each other in a width in inches: one to six."""
     font = FontProperties(size=_SETTINGS["legend.fontsize"])
     with _untold():
         longest = max(
@@ -147,18 +147,18 @@ def legend_columns(labels: Sequence[str], *, width: float = COLUMN_WIDTH) -> int
 
 
 def span_times(axes: Axes, times: Floats) -> None:
-    """Let the axis begin with the first time and end with the last; a single one gets a second to either side."""
+    """Limit the axis to the first and the last time; a single time gets one second to either side."""
     room = 0.0 if times[-1] > times[0] else 1.0
     axes.set_xlim(times[0] - room, times[-1] + room)
 
 
 def colour(index: int) -> str:
-    """Colour of the strategy at this place, the same in every figure."""
+    """Return the colour of the strategy at this index, the same in every figure."""
     return COLOURS[index % len(COLOURS)]
 
 
 def sensor_looks(sensors: Sequence[int]) -> dict[int, tuple[str, str, Any]]:
-    """Colour, marker and dashes of each sensor of a figure, no two of six alike.
+    """Return colour, marker and dashes of each sensor of a figure; those of six sensors all differ.
 
     They are the same in every figure of at most six sensors, and no strategy has one of these colours.
     """
@@ -171,25 +171,25 @@ def sensor_looks(sensors: Sequence[int]) -> dict[int, tuple[str, str, Any]]:
 
 
 def shown_decisions(number: int, most: int = 6) -> tuple[int, ...]:
-    """Indices of at most `most` of `number` decisions, evenly spread, the first and the last among them."""
+    """Return indices of at most `most` of `number` decisions, evenly spread, with the first and the last."""
     if number <= most:
         return tuple(range(number))
     return tuple(round(place * (number - 1) / (most - 1)) for place in range(most))
 
 
 def line_style(index: int) -> Any:
-    """Dashes of the strategy at this place, the same in every figure."""
+    """Return the dashes of the strategy at this index, the same in every figure."""
     return LINE_STYLES[index % len(LINE_STYLES)]
 
 
 @styled
 def save_figure(figure: Figure, path: Path | str, *, formats: Sequence[str] = _FORMATS) -> tuple[Path, ...]:
-    """Write a figure once for each format, beside one another; the same figure gives the same bytes.
+    """Write a figure once for each format, into one folder; the same figure gives the same bytes.
 
     Args:
-        figure: what to draw.
+        figure: to be drawn.
         path: file name without its ending, in a folder that exists or can be made.
-        formats: some of "pdf", "svg" (vector) and "png" (300 dots an inch).
+        formats: some of "pdf", "svg" (vector) and "png" (300 dots per inch).
 
     Returns the files written. Raises `InputError` for another format or a path that cannot be written.
     """
@@ -209,7 +209,7 @@ def save_figure(figure: Figure, path: Path | str, *, formats: Sequence[str] = _F
 
 @styled
 def svg_text(figure: Figure) -> str:
-    """The figure as the text of an SVG file; the same figure gives the same text."""
+    """Return the figure as the text of an SVG file; the same figure gives the same text."""
     out = io.StringIO()
     with _as_it_is(figure):
         _print(figure, out, "svg")
@@ -218,7 +218,7 @@ def svg_text(figure: Figure) -> str:
 
 @styled
 def png_bytes(figure: Figure, *, dots_per_inch: float) -> bytes:
-    """The figure as the bytes of a PNG file, for what has too many lines for `svg_text`; equal as there."""
+    """Return the figure as the bytes of a PNG file, reproducibly; for figures with too many lines for `svg_text`."""
     out = io.BytesIO()
     with _as_it_is(figure):
         figure.dpi = dots_per_inch
@@ -228,7 +228,7 @@ def png_bytes(figure: Figure, *, dots_per_inch: float) -> bytes:
 
 @contextmanager
 def _as_it_is(figure: Figure) -> Iterator[None]:
-    """Leave the figure as it came. What draws it in the first format lays it out for all."""
+    """Restore the figure's settings afterwards. Drawing the first format lays the figure out for all."""
     engine, dpi, canvas = figure.get_layout_engine(), figure.dpi, figure.canvas
     try:
         with _untold():
@@ -241,7 +241,7 @@ def _as_it_is(figure: Figure) -> Iterator[None]:
 
 def _save(figure: Figure, path: Path, name: str) -> Path:
     partial = path.with_name(f".{path.name}.{os.getpid()}.part")
-    figure.dpi = _DOTS_PER_INCH  # of what is drawn in dots; printing a PDF or an SVG leaves another behind
+    figure.dpi = _DOTS_PER_INCH  # for raster parts; printing a PDF or an SVG changes it
     try:
         _print(figure, partial, name)
         partial.replace(path)
@@ -252,7 +252,7 @@ def _save(figure: Figure, path: Path, name: str) -> Path:
 
 
 def _print(figure: Figure, to: Any, name: str) -> None:
-    """By the canvas of a format: `Figure.savefig` draws twice, the first time to lay out what this lays out itself."""
+    """Print with the canvas of a format: `Figure.savefig` would draw twice, the first time only for the layout."""
     canvas: Any = {"pdf": FigureCanvasPdf, "svg": FigureCanvasSVG, "png": FigureCanvasAgg}[name](figure)
     if name == "png":
         canvas.print_png(to)

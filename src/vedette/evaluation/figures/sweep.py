@@ -1,4 +1,4 @@
-"""The error against a number that a campaign varies."""
+"""Figure of the error against a number that a campaign varies."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ class SweepCurve:
 
     Attributes:
         name: of the strategy.
-        values: (num_values,) the number that was varied.
-        errors: for each value the mean over runs of the runs' mean OSPA.
+        values: (num_values,) of the varied number.
+        errors: for each value, the mean over runs of their mean OSPA.
     """
 
     name: str
@@ -40,12 +40,12 @@ class SweepCurve:
 
 @styled
 def sweep_figure(curves: Sequence[SweepCurve], label: str, unit: str = "m") -> Figure:
-    """Mean OSPA over the runs against a varied number, with its 95 % confidence interval.
+    """Return a figure of the mean OSPA over the runs against a varied number, with its 95 % confidence interval.
 
     Args:
-        curves: one a strategy.
-        label: what was varied, for the axis.
-        unit: of OSPA; none ("") where it compares whole states.
+        curves: one for each strategy.
+        label: of the varied number, for the axis.
+        unit: of OSPA; none ("") if it compares whole states.
 
     Raises `InputError` for no curve.
     """
@@ -77,7 +77,7 @@ def sweep_figure(curves: Sequence[SweepCurve], label: str, unit: str = "m") -> F
 
 
 def _beside(at: Floats, offset: float, values: Floats, logarithmic: bool) -> Floats:
-    """Moved a little sideways, so that the intervals of several curves at one value do not hide one another."""
+    """Return values shifted a little sideways, so that the intervals of several curves at one value do not overlap."""
     if len(values) < 2:
         return at
     if logarithmic:

@@ -1,4 +1,4 @@
-"""Where the targets went, where they were thought to be, and where the sensors went to see them (paper Fig. 3)."""
+"""Figures of the paths of targets and sensors, and of the estimates (paper Fig. 3)."""
 
 from __future__ import annotations
 
@@ -41,22 +41,23 @@ from vedette.internal.text import named_in
 from vedette.kernels.base.types import Floats, Ints
 from vedette.simulation.records import Decision, RunRecord
 
-LARGE = 5000.0  # m, beyond which axes are in kilometres
-_MANY_SCANS = 200  # from which on estimates are drawn smaller
+LARGE = 5000.0  # m; axes of a larger extent are in kilometres
+_MANY_SCANS = 200  # with more scans, estimates are drawn smaller
 _TITLE_PAD = 14  # points, above the names of sensors at the upper edge
 SENSOR_MARKERS = "sDpP*X"
-_MOST_NAMED, _MOST_DECISIONS = 8, 12  # sensors whose names, and decisions whose numbers, there is room for
+_MOST_NAMED, _MOST_DECISIONS = 8, 12  # largest numbers of sensor names and of decisions that fit
 
 
 @styled
 def tracks_figure(*records: RunRecord, titles: Sequence[str] | None = None, scene: Scene | None = None) -> Figure:
-    """Truth, estimates, sensor paths, decisions and zones in the plane; one panel a run, on equal axes.
+    """Return a figure of truth, estimates, sensor paths, decisions and zones in the plane, one panel for each run.
 
-    Of more than eight sensors, names and decisions are left out; so are more than twelve decisions.
+    The axes are equal. With more than eight sensors, names and decisions are left out; so are more than twelve
+    decisions.
 
     Args:
         records: one run fills a column, two fill the width of the page.
-        titles: one a run; by default the strategies.
+        titles: one for each run; by default the strategies.
         scene: the sensors' names, and the zones.
 
     Raises `InputError` for no record, or another number of titles.
@@ -69,7 +70,7 @@ def tracks_figure(*records: RunRecord, titles: Sequence[str] | None = None, scen
         raise InputError(f"titles: expected {len(records)}; got {len(names)}")
     width = COLUMN_WIDTH if len(records) == 1 else TEXT_WIDTH * max(1.0, len(records) / 2)
     figure = new_figure(width / len(records) + 0.4, width=width)
-    figure.set_layout_engine("constrained", h_pad=0.08)  # equal axes are fitted last, and would push titles off the top
+    figure.set_layout_engine("constrained", h_pad=0.08)  # equal axes are fitted last and would push titles off the top
     panels = figure.subplots(1, len(records), sharex=True, sharey=True, squeeze=False)[0]
     scale = 1e-3 if reach_of(records) > LARGE else 1.0
     for panel, record, name in zip(panels, records, names, strict=True):
@@ -84,15 +85,15 @@ def tracks_figure(*records: RunRecord, titles: Sequence[str] | None = None, scen
 def overview_figure(
     record: RunRecord, comparison: Comparison, *, strategy: str = "", scene: Scene | None = None
 ) -> Figure:
-    """One picture of an experiment, as wide as a page: the tracks of one run, and what the decisions changed.
+    """Return an overview of an experiment, as wide as a page: the tracks of one run, and the effect of the decisions.
 
-    Right: the paired difference of each strategy to the first, from the first decision on, with 95 % confidence bands;
-    a small chart of the whole course beside it. Of one run or one strategy, the error itself.
+    Right: the paired difference of each strategy to the first, from the first decision on, with 95 % confidence bands,
+    and a small chart of the whole run above it. With one run or one strategy, the error itself.
 
     Args:
         record: the run.
         comparison: of all strategies.
-        strategy: which of them the run is of; else the one named as its planner.
+        strategy: of the run; default: the one named as its planner.
         scene: the sensors' names, and the zones.
 
     Raises `InputError` for a strategy that is not compared.
@@ -132,7 +133,7 @@ def _draw_gain(axes: Axes, comparison: Comparison) -> None:
 
 
 def _draw_course(axes: Axes, comparison: Comparison) -> None:
-    """Draw the whole course of the error, small."""
+    """Draw the error over the whole run, small."""
     draw_ospa(axes, comparison, "total")
     axes.set_ylabel(named_in("OSPA", comparison.unit), fontsize=6)
     axes.tick_params(labelsize=6)
@@ -140,7 +141,7 @@ def _draw_course(axes: Axes, comparison: Comparison) -> None:
 
 
 def draw_tracks(axes: Axes, record: RunRecord, scale: float, scene: Scene, shade: str = "") -> None:
-    """Draw one run into axes, in metres times `scale`; the estimates in a shade, or else coloured by label."""
+    """Draw one run into axes, in metres times `scale`; the estimates in a shade, or coloured by label."""
     draw_zones(axes, scene.zones, scale)
     _draw_truth(axes, record, scale)
     _draw_estimates(axes, record, scale, shade)
@@ -153,7 +154,7 @@ def draw_tracks(axes: Axes, record: RunRecord, scale: float, scene: Scene, shade
 
 
 def frame_tracks(axes: Axes, records: Sequence[RunRecord], scale: float, scene: Scene) -> None:
-    """Limits of `bounds_of`, shared by all panels; a label on the y axis."""
+    """Set the limits from `bounds_of`, shared by all panels, and the labels of the axes."""
     low, high = bounds_of(records, scene) * scale
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
@@ -172,12 +173,12 @@ def bounds_of(records: Sequence[RunRecord], scene: Scene) -> Floats:
 
 
 def reach_of(records: Sequence[RunRecord]) -> float:
-    """Extent of targets and sensors of runs, m."""
+    """Return the extent of the targets and sensors of runs, m."""
     return float(max(np.ptp(_positions(record), axis=0).max() for record in records))
 
 
 def _positions(record: RunRecord) -> Floats:
-    """(n, 2) of targets, or where nobody knows these of estimates, and of sensors, m."""
+    """Return the positions, (n, 2) m, of targets (if unknown, of estimates) and sensors."""
     known = record.truth.states[:, :2]
     targets = [known] if len(known) else [estimate.means[:, :2] for estimate in record.estimates]
     return np.concatenate([*targets, record.poses[:, :, :2].reshape(-1, 2)])
@@ -208,7 +209,7 @@ def _draw_estimates(axes: Axes, record: RunRecord, scale: float, shade: str) -> 
 
 
 def recur(labels: Ints) -> bool:
-    """Whether a label is there twice or more; each is there once where a filter has none."""
+    """Return True if a label occurs more than once; filters without labels give each estimate another one."""
     return len(np.unique(labels, axis=0)) < len(labels)
 
 
@@ -244,7 +245,7 @@ def _draw_sensor(
 
 
 def _draw_field(axes: Axes, decision: Decision, sensor: int, size: float, scale: float) -> None:
-    """A sector of a given size, where the sensor was told to point."""
+    """Draw a sector of a given size in the chosen pointing direction of the sensor."""
     plan, pose = decision.plan, decision.poses[sensor]
     row = dict(zip(plan.actions[sensor].columns, plan.chosen_actions[sensor].tolist(), strict=True))
     middle = angle_of(row, "pointing_deg", "azimuth_deg")
@@ -255,7 +256,7 @@ def _draw_field(axes: Axes, decision: Decision, sensor: int, size: float, scale:
 
 
 def _direction(decision: Decision, sensor: int) -> Floats:
-    """Where the sensor was sent, of length 1; 0 where its action is no heading and no step."""
+    """Return the unit vector of the sensor's chosen direction; 0 if its action is neither a heading nor a step."""
     plan = decision.plan
     row = dict(zip(plan.actions[sensor].columns, plan.chosen_actions[sensor].tolist(), strict=True))
     heading = angle_of(row)
@@ -270,9 +271,9 @@ def _point(values: Floats) -> tuple[float, float]:
 
 
 def add_legend(figure: Figure, record: RunRecord, scene: Scene, shade: str = "", *, is_video: bool = False) -> None:
-    """What the marks mean, below the axes; estimates that are coloured by label have a mark of several colours.
+    """Add the legend below the axes; estimates coloured by label have a mark of several colours.
 
-    In a video a target has one mark, where it is; measurements have one, and there are no decisions.
+    In a video a target has one mark, at its position; measurements have one, and there are no decisions.
     """
     open_marker: dict[str, Any] = {"color": INK, "markerfacecolor": "white", "markersize": 4.5, "linewidth": 0.9}
     labels = np.concatenate([estimate.labels for estimate in record.estimates])

@@ -46,10 +46,10 @@ if TYPE_CHECKING:
 
 ENDINGS = (".mp4", ".gif")
 SCANS_PER_SECOND = 5.0
-_SHORTEST, _LONGEST = 2.0, 60.0  # s, of a video whose length nobody said
-_MOST_FRAMES = {".mp4": 20_000, ".gif": 1000}  # those of a GIF are all in memory
+_SHORTEST, _LONGEST = 2.0, 60.0  # s, limits of the default length of a video
+_MOST_FRAMES = {".mp4": 20_000, ".gif": 1000}  # all frames of a GIF are in memory at once
 _SIGMAS = 2.0
-_MOST_NAMED = 12  # estimates whose labels, and sensors whose names, there is room for
+_MOST_NAMED = 12  # largest number of estimates, targets or sensors with names
 
 
 @styled
@@ -64,25 +64,25 @@ def write_video(
     trust: bool = False,
     watch: Callable[[int, int], None] | None = None,
 ) -> int:
-    """Write a run as a video, whole or not at all; gives back the number of its frames.
+    """Write a run as a video, whole or not at all; return the number of its frames.
 
-    A frame shows the last scan at its time: true targets (rings) and where they went, estimates by label with their
-    ellipses of two standard deviations, sensors with what they see and measured. Measurements are those of
-    `scans_of_record`; they are left out where those cannot be had.
+    A frame shows the last scan at its time: true targets (rings) and their paths, estimates by label with their
+    ellipses of two standard deviations, sensors with their fields of view and measurements. Measurements are those of
+    `scans_of_record`; they are left out if they are not available.
 
     Args:
         record: the run.
-        scenario: that it is of.
-        path: a file that ends with .mp4 (ffmpeg writes it) or .gif.
-        fps: frames a second.
+        scenario: of the run.
+        path: a file that ends with .mp4 (written by ffmpeg) or .gif.
+        fps: frames per second.
         seconds: length; None: a fifth of a second for each scan, from two seconds to a minute.
         size: width in pixels.
         trust: run the code that the scenario names, to draw measurements.
-        watch: told the number of every frame that is drawn, and of all.
+        watch: called with the number of every frame drawn, and the number of all frames.
 
     Raises:
-        InputError: another ending, more frames than there can be, a file that cannot be written; or no ffmpeg, or one
-            that fails.
+        InputError: another ending, too many frames, a file that cannot be written, or an ffmpeg that is missing or
+            fails.
     """
     ending = path.suffix.lower()
     writer = _writer(ending, path, fps)
@@ -104,7 +104,7 @@ def write_video(
                     if watch is not None:
                         watch(frame, number)
         except (subprocess.CalledProcessError, BrokenPipeError) as error:
-            if isinstance(error.__context__, KeyboardInterrupt):  # which went to ffmpeg, too
+            if isinstance(error.__context__, KeyboardInterrupt):  # the signal went to ffmpeg, too
                 raise KeyboardInterrupt from None
             told = str(getattr(error, "stderr", None) or error).strip().splitlines()[-1:]
             raise InputError(f"{path}: expected ffmpeg to write it; it failed: {' '.join(told)}") from error
@@ -119,7 +119,7 @@ def write_video(
 
 @styled
 def scan_image(record: RunRecord, scenario: Scenario, *, size: int = 800) -> NDArray[np.uint8]:
-    """(height, size, 3) a picture of the last scan of a run, as a frame of `write_video` shows it; red, green, blue."""
+    """Return an image of the last scan of a run, (height, size, 3) RGB, as a frame of `write_video` shows it."""
     drawing = _Drawing(record, scenario, trust=False)
     drawing.show(record.num_scans - 1)
     drawing.figure.set_dpi(size / drawing.figure.get_figwidth())
@@ -141,7 +141,7 @@ def _writer(ending: str, path: Path, fps: float) -> AbstractMovieWriter:
 
 
 class _Drawing:
-    """One figure whose axes show one scan after another."""
+    """A figure whose axes show one scan after another."""
 
     def __init__(self, record: RunRecord, scenario: Scenario, trust: bool) -> None:
         self._record, self._scenario = record, scenario
@@ -149,7 +149,7 @@ class _Drawing:
         self._scene, self._told = scene_of(scenario, record.planner), told_by(record, scenario)
         self._scale = 1e-3 if reach_of([record]) > LARGE else 1.0
         self.figure = new_figure(COLUMN_WIDTH + 0.75)
-        self.figure.set_layout_engine("constrained", h_pad=0.08)  # as in `tracks_figure`
+        self.figure.set_layout_engine("constrained", h_pad=0.08)  # see `tracks_figure`
         self._axes: Axes = self.figure.subplots()
         self._axes.set_aspect("equal")
         draw_zones(self._axes, self._scene.zones, self._scale)
@@ -161,10 +161,10 @@ class _Drawing:
         self._step = -1
         self.show(0)
         self.figure.draw_without_rendering()
-        self.figure.set_layout_engine("none")  # every frame alike
+        self.figure.set_layout_engine("none")  # the same layout in every frame
 
     def show(self, step: int) -> None:
-        """Show a scan in place of the one before."""
+        """Show a scan in place of the previous one."""
         if step == self._step:
             return
         for artist in self._shown:
@@ -214,7 +214,7 @@ class _Drawing:
             self._add(self._axes.plot(*place, marker=".", color=shade, markersize=5, zorder=6)[0])
 
     def _draw_names(self, step: int) -> None:
-        """Names of sensors, targets and estimates, in this order; a name that would cover another is left out."""
+        """Draw names of sensors, targets and estimates, in this order; a name that would cover another is left out."""
         record, now = self._record, self._record.estimates[step]
         ids, states = record.truth.at(step)
         names = [(self._scene.name(s), pose[:2], INK) for s, pose in enumerate(record.poses[step])]
@@ -260,7 +260,7 @@ class _Drawing:
                 self._draw_scan(scan, section.measurement.kind, pose)
 
     def _draw_scan(self, scan: Scan, kind: str, pose: Floats) -> None:
-        """Crosses, rays or circles; those of targets in ink, clutter in grey."""
+        """Draw crosses, rays or circles; measurements of targets in dark ink, clutter in grey."""
         lie = in_plane(scan.measurements, kind, pose) * (1.0 if LIE[kind] == "ray" else self._scale)
         for is_clutter in (False, True):
             mine = lie[(scan.origins == CLUTTER) == is_clutter]
@@ -282,7 +282,7 @@ class _Drawing:
 
 
 def _scans(record: RunRecord, scenario: Scenario, trust: bool) -> Scans:
-    """The scans of a run; none where they cannot be had, or not without the code of somebody's own."""
+    """Return the scans of a run; empty if they are not available, or need custom code that is not trusted."""
     if code_of_sensors(scenario) and not trust:
         return ()
     try:
