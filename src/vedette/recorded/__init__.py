@@ -1,4 +1,4 @@
-"""What was recorded in the world: reports of targets and their cleaning, scans of sensors, longitude and latitude."""
+"""Recorded data: reports of targets and their cleaning, scans of sensors, longitude and latitude."""
 
 from vedette.recorded.cleaning import Cleaning, CleaningCounts, RecordedTrack
 from vedette.recorded.conventions import Conventions

@@ -12,25 +12,25 @@ from vedette.internal.extras import require_packages
 from vedette.internal.text import pluralise
 
 AIS_ENDINGS = (".nmea", ".ais")
-_FIRST_TIME = 3e8  # s; numbers below are no times since 1970 of an AIS message
+_FIRST_TIME = 3e8  # s; lower numbers are not times since 1970 of an AIS message
 _MILLISECONDS = 1e11  # greater times are milliseconds
 _KNOT = 1852.0 / 3600.0  # m/s
-_SIGNS = (b"!", b"VDM,", b"VDO,")  # of an AIS message, whose first letter may be damaged
-_NO_SPEED, _NO_COURSE = 102.3, 360.0  # what AIS says where a ship does not know
+_SIGNS = (b"!", b"VDM,", b"VDO,")  # marks of an AIS message, whose first letter may be damaged
+_NO_SPEED, _NO_COURSE = 102.3, 360.0  # values in AIS for unknown speed and course
 
 
 def read_ais(file: Path) -> tuple[dict[str, list[Any]], list[int], tuple[str, ...]]:
-    """Positions of ships: `time`, `id` (MMSI), `longitude`, `latitude`; `vx`, `vy` where every ship says them.
+    """Return positions of ships: `time`, `id` (MMSI), `longitude`, `latitude`; `vx`, `vy` if every ship reports them.
 
     Times are those of the receiver: in tag blocks (`\\c:1452603741*..\\`), before the message (`2016-01-12T13:02:21Z
-    !AIVDM,...`, or seconds since 1970), or after it (`...*5C,r003669930,1452603741`); of a message of several sentences
-    the first that is there. Messages that are no positions are passed over. Lines that are damaged (their checksums say
-    so), sentences of messages that are not complete, and positions without a time, are left out. Returns the columns,
-    the line of each row, and a warning that counts what was left out.
+    !AIVDM,...`, or seconds since 1970), or after it (`...*5C,r003669930,1452603741`); for a message of several
+    sentences the first time found. Messages without positions are skipped. Damaged lines (by their checksums),
+    sentences of incomplete messages, and positions without a time are left out. Returns the columns, the line of each
+    row, and a warning that counts the rows left out.
 
     Raises:
         MissingPackageError: pyais is not installed.
-        InputError: no position with a time in it.
+        InputError: no position with a time in the file.
     """
     require_packages(f"{file}, which is a file of AIS messages,", "pyais")
     rows, lines, lost, open_ones = list[tuple[Any, ...]](), list[int](), dict[str, list[int]](), _Open({}, [])
@@ -62,7 +62,7 @@ def _lost_in_words(lost: dict[str, list[int]]) -> str:
 
 
 def _sentence(line: bytes) -> tuple[bytes, float | None]:
-    """The sentence of a line, with its tag block if there is one, and the time that stands before or after it."""
+    """Return the sentence of a line, with its tag block if there is one, and the time before or after it."""
     if line.startswith(b"\\"):
         return line, None
     start, star = max(line.find(b"!"), 0), line.rfind(b"*")
@@ -72,7 +72,7 @@ def _sentence(line: bytes) -> tuple[bytes, float | None]:
 
 
 def _clock(cell: bytes) -> float | None:
-    """Seconds since 1970 of an ISO 8601 time (UTC unless it names a zone) or of a number; None of anything else."""
+    """Return seconds since 1970 from an ISO 8601 time (default zone UTC) or a number; None for anything else."""
     text = cell.decode("ascii", "replace")
     try:
         if text.replace(".", "", 1).isdigit():
@@ -92,16 +92,16 @@ class _Part(NamedTuple):
 
 
 class _Open(NamedTuple):
-    """Messages of several sentences of which not all have come, by what their sentences have in common.
+    """Incomplete messages of several sentences, by the fields that their sentences share.
 
-    lost: lines of messages that will not be complete any more.
+    lost: lines of messages that will not be completed.
     """
 
     waiting: dict[tuple[Any, ...], list[_Part]]
     lost: list[int]
 
     def joined(self, part: _Part) -> list[_Part]:
-        """All parts of the message that this part completes, in order; none where others are to come."""
+        """Return all parts of the message that this part completes, in order; empty if other parts are missing."""
         own = part.sentence
         if own.frag_cnt == 1:
             return [part]
@@ -120,12 +120,12 @@ class _Open(NamedTuple):
         return []
 
     def left(self) -> list[int]:
-        """Lines of messages that were not completed, in order."""
+        """Return the lines of messages that were not completed, in order."""
         return sorted([*self.lost, *(part.line for parts in self.waiting.values() for part in parts)])
 
 
 def _part(line: bytes, number: int) -> _Part | None:
-    """The AIS sentence of a line; None of an empty line or another sentence. Raises `ValueError` for a damaged one."""
+    """Return the AIS sentence of a line; None for an empty line or another sentence. Raises `ValueError` if damaged."""
     from pyais.exceptions import AISBaseException
     from pyais.messages import AISSentence, NMEASentenceFactory
 
@@ -147,9 +147,9 @@ def _part(line: bytes, number: int) -> _Part | None:
 
 
 def _position(parts: list[_Part]) -> tuple[Any, ...] | None:
-    """Time, MMSI, longitude, latitude and velocity of a message; None of one that is no position, or of no parts.
+    """Return time, MMSI, longitude, latitude and velocity of a message; None for one without position, or no parts.
 
-    Raises `ValueError` with what the message is where it cannot be decoded, or is a position without a time.
+    Raises `ValueError` with a description of a message that cannot be decoded, or is a position without a time.
     """
     from pyais.exceptions import AISBaseException
     from pyais.messages import AISSentence
@@ -170,7 +170,7 @@ def _position(parts: list[_Part]) -> tuple[Any, ...] | None:
 
 
 def _velocity(said: dict[str, Any]) -> tuple[float, float] | None:
-    """m/s to the east and north."""
+    """Return the velocity to the east and north, m/s; None if unknown."""
     speed, course = said.get("speed"), said.get("course")
     if speed is None or course is None or speed >= _NO_SPEED or course >= _NO_COURSE:
         return None

@@ -15,26 +15,25 @@ ASTERIX_ENDINGS = (".ast", ".asterix", ".raw")
 CAPTURE_ENDINGS = (".pcap", ".pcapng")
 _HALF_DAY = 43_200.0  # s
 _MILE, _FLIGHT_LEVEL, _EARTH = 1852.0, 30.48, 6_371_000.0  # m
-_PLOTS, _TRACKS = 48, 62  # categories of what a rotating radar sees, and of what a tracker has made of such
+_PLOTS, _TRACKS = 48, 62  # categories of plots of a rotating radar, and of tracks of a tracker
 _DEGREE = "\N{DEGREE SIGN}"
 
 
 def read_asterix(file: Path, *, reports: bool = False) -> tuple[dict[str, list[Any]], list[int], tuple[str, ...]]:
     """Read plots of rotating radars, category 048, or tracks of a system, category 062; a sensor is "SAC/SIC".
 
-    Columns of plots are `time`, `sensor`, `bearing_deg` from the north, `range_nmi` and `slant_range_nmi`; where any
-    plot has a valid flight level (I048/090), which is taken as the height above the radar, `altitude_m`; where any
-    has a valid Doppler speed (I048/120, CAL), `range_rate_mps`, positive where the range grows, as the standard gives
-    no sign. `range_nmi` is along the ground where a plot has a flight level, else it is the slant range. Columns of
-    tracks, which are read if there are no plots or `reports` are asked for, are `time`, `sensor`, `longitude`,
-    `latitude`, `id` (the number of the track), and `vx`, `vy` where every track has them. Times are seconds from
-    midnight UTC of the day of the first one. Other categories are passed over, and records without a time and place
-    are left out. Returns the columns, the number of each record, and warnings of plots without a flight level and of
-    what was left out.
+    Columns of plots are `time`, `sensor`, `bearing_deg` from the north, `range_nmi` and `slant_range_nmi`; if any plot
+    has a valid flight level (I048/090), which is taken as the height above the radar, `altitude_m`; if any has a valid
+    Doppler speed (I048/120, CAL), `range_rate_mps`, taken as positive for growing ranges, as the standard gives no
+    sign. `range_nmi` is along the ground if a plot has a flight level, else it is the slant range. Columns of tracks,
+    which are read if there are no plots or if `reports` is True, are `time`, `sensor`, `longitude`, `latitude`, `id`
+    (the number of the track), and `vx`, `vy` if every track has them. Times are seconds from midnight UTC of the day of
+    the first one. Other categories are skipped, and records without a time and place are left out. Returns the columns,
+    the number of each record, and warnings of plots without a flight level and of records left out.
 
     Raises:
         MissingPackageError: libasterix is not installed.
-        InputError: bytes that are no ASTERIX, or no plots and tracks in them.
+        InputError: bytes that are not ASTERIX, or contain no plots and tracks.
     """
     require_packages(f"{file}, which is an ASTERIX file,", "asterix")
     found: dict[int, tuple[list[dict[str, Any]], list[int]]] = {_PLOTS: ([], []), _TRACKS: ([], [])}
@@ -76,7 +75,7 @@ def _of_slant_ranges(number: int, total: int) -> str:
 
 
 def _records(file: Path) -> Iterator[tuple[int, Any]]:
-    """Category and content of every plot and track."""
+    """Yield category and content of every plot and track."""
     from asterix.base import Bits, RawDatablock
     from asterix.generated import manifest
 
@@ -114,7 +113,7 @@ def _plot(record: Any) -> dict[str, Any] | None:
 
 
 def _range_rate(doppler: Any) -> float | None:
-    """m/s, of a calculated Doppler speed that is there and not doubtful."""
+    """Return a calculated Doppler speed in m/s; None if it is missing or doubtful."""
     calculated = None if doppler is None else doppler.variation.get_item("CAL")
     if calculated is None or calculated.variation.get_item("D").as_uint():
         return None
@@ -122,14 +121,14 @@ def _range_rate(doppler: Any) -> float | None:
 
 
 def _height(level: Any) -> float | None:
-    """m, of a flight level that is there, validated and not garbled."""
+    """Return the height of a flight level in m; None if it is missing, not validated or garbled."""
     if level is None or any(level.variation.get_item(name).as_uint() for name in ("V", "G")):
         return None
     return _FLIGHT_LEVEL * _quantity(level, "FL", "FL")
 
 
 def _ground_range(slant: float, height: float | None) -> float | None:
-    """m along the radar's horizontal plane of a slant range in m to a height above a round Earth; None: not known."""
+    """Return the range along the radar's horizontal plane, m, for a round Earth; None if the height is unknown."""
     if height is None:
         return None
     up = ((_EARTH + height) ** 2 - _EARTH**2 - slant**2) / (2.0 * _EARTH)

@@ -1,4 +1,4 @@
-"""Recordings of ROS 2 (rosbag2), as tables: detections that have positions, and what receivers say of themselves."""
+"""Recordings of ROS 2 (rosbag2) as tables: detections with positions, and position reports of receivers."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ _FIRST_DATE = 1e8  # s since 1970; smaller stamps are seconds of a simulation
 
 
 def read_bag(file: Path, *, reports: bool) -> tuple[dict[str, list[Any]], list[int]]:
-    """Messages of a bag, each at the time of its header.
+    """Return the messages of a bag, each at the time of its header.
 
-    Of `PoseArray` and `PointStamped` their positions, in metres in the plane of the scenario: `time`, `sensor` (the
-    topic), `x`, `y`; an array without poses is a scan that found nothing. With `reports`, of `NavSatFix` the positions
-    of who sent them: `time`, `id` (the topic), `longitude`, `latitude`; without a fix they are passed over. Other
-    messages are, too. Returns the columns and the number of each row's message among these.
+    Positions of `PoseArray` and `PointStamped`, in metres in the plane of the scenario: `time`, `sensor` (the topic),
+    `x`, `y`; an array without poses is a scan without measurements. With `reports`, positions of the senders of
+    `NavSatFix`: `time`, `id` (the topic), `longitude`, `latitude`; messages without a fix are skipped, and so are all
+    other messages. Returns the columns and the number of each row's message among the messages read.
 
     Raises:
         MissingPackageError: rosbags is not installed.
@@ -35,7 +35,7 @@ def read_bag(file: Path, *, reports: bool) -> tuple[dict[str, list[Any]], list[i
             stamp = message.header.stamp
             for place in _places(message):
                 rows.append((number, stamp.sec + 1e-9 * stamp.nanosec, topic, place))
-    except Exception as error:  # whatever a damaged bag makes of the packages that read it
+    except Exception as error:  # a damaged bag may raise any error in the packages that read it
         said = elided(printable(" ".join(str(error).split())), 200)
         raise InputError(f"{file}: expected a ROS 2 bag; it cannot be read: {type(error).__name__}: {said}") from error
     if not rows:
@@ -51,11 +51,11 @@ def read_bag(file: Path, *, reports: bool) -> tuple[dict[str, list[Any]], list[i
 
 
 def _messages(file: Path, kinds: tuple[str, ...]) -> Any:
-    """Topic and content of every message of these kinds, in order of time."""
+    """Yield topic and content of every message of these kinds, in order of time."""
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
-    # Of these messages all distributions have the same; bags that define their own messages are read by those.
+    # All distributions define these messages equally; definitions in the bag take precedence.
     with AnyReader([file], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
         wanted = [connection for connection in reader.connections if connection.msgtype in kinds]
         if wanted:

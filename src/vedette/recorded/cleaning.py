@@ -1,4 +1,4 @@
-"""Making tracks of recorded reports: jumps, silences, moored ships and the edges of the region."""
+"""Tracks from recorded reports: removal of jumps, silences, moored ships and reports outside the region."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class RecordedTrack:
 
 @dataclass(frozen=True, slots=True)
 class CleaningCounts:
-    """Reports in all, those removed as jumps and as outside the region; tracks dropped as short, as slow, and kept."""
+    """Numbers of reports: all, jumps, outside the region; numbers of tracks: too short, too slow, and retained."""
 
     reports: int
     jumps: int
@@ -44,7 +44,7 @@ class CleaningCounts:
     tracks: int
 
     def in_words(self) -> str:
-        """The reports, and what was removed, for messages."""
+        """Return the numbers of reports and of removed ones, for messages."""
         removed = {
             "jumps": self.jumps,
             "outside the region": self.outside,
@@ -57,10 +57,10 @@ class CleaningCounts:
 
 @dataclass(frozen=True, slots=True)
 class Cleaning:
-    """How reports become tracks, in this order.
+    """Settings of the steps from reports to tracks, in this order.
 
     Attributes:
-        max_speed: as few reports as possible are dropped so that no two that follow one another need more (jumps);
+        max_speed: as few reports as possible are dropped so that no two successive ones need a higher speed (jumps);
             none: no limit [m/s].
         region: reports outside it are removed, and a track ends where it leaves; None: everywhere.
         max_gap: a longer silence ends a track, and the next report begins another [s].
@@ -81,7 +81,7 @@ class Cleaning:
             raise reject("region", "a Region or None", self.region)
 
     def apply(self, reports: Reports) -> tuple[tuple[RecordedTrack, ...], CleaningCounts]:
-        """Tracks in order of their first report, and what was left out."""
+        """Return the tracks in order of their first report, and the counts of what was left out."""
         jumps = outside = short = slow = 0
         tracks: list[RecordedTrack] = []
         for target in range(len(reports.names)):
@@ -107,7 +107,7 @@ class Cleaning:
         return rows[longest_reachable(reports.times[rows], reports.positions[rows], self.max_speed)]
 
     def _runs(self, reports: Reports, rows: Ints) -> Iterator[Ints]:
-        """Stretches without a silence and without a report outside the region."""
+        """Yield runs of reports without a silence and without a report outside the region."""
         inside = np.ones(len(rows), np.bool_) if self.region is None else self.region.contains(reports.positions[rows])
         kept = np.flatnonzero(inside)
         left_region = np.diff(kept) > 1
@@ -118,16 +118,16 @@ class Cleaning:
 
 
 def longest_reachable(times: Floats, positions: Floats, max_speed: float) -> Ints:
-    """Indices of the most reports of one target that it could have made at `max_speed`, in order of time.
+    """Return indices of the most reports of one target that are possible at `max_speed`, in order of time.
 
-    What can be reached from a report that can be reached can itself be reached, so the longest chain over pairs in
-    order is exact; a bad first report cannot take the good ones with it.
+    Reachability is transitive, so the longest chain over pairs in order is exact; a bad first report cannot remove the
+    good ones.
     """
     num = len(times)
     length, previous = np.ones(num, np.int64), np.full(num, -1)
     for i in range(1, num):
         distances = np.hypot(*(positions[:i] - positions[i]).T)
-        # The last of the longest: where all is well this is the report just before.
+        # The last of the longest: without jumps this is the previous report.
         lengths = np.where(distances <= max_speed * (times[i] - times[:i]), length[:i], 0)
         best = i - 1 - int(np.argmax(lengths[::-1]))
         if lengths[best] > 0:

@@ -1,4 +1,4 @@
-"""The columns of a table of scans: which quantity each is, in which unit, and whether they are what sensors measure."""
+"""Columns of a table of scans: their quantities and units, and checks that they suit the sensors' measurements."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from vedette.recorded.tables import Table, are_dates, column_names
 
 
 class ScanColumns:
-    """The columns of a table as quantities; raises `InputError` for those that are missing or do not fit together."""
+    """The columns of a table as quantities; raises `InputError` for missing or inconsistent ones."""
 
     def __init__(self, table: Table, sites: Sequence[Site], conventions: Conventions, origin: Origin | None) -> None:
         self.table, self.sites, self.conventions, self.origin = table, sites, conventions, origin
@@ -38,12 +38,12 @@ class ScanColumns:
         self._check()
 
     def _has_sensor(self) -> bool:
-        """Whether there is a column of sensors, or one is named; of a single sensor there need not be one."""
+        """Return True if there is a column of sensors, or one is named; for a single sensor there need not be one."""
         return "sensor" in self.conventions.columns or "sensor" in self.table.columns
 
     @property
     def unused(self) -> tuple[str, ...]:
-        """The columns that are not read."""
+        """Columns that are not read."""
         measured = {name for site in self.sites for name in COMPONENTS[site.kind]}
         measured |= {"lon", "lat"} if "x" in measured else set()
         own = {"own_x", "own_y", "own_lon", "own_lat", "own_heading"}
@@ -53,8 +53,9 @@ class ScanColumns:
         return tuple(name for name in self.table.columns if name not in used)
 
     def without_velocity(self, poses: Floats) -> tuple[str, ...]:
-        """Return a note of each sensor that measures range rates and moves, at (num_instants, num_sensors, ...) poses,
-        without columns of its velocity.
+        """Return a note of each moving sensor that measures range rates but has no columns of its velocity.
+
+        poses: (num_instants, num_sensors, ...).
         """
         if {*OWN_SPEEDS} <= set(self._columns):
             return ()
@@ -66,16 +67,16 @@ class ScanColumns:
         )
 
     def _plain(self, quantity: str) -> str:
-        """The column of time or sensor."""
+        """Return the name of the column of time or sensor."""
         names = (self.conventions.columns.get(quantity, quantity), *OTHER_NAMES.get(quantity, ()))
         for name in names:
             if name in self.table.columns:
                 return name
         self.table.column(names[0])
-        raise AssertionError  # it is not there, which was told
+        raise AssertionError  # the line above raises for a missing column
 
     def _found(self, quantity: str, units: Mapping[str, float]) -> tuple[str, float] | None:
-        """The column of a quantity and what one of its units is in SI; None where there is none."""
+        """Return the column of a quantity and the size of its unit in SI; None if there is none."""
         if (named := self.conventions.columns.get(quantity)) is not None:
             self.table.column(named)
             return named, self._unit(quantity, named, units)
@@ -97,12 +98,12 @@ class ScanColumns:
         return units[given or (ends[0] if ends else next(iter(units)))]
 
     def _told_by_compass(self, quantity: str) -> bool:
-        """Whether all sensors that have an angle tell it in degrees, as a compass does."""
+        """Return True if all sensors with an angle give it in degrees, as a compass does."""
         sites = [site for site in self.sites if quantity != "bearing" or "bearing" in COMPONENTS.get(site.kind, ())]
         return bool(sites) and all(site.compass for site in sites)
 
     def _check(self) -> None:
-        """That the table has what the sensors measure, and says how."""
+        """Check that the table has the sensors' measurements, with units and conventions."""
         have = column_names(self.table.columns) or "none"
         geographic = {"lon", "lat"} <= set(self._columns)
         for site in self.sites:
@@ -127,7 +128,7 @@ class ScanColumns:
         self._check_places()
 
     def _check_places(self) -> None:
-        """That places have both of their numbers."""
+        """Check that places have both coordinates."""
         pairs = [("own_x", "own_y"), ("own_lon", "own_lat"), OWN_SPEEDS]
         if any(is_position(site.kind) for site in self.sites):
             pairs += [("x", "y"), ("lon", "lat")]

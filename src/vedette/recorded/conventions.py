@@ -1,4 +1,4 @@
-"""In which units and from where whoever wrote the rows of a recording counts."""
+"""Units, directions and column names in the rows of a recording."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from vedette.internal.quantities import ANGLES, HEIGHTS, LENGTHS, QUANTITIES, SP
 from vedette.models.arguments import reject
 from vedette.recorded.instants import Bearings
 
-# What a row may say: the quantity, and the units that the end of a column's name may give it.
+# Quantities of a row, and the units that may follow at the end of a column's name.
 UNITS: dict[str, Mapping[str, float]] = {
     **{name: each.units for name, each in QUANTITIES.items()},
     "lon": {"deg": 1.0},
@@ -25,18 +25,18 @@ UNITS: dict[str, Mapping[str, float]] = {
     "own_vy": SPEEDS,
     "own_height": HEIGHTS,
 }
-OWN_SPEEDS = ("own_vx", "own_vy")  # of a sensor, east and north, read where it measures range rates
+OWN_SPEEDS = ("own_vx", "own_vy")  # velocity of a sensor, east and north, read if it measures range rates
 OTHER_NAMES = {
     "lon": ("longitude",),
     "lat": ("latitude",),
-    "longitude": ("lon", "LON"),  # of reports
+    "longitude": ("lon", "LON"),  # names in reports
     "latitude": ("lat", "LAT"),
     "id": ("mmsi", "MMSI", "icao24", "track_id"),
     "time": ("time_s", "time_utc", "BaseDateTime"),
     "range": ("distance",),
     "altitude": ("height", "flight_level"),
 }
-# m, and a share of the distance from the origin: places in metres and in degrees of one row are nearer than that.
+# Largest distance between places in metres and in degrees in one row: m, plus a share of the distance from the origin.
 ONE_PLACE, ONE_PLACE_SHARE = 50.0, 0.001
 MOST = {
     **dict.fromkeys(("lon", "own_lon"), 360.0),
@@ -46,24 +46,24 @@ MOST = {
     **dict.fromkeys(OWN_SPEEDS, QUANTITIES["range_rate"].most),
     **{name: each.most for name, each in QUANTITIES.items() if each.most < math.inf},
 }
-OVER_A_TURN = math.radians(10.0)  # what a bias or noise may add to an angle
+OVER_A_TURN = math.radians(10.0)  # largest excess of an angle from bias or noise
 
 
 @dataclass(frozen=True, slots=True)
 class Conventions:
-    """How the rows are to be read.
+    """Conventions for reading the rows.
 
     Attributes:
-        columns: name in the table of a quantity, where it differs: {"time": "Time", "sensor": "radar", ...}.
-        units: unit of a quantity ("m", "km", "nmi"; "deg", "rad"), where its column's name does not end with it, as
-            `range_km` and `bearing_deg` do. Lengths are else in m; angles must say.
-        bearings: from where bearings and headings are counted: "north", clockwise, as a compass has them; or "east",
-            counter-clockwise, as the library has them.
+        columns: name in the table of a quantity, if it differs: {"time": "Time", "sensor": "radar", ...}.
+        units: unit of a quantity ("m", "km", "nmi"; "deg", "rad"), if its column's name does not end with it, as
+            `range_km` and `bearing_deg` do. The default of lengths is m; angles have none.
+        bearings: zero and sense of bearings and headings: "north", clockwise, like a compass; or "east",
+            counter-clockwise, like the library.
         gather: s; rows of a sensor within this time after its first make one scan, at the mean of their times.
-        bad_rows: whether a row that cannot be read is refused or left out, and counted.
+        bad_rows: "refuse": an unreadable row is an error; "skip": it is left out and counted.
 
     Raises:
-        InputError: a quantity, unit or word of another kind, or a time below 0.
+        InputError: an unknown quantity, unit or word, or a time below 0.
     """
 
     columns: Mapping[str, str]

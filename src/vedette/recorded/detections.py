@@ -1,4 +1,4 @@
-"""Detections of Stone Soup as a table of scans; nothing of it is imported."""
+"""Detections of Stone Soup as a table of scans, without importing Stone Soup."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ Place: TypeAlias = tuple[float, float]
 def table_of_detections(
     reader: Iterable[tuple[Any, Iterable[Any]]], quantities: Sequence[str | None], *, sensor: str | None = None
 ) -> Table:
-    """The rows of what a `DetectionReader`, a simulator or a list of the same yields, for `parse_scans`.
+    """Return the rows from a `DetectionReader`, a simulator or an equivalent list, for `parse_scans`.
 
-    Bearings are Stone Soup's: from the east, in rad; where the detection's `measurement_model` has a
-    `translation_offset` and a `rotation_offset`, of a sensor that was there, and turned so far.
+    Bearings are Stone Soup's: from the east, in rad. If the detection's `measurement_model` has a `translation_offset`
+    and a `rotation_offset`, they are the sensor's position and rotation.
 
     Args:
         reader: pairs of a time (a `datetime`; without a zone it is taken as UTC) and a set of detections, each with a
-            `state_vector`. A set without any is a scan that found nothing, where `sensor` says whose; it was
-            where that sensor last said.
+            `state_vector`. If `sensor` is given, an empty set is a scan without measurements, at the sensor's last
+            position.
         quantities: of the elements of the state vector, such as ("bearing", "range"): bearing, range, range_rate, x,
-            y, lon or lat; None: an element that is not taken.
-        sensor: that all are of; None: each says so in its `metadata["sensor"]`.
+            y, lon or lat; None: an element that is ignored.
+        sensor: of all detections; None: each gives its own in `metadata["sensor"]`.
 
     Raises:
-        InputError: names the scan, the detection and its attribute, what was expected and what came.
+        InputError: names the scan, the detection and its attribute, and the expected and given values.
     """
     for quantity in quantities:
         if quantity is not None and quantity not in _COLUMNS:
@@ -48,14 +48,14 @@ def table_of_detections(
         rows = [_row(each, quantities, sensor, f"scan {number}, detection {k}") for k, each in found]
         if not rows and sensor is not None:
             rows = [(sensor, (), None)]
-        for name, values, own in sorted(rows, key=lambda row: row[:2]):  # a set has no order of its own
+        for name, values, own in sorted(rows, key=lambda row: row[:2]):  # a set has no order
             for column, cell in zip(columns, (time, name, *(values or [None] * len(columns))), strict=False):
                 columns[column].append(cell)
             places.append(own if values or not places else places[-1])
             numbers.append(number)
     known = [k for k, place in enumerate(places) if place is not None]
     if known:
-        cells = list(columns.values())[2]  # of scans of nothing before all others
+        cells = list(columns.values())[2]  # cells of empty scans before all others
         places[: known[0]] = [places[known[0]] if cell is None else None for cell in cells[: known[0]]]
         if None in places:
             wanted = "a measurement_model with a translation_offset, as others have"
@@ -75,7 +75,7 @@ def _pair(pair: Any, number: int) -> tuple[Any, list[tuple[int, Any]]]:
 def _row(
     detection: Any, quantities: Sequence[str | None], sensor: str | None, place: str
 ) -> tuple[str, tuple[float, ...], Place | None]:
-    """Sensor, what is taken of the state vector, and where the sensor was."""
+    """Return the sensor, the elements of the state vector that are used, and the position of the sensor."""
     name = sensor
     if name is None:
         told = getattr(detection, "metadata", None) or {}
@@ -92,9 +92,9 @@ def _row(
 
 
 def elements_of(detection: Any, quantities: Sequence[str | None], model: Any, place: str) -> tuple[float, ...]:
-    """What is taken of a detection's state vector; bearings turned by the `rotation_offset` of its measurement model.
+    """Return the used elements of a detection's state vector, bearings turned by its model's `rotation_offset`.
 
-    place: what stands in an error before the attribute. Raises `InputError` for what is no such vector.
+    place: text of an error before the attribute. Raises `InputError` if there is no such vector.
     """
     vector = getattr(detection, "state_vector", None)
     try:

@@ -1,4 +1,4 @@
-"""Where measurements lie in the plane, how far they extend, and which rows of a recording lie far beyond all others."""
+"""Places and extent of measurements in the plane, and rows of a recording far beyond all others."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from vedette.internal.quantities import PLACED, is_position
 from vedette.kernels.base.types import OWN_HEIGHT, Bools, Floats
 from vedette.models.turns import own_places
 
-MARGIN = 0.05  # of the longer side of an extent, around it
-_LONELY = 0.9  # a value is far from all others where the third on its side is nearer than this share of its distance
-_FEWEST, _FEWEST_TIMES = 20, 10  # rows and times of a recording; of fewer no row is taken for wild
-_MOST_WILD = 50  # one row of so many may be wild on a side
+MARGIN = 0.05  # around an extent, as a share of its longer side
+_LONELY = 0.9  # a value is far from all others if the third on its side is nearer than this share of its distance
+_FEWEST, _FEWEST_TIMES = 20, 10  # rows and times of a recording; with fewer, no row counts as wild
+_MOST_WILD = 50  # one row in this number may be wild on a side
 
 
 def places_of(scan: Floats, pose: Floats, kind: str) -> Floats:
-    """Return the (num, 2) places in m of a scan by a sensor at a pose; none of a kind that measures no places.
+    """Return the (num, 2) places in m of a scan by a sensor at a pose; none if the kind measures no places.
 
     Slant ranges without a height count as ranges in the plane.
     """
@@ -44,29 +44,29 @@ def box_of(places: Floats, share: float = MARGIN) -> Floats:
 
 
 def is_within(places: Floats, box: Floats) -> Bools:
-    """(num,) whether places lie in a box."""
+    """Return True for each place in a box, (num,)."""
     found: Bools = ((places >= box[0]) & (places <= box[1])).all(axis=1)
     return found
 
 
 def beyond_reach(places: Floats, own: Floats, reaches: ArrayLike) -> Bools:
-    """(num,) whether places are farther than 5 % beyond the reach, m, of the sensors at `own` (num, 2) or (2,)."""
+    """Return True for each place more than 5 % beyond the reach, m, of the sensors at `own`, (num, 2) or (2,)."""
     return np.asarray(np.hypot(*(places - own).T) > (1.0 + MARGIN) * np.asarray(reaches))
 
 
 def wild(times: Floats, places: Floats, own: Floats, reaches: Floats) -> Bools:
-    """Return (num,) whether each of the rows of a recording lies beyond its sensor's reach or far beyond all others.
+    """Return True for each row of a recording beyond its sensor's reach or far beyond all others, (num,).
 
     On each side of the median an extent ends at the outermost value whose distance is at most 1 / 0.9 times that of two
-    others. At most one row in 50, and one at least, is left out of it on a side, and rows within 5 % of its longer side
-    belong to it, too. One more row so moves a side of the extent by at most a ninth of its distance from the median.
-    Nothing is far beyond the others where there are fewer than 20 rows or 10 times.
+    others. At most one row in 50, and at least one, is left out of it on a side, and rows within 5 % of its longer side
+    belong to it, too. One more row therefore moves a side of the extent by at most a ninth of its distance from the
+    median. No row is far beyond the others if there are fewer than 20 rows or 10 times.
 
     Args:
         times: (num,) s.
-        places: (num, 2) m, what was measured.
-        own: (num, 2) m, of the sensors then.
-        reaches: (num,) m, inf where it is not known.
+        places: (num, 2) m, of the measurements.
+        own: (num, 2) m, of the sensors at these times.
+        reaches: (num,) m, inf if unknown.
     """
     beyond = beyond_reach(places, own, reaches)
     near = ~beyond
@@ -77,12 +77,12 @@ def wild(times: Floats, places: Floats, own: Floats, reaches: Floats) -> Bools:
 
 
 def _extent(places: Floats) -> Floats:
-    """(2, 2) lower left and upper right corners of places without those far beyond all others."""
+    """Return lower left and upper right corners of places without those far beyond all others, (2, 2)."""
     return np.array([_ends(places[:, 0]), _ends(places[:, 1])]).T
 
 
 def _ends(values: Floats) -> Sequence[float]:
-    """Lower and upper end of values."""
+    """Return lower and upper end of values."""
     middle, most, ends = float(np.median(values)), max(len(values) // _MOST_WILD, 1), list[float]()
     for side in (-1.0, 1.0):
         distances = np.sort(side * (values - middle))[::-1]

@@ -14,22 +14,22 @@ from vedette.kernels.base.types import Bools, Floats
 from vedette.models.arguments import float_array, real, reject
 from vedette.platforms.compass import wrapped
 
-PLANE_REACH = 1e6  # m along each axis; sensors and zones beyond are in no plane with the origin, but were mistyped
+PLANE_REACH = 1e6  # m along each axis; sensors and zones beyond are probably mistyped
 _LONGEST, _HIGHEST = 360.0, 90.0  # deg
-_NEAR_ENOUGH = 1e-7  # m above the ellipsoid, of a point that is to lie on it; it is known to some 1e-8
+_NEAR_ENOUGH = 1e-7  # m, largest height of a point on the ellipsoid; heights are accurate to about 1e-8 m
 _MOST_STEPS = 60
 _RADIUS, _SQUASH = 6378137.0, (2.0 - 1.0 / 298.257223563) / 298.257223563  # m, and the square of the eccentricity
 
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """Where on the Earth (0, 0) is: x goes to the east, y to the north in the plane that touches it there.
+    """The place (0, 0) on the Earth: x is to the east, y to the north in the tangent plane there.
 
     The projection is orthographic: a point of the ellipsoid is moved along the vertical of the origin. Distances from
-    the origin come out short by about d^3 / (6 R^2): 4 mm at 10 km, 4 m at 100 km. Away from the origin true north is
+    the origin are too short by about d^3 / (6 R^2): 4 mm at 10 km, 4 m at 100 km. Away from the origin true north is
     not along y: the meridians converge, by the difference of longitude times the sine of the latitude. It is a
-    `vedette.platforms.Compass`, which turns azimuths at any place into angles of the plane and back. What remains of an
-    azimuth between two points is at most about .005 degrees at 100 km from the origin.
+    `vedette.platforms.Compass`, which converts azimuths at any place to angles of the plane and back. The remaining
+    error of an azimuth between two points is at most about .005 degrees at 100 km from the origin.
 
     Attributes:
         longitude_deg: degrees to the east.
@@ -49,15 +49,15 @@ class Origin:
                 raise reject(f"origin.{name}", f"degrees from {-most:g} to {most:g}", value)
 
     def to_plane(self, longitude_deg: ArrayLike, latitude_deg: ArrayLike) -> Floats:
-        """(n, 2) metres east and north of the origin: points of the ellipsoid, projected on its tangent plane.
+        """Return metres east and north of the origin, (n, 2): points of the ellipsoid, projected on its tangent plane.
 
         Args:
             longitude_deg, latitude_deg: (n,) degrees east and north.
 
         Raises:
-            InputError: a point on the other side of the globe, which would fall on the place of one on this side.
+            InputError: a point on the other side of the globe, which would coincide with one on this side.
         """
-        from pymap3d import geodetic2enu  # here, as most programs need none
+        from pymap3d import geodetic2enu  # imported here, as most programs do not need it
 
         longitudes = float_array("longitude_deg", longitude_deg, (None,))
         latitudes = float_array("latitude_deg", latitude_deg, (len(longitudes),))
@@ -72,12 +72,12 @@ class Origin:
         return np.stack([east, north], axis=-1)
 
     def beyond(self, longitude_deg: Floats, latitude_deg: Floats) -> Bools:
-        """(n,) which points are on the other side of the globe."""
+        """Return True for each point on the other side of the globe, (n,)."""
         ups = _cosines(longitude_deg, latitude_deg) @ _cosines(self.longitude_deg, self.latitude_deg)
         return np.asarray(ups <= 0.0)
 
     def nearby(self, longitude_deg: float, latitude_deg: float) -> tuple[float, float] | None:
-        """As `to_plane`, of a place in degrees; None of one that is beyond `PLANE_REACH`."""
+        """Return the place in the plane, m, of a place in degrees; None if it is beyond `PLANE_REACH`."""
         try:
             x, y = self.to_plane([longitude_deg], [latitude_deg])[0].tolist()
         except InputError:  # on the other side of the globe
@@ -85,12 +85,12 @@ class Origin:
         return (x, y) if max(abs(x), abs(y)) <= PLANE_REACH else None
 
     def to_degrees(self, positions: ArrayLike) -> Floats:
-        """(n, 2) longitudes and latitudes in degrees of points of the plane, (n, 2) m east and north of the origin.
+        """Return longitudes and latitudes in degrees, (n, 2), of points of the plane, (n, 2) m.
 
-        The inverse of `to_plane`: of each point the one of the ellipsoid below it.
+        The inverse of `to_plane`: for each point, the point of the ellipsoid below it.
 
         Raises:
-            InputError: a point of the plane that no point of this side of the globe lies below.
+            InputError: a point of the plane with no point of this side of the globe below it.
         """
         from pymap3d import enu2geodetic
 
@@ -100,28 +100,28 @@ class Origin:
             latitude, longitude, above = enu2geodetic(*plane.T, up, self.latitude_deg, self.longitude_deg, 0.0)
             if (np.abs(above) <= _NEAR_ENOUGH).all():
                 return np.stack([longitude, latitude], axis=-1)
-            # The height above the ellipsoid grows with that above the plane by the cosine of the angle between them.
+            # Height above the ellipsoid grows with height above the plane by the cosine of the angle between them.
             slopes = _cosines(longitude, latitude) @ _cosines(self.longitude_deg, self.latitude_deg)
             up = up - above / np.maximum(slopes, 0.1)
         index = int(np.argmax(np.abs(above)))
         raise reject("positions", "points above the origin's side of the globe", plane[index].tolist())
 
     def angle(self, azimuth: ArrayLike, place: ArrayLike) -> Floats:
-        """Angles of the plane, rad in [-pi, pi], of azimuths, rad clockwise from true north at `place`, (2,) m."""
+        """Return angles of the plane, rad in [-pi, pi], of azimuths, clockwise from true north at `place`, (2,) m."""
         given = np.asarray(azimuth, np.float64)
         (east_x, north_x), (east_y, north_y) = self._axes_at(place)
         sines, cosines = np.sin(given), np.cos(given)
         return wrapped(np.arctan2(east_y * sines + north_y * cosines, east_x * sines + north_x * cosines))
 
     def azimuth(self, angle: ArrayLike, place: ArrayLike) -> Floats:
-        """Azimuths, rad in [-pi, pi] clockwise from true north at `place`, of angles of the plane."""
+        """Return azimuths, rad in [-pi, pi] clockwise from true north at `place`, (2,) m, of angles of the plane."""
         given = np.asarray(angle, np.float64)
         (east_x, north_x), (east_y, north_y) = self._axes_at(place)
         sines, cosines = np.sin(given), np.cos(given)
         return wrapped(np.arctan2(north_y * cosines - north_x * sines, east_x * sines - east_y * cosines))
 
     def axes(self, longitude_deg: ArrayLike, latitude_deg: ArrayLike) -> Floats:
-        """(n, 2, 2) what true east (first column) and true north at places, (n,) degrees, are in the plane."""
+        """Return true east (first column) and true north at places in degrees, (n,), in the plane, (n, 2, 2)."""
         longitude, latitude = np.radians(longitude_deg), np.radians(latitude_deg)
         origin = math.radians(self.latitude_deg)
         off = longitude - math.radians(self.longitude_deg)
@@ -139,9 +139,10 @@ class Origin:
 
 @lru_cache(maxsize=4096)
 def _axes_at(origin: Origin, x: float, y: float) -> tuple[tuple[float, float], tuple[float, float]]:
-    """What `Origin.axes` says of one place of the plane, in closed form, as planners ask of very many places.
+    """Return `Origin.axes` at one place of the plane, in closed form, as planners need very many places.
 
-    The ellipsoid is met on the vertical of the origin, through the place, at the smaller root of a quadratic equation.
+    The point of the ellipsoid is the intersection with the vertical of the origin through the place, at the smaller
+    root of a quadratic equation.
     """
     sine, cosine = math.sin(math.radians(origin.latitude_deg)), math.cos(math.radians(origin.latitude_deg))
     across = _RADIUS / math.sqrt(1.0 - _SQUASH * sine**2)
@@ -160,7 +161,7 @@ def _axes_at(origin: Origin, x: float, y: float) -> tuple[tuple[float, float], t
 
 
 def _cosines(longitude_deg: ArrayLike, latitude_deg: ArrayLike) -> Floats:
-    """(..., 3) direction cosines of what is up at a place."""
+    """Return direction cosines of the vertical at a place, (..., 3)."""
     longitude, latitude = np.radians(longitude_deg), np.radians(latitude_deg)
     return np.stack(
         [np.cos(latitude) * np.cos(longitude), np.cos(latitude) * np.sin(longitude), np.sin(latitude)], axis=-1

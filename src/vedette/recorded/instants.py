@@ -1,4 +1,4 @@
-"""Recorded scans in order of time, and what becomes of them without the biases of the sensors."""
+"""Recorded scans in order of time, and their correction for the biases of the sensors."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _Change = Callable[[Floats], Floats]
 
 
 def turned(angles: ArrayLike, bearings: Bearings | None, compass: Compass, place: ArrayLike) -> Floats:
-    """Return angles of the plane, rad in [-pi, pi], of angles that a sensor at `place` counts as `bearings` says."""
+    """Return angles of the plane, rad in [-pi, pi], from angles of a sensor at `place` in the convention `bearings`."""
     return compass.angle(angles, place) if bearings == "north" else wrapped(angles)
 
 
@@ -45,15 +45,14 @@ class Site:
     """A sensor of a recording.
 
     Attributes:
-        name: as the rows name it; its number, from 1, will do too.
+        name: in the rows; its number, from 1, is accepted, too.
         kind: of its measurements, a key of `vedette.internal.quantities.COMPONENTS`.
-        pose: [px, py, heading_rad, ...] where the rows do not say.
-        bias: what the rows say too much, which is taken off as they are read; ranges that would be below 1 m without it
-            are taken as 1 m.
-        compass: whether it tells bearings in degrees clockwise from true north, where the rows say nothing else.
-        reach: m, beyond which it measures nothing; inf: not known.
-        north: where true north is; an `Origin` knows it at every place, without one it is along y.
-        turn: how its beam turns, where its scans are turns; "found": as its rows show, if they do; "none": it does not.
+        pose: [px, py, heading_rad, ...] if the rows have none.
+        bias: of its rows, removed on reading; corrected ranges below 1 m become 1 m.
+        compass: True if its bearings are degrees clockwise from true north, unless the rows give another convention.
+        reach: m, beyond which it measures nothing; inf: unknown.
+        north: direction of true north; an `Origin` gives it at every place, the default is along y.
+        turn: how its beam turns, if its scans are turns; "found": from its rows, if they show one; "none": no turn.
     """
 
     name: str
@@ -66,7 +65,7 @@ class Site:
     turn: Turning = "found"
 
     def measured(self, told: ArrayLike, pose: ArrayLike | None = None) -> Floats:
-        """Return (num, meas_dim) measurements for filters, bias included, from those that the sensor gives.
+        """Return (num, meas_dim) measurements for filters, bias included, from the sensor's own measurements.
 
         pose: of the sensor then; None: the site's own.
 
@@ -85,7 +84,7 @@ class Site:
         return np.asarray(self.pose if pose is None else pose, np.float64)[:2]
 
     def _with_angles(self, measurements: Floats, bearing: _Change, other: _Change) -> Floats:
-        """Return the measurements with bearings and other angles changed, of a sensor with a compass."""
+        """Return the measurements with bearings and other angles converted, if the sensor has a compass."""
         found, names = measurements.copy(), COMPONENTS[self.kind]
         for place in angles(names) if self.compass else ():
             found[:, place] = (bearing if names[place] == "bearing" else other)(found[:, place])
@@ -98,17 +97,17 @@ class RecordedScans(SummaryRepr):
 
     Attributes:
         times: (num_instants,) s after the first, increasing.
-        start: s; the recorded time of the first: since 1970 UTC where times were dates.
-        is_utc: whether they were.
-        scans: for each instant one a sensor: (num, meas_dim) measurements as filters take them; None: it did not scan.
-        poses: (num_instants, num_sensors, 3 or more), each sensor where it was when it scanned last, or will be when it
-            first does.
-        skipped: what was wrong with the rows that were left out.
-        bearings: for each sensor, from where its rows counted bearings, whose direction a bearing's bias has; None: it
+        start: s; the recorded time of the first: since 1970 UTC if times were dates.
+        is_utc: True if times were dates.
+        scans: for each instant one per sensor: (num, meas_dim) measurements as filters take them; None: it did not
+            scan.
+        poses: (num_instants, num_sensors, 3 or more), each sensor at its last scan, or before it at its first one.
+        skipped: faults of the rows that were left out.
+        bearings: for each sensor, the convention of bearings in its rows, in which a bearing's bias counts; None: it
             has none.
         unused: columns that were not read.
-        notes: what may mislead: slant ranges; of a sensor whose measurements were merged, how many and how wide.
-        file: that the rows came from.
+        notes: warnings: slant ranges; for a sensor whose measurements were merged, their number and spread.
+        file: of the rows.
         gathered: for each sensor, the median time between the first and the last row of a gathered scan, s; () if none
             were gathered.
     """
@@ -133,7 +132,7 @@ class RecordedScans(SummaryRepr):
         )
 
     def between(self, begin: float, end: float) -> RecordedScans:
-        """The instants from `begin` to before `end`, s of `times`; they start anew where there are any."""
+        """Return the instants from `begin` to before `end`, s of `times`; their times start at 0."""
         low, high = np.searchsorted(self.times, [begin, end]).tolist()
         first = float(self.times[low]) if low < high else 0.0
         parts = (
@@ -146,7 +145,7 @@ class RecordedScans(SummaryRepr):
         return RecordedScans(*parts, self.skipped, self.bearings)
 
     def arrivals(self) -> Iterator[SensorScan]:
-        """Every scan by itself, in order of time, as `LateScans` takes them; times as of `times`."""
+        """Yield every scan separately, in order of time, as `LateScans` takes them; times as in `times`."""
         for time, scans, poses in zip(self.times.tolist(), self.scans, self.poses, strict=True):
             for s, scan in enumerate(scans):
                 if scan is not None:
@@ -154,12 +153,12 @@ class RecordedScans(SummaryRepr):
 
     @property
     def num_measurements(self) -> int:
-        """Of all scans."""
+        """Number of measurements of all scans."""
         return sum(len(scan) for scans in self.scans for scan in scans if scan is not None)
 
 
 class Look(NamedTuple):
-    """A scan of one sensor: when, which, (num, meas_dim) what it measured and (3 or more,) from where."""
+    """A scan of one sensor: time, sensor, (num, meas_dim) measurements and (3 or more,) pose."""
 
     time: float
     sensor: int
@@ -175,19 +174,19 @@ def in_order(
     skipped: tuple[str, ...],
     bearings: tuple[Bearings | None, ...],
 ) -> RecordedScans:
-    """The scans of a recording, those of one time as an instant.
+    """Return the scans of a recording, those with equal times as one instant.
 
     Args:
         looks: in any order, at most one of a sensor at a time.
         poses: (num_sensors, 3 or more) the sensors that never scan.
         start: of the times of the looks, see `RecordedScans`.
-        is_utc, skipped, bearings: as of `RecordedScans`.
+        is_utc, skipped, bearings: see `RecordedScans`.
     """
     instants: dict[float, dict[int, Look]] = {}
     for look in looks:
         instants.setdefault(look.time, {})[look.sensor] = look
     times, at = np.array(sorted(instants)), poses.copy()
-    for time in reversed(times.tolist()):  # before its first scan a sensor was where it then is
+    for time in reversed(times.tolist()):  # before its first scan, a sensor has the pose of that scan
         for s, look in instants[time].items():
             at[s, : len(look.pose)] = look.pose
     found, places = [], np.empty((len(times), *poses.shape))
@@ -200,7 +199,7 @@ def in_order(
 
 
 def without_biases(recording: RecordedScans, sites: Sequence[Site]) -> RecordedScans:
-    """The recording as its sensors would have made it without their biases."""
+    """Return the recording as its sensors would have made it without their biases."""
     looks = []
     for time, scans, poses in zip(recording.times.tolist(), recording.scans, recording.poses, strict=True):
         for s, scan in enumerate(scans):
@@ -212,7 +211,7 @@ def without_biases(recording: RecordedScans, sites: Sequence[Site]) -> RecordedS
 
 
 def bias_of(site: Site, bearings: Bearings | None) -> tuple[Floats, Floats]:
-    """Return what the bias of a sensor adds to measurements, (meas_dim,) in rad and m, and to its place, (2,) in m."""
+    """Return a sensor's bias of measurements, (meas_dim,) in rad and m, and of its place, (2,) in m."""
     bias, is_place = site.bias, is_position(site.kind)
     measured = np.array([getattr(bias, component) for component in COMPONENTS[site.kind]])
     if bearings == "north" and "bearing" in COMPONENTS[site.kind]:
@@ -221,7 +220,7 @@ def bias_of(site: Site, bearings: Bearings | None) -> tuple[Floats, Floats]:
 
 
 def without_bias(look: Look, site: Site, bearings: Bearings | None) -> Look:
-    """A scan as its sensor would have made it without its bias."""
+    """Return a scan as its sensor would have made it without its bias."""
     if site.bias == NO_BIAS:
         return look
     measured, place = bias_of(site, bearings)

@@ -1,4 +1,4 @@
-"""Several measurements of one target in a scan: filters take targets for points, so clusters become one measurement."""
+"""Merging of several measurements of one target in a scan, as filters assume points with one measurement each."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.recorded.instants import RecordedScans, Site, with_wrapped_angles
 
 _CLOSE = 3.0  # noise standard deviations between two measurements of one target
-_FEWEST = 10  # scans that tell something
+_FEWEST = 10  # fewest scans for a result
 
 
 def merged(
@@ -23,10 +23,10 @@ def merged(
     """Return the recording with the measurements of each cluster of a scan replaced by their mean.
 
     Args:
-        recording: to whose `notes` is added for each sensor how many clusters there were and how wide they are.
+        recording: the result has notes with the numbers of measurements and their spread, for each sensor.
         sites: the sensors.
         stds: for each sensor the standard deviation of each component, rad and m; None: unknown.
-        distance: between two measurements of one cluster at most, in standard deviations; clusters are chains of these.
+        distance: largest between two measurements of one cluster, in standard deviations; clusters are chains of them.
 
     Raises:
         InputError: a sensor whose standard deviations are unknown.
@@ -52,7 +52,7 @@ def merged(
 
 
 def _told(site: Site, before: int, after: int, offsets: Floats) -> str:
-    """How many measurements became how many, and the root mean square of their offsets from their means."""
+    """Describe the numbers before and after merging, and the root mean square of the offsets from the means."""
     units = [(QUANTITIES[name].per_si, QUANTITIES[name].unit) for name in COMPONENTS[site.kind]]
     spread = np.sqrt((offsets**2).mean(axis=0)) if len(offsets) else np.zeros(len(units))
     parts = [
@@ -64,7 +64,7 @@ def _told(site: Site, before: int, after: int, offsets: Floats) -> str:
 
 
 def _means(scan: Floats, kind: str, stds: Floats, distance: float) -> tuple[Floats, Floats]:
-    """The mean of each cluster of a scan, and the offsets from it of the measurements of clusters of several."""
+    """Return the mean of each cluster of a scan, and offsets from it in clusters of several measurements."""
     clusters, means, offsets = _clusters(scan, kind, stds, distance), list[Floats](), [np.empty((0, scan.shape[1]))]
     for cluster in range(int(clusters.max(initial=-1)) + 1):
         own = scan[clusters == cluster]
@@ -76,7 +76,7 @@ def _means(scan: Floats, kind: str, stds: Floats, distance: float) -> tuple[Floa
 
 
 def _clusters(scan: Floats, kind: str, stds: Floats, distance: float) -> Ints:
-    """(num,) number of the cluster of each measurement."""
+    """Return the index of the cluster of each measurement, (num,)."""
     from scipy.sparse.csgraph import connected_components
 
     if not len(scan):
@@ -85,7 +85,7 @@ def _clusters(scan: Floats, kind: str, stds: Floats, distance: float) -> Ints:
 
 
 def _close(scan: Floats, kind: str, stds: Floats, distance: float) -> Bools:
-    """(num, num) whether two measurements lie within a number of standard deviations."""
+    """Return True for each pair of measurements within a number of standard deviations, (num, num)."""
     gaps = with_wrapped_angles(scan[:, None] - scan[None], kind) / stds
     return np.asarray((gaps**2).sum(axis=2) <= distance**2)
 

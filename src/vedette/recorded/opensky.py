@@ -1,4 +1,4 @@
-"""Tables of state vectors of the OpenSky Network: what aircraft report of themselves by ADS-B."""
+"""Tables of state vectors of the OpenSky Network: ADS-B reports of aircraft."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ _NOTHING = ("null", "none", "nan", r"\n")
 
 
 def is_opensky(columns: Iterable[str]) -> bool:
-    """Whether these are the columns of state vectors."""
+    """Return True if these are the columns of state vectors."""
     return {"time", *_POSITION} <= set(columns)
 
 
 def of_opensky(table: Table) -> tuple[Table, dict[str, str]]:
-    """State vectors as reports of aircraft, and which of the columns are what `parse_reports` asks for.
+    """Return state vectors as reports of aircraft, and the names of their columns for `parse_reports`.
 
-    State vectors say every second what was last heard: rows without a position, and those that repeat one, are left
-    out (the former are counted in `notes`), and the time is that of the position (`lastposupdate`) where every row has
-    one. Velocities are `velocity` (m/s over ground) along `heading` (degrees clockwise from the north) where every row
-    has both.
+    State vectors repeat the last report every second: rows without a position, and repeated ones, are left out (the
+    former are counted in `notes`), and the time is that of the position (`lastposupdate`) if every row has one.
+    Velocities are `velocity` (m/s over ground) along `heading` (degrees clockwise from the north) if every row has
+    both.
 
     Raises:
-        InputError: names the file, row, column, what was expected and what came.
+        InputError: names the file, row, column, and the expected and given values.
     """
     kept = [i for i in range(len(table.rows)) if all(_is_there(table, name, i) for name in _POSITION)]
     without = len(table.rows) - len(kept)

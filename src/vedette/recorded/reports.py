@@ -16,7 +16,7 @@ from vedette.recorded.opensky import is_opensky, of_opensky
 from vedette.recorded.tables import FARTHEST, Table
 
 _USED = ("time", "id", "x", "y", "longitude", "latitude", "vx", "vy")
-_SAME_TIME = 1e-6  # s; two reports of one target nearer in time than this are one
+_SAME_TIME = 1e-6  # s; two reports of one target nearer in time than this count as one
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,16 +24,16 @@ class Reports:
     """Positions of targets, sorted by target and time.
 
     Attributes:
-        times: (n,) s; of ISO 8601 times, seconds since 1970 UTC.
+        times: (n,) s; for ISO 8601 times, seconds since 1970 UTC.
         tracks: (n,) index into `names`.
         positions: (n, 2) m.
-        velocities: (n, 2) m/s along x and y of the plane, or None where the record has none.
-        names: the record's own name of each target.
-        origin_deg: longitude and latitude of (0, 0) where the record was geographic, else None.
-        bounds_deg: its least and greatest longitude and latitude where it was geographic, else None.
-        repeats: rows of the table, (kept, left out), where a target has a second report at one time: the first is kept.
+        velocities: (n, 2) m/s along x and y of the plane, or None if the record has none.
+        names: of each target in the record.
+        origin_deg: longitude and latitude of (0, 0) if the record was geographic, else None.
+        bounds_deg: its smallest and largest longitude and latitude if it was geographic, else None.
+        repeats: rows of the table (retained, left out) of second reports of a target at one time.
         unused: columns of the table that were not read.
-        notes: of the table, what may mislead.
+        notes: warnings of the table.
         sha256: of the table.
     """
 
@@ -57,19 +57,19 @@ def parse_reports(
     origin_deg: tuple[float, float] | None = None,
     usual_origin_deg: tuple[float, float] | None = None,
 ) -> Reports:
-    """Reports out of a table with columns time, id and x, y or longitude, latitude; vx, vy where there are any.
+    """Return reports from a table with columns time, id and x, y or longitude, latitude; vx, vy if there are any.
 
-    Of a geographic record `vx` and `vy` are to true east and north at the place of each report.
+    In a geographic record `vx` and `vy` are to true east and north at the place of each report.
 
     Args:
-        table: see `read_table`; state vectors of OpenSky are known by their columns where `columns` names none.
-        columns: names in the table where they differ: {"time": "Time", "id": "MMSI", ...}. Naming a longitude and
-            latitude makes the record geographic; otherwise x, y are used if they are there.
-        origin_deg: longitude and latitude of (0, 0) for a geographic record; for another it is an error.
-        usual_origin_deg: the same where that is None, and of no matter for another; None: the median of the reports.
+        table: see `read_table`; state vectors of OpenSky are recognised by their columns if `columns` names none.
+        columns: names in the table if they differ: {"time": "Time", "id": "MMSI", ...}. Naming a longitude and latitude
+            makes the record geographic; otherwise x, y are used if they are there.
+        origin_deg: longitude and latitude of (0, 0) for a geographic record; an error for any other.
+        usual_origin_deg: used if `origin_deg` is None, and ignored for other records; None: the median of the reports.
 
     Raises:
-        InputError: names the file, row, column, what was expected and what came.
+        InputError: names the file, row, column, and the expected and given values.
     """
     given = dict(columns or {})
     if is_known := not given and is_opensky(table.columns):
@@ -85,7 +85,7 @@ def parse_reports(
     has_velocity = any(name in given for name in ("vx", "vy")) or all(name in table.columns for name in speed_columns)
     velocities = _velocities(table, given, speed_columns, origin) if has_velocity else None
     names, tracks = np.unique(labels, return_inverse=True)
-    order = np.lexsort((times, tracks))  # of equal ones, the order of the file
+    order = np.lexsort((times, tracks))  # equal ones stay in the order of the file
     again = (np.diff(times[order], prepend=-np.inf) < _SAME_TIME) & (np.diff(tracks[order], prepend=-1) == 0)
     repeats = tuple((table.rows[order[i - 1]], table.rows[order[i]]) for i in np.flatnonzero(again))
     order = order[~again]
@@ -109,7 +109,7 @@ def parse_reports(
 
 
 def usual_names(columns: Iterable[str]) -> dict[str, str]:
-    """Columns under other names that they often have; places in degrees only where there are none in metres."""
+    """Return columns under other usual names; places in degrees only if there are none in metres."""
     have = set(columns)
     wanted = ("time", "id") if {"x", "y"} <= have else ("time", "id", "longitude", "latitude")
     found = {}
@@ -121,14 +121,14 @@ def usual_names(columns: Iterable[str]) -> dict[str, str]:
 
 
 def _pair(table: Table, names: Sequence[str]) -> Floats:
-    """(n, 2) of two columns, in m or m/s."""
+    """Return two columns, in m or m/s, (n, 2)."""
     return np.stack([table.numbers(name, FARTHEST) for name in names], axis=1)
 
 
 def _velocities(
     table: Table, given: Mapping[str, str], names: Sequence[str], origin: tuple[float, float] | None
 ) -> Floats:
-    """(n, 2) along x and y of the plane, m/s."""
+    """Return velocities along x and y of the plane, (n, 2) m/s."""
     found = _pair(table, names)
     if origin is None:
         return found
@@ -137,7 +137,7 @@ def _velocities(
 
 
 def _degrees(table: Table, given: Mapping[str, str]) -> list[Floats]:
-    """Longitudes and latitudes."""
+    """Return longitudes and latitudes."""
     degrees = []
     for name, limit in (("longitude", 360.0), ("latitude", 90.0)):
         column = given.get(name, name)
@@ -149,7 +149,7 @@ def _degrees(table: Table, given: Mapping[str, str]) -> list[Floats]:
 
 
 def _to_plane(table: Table, given: Mapping[str, str], origin: Origin, degrees: list[Floats]) -> Floats:
-    """(num_rows, 2) places in m."""
+    """Return places in the plane, (num_rows, 2) m."""
     if (beyond := origin.beyond(*degrees)).any():
         at = f"({origin.longitude_deg:g}, {origin.latitude_deg:g}) degrees"
         wanted = f"a place on the same side of the globe as the origin, {at}"
@@ -158,14 +158,14 @@ def _to_plane(table: Table, given: Mapping[str, str], origin: Origin, degrees: l
 
 
 def _median_longitude(longitudes: Floats) -> float:
-    """The median, also of longitudes on both sides of 180 degrees; from -180 to 180."""
+    """Return the median of longitudes, also on both sides of 180 degrees; from -180 to 180."""
     around = longitudes[0] + np.remainder(longitudes - longitudes[0] + 180.0, 360.0) - 180.0
     middle = float(np.median(around))
     return middle if abs(middle) <= 180.0 else middle - math.copysign(360.0, middle)
 
 
 def _check_agreed(table: Table, found: Floats, origin: Origin) -> None:
-    """That places in metres are those of the longitudes and latitudes beside them."""
+    """Check that places in metres agree with the longitudes and latitudes of the same rows."""
     told = _to_plane(table, {}, origin, _degrees(table, {})) if len(found) else found
     apart = np.hypot(*(found - told).T)
     if (wrong := apart > ONE_PLACE + ONE_PLACE_SHARE * np.hypot(*told.T)).any():
@@ -181,7 +181,7 @@ def _positions(
     origin_deg: tuple[float, float] | None,
     usual_origin_deg: tuple[float, float] | None,
 ) -> tuple[Floats, tuple[float, float] | None, tuple[tuple[float, float], tuple[float, float]] | None]:
-    """Places in m, where the origin is, and between which degrees they were."""
+    """Return places in m, the origin, and the bounds in degrees."""
     named_geographic = "longitude" in given or "latitude" in given
     if named_geographic and ("x" in given or "y" in given):
         raise InputError("columns: expected either x and y, or longitude and latitude; got both")

@@ -1,4 +1,4 @@
-"""Recorded scans of sensors: rows of measurements, in the units and conventions of whoever wrote them."""
+"""Recorded scans of sensors: rows of measurements, in any units and conventions."""
 
 from __future__ import annotations
 
@@ -42,19 +42,19 @@ from vedette.simulation.records import ScansFile
 def parse_scans(
     table: Table, sites: Sequence[Site], conventions: Conventions, origin: Origin | None = None
 ) -> RecordedScans:
-    """Scans out of rows of one measurement each: time, sensor, and what was measured.
+    """Return scans from rows of one measurement each: time, sensor, and the measured quantities.
 
-    A row whose measured cells are all empty says that the sensor scanned and found nothing. So does one that lies
-    beyond the sensor's reach or far beyond all others (see `vedette.recorded.extents.wild`); it is named in `skipped`.
+    A row whose measured cells are all empty is a scan without measurements. So is one that lies beyond the sensor's
+    reach or far beyond all others (see `vedette.recorded.extents.wild`); it is listed in `skipped`.
 
     Args:
         table: see `vedette.recorded.tables.read_table`.
         sites: the sensors, in the order of the tracker's.
-        conventions: how rows are read.
+        conventions: of the rows.
         origin: of longitudes and latitudes.
 
     Raises:
-        InputError: names the file, row, column, what was expected and what came.
+        InputError: names the file, row, column, and the expected and given values.
     """
     rows = _Rows(table, sites, conventions, origin)
     found, skipped = rows.read()
@@ -82,7 +82,7 @@ class _Rows(ScanColumns):
     """The rows of a table as scans."""
 
     def read(self) -> tuple[list[_Row], tuple[str, ...]]:
-        """The rows that can be read, and what is wrong with the others."""
+        """Return the rows that can be read, and the faults of the others."""
         found, skipped = list[_Row](), list[str]()
         for i in range(len(self.table.rows)):
             try:
@@ -99,7 +99,7 @@ class _Rows(ScanColumns):
         return _Row(i, time, s, self._measured(i, s, pose), pose)
 
     def _site(self, i: int) -> int:
-        """The sensor of a row; where there is one and no column of sensors, that one."""
+        """Return the sensor of a row; without a column of sensors, the only one."""
         if self._sensor is None:
             return 0
         label = str(self.table.columns[self._sensor][i]).strip()
@@ -109,7 +109,7 @@ class _Rows(ScanColumns):
         return self._numbers[label]
 
     def _seconds(self, i: int) -> float:
-        """The time of a row, all as dates or all as numbers."""
+        """Return the time of a row, all as dates or all as numbers."""
         cell = self.table.columns[self._time][i]
         try:
             time = seconds(cell)
@@ -142,11 +142,11 @@ class _Rows(ScanColumns):
         return value
 
     def _angle(self, i: int, quantity: str, s: int, place: Sequence[float]) -> float:
-        """A bearing or heading of a sensor at a place, as an angle of the plane."""
+        """Return a bearing or heading of a sensor at a place, as an angle of the plane."""
         return float(turned(self._value(i, quantity), self.bearings[s], self.compass, place))
 
     def _measured(self, i: int, s: int, pose: Sequence[float]) -> tuple[float, ...] | None:
-        """As filters take it; None of a scan that found nothing."""
+        """Return the measurement as filters take it; None for a scan without measurements."""
         site = self.sites[s]
         quantities: tuple[str, ...] = COMPONENTS[site.kind]
         if is_position(site.kind) and "lon" in self._columns:
@@ -163,7 +163,7 @@ class _Rows(ScanColumns):
         )
 
     def _pose(self, i: int, s: int) -> tuple[float, ...]:
-        """Where the sensor was, as far as the row says."""
+        """Return the pose of the sensor; the site gives what is not in the row."""
         site = self.sites[s]
         place: tuple[float, ...] = site.pose[:2]
         if {"own_lon", "own_lat"} <= set(self._columns):
@@ -182,7 +182,7 @@ class _Rows(ScanColumns):
         return (*place, heading, *rest)
 
     def _agreed(self, i: int, place: tuple[float, ...], x: str, y: str) -> tuple[float, ...]:
-        """A place in degrees, with which one in metres has to agree where the row has that, too."""
+        """Return a place given in degrees; raises if the row has one in metres, too, that does not agree."""
         if not {x, y} <= set(self._columns) or any(
             is_empty(self.table.columns[self._columns[name][0]][i]) for name in (x, y)
         ):
@@ -196,7 +196,7 @@ class _Rows(ScanColumns):
         return place
 
     def _plane(self, i: int, lon: str, lat: str) -> tuple[float, ...]:
-        assert self.origin is not None  # as was checked
+        assert self.origin is not None  # checked before
         degrees = self._value(i, lon), self._value(i, lat)
         if (place := self.origin.nearby(*degrees)) is None:
             wanted = f"with latitude {degrees[1]:g} a longitude within {PLANE_REACH / 1000.0:g} km of the origin"
@@ -205,7 +205,7 @@ class _Rows(ScanColumns):
 
 
 def _without_wild(rows: list[_Row], table: Table, sites: Sequence[Site]) -> tuple[list[_Row], tuple[str, ...]]:
-    """The rows, wild ones without what was measured and before the others, and what is wrong with these."""
+    """Return the rows, wild ones first and without measurements, and the faults of the wild ones."""
     placed = [i for i, row in enumerate(rows) if row.measured is not None and sites[row.sensor].kind in PLACED]
     if not placed:
         return rows, ()
@@ -229,7 +229,7 @@ def _without_wild(rows: list[_Row], table: Table, sites: Sequence[Site]) -> tupl
 
 
 def _at_instants(rows: list[_Row], how: _Rows, skipped: tuple[str, ...]) -> RecordedScans:
-    """Rows of one sensor and time as a scan, scans of one time as an instant."""
+    """Return rows with one sensor and time as scans, scans with one time as instants."""
     looks, sites, gather = [], how.sites, how.conventions.gather
     for s, site in enumerate(sites):
         own = sorted((row for row in rows if row.sensor == s), key=lambda row: row.time)

@@ -1,4 +1,4 @@
-"""Tables of records, whoever wrote them: files of several kinds and columns in memory, and what their cells say."""
+"""Tables of records: files of several formats and columns in memory, and the values of their cells."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from vedette.recorded.ais import AIS_ENDINGS, read_ais
 from vedette.recorded.asterix import ASTERIX_ENDINGS, CAPTURE_ENDINGS, read_asterix
 from vedette.recorded.bags import BAG_ENDINGS, read_bag
 
-# Beyond these, differences and speeds of reports mean nothing.
+# Beyond these values, differences and speeds of reports are meaningless.
 FARTHEST = 1e9  # m, m/s
 LATEST = 1e12  # s
 _SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars"}
-# Larger files would fill the memory before anything could be said of them.
+# Larger files would fill the memory before they could be checked.
 _MOST_BYTES = 500_000_000
 _MOST_REPORTS = 5_000_000
 _MOST_NAMES = 20
@@ -37,10 +37,10 @@ ENDINGS = (".csv", ".parquet", *AIS_ENDINGS, *ASTERIX_ENDINGS, *BAG_ENDINGS)
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Columns as they came, the row number of each entry in its file, and a name for messages.
+    """Unchanged columns, the row number of each entry in its file, and a name for messages.
 
-    bearings: from where the format counts them, "north" or "east"; None: it does not say. notes: what may mislead.
-    sha256: of the file, in hexadecimal digits; "" of columns in memory.
+    bearings: their zero in the format, "north" or "east"; None: not defined. notes: warnings. sha256: of the file, in
+    hexadecimal digits; "" for columns in memory.
     """
 
     columns: Mapping[str, Sequence[Any]]
@@ -51,19 +51,19 @@ class Table:
     sha256: str = ""
 
     def column(self, name: str) -> Sequence[Any]:
-        """The cells of a column, or an error that says which there are."""
+        """Return the cells of a column; raises `InputError` with the names of all columns if it is missing."""
         if name not in self.columns:
             have = column_names(self.columns) or "none"
             raise InputError(f"{self.source}: expected a column {shown(name)}; got columns {have}")
         return self.columns[name]
 
     def fault(self, index: int, name: str, expected: str) -> InputError:
-        """An error that names file, row and column of a cell."""
+        """Return an error that names file, row and column of a cell."""
         place = f"{self.source}, row {self.rows[index]}, column {shown(name)}"
         return InputError(f"{place}: expected {expected}; got {shown(self.columns[name][index])}")
 
     def numbers(self, name: str, largest: float) -> Floats:
-        """A column of numbers of at most that size."""
+        """Return a column of numbers of at most that size."""
         cells = self.column(name)
         values = np.empty(len(cells))
         for i, cell in enumerate(cells):
@@ -78,7 +78,7 @@ class Table:
         return values
 
     def times(self, name: str) -> Floats:
-        """A column of numbers of seconds, or of ISO 8601 times, whichever most of its cells are."""
+        """Return a column of times as seconds; its cells are numbers or ISO 8601 times, as most of them are."""
         cells = self.column(name)
         if not are_dates(cells):
             return self.numbers(name, LATEST)
@@ -93,7 +93,7 @@ class Table:
         return values
 
     def labels(self, name: str) -> list[str]:
-        """A column of names or numbers, none empty."""
+        """Return a column of names or numbers, none empty."""
         labels = ["" if cell is None else str(cell).strip() for cell in self.column(name)]
         if "" in labels:
             raise self.fault(labels.index(""), name, "a name or number")
@@ -101,7 +101,7 @@ class Table:
 
 
 def table_of(frame: Any, source: str = "table") -> Table:
-    """A table of columns in memory: a mapping, or a data frame of pandas or Polars; rows count from 1 in messages.
+    """Return a table of columns in memory: a mapping, or a data frame of pandas or Polars; messages count rows from 1.
 
     Raises `InputError` for something else, or columns of different lengths.
     """
@@ -116,15 +116,15 @@ def table_of(frame: Any, source: str = "table") -> Table:
 
 
 def column_names(names: Iterable[str]) -> str:
-    """Names of columns in a message."""
+    """Return names of columns for a message."""
     listed = [elided(printable(name)) for name in names]
     return ", ".join(listed[:_MOST_NAMES]) + (f" and {len(listed) - _MOST_NAMES} more" * (len(listed) > _MOST_NAMES))
 
 
 def number(cell: Any) -> float:
-    """A number, or text of one as every program writes it. Raises `TypeError` or `ValueError` for anything else."""
+    """Return the number in a cell, or in its text; raises `TypeError` or `ValueError` for anything else."""
     if isinstance(cell, str):
-        if "_" in cell or not cell.isascii():  # Python reads 1_000 and digits of any script
+        if "_" in cell or not cell.isascii():  # Python would read 1_000 and digits of any script
             raise ValueError(cell)
     elif isinstance(cell, bool) or not isinstance(cell, numbers.Real | Decimal):
         raise TypeError(cell)
@@ -132,12 +132,12 @@ def number(cell: Any) -> float:
 
 
 def is_empty(cell: Any) -> bool:
-    """Whether nothing stands there: None, an empty text, or what data frames have in its place."""
+    """Return True for an empty cell: None, an empty text, or the missing value of data frames."""
     return cell is None or cell != cell or str(cell).strip() == ""
 
 
 def is_number(cell: Any) -> bool:
-    """Whether `number` takes it."""
+    """Return True if `number` accepts the cell."""
     try:
         number(cell)
     except (TypeError, ValueError, OverflowError):
@@ -146,9 +146,9 @@ def is_number(cell: Any) -> bool:
 
 
 def are_dates(cells: Sequence[Any]) -> bool:
-    """Whether more of the cells are ISO 8601 times than numbers; of as many the first cell says.
+    """Return True if more of the cells are ISO 8601 times than numbers; for equal numbers the first cell decides.
 
-    What most cells are decides, so that a bad one among them is the bad one.
+    The majority decides, so that a single bad cell is reported as the bad one.
     """
     num = sum(map(is_number, cells))
     if num == 0 or 2 * num > len(cells):
@@ -166,7 +166,7 @@ def _is_date(cell: Any) -> bool:
 
 
 def seconds(time: Any) -> float:
-    """A number, or the seconds from 1970 UTC to an ISO 8601 time or `datetime`; without a zone it is taken as UTC."""
+    """Return a number, or the seconds from 1970 UTC to an ISO 8601 time or `datetime`; the default zone is UTC."""
     if is_number(time):
         return number(time)
     moment = time if isinstance(time, datetime) else datetime.fromisoformat(str(time).strip())
@@ -174,19 +174,20 @@ def seconds(time: Any) -> float:
 
 
 def read_table(path: str | Path, *, reports: bool = False, sha256: str | None = None) -> Table:
-    """A .csv file with a header line, or a .parquet file; or as `ais`, `asterix` and `bags` have it.
+    """Return a table from a .csv file with a header line, or from a .parquet, AIS, ASTERIX or ROS 2 bag file.
 
-    These are AIS messages (.nmea, .ais), plots and tracks of radars (.ast, .asterix), and ROS 2 bags (.db3, .mcap).
+    These are AIS messages (.nmea, .ais), plots and tracks of radars (.ast, .asterix, .raw), and ROS 2 bags (.db3,
+    .mcap).
 
     Args:
         path: of the file.
-        reports: whether positions that targets report are asked for, of a file that may have scans, too.
+        reports: True to read positions that targets report, from a file that may have scans, too.
         sha256: SHA-256 that the file must have, in hexadecimal digits; None: any.
 
     Raises:
-        MissingPackageError: what reads it is not installed.
-        InputError: not there, another ending, another `sha256`, not readable as what it says it is, rows not as long as
-            the header.
+        MissingPackageError: the package that reads the format is not installed.
+        InputError: no such file, another ending, another `sha256`, content that does not match the format, or rows of
+            another length than the header.
     """
     file = Path(path)
     named = elided(printable(str(file)), 200)
@@ -195,7 +196,7 @@ def read_table(path: str | Path, *, reports: bool = False, sha256: str | None = 
         raise InputError(f"{named}: expected ASTERIX without network headers; got a capture; write it by `{how}`")
     if file.suffix.lower() not in ENDINGS:
         raise InputError(f"{named}: expected a file that ends with {', '.join(ENDINGS)}")
-    if not os.path.isfile(file):  # a name can be too long, or hold what no name can: for pathlib, an error
+    if not os.path.isfile(file):  # pathlib raises for a name that is too long or has forbidden characters
         raise InputError(f"{named}: no such file; expected a table of records")
     if (size := file.stat().st_size) > _MOST_BYTES:
         raise InputError(f"{named}: expected a file of at most {_MOST_BYTES} bytes; got {size}")
@@ -207,7 +208,7 @@ def read_table(path: str | Path, *, reports: bool = False, sha256: str | None = 
 
 
 def _content(file: Path) -> tuple[bytes, str]:
-    """The bytes of a file, empty where a package reads them by its name, and their SHA-256 in hexadecimal digits."""
+    """Return the bytes of a file (empty if a package reads it by its name) and their SHA-256 in hexadecimal digits."""
     try:
         with file.open("rb") as source:
             if file.suffix.lower() in (".csv", ".parquet"):
@@ -219,7 +220,7 @@ def _content(file: Path) -> tuple[bytes, str]:
 
 
 def _parsed(file: Path, content: bytes, reports: bool) -> Table:
-    """The table of a file with an ending of `ENDINGS`."""
+    """Return the table of a file with an ending of `ENDINGS`."""
     ending = file.suffix.lower()
     if ending in AIS_ENDINGS:
         columns, rows, notes = read_ais(file)
@@ -249,7 +250,7 @@ def _csv(file: Path, content: bytes) -> Table:
 
 
 def header_of(reader: Iterator[list[str]], file: Path) -> list[str]:
-    """The names of the columns of a CSV file; `InputError` where other letters than commas separate them."""
+    """Return the names of the columns of a CSV file; raises `InputError` if the separators are not commas."""
     header = [name.strip() for name in next(reader, [])]
     other = next((letter for letter in _SEPARATORS if letter in header[0]), None) if len(header) == 1 else None
     if other is not None:
@@ -276,5 +277,5 @@ def _parquet(file: Path, content: bytes) -> Table:
 
 
 def _reason(error: Exception) -> str:
-    """What another library says of a file, on one line."""
+    """Return the error message of another library, on one line."""
     return elided(printable(" ".join(str(error).split())), 300)

@@ -1,4 +1,4 @@
-"""Recorded trajectories as targets: aircraft, ships, or anything that reports where it is."""
+"""Recorded trajectories as targets: aircraft, ships, or anything that reports its position."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ _FIRST_DATE, _LAST_DATE = 1e8, 1e10  # s of the Unix epoch, 1973 and 2286
 class RecordedTargets:
     """Targets that follow recorded reports; between them, a cubic through positions and velocities (Hermite).
 
-    A target is there from its first report to its last. States are [px, py, vx, vy]; ids count the tracks in order of
+    A target exists from its first report to its last. States are [px, py, vx, vy]; ids count the tracks in order of
     their first report.
 
     Attributes:
         reports: see `from_file` and `from_columns`.
         time_origin: recorded time of the first scan: seconds, or an ISO 8601 time; None: the earliest report.
-        cleaning: how reports become tracks.
+        cleaning: settings of the steps from reports to tracks.
         tracks: the tracks, in order of target id.
-        counts: what the cleaning left out.
+        counts: of what the cleaning left out.
 
     Raises:
         InputError: no track is left after the cleaning.
@@ -70,19 +70,18 @@ class RecordedTargets:
         cleaning: Cleaning | None = None,
         sha256: str | None = None,
     ) -> RecordedTargets:
-        """Of a .csv or .parquet file with columns time, id and x, y or longitude, latitude (and vx, vy if it has them).
+        """Return targets from a file with columns time, id and x, y or longitude, latitude (and optionally vx, vy).
 
         Args:
-            path: the file.
-            columns: names in the file where they differ, {"time": "Time", "id": "MMSI", "longitude": "lon", ...}.
+            path: of a file that `read_table` reads, such as .csv or .parquet.
+            columns: names in the file if they differ, {"time": "Time", "id": "MMSI", "longitude": "lon", ...}.
             origin_deg: longitude and latitude of (0, 0), for the tangent plane; only for longitudes and latitudes.
-            usual_origin_deg: the same where `origin_deg` is None, and of no matter for x and y; None: the median of the
-                reports.
+            usual_origin_deg: used if `origin_deg` is None, and ignored for x and y; None: the median of the reports.
             time_origin, cleaning: see the class.
-            sha256: as of `read_table`.
+            sha256: see `read_table`.
 
         Raises:
-            InputError: names the file, row, column, what was expected and what came.
+            InputError: names the file, row, column, and the expected and given values.
         """
         table = read_table(path, reports=True, sha256=sha256)
         reports = parse_reports(table, columns=columns, origin_deg=origin_deg, usual_origin_deg=usual_origin_deg)
@@ -98,15 +97,18 @@ class RecordedTargets:
         time_origin: float | str | None = None,
         cleaning: Cleaning | None = None,
     ) -> RecordedTargets:
-        """Of columns in memory, a mapping or a data frame; rows count from 1 in messages. See `from_file`."""
+        """Return targets from columns in memory, a mapping or a data frame; see `from_file`.
+
+        Messages count rows from 1.
+        """
         reports = parse_reports(table_of(table), columns=columns, origin_deg=origin_deg)
         return cls(reports, time_origin, cleaning or Cleaning())
 
     def truth(self, times: ArrayLike, *, rng: np.random.Generator) -> Truth:
-        """The tracks at the scan times, the first of which is at `time_origin`; `rng` is not used.
+        """Return the tracks at the scan times, with the first scan at `time_origin`; `rng` is not used.
 
         Raises:
-            InputError: no track is there at any of the scans.
+            InputError: no track exists at any of the scans.
         """
         from scipy.interpolate import CubicHermiteSpline
 
@@ -127,7 +129,7 @@ class RecordedTargets:
 
 
 def _span(first: float, last: float) -> str:
-    """Two recorded times in a message: as dates where they are seconds of the Unix epoch."""
+    """Return two recorded times for a message: as dates if they are seconds of the Unix epoch."""
     if not _FIRST_DATE <= first <= last <= _LAST_DATE:
         return f"{first:.6g} to {last:.6g} s"
     return " to ".join(datetime.fromtimestamp(time, UTC).isoformat(timespec="seconds") for time in (first, last))

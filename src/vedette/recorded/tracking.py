@@ -1,4 +1,4 @@
-"""The loop over recorded scans: for each instant a step of the tracker and an estimate."""
+"""The loop over recorded scans: for each instant, a step of the tracker and an estimate."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Tracking:
         name: of the scenario, for records.
         recording: the scans.
         tracker: of its sensors.
-        estimate: reads the targets off the fused belief, given the number of the instant (from 1).
+        estimate: estimates the targets from the fused belief, given the number of the instant (from 1).
         truth: the targets at the times of the recording; no targets if they are unknown.
 
     Raises:
@@ -45,14 +45,14 @@ class Tracking:
             raise InputError("truth: expected the times of the recording; got others")
 
     def first(self, num: int) -> Tracking:
-        """Of the first instants alone."""
+        """Return the tracking of only the first `num` instants."""
         later = [*self.recording.times[: num + 1].tolist(), np.inf][num]
         return replace(self, recording=self.recording.between(0.0, later), truth=self.truth.first(num))
 
     def run(
         self, score: Score | None, *, seed: int = 0, run: int = 0, watch: Callable[[int], None] | None = None
     ) -> RunRecord:
-        """Track the targets; raises `RunStopped` and `RunInterrupted` as `vedette.simulation.simulate`.
+        """Track the targets; raises `RunStopped` and `RunInterrupted` like `vedette.simulation.simulate`.
 
         Args:
             score: (num_scans, 3) OSPA of the estimates against the truth; None: NaN.

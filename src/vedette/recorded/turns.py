@@ -14,7 +14,7 @@ from vedette.models.turns import Turn, with_beam
 # The scans of a sensor: turns as given ("found": as found in its rows, if any), or rows with one time ("none").
 Turning = Turn | Literal["found", "none"]
 
-_FEWEST_ROWS, _FEWEST_TURNS = 16, 3.0  # of which a turn is found
+_FEWEST_ROWS, _FEWEST_TURNS = 16, 3.0  # fewest rows and turns from which a turn is found
 _PERIODS = 0.5, 60.0  # s, shortest and longest turn that is found
 _SEARCHED_ROWS, _SEARCHED_TIME = 300, 300.0  # number of rows and seconds that the search for a period uses
 _STEPS = 8.0  # frequencies tried within the width of a peak
@@ -22,12 +22,12 @@ _STEPS = 8.0  # frequencies tried within the width of a peak
 # first threshold is for trial frequencies, the second for the refined rate.
 _ALIKE, _FOUND = 0.95, 0.98
 _ANYWHERE = 0.98  # the same for the bearings alone: above it they are nearly equal and show no turn
-_FEWEST_PLACES = 4  # of rows that tell how a sensor moves
+_FEWEST_PLACES = 4  # fewest rows for the velocity of a sensor
 _SECTORS, _NEAR = 72, 12  # directions in which rows are counted, and how many on a side count as near
 
 
 def bearings_of(scan: Floats, poses: Floats, kind: str) -> Floats:
-    """(num,) rad from east, of measurements from poses (num, 3 or more) or (3 or more,); (0,) of a kind without."""
+    """Return bearings from east, rad, of measurements from poses (num, 3 or more) or (3 or more,); empty if none."""
     if is_position(kind):
         off = scan[:, :2] - poses[..., :2]
         return np.asarray(np.arctan2(off[:, 1], off[:, 0]))
