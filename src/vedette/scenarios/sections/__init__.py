@@ -1,4 +1,4 @@
-"""The sections of a scenario file: one class a mapping, one field a key, and what is built of it."""
+"""The sections of a scenario file: one class for each mapping, one field for each key, and their builders."""
 
 from vedette.scenarios.sections.base import Section
 from vedette.scenarios.sections.scenario import ScenarioModel, merge_sensor_defaults

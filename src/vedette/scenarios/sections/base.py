@@ -1,5 +1,4 @@
-"""What the sections of a scenario share: the strict base class, the types of their fields, and what stands for a value
-that could not be read.
+"""Shared parts of the sections: the strict base class, the types of fields, and the stand-in for unreadable values.
 
 Each field's description ends with its unit in brackets; [-] is a number without a unit.
 """
@@ -31,14 +30,14 @@ from vedette.scenarios.faults import Finding, Path, describe
 
 
 class NotRead(Exception):
-    """A check asked for a value that could not be read."""
+    """A check used a value that could not be read."""
 
 
 class Unread:
-    """A value that could not be read; whatever is done with it raises `NotRead`.
+    """A value that could not be read; any use of it raises `NotRead`.
 
     Attributes:
-        errors: what pydantic said of the value.
+        errors: pydantic's errors of the value.
     """
 
     __slots__ = ("errors",)
@@ -57,17 +56,17 @@ class Unread:
     __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = __pow__ = _refuse
 
 
-# Squares and products of numbers in this range are numbers, too.
+# Squares and products of numbers in this range neither overflow nor underflow.
 _SMALLEST, _LARGEST = 1e-30, 1e15
 
 
 def expected(what: str, *, at: tuple[str | int, ...] = (), got: str = "") -> PydanticCustomError:
-    """The error of a validator that wants `what`, at the field itself or a place inside it, where `got` is."""
+    """Return the error of a validator that expects `what`, at the field itself or at a place inside it with `got`."""
     return PydanticCustomError("expected", "expected {expected}", {"expected": what, "at": at, "got": got})
 
 
 def _whole(value: Any) -> Any:
-    # In YAML 1.2 `1e3` is a floating-point number; where a count is wanted it is 1000.
+    # In YAML 1.2 `1e3` is a floating-point number; as a count it is 1000.
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
@@ -93,7 +92,7 @@ Whole = Annotated[int, BeforeValidator(_whole)]
 Name = Annotated[str, AfterValidator(_word)]
 Sha256 = Annotated[str, AfterValidator(_digest)]
 SHA256_FIELD = "SHA-256 that the file must have, as it is kept beside a run of it; none: any [-]."
-# By the names of `vedette.models.fields`, and within what is of sense in a file.
+# Types with the names of `vedette.models.fields`, and limits that are sensible in a file.
 Count = Annotated[Whole, Field(ge=1, le=1_000_000_000)]
 Natural = Annotated[Whole, Field(ge=0)]
 Repeats = Annotated[Whole, Field(ge=0, le=1_000_000)]
@@ -121,19 +120,19 @@ GaussianMethod = Literal["auto", "ekf", "ukf", "ckf"]
 DetectionAt = Literal["centre", "mean"]
 
 
-IN_PART = {"in_part": True}  # validation context under which what cannot be read becomes an `Unread`
+IN_PART = {"in_part": True}  # validation context in which an unreadable value becomes an `Unread`
 
 Check = Callable[[Any], Iterator[Finding]]
 
 
 def check(findings: Check) -> Check:
-    """Mark a method that says what is wrong with a section: paths inside it, what was expected, what came."""
+    """Mark a method that yields faults of a section: paths inside it, and the expected and given values."""
     findings.is_check = True  # type: ignore[attr-defined] # a function takes attributes
     return findings
 
 
 def attempt(findings: Iterator[Finding]) -> Iterator[Finding]:
-    """The findings up to the first that would need what could not be read."""
+    """Yield the findings up to the first that needs a value that could not be read."""
     try:
         yield from findings
     except NotRead:
@@ -141,7 +140,7 @@ def attempt(findings: Iterator[Finding]) -> Iterator[Finding]:
 
 
 def sections_in(value: Any) -> list[tuple[Path, Section]]:
-    """A section and all in it, each with its path, from the outside in and in the order of the fields."""
+    """Return a section and all sections in it, each with its path, from the outside in, in the order of the fields."""
     found: list[tuple[Path, Section]] = []
     left: list[tuple[Path, Any]] = [((), value)]
     while left:
@@ -158,7 +157,7 @@ def sections_in(value: Any) -> list[tuple[Path, Section]]:
 
 
 def is_whole(value: Any) -> bool:
-    """Whether all of a section could be read."""
+    """Return True if all of a section could be read."""
     if isinstance(value, Section):
         return all(is_whole(getattr(value, name)) for name in type(value).model_fields)
     return all(map(is_whole, value)) if isinstance(value, tuple) else not isinstance(value, Unread)
@@ -171,7 +170,7 @@ class Section(BaseModel):
     faulty mapping is a section too, with `Unread` in place of what is faulty, so that all other checks can go on.
     """
 
-    # Built when first read: a part of a scenario is never read by itself, and to build each took twice as long.
+    # Validators are built at first use: parts are never read separately, and building each of them took twice as long.
     model_config = ConfigDict(
         extra="forbid", frozen=True, strict=True, allow_inf_nan=False, validate_default=True, defer_build=True
     )
@@ -183,7 +182,7 @@ class Section(BaseModel):
         cls._checks = tuple(dict.fromkeys([*chain(*parents), *own]))
 
     def findings(self) -> Iterator[Finding]:
-        """What is wrong with the section beyond its fields one by one."""
+        """Yield the faults of the section that no single field has."""
         for method in self._checks:
             yield from attempt(method(self))
 
@@ -197,7 +196,7 @@ class Section(BaseModel):
                     left += [((*path, index), value[index]) for index in reversed(range(len(value)))]
                 elif isinstance(value, float | int) and abs(value) > _LARGEST:
                     yield path, f"a number from {-_LARGEST:g} to {_LARGEST:g}", describe(value)
-                    break  # the first of a field is enough
+                    break  # one fault for each field is enough
 
     _checks: ClassVar[tuple[Check, ...]] = (_numbers_within_reason,)
 
@@ -210,12 +209,12 @@ class Section(BaseModel):
 
     @classmethod
     def in_metres(cls, data: Mapping[str, Any]) -> Mapping[str, Any]:
-        """The mapping with its places in metres, where they may be in anything else."""
+        """Return the mapping with its places in metres, if it allows other units."""
         return data
 
     @classmethod
     def prepared(cls, data: Mapping[str, Any]) -> Mapping[str, Any]:
-        """The mapping as its fields read it."""
+        """Return the mapping as its fields read it."""
         return data
 
     @model_validator(mode="wrap")
@@ -245,6 +244,6 @@ def _field_in_part(section: type[Section], name: str, data: Mapping[str, Any]) -
 
 @cache
 def _alone(section: type[Section], name: str) -> type[BaseModel]:
-    """A model of one field of a section."""
+    """Return a model of one field of a section."""
     field = section.model_fields[name]
     return create_model("Alone", __config__=section.model_config, **{name: (field.annotation, field)})  # type: ignore[call-overload, no-any-return]

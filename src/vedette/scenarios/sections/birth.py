@@ -1,4 +1,4 @@
-"""Sections about where targets appear, as the filters know it."""
+"""Sections about target birth, as the filters assume it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import Chance, Positive, Reals, Section, Steps, check
 from vedette.scenarios.sections.world import Motion, RegionSection, grouped_order
 
-if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
+if TYPE_CHECKING:  # importing the models imports the compiler, which a check does not need
     from vedette.kernels.base.types import Floats
     from vedette.models import BirthModel
 
@@ -22,7 +22,7 @@ CovRows = Annotated[tuple[Reals, ...], Field(strict=False)]
 
 
 def _spreads(stds: Reals) -> Iterator[Finding]:
-    """What is wrong with standard deviations of a birth."""
+    """Yield faults of the standard deviations of a birth."""
     for j, std in enumerate(stds):
         if std <= 0.0:
             yield ("std", j), "a number above 0", describe(std)
@@ -54,7 +54,7 @@ class BirthSite(Section):
         yield from _spreads(self.std or ())
 
     def covariance(self) -> Floats:
-        """Covariance of the state, in the order of the file."""
+        """Return the covariance of the state, in the order of the file."""
         return np.array(self.cov) if self.cov is not None else np.diag(np.square(self.std or ()))
 
 
@@ -111,7 +111,7 @@ class Birth(Section):
             seen.add(step)
 
     def build(self, motion: Motion, region: RegionSection) -> BirthModel:
-        """The births, shared by all sensors. region: in which those from measurements appear."""
+        """Return the births, shared by all sensors. region: of births from measurements."""
         from vedette.models import BirthModel, MeasurementBirth
 
         order, dim, num = grouped_order(motion), motion.state_dim, len(self.sites)

@@ -2,7 +2,7 @@
 
 A delta-GLMB makes a label for each birth site at each step. Until a scan confirms or rejects them, every set of these
 labels is a hypothesis. `birth.period` keeps the expected number of births the same for steps of any length, but shorter
-steps make more labels, of which the cap on hypotheses cuts the larger sets.
+steps make more labels, and the cap on hypotheses cuts their larger sets.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ if TYPE_CHECKING:
     from vedette.kernels.base.types import Floats
     from vedette.scenarios.sections.scenario import ScenarioModel
 
-# Share of the expected births from which a scenario is refused, or warned of.
+# Share of the expected births above which a scenario is refused, or causes a warning.
 LARGEST_SHARE = 0.05
 CAPPED = ("delta_glmb", "m_delta_glmb")
 
 
 def share_cut(num_labels: float, probability: float, most: int) -> float:
-    """Share of the expected births that is cut where the heaviest `most` sets of unconfirmed labels are kept.
+    """Return the share of the expected births that is cut if the heaviest `most` label sets are retained.
 
-    Of n labels of probability q each, the sets of k labels have the probability q^k (1 - q)^(n - k). Small sets are the
-    heaviest, and what is kept is normalised.
+    For n labels of probability q each, the sets of k labels have the probability q^k (1 - q)^(n - k). Small sets are
+    the heaviest, and the retained ones are normalised.
 
     Args:
         num_labels: number of unconfirmed labels, at least 0.
-        probability: of each, in (0, 0.5); larger ones are not judged.
-        most: number of hypotheses kept.
+        probability: of each, in (0, 0.5); for larger ones the result is 0.
+        most: number of hypotheses retained.
     """
     n, expected = math.floor(num_labels), math.floor(num_labels) * probability
     if n == 0 or probability >= 0.5:
@@ -43,7 +43,7 @@ def share_cut(num_labels: float, probability: float, most: int) -> float:
     for k in range(min(n, math.ceil(expected + 10.0 * math.sqrt(expected) + 20.0)) + 1):
         log_sets = math.lgamma(n + 1) - math.lgamma(k + 1) - math.lgamma(n - k + 1)
         kept = min(math.exp(min(log_sets, 700.0)), room)
-        weight = kept * math.exp(k * math.log(probability / (1.0 - probability)))  # relative to no birth
+        weight = kept * math.exp(k * math.log(probability / (1.0 - probability)))  # relative to the set without births
         room, total, births = room - kept, total + weight, births + k * weight
         if room <= 0.5:
             break
@@ -51,7 +51,7 @@ def share_cut(num_labels: float, probability: float, most: int) -> float:
 
 
 def most_hypotheses(model: ScenarioModel) -> int | None:
-    """The cap on sets of labels of a filter that keeps such, where births have a period; None where there is none."""
+    """Return the cap on label sets of a filter that enumerates them, if births have a period; None without a cap."""
     birth, own = model.birth, model.filter
     if own.kind == "custom" or own.kind not in CAPPED:
         return None
@@ -61,13 +61,13 @@ def most_hypotheses(model: ScenarioModel) -> int | None:
 
 
 def birth_probability(model: ScenarioModel) -> float:
-    """Mean probability of a birth at a site within a step."""
+    """Return the mean probability of a birth at a site within a step."""
     steps = model.time.step_period / (model.birth.period or model.time.step_period)
     return float(np.mean([-math.expm1(steps * math.log1p(-site.existence)) for site in model.birth.sites]))
 
 
 def birth_steps(model: ScenarioModel) -> int:
-    """Largest number of steps with births from one scan of a belief to its next."""
+    """Return the largest number of steps with births from one scan of a belief to its next."""
     num, steps = model.time.num_steps, model.birth.steps
     births = np.ones(num) if steps == "every" else np.isin(np.arange(1, num + 1), steps)
     scans = np.array([sensor.scans.build(model.time) for sensor in model.sensors])
@@ -80,19 +80,19 @@ def birth_steps(model: ScenarioModel) -> int:
 
 
 def has_one_belief(model: ScenarioModel) -> bool:
-    """Whether all scans go into one belief."""
+    """Return True if all scans update one belief."""
     return model.fusion.kind in ONE_BELIEF
 
 
 def labels_until_detection(model: ScenarioModel, chances: Floats) -> float:
-    """Mean number of labels that are unconfirmed, where a target of each site is detected with these probabilities."""
+    """Return the mean number of unconfirmed labels if a target of each site is detected with these probabilities."""
     most = model.time.num_steps if model.birth.steps == "every" else len(model.birth.steps)
     steps = birth_steps(model) / np.maximum(chances, 1e-9)
     return float(np.minimum(steps, most).sum())
 
 
 def births_cut(model: ScenarioModel) -> Iterator[Finding]:
-    """A filter that cuts its own births between scans, whatever these detect."""
+    """Yield a fault if a filter cuts its own births between scans, regardless of detections."""
     most = most_hypotheses(model)
     if most is None:
         return

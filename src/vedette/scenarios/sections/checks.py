@@ -1,6 +1,6 @@
-"""Checks across the sections of a scenario: what each section alone cannot know.
+"""Checks across the sections of a scenario, which no single section can make.
 
-Each is written as for a valid scenario. In a faulty one, a check ends where it would need what could not be read.
+Each is written as for a valid scenario. In a faulty one, a check ends at the first value that could not be read.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ if TYPE_CHECKING:
     from vedette.scenarios.sections.scenario import ScenarioModel
     from vedette.scenarios.sections.sensors import Sensor
 
-# How far a decision time may be from the time of a scan, in scans: rounding of sums of decimal fractions.
+# Largest distance of a decision time from a scan, in scans: rounding of sums of decimal fractions.
 _TIME_TOLERANCE = 1e-6
 
 
 def step_of_time(time: float, start: float, step_period: float) -> int | None:
-    """The scan at `time`, or None where there is none."""
+    """Return the scan at `time`, or None if there is none."""
     position = (time - start) / step_period + 1.0
     return round(position) if abs(position - round(position)) <= _TIME_TOLERANCE else None
 
@@ -134,7 +134,7 @@ def _combinations(model: ScenarioModel) -> Iterator[Finding]:
 
 
 def _heights(model: ScenarioModel) -> Iterator[Finding]:
-    """Measurements that depend on a height need states with one, in the filters and in the simulated truth."""
+    """Yield faults if measurements depend on a height but states of the filters or the simulated truth have none."""
     kinds = [(i, sensor.measurement.kind) for i, sensor in enumerate(model.sensors)]
     for i, kind in ((i, kind) for i, kind in kinds if kind in SOLID):
         path: Path = ("sensors", i, "measurement", "kind")
@@ -241,7 +241,7 @@ def _first_scan(path: Path, sensor: Sensor, model: ScenarioModel) -> Iterator[Fi
     for inside, wanted, got in scans.findings_beside(period):
         yield (*path, *inside), wanted, got
     interval = scans.steps(period)[0] * period
-    # Sensors files have no targets to simulate, and scans with times of their own.
+    # Sensors files have no targets to simulate, and their scans have separate times.
     simulates = model.recording is None and (model.targets.kind != "scripted" or model.targets.tracks)
     if sensor.turn is not None and simulates and sensor.turn.period > interval * (1.0 + 1e-9):
         wanted = f"at most the time from one scan to the next, {interval:g} s"

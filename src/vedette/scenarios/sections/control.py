@@ -1,4 +1,4 @@
-"""Section about control: when to decide and how an action is valued; and what must hold between it and tracking."""
+"""Section about control: decision times and the value of actions; and its consistency with tracking."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from vedette.scenarios.sections.deciding import AnyConstraint, AnyReward, AnySea
 from vedette.scenarios.sections.derived import Derived, derived, of_kind
 from vedette.scenarios.sections.tracking import UNLABELLED
 
-if TYPE_CHECKING:  # with these comes the compiler, which a check does without
+if TYPE_CHECKING:  # importing these imports the compiler, which a check does not need
     from vedette.control import Constraint, PlanningSettings
     from vedette.scenarios.sections.deciding import AnyReward, AnySearch, Lookahead
     from vedette.scenarios.sections.scenario import ScenarioModel
@@ -39,9 +39,9 @@ _LIMITS = (
     "max_glmb_targets",
     "max_bound_work",
 )
-# Of the settings, those that no file gives or gives otherwise.
+# Settings that a file does not give, or gives in another form.
 _ELSEWHERE = (*_LIMITS, "horizon_steps", "horizon_period", "end", "limits", "num_threads")
-# Of which at most one says when the sensors decide.
+# Alternatives for the decision times; at most one is given.
 _SCHEDULES = ("decision_steps", "decision_times", "decision_every")
 _FIRST = (
     *("decision_steps", "decision_times", "decision_every", "horizon_steps", "horizon_period"),
@@ -138,7 +138,7 @@ class Control(Derived):
                     yield (name,), "confidence beside it, such as 0.95", describe(value)
 
     def build(self, horizon: tuple[int, float], num_threads: int = 0) -> PlanningSettings:
-        """Samples and caps of a decision with this horizon, H and T."""
+        """Return samples and caps of a decision with this horizon, H and T."""
         from vedette.control import PlanningSettings, planning_limits
 
         return PlanningSettings(
@@ -155,12 +155,12 @@ class Control(Derived):
         )
 
     def build_constraints(self, folder: FilePath) -> tuple[Constraint, ...]:
-        """What the sensors must not do; raises `InputError` for what cannot be had."""
+        """Return the constraints on the sensors; raises `InputError` for one that cannot be built."""
         return tuple(constraint.build(folder) for constraint in self.constraints)
 
 
 def constraints_on_labels(model: ScenarioModel) -> Iterator[Finding]:
-    """Constraints that ask where targets will be ask a density with labels."""
+    """Yield faults of constraints on predicted targets if the filter has no labels."""
     for i, constraint in enumerate(model.control.constraints):
         if model.filter.kind in UNLABELLED and constraint.kind == "void_probability":
             wanted = f"another constraint, as {model.filter.kind} filters have no labels to look ahead by"
@@ -168,7 +168,7 @@ def constraints_on_labels(model: ScenarioModel) -> Iterator[Finding]:
 
 
 def enough_switchable(model: ScenarioModel) -> Iterator[Finding]:
-    """Where only some sensors may scan, the others can be switched off; of custom platforms that is not known."""
+    """Yield faults if fewer sensors may scan than cannot be switched off; skipped with custom platforms."""
     fixed = sum(not sensor.switchable for sensor in model.sensors)
     if any(sensor.platform.kind == "custom" for sensor in model.sensors):
         return
@@ -183,7 +183,7 @@ def enough_switchable(model: ScenarioModel) -> Iterator[Finding]:
 
 
 def longer_plans(model: ScenarioModel) -> Iterator[Finding]:
-    """Decisions over several periods are whole pseudo-updates apart, and sums over labels."""
+    """Yield faults of decisions over several periods that are not whole pseudo-updates, or not sums over labels."""
     control = model.control
     given: dict[Path, Lookahead | None] = {("control", "lookahead"): control.lookahead}
     given.update({("planners", name): own for name, own in model.planners.items() if own.kind == "lookahead"})
@@ -201,7 +201,7 @@ def longer_plans(model: ScenarioModel) -> Iterator[Finding]:
 
 
 def targets_of_rules(model: ScenarioModel) -> Iterator[Finding]:
-    """Each sensor heads for a target."""
+    """Yield faults of rules without one target for each sensor."""
     for name, own in model.planners.items():
         if own.kind == "assigned" and own.targets is not None and len(own.targets) != len(model.sensors):
             wanted = f"{len(model.sensors)} numbers, one a sensor"
@@ -209,12 +209,12 @@ def targets_of_rules(model: ScenarioModel) -> Iterator[Finding]:
 
 
 def revisited(model: ScenarioModel) -> Revisit | None:
-    """The constraint on places to be visited again and again; None: there is none."""
+    """Return the constraint on places to be visited repeatedly; None if there is none."""
     return next((own for own in model.control.constraints if isinstance(own, Revisit)), None)
 
 
 def one_patrol(model: ScenarioModel) -> Iterator[Finding]:
-    """Places are visited by sensors that move, and stand in one constraint, as poses have the time of each."""
+    """Yield faults of visits: they need a moving sensor, one constraint, and poses with room for the time of each."""
     constraints = model.control.constraints
     numbers = [i for i, own in enumerate(constraints) if isinstance(own, Revisit)]
     if numbers and not any(sensor.platform.top_speed > 0.0 for sensor in model.sensors):

@@ -1,4 +1,4 @@
-"""Directions by compass in a scenario: where a heading in degrees from east is read, a course may stand.
+"""Directions by compass in a scenario: a course may be given in place of a heading in degrees from east.
 
 With an origin, a sensor with a compass or scans that count from north, `course_deg`, `courses_deg`, `azimuth_deg` and
 `azimuths_deg` count clockwise from true north, as plans do. A file counts all directions of its sensors in one way.
@@ -20,15 +20,15 @@ if TYPE_CHECKING:
 
 COURSES = ("course_deg", "courses_deg", "azimuth_deg", "azimuths_deg")
 _HEADINGS = {"heading_deg", "headings_deg", "directions_deg", "pointing_deg", "pointings_deg"}
-# What the keys of a platform become; those of `courses_deg` by its kind.
+# New name of the key `courses_deg` of a platform, by its kind.
 _LISTS = {"courses": "headings_deg", "steps": "directions_deg"}
 
 
 def from_east(data: Mapping[str, Any]) -> Mapping[str, Any]:
     """Return a scenario's data with its courses as headings, counter-clockwise from east.
 
-    Data stays as it is where nothing counts from north, or where it counts directions in both ways; the keys are then
-    unknown ones.
+    Data is unchanged if nothing counts from north, or if directions are counted in both ways; the keys are then unknown
+    ones.
     """
     sensors, defaults = data.get("sensors"), data.get("sensor_defaults")
     parts = [part for part in (defaults, *(sensors if isinstance(sensors, list | tuple) else ())) if _is_mapping(part)]
@@ -51,7 +51,7 @@ def from_east(data: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def as_courses(platform: Section, compass: Compass, place: Any) -> dict[str, tuple[str, Any]]:
-    """Return the directions of a platform as a file by compass has them: name and value by the name of its field."""
+    """Return the directions of a platform by compass, as in a file: name and value by the name of its field."""
     found: dict[str, tuple[str, Any]] = {}
     lists = {"headings_deg": "courses_deg", "directions_deg": "courses_deg", "pointings_deg": "azimuths_deg"}
     for name, key in lists.items():
@@ -80,12 +80,12 @@ def _told(data: Mapping[str, Any], platform: Section, compass: Compass, place: A
 
 
 def start_course(heading_deg: float, compass: Compass, place: Any) -> float:
-    """Return the course that a heading of the plane is at a place, deg in [0, 360)."""
+    """Return the course of a heading in the plane at a place, deg in [0, 360)."""
     return round(math.degrees(float(compass.azimuth(math.radians(heading_deg), place))), 9) % 360.0
 
 
 def as_written(path: Path, data: Any) -> Path:
-    """Return the path in a file of what stands at a path after `from_east`."""
+    """Return the path in the file for a path after `from_east`."""
     found: list[str | int] = []
     for key in path:
         if _is_mapping(data) and key not in data:
@@ -99,13 +99,13 @@ def as_written(path: Path, data: Any) -> Path:
 
 
 def _names_of(key: str) -> Collection[str]:
-    """What a key of courses may become."""
+    """Return the possible new names of a key of courses."""
     named = {"course_deg": "heading_deg", "azimuth_deg": "pointing_deg", "azimuths_deg": "pointings_deg"}
     return (named[key],) if key in named else _LISTS.values()
 
 
 def _keys(part: Mapping[str, Any]) -> Iterator[str]:
-    """Keys of a sensor, its platform and what carries that."""
+    """Yield the keys of a sensor, its platform and that platform's carrier."""
     platform = part.get("platform")
     for section in (part, platform, platform.get("carrier") if _is_mapping(platform) else None):
         if _is_mapping(section):
@@ -134,7 +134,7 @@ def _platform(data: Mapping[str, Any], compass: Compass, place: Any) -> dict[str
 
 
 def _renamed(data: Mapping[str, Any], key: str, name: str, change: Any) -> dict[str, Any]:
-    """A copy in which a key has another name and its numbers are changed; what is no number stays."""
+    """Return a copy with one key renamed and its numbers changed; other values stay."""
     found = dict(data)
     if key in found:
         value = found.pop(key)
@@ -144,12 +144,12 @@ def _renamed(data: Mapping[str, Any], key: str, name: str, change: Any) -> dict[
 
 
 def _angle(azimuth: float, compass: Compass, place: Any) -> float:
-    """The heading that a course is at a place of the plane, deg."""
+    """Return the heading of a course at a place of the plane, deg."""
     return math.degrees(float(compass.angle(math.radians(azimuth), place)))
 
 
 def _turned(course: float) -> float:
-    """The true direction that a course is, deg counter-clockwise from east in [-180, 180)."""
+    """Return the true direction of a course, deg counter-clockwise from east in [-180, 180)."""
     return (270.0 - course) % 360.0 - 180.0
 
 

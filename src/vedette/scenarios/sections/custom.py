@@ -1,4 +1,4 @@
-"""Things of the user's own that a scenario names: imported, made, and held against the protocol they are to meet."""
+"""Custom objects that a scenario names: import, construction, and checks against their protocol."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ def _reference(value: str) -> str:
 
 
 class NotGiven(InputError):
-    """Code of the user's own that does not give what it is to give.
+    """Custom code that does not return the expected object.
 
     Attributes:
         section: that names it.
         key: of the section at which the fault is.
-        wanted, got: what was expected there, and what came.
+        wanted, got: expected and given value.
     """
 
     def __init__(self, section: Custom, key: str, wanted: str, got: str) -> None:
@@ -54,36 +54,36 @@ class Custom(Section):
     function: Annotated[str, AfterValidator(_reference)] = Field(
         description="Where it is: `package.module:attribute`, or `file.py:attribute` relative to the scenario file [-]."
     )
-    gives: ClassVar[str]  # where the class or protocol of what it gives is: with it comes the compiler
-    spared: ClassVar[tuple[str, ...]] = ()  # members of the protocol that it need not have
+    gives: ClassVar[str]  # module:name of the class or protocol of the object; importing it imports the compiler
+    spared: ClassVar[tuple[str, ...]] = ()  # optional members of the protocol
     arguments: dict[str, JsonValue] = Field(
         default={}, description="Keyword arguments, where the attribute is a class or function that is called [-]."
     )
 
     @property
     def field(self) -> str:
-        """What it is to be, in a word, for messages."""
+        """Name of its field in a word, for messages."""
         return type(self).__name__.removeprefix("Custom").lower()
 
     @property
     def code(self) -> str:
-        """What it runs, for people."""
+        """Description of the code that it runs."""
         return self.function
 
     def files(self, folder: Path) -> tuple[str, ...]:
-        """The Python file that it names, where it does."""
+        """Return the Python file that it names, if any."""
         name = self.function.rpartition(":")[0]
         return (name,) if name.endswith(".py") else ()
 
     @classmethod
     def protocol(cls) -> type:
-        """The class or protocol of what it gives."""
+        """Return the class or protocol of the object."""
         module, _, name = cls.gives.partition(":")
         found: type = getattr(importlib.import_module(module), name)
         return found
 
     def named(self, folder: Path) -> Any:
-        """What `function` names; importing it runs the user's code. Raises `NotGiven` where it cannot be had."""
+        """Return the object that `function` names; importing it runs custom code. Raises `NotGiven` if that fails."""
         name, _, attribute = self.function.rpartition(":")
         try:
             found: Any = _module(name, folder)
@@ -96,7 +96,7 @@ class Custom(Section):
         return found
 
     def made(self, folder: Path, **parts: Any) -> Any:
-        """The object, of `parts` where it has to be made. Raises `NotGiven` for anything but what is wanted."""
+        """Return the object, made from `parts` if necessary. Raises `NotGiven` for an object of another kind."""
         found, wanted = self.named(folder), self.protocol()
         as_it_is = not isinstance(found, type) and (_is_function(wanted) or not self.lacking(found))
         try:
@@ -116,7 +116,7 @@ class Custom(Section):
         return found
 
     def lacking(self, found: object) -> str:
-        """What an object lacks to be what is wanted, in words; empty where it lacks nothing."""
+        """Return in words how an object fails its protocol; empty if it meets it."""
         return lacks(found, self.protocol(), self.spared)
 
     def _not_given(self, got: str) -> NotGiven:
@@ -124,7 +124,7 @@ class Custom(Section):
 
 
 def customs(section: Section) -> Iterator[tuple[Places, Custom]]:
-    """Everything of the user's own in a section, with its path."""
+    """Return every custom object in a section, with its path."""
     return ((path, found) for path, found in sections_in(section) if isinstance(found, Custom))
 
 
@@ -133,10 +133,10 @@ def _is_function(wanted: type) -> bool:
 
 
 def asked_for(made: Any, parts: dict[str, Any]) -> dict[str, Any]:
-    """Of the parts, those that a class or function has parameters for."""
+    """Return the parts for which a class or function has parameters."""
     try:
         parameters = inspect.signature(made).parameters
-    except (ValueError, TypeError):  # some that are written in C have none
+    except (ValueError, TypeError):  # some functions written in C have no signature
         return {}
     if inspect.Parameter.VAR_KEYWORD in [parameter.kind for parameter in parameters.values()]:
         return parts
@@ -144,7 +144,7 @@ def asked_for(made: Any, parts: dict[str, Any]) -> dict[str, Any]:
 
 
 def lacks(found: Any, wanted: type, spared: Sequence[str] = ()) -> str:
-    """What an object lacks of a class or protocol but for what is spared, in words; empty where it lacks nothing."""
+    """Return in words how an object fails a class or protocol, except in the members `spared`; empty if it does not."""
     if not getattr(wanted, "_is_protocol", False):
         return "" if isinstance(found, wanted) else f"a {type(found).__name__}"
     from vedette.models.arguments import protocol_members
@@ -174,7 +174,7 @@ def _shown(name: str, member: Any) -> str:
 
 
 def _takes(own: Any, member: Any) -> bool:
-    """Whether a method can be called as that of a protocol is: keyword-only arguments by name, the others in order."""
+    """Return True if a method accepts the protocol's call: keyword-only arguments by name, the others in order."""
     if not callable(own):
         return False
     parameters = _parameters(member)
@@ -184,7 +184,7 @@ def _takes(own: Any, member: Any) -> bool:
         inspect.signature(own).bind(*in_order, **by_name)
     except TypeError:
         return False
-    except ValueError:  # written in C, or bound to arguments that it does not take
+    except ValueError:  # written in C, or bound to arguments that it does not accept
         return not isinstance(own, partial)
     return True
 
@@ -193,7 +193,7 @@ def _module(name: str, folder: Path) -> ModuleType:
     if not name.endswith(".py"):
         return importlib.import_module(name)
     file = (folder / name).resolve()
-    # Two scenarios may each have a `models.py` beside them.
+    # Two scenarios in different folders may each have a `models.py`.
     unique = f"vedette_scenario_{file.stem}_{hashlib.sha256(str(file).encode()).hexdigest()[:12]}"
     if unique in sys.modules:
         return sys.modules[unique]
@@ -213,7 +213,7 @@ def _module(name: str, folder: Path) -> ModuleType:
 
 @contextmanager
 def _neighbours(folder: Path) -> Iterator[None]:
-    """Let a file import those beside it, which others of the same name elsewhere do not get."""
+    """Let a file import other files in its folder, hidden from files of the same names elsewhere."""
     before = set(sys.modules)
     sys.path.insert(0, str(folder))
     try:

@@ -1,4 +1,4 @@
-"""Sections about decisions: rewards, constraints, searches, and how far they look ahead."""
+"""Sections about decisions: rewards, constraints, searches, and lookahead."""
 
 from __future__ import annotations
 
@@ -39,13 +39,13 @@ class CustomReward(Custom):
     gives: ClassVar[str] = "vedette.control:Reward"
 
     def lacking(self, found: object) -> str:
-        """As of other kinds; a reward of sums is no function."""
+        """Return in words how an object fails as a reward; a reward of sums need not be a function."""
         from vedette.control import LabelReward, PowerReward
 
         return "" if isinstance(found, PowerReward | LabelReward) else super().lacking(found)
 
     def build(self, folder: Path) -> Any:
-        """The user's own."""
+        """Return the custom reward."""
         return self.made(folder)
 
 
@@ -87,7 +87,7 @@ class KeepOut(Section):
             yield (), "either region, polygon or geojson", " and ".join(given) or "none"
 
     def build(self, folder: Path) -> Any:
-        """The constraint. Raises `InputError` for one whose file was not read, as `load_scenario` does."""
+        """Return the constraint. Raises `InputError` if its file was not read, as `load_scenario` does."""
         from vedette.control import KeepOut
 
         if self.geojson is not None:
@@ -106,7 +106,7 @@ class Revisit(Section):
     every: Positive = Field(description="Longest time from one visit of a place to the next [s].")
 
     def build(self, folder: Path) -> Any:
-        """The constraint."""
+        """Return the constraint."""
         from vedette.control.constraints import Revisit
 
         return Revisit(self.places, self.radius, self.every)
@@ -158,7 +158,7 @@ class Lookahead(Section):
                 yield (name,), f"none, as it is of method {method}", describe(getattr(self, name))
 
     def build(self) -> dict[str, Any]:
-        """Arguments of `vedette.control.HorizonPlanner` by name."""
+        """Return arguments of `vedette.control.HorizonPlanner` by name."""
         from vedette.control import BeamSearch, TreeSearch
 
         names = ("beam_width",) if self.method == "beam" else ("exploration", "rollout")

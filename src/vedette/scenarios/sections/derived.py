@@ -1,10 +1,10 @@
-"""Sections of run-time classes and functions, made from their declarations: what is written there is written once.
+"""Sections generated from the declarations of run-time classes and functions, so that each is written once.
 
 A field's name, type, default and description are those of the dataclass field or of the parameter, and of its entry in
-the docstring, which ends with its unit in brackets where it has one. The source is read and nothing is imported, as
-with the parts comes the compiler, which a check does without; fields of parents are not. What is of no type of
-`vedette.models.fields` (a region, a sensor) is not said in a file but given to `build`. In a file an angle `*_rad` is
-`*_deg`, and what may be infinite is left out.
+the docstring, which ends with its unit in brackets if it has one. The source is read but not imported, as importing
+parts imports the compiler, which a check does not need; fields of parents are ignored. A parameter whose type is not
+in `vedette.models.fields` (a region, a sensor) is not given in a file but passed to `build`. In a file an angle
+`*_rad` is `*_deg`, and values that may be infinite are optional.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _ENTRY = re.compile(r"    (\w+(?:, \w+)*): (.*)")
 _TYPES = {**vars(base), "__builtins__": {"bool": bool}, "UnitVolume": Literal["reference"] | base.Positive}
 _CONSTANTS = {"__builtins__": {}, "math": math}
 
-# A mark with its kind and room, and the name of what is marked; texts that a class has beside its fields.
+# A mark with its kind and room, and the name of the marked part; texts that a class has in addition to its fields.
 _MARK = re.compile(r'(?m)^@part\("(\w+)", "(\w+)".*\n(?:@.*\n)*(?:class|def) (\w+)')
 _WORDS = re.compile(r'(?m)^    (\w+): ClassVar\[str\] = "(.*)"$')
 
@@ -44,14 +44,14 @@ class Derived(Section):
     """A section with fields of a class or function of the library."""
 
     of: ClassVar[str]  # module:name of the class or function
-    declared: ClassVar[tuple[Declared, ...]] = ()  # those of its fields or parameters that a file gives
+    declared: ClassVar[tuple[Declared, ...]] = ()  # its fields or parameters that a file gives
 
-    if TYPE_CHECKING:  # its fields are declared where the part is
+    if TYPE_CHECKING:  # its fields are declared with the part
 
         def __getattr__(self, name: str) -> Any: ...
 
     def given(self) -> dict[str, Any]:
-        """What the file says, by the names and in the units of the class or function; what it leaves open is not."""
+        """Return the values in the file, with names and units of the class or function; without limits left open."""
         found = {}
         for each in self.declared:
             value = getattr(self, each.key)
@@ -68,7 +68,7 @@ class Part(Derived):
     """A section of a part of the library, which is made by what it is derived from."""
 
     def build(self, folder: Path | None = None, **given: Any) -> Any:
-        """The part; of what is `given` it takes what it has parameters for."""
+        """Return the part; uses the arguments `given` for which it has parameters."""
         module, _, name = self.of.partition(":")
         made = getattr(importlib.import_module(module), name)
         with suppress_unit_warnings():
@@ -81,9 +81,9 @@ class _OwnPart(Custom):
 
 
 class Declared(NamedTuple):
-    """A field or parameter as it stands in the source: type and default in words of Python, and its description.
+    """A field or parameter in the source: type and default as Python text, and its description.
 
-    key: its name in a file. in_degrees: whether a file gives it in degrees, and the library in radians.
+    key: its name in a file. in_degrees: True if a file gives it in degrees, and the library in radians.
     """
 
     key: str
@@ -97,10 +97,10 @@ class Declared(NamedTuple):
 def derived(of: str, **which: tuple[str, ...]) -> Callable[[type[S]], type[S]]:
     """Add the fields of a class or function, `module:name`, to a section that does not have them.
 
-    A field that the section itself has without a description, as it is of another type in a file, is described so too.
-    without: those that no file gives. only: those that it has; none: all others. first: keys in front of these, and
-    those of the section alone behind them, in what is written and shown. Raises `TypeError` for a plain number that is
-    neither, as what it may be is not said.
+    A field that the section itself has without a description, because its type in a file differs, gets the description,
+    too. without: fields that no file gives. only: fields to add; none: all others. first: keys before these in the file
+    and in displays; keys of the section alone come after them. Raises `TypeError` for a plain number that is in
+    neither, as its domain is not declared.
     """
     return lambda section: _extended(section, section.__name__, of, {}, **which)
 
@@ -115,7 +115,7 @@ def _extended(
     only: tuple[str, ...] = (),
     first: tuple[str, ...] = (),
 ) -> type[S]:
-    """A section with further fields and those of a class or function."""
+    """Return a section with further fields and those of a class or function."""
     chosen = []
     for declared in _declared(of):
         own, key = section.model_fields.get(declared.key), declared.key
@@ -142,11 +142,11 @@ def _extended(
 def one_of(
     room: str, folder: str, gives: str = "", own: tuple[type[Section], ...] = (), parent: type[Part] = Part
 ) -> Any:
-    """The parts of a room, such as "search", as a field's type: one section a kind, which the field `kind` chooses.
+    """Return the type of a field for the parts of a room, such as "search": one section for each `kind`.
 
-    folder: of the modules in which parts are marked by `vedette.models.fields.part`. gives: class or protocol of one of
-    the user's own, and what else is to be said of it. own: sections that are more than what they are derived from, in
-    place of those. parent: of the others.
+    folder: of the modules in which parts are marked by `vedette.models.fields.part`. gives: class or protocol of custom
+    parts, with any further text of their description. own: sections that extend the class they are derived from, in
+    place of generated ones. parent: of the others.
     """
     found = {section.model_fields["kind"].default: section for section in own}
     for kind, of in _marked(folder)[room]:
@@ -164,14 +164,14 @@ def one_of(
 
 
 def _importable(section: Any) -> Any:
-    """A section that no module defines, as a name of this one: workers get it by pickle."""
+    """Return a section that no module defines, as a name of this module, so that workers can unpickle it."""
     section.__module__ = __name__
     globals()[section.__name__] = section
     return section
 
 
 def of_kind(kind: str) -> Any:
-    """The default of a field: its part of this kind, as the file would say it."""
+    """Return the default of a field: its part of this kind, as in a file."""
     return {"kind": kind}
 
 
@@ -180,7 +180,7 @@ def _name(room: str, kind: str) -> str:
 
 
 def _kind(room: str, kind: str) -> dict[str, Any]:
-    """The field of a section that says its kind."""
+    """Return the field `kind` of a section."""
     return {"kind": (Literal[kind], Field(default=kind, description=f"Kind of {room} [-]."))}
 
 
@@ -191,7 +191,7 @@ def _text(file: Path) -> str:
 
 @cache
 def _source(of: str) -> str:
-    """Of a class or function, with what decorates it; of a class as far as its first method."""
+    """Return the source of a class or function with its decorators; of a class up to its first method."""
     module, _, name = of.partition(":")
     text = _text(_ROOT / (module.partition(".")[2].replace(".", "/") + ".py"))
     head = re.search(rf"(?m)^(?:@.*\n)*(?:class|def) {name}\b", text)
@@ -207,7 +207,7 @@ def _definition(of: str) -> Definition:
 
 @cache
 def _marked(folder: str) -> dict[str, list[tuple[str, str]]]:
-    """By room: kind, and module and name, of what is marked as its parts in the modules of a folder."""
+    """Return by room the kind, and module and name, of the parts that are marked in the modules of a folder."""
     found = defaultdict[str, list[tuple[str, str]]](list)
     for file in sorted((_ROOT / folder).glob("*.py")):
         module = ".".join(("vedette", *file.relative_to(_ROOT).with_suffix("").parts))
@@ -217,12 +217,12 @@ def _marked(folder: str) -> dict[str, list[tuple[str, str]]]:
 
 
 def _summary(of: str) -> str:
-    """First paragraph of the docstring."""
+    """Return the first paragraph of the docstring."""
     return inspect.cleandoc(ast.get_docstring(_definition(of)) or "").partition("\n\n")[0]
 
 
 def _entries(text: str) -> dict[str, str]:
-    """What a docstring says of each field or parameter."""
+    """Return the description of each field or parameter in a docstring."""
     found: dict[str, str] = {}
     names: list[str] = []
     for line in text.splitlines():
@@ -265,7 +265,7 @@ def _parameters(node: ast.FunctionDef) -> Iterator[tuple[str, str, ast.expr | No
 
 
 def _type(words: str) -> Any:
-    """A type of a section; None for what no file says."""
+    """Return the type of a field in a section; None for one that no file gives."""
     if words == "Sequence[float]":
         return base.Reals
     try:

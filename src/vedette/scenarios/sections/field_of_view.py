@@ -1,4 +1,4 @@
-"""What a sensor sees where its view ends: for checks, which compile nothing, and for drawings."""
+"""Fields of view with an edge, for drawings and for checks, which compile nothing."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from vedette.scenarios.sections.sensors import Sensor
 
-_FADED = 0.01  # share of the probability of a soft sector from which on nothing is detected
+_FADED = 0.01  # share of the probability of a soft sector below which detection is neglected
 
 
 class FieldOfView(NamedTuple):
@@ -21,9 +21,9 @@ class FieldOfView(NamedTuple):
 
 
 def field_of_view(sensor: Sensor, pose: Sequence[float] | None = None) -> FieldOfView | None:
-    """Of a sensor at a pose, or where it starts; None where its view has no edge, or is of the user's own.
+    """Return the field of view of a sensor at a pose, or at its start; None without an edge, or for a custom model.
 
-    The edge of a soft sector is where half of its probability is left.
+    The edge of a soft sector is where its probability has dropped to a half.
     """
     section, at = sensor.detection, sensor.pose if pose is None else pose
     if section.kind == "limited_range":
@@ -38,7 +38,7 @@ def field_of_view(sensor: Sensor, pose: Sequence[float] | None = None) -> FieldO
 
 
 def reach_of(sensor: Sensor) -> float:
-    """m beyond which a sensor measures nothing, wherever it is; inf where its detection has no such edge."""
+    """Return the range beyond which a sensor measures nothing at any pose, m; inf if its detection has no such edge."""
     view, detection = field_of_view(sensor), sensor.detection
     if view is None or detection.kind == "camera" or getattr(detection, "outside", 0.0) > 0.0:  # a camera zooms
         return math.inf

@@ -1,4 +1,4 @@
-"""Sections about fusion: how what the sensors believe, or see, becomes one."""
+"""Sections about fusion of the sensors' beliefs or scans."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from vedette.scenarios.sections.custom import Custom
 from vedette.scenarios.sections.derived import Derived, derived
 from vedette.scenarios.sections.program import ProgramCentral
 
-if TYPE_CHECKING:  # with the fusions comes the compiler, which a check does without
+if TYPE_CHECKING:  # importing the fusions imports the compiler, which a check does not need
     from vedette.fusion import Fusion as FusionRule
     from vedette.fusion import FusionLimits as RuleLimits
 
@@ -25,14 +25,14 @@ _WEIGHT_TOLERANCE = 1e-6
 FusionKind: TypeAlias = Literal[
     "sequential", "parallel", "clmb", "cm_delta_glmb", "arithmetic_average", "central", "none"
 ]
-# One belief takes the scans of all sensors: nothing is fused while tracking.
+# All scans update one belief: no fusion in tracking.
 OF_SCANS: tuple[FusionKind, ...] = ("sequential", "central")
 ONE_BELIEF: tuple[FusionKind, ...] = (*OF_SCANS, "none")
-# What every sensor's scan says counts in full.
+# Every sensor's scan counts in full.
 IN_FULL: tuple[FusionKind, ...] = (*OF_SCANS, "parallel")
-# Of beliefs that each sensor keeps for itself, by their labels.
+# Fusion of local beliefs of the sensors, by their labels.
 BY_LABEL: tuple[FusionKind, ...] = ("clmb", "cm_delta_glmb", "arithmetic_average")
-# Of those, the ones whose fused density is an LMB, and which may go by views.
+# Those with an LMB as fused density, which may use views.
 OF_LMBS: tuple[FusionKind, ...] = ("clmb", "arithmetic_average")
 
 
@@ -52,7 +52,7 @@ class FusionLimits(Derived):
     )
 
     def build(self) -> RuleLimits:
-        """The caps, of the weight its log."""
+        """Return the caps, with the log of the weight."""
         from vedette.fusion import FusionLimits
 
         return FusionLimits(log_min_component_weight=math.log(self.min_component_weight), **self.given())
@@ -141,21 +141,21 @@ class Fusion(Section):
 
     @property
     def feeds_back(self) -> bool:
-        """Whether the sensors go on from the fused density."""
+        """True if the fused density replaces the sensors' own."""
         return self.feedback or self.kind == "parallel"
 
     @property
     def decides_in_full(self) -> bool:
-        """Whether joint decisions count what each sensor's scans say in full, whatever they are to gain."""
+        """True if joint decisions count every sensor's scans in full, for any reward."""
         return self.kind in (*IN_FULL, "arithmetic_average") or self.by_views
 
     def scaled_weights(self, num_sensors: int) -> tuple[float, ...]:
-        """Weight of each sensor: equal where none are given; scaled to sum to one beyond the rounding of the file."""
+        """Return the weight of each sensor (default: equal), scaled to a sum of one beyond the rounding of the file."""
         given = self.weights or (1.0,) * num_sensors
         return tuple(weight / math.fsum(given) for weight in given)
 
     def build(self, num_sensors: int, folder: Path) -> FusionRule | None:
-        """The fusion of the sensors' densities after each scan; None where one belief takes all scans."""
+        """Return the fusion of the sensors' densities after each scan; None if all scans update one belief."""
         from vedette.fusion import LabelMatchedFusion, ParallelUpdate
 
         if self.kind in ONE_BELIEF:
@@ -166,10 +166,10 @@ class Fusion(Section):
         return LabelMatchedFusion(rule) if self.matching == "assignment" else rule
 
     def build_of_decisions(self, num_sensors: int, *, of_lmbs: bool) -> FusionRule:
-        """The fusion that joint decisions go by: a parallel update, of any density, or plain covariance intersection.
+        """Return the fusion for joint decisions: a parallel update, of any density, or plain covariance intersection.
 
-        Averages and what goes by views are decided on as if each sensor said all it knows.
-        of_lmbs: whether the filters keep LMBs, on which a sensor by itself is then planned.
+        Averages and fusion by views are planned as if each sensor's scans counted in full.
+        of_lmbs: True if the filters use LMBs, on which a single sensor is then planned.
         """
         from vedette.fusion import ParallelUpdate
 
@@ -199,11 +199,11 @@ class CustomFusion(Custom):
 
     @property
     def feeds_back(self) -> bool:
-        """Whether the sensors go on from the fused density."""
+        """True if the fused density replaces the sensors' own."""
         return self.feedback
 
     def build(self, num_sensors: int, folder: Path) -> FusionRule:
-        """The fusion of the sensors' densities."""
+        """Return the fusion of the sensors' densities."""
         made: FusionRule = self.made(folder, num_sensors=num_sensors)
         return made
 

@@ -1,4 +1,4 @@
-"""The radio network that sensors send their scans or beliefs over, and what must hold between it, births and fusion."""
+"""The radio network over which sensors send their scans or beliefs, and its consistency with births and fusion."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from vedette.scenarios.sections.derived import Part, derived
 from vedette.scenarios.sections.fusion import BY_LABEL, OF_SCANS, Fusion
 from vedette.scenarios.sections.tracking import UNLABELLED
 
-if TYPE_CHECKING:  # with these comes the compiler, which a check does without
+if TYPE_CHECKING:  # importing these imports the compiler, which a check does not need
     from vedette.scenarios.sections.scenario import ScenarioModel
 
 
@@ -32,7 +32,7 @@ class NetworkSection(Part):
 
 
 def network_of_several(model: ScenarioModel) -> Iterator[Finding]:
-    """A network has sensors that fuse something."""
+    """Yield faults of a network with a single sensor, or without fusion."""
     if model.network is None:
         return
     if len(model.sensors) < 2:
@@ -42,7 +42,7 @@ def network_of_several(model: ScenarioModel) -> Iterator[Finding]:
 
 
 def network_of_fusion(model: ScenarioModel) -> Iterator[Finding]:
-    """What is sent can be sent as the network does it."""
+    """Yield faults of filters, fusion and network that do not work together."""
     network, fusion = model.network, model.fusion
     if network is None:
         return
@@ -59,7 +59,7 @@ def network_of_fusion(model: ScenarioModel) -> Iterator[Finding]:
 
 
 def births_from_measurements(model: ScenarioModel) -> Iterator[Finding]:
-    """Measurements say where a target may have been born, and labels whose it is."""
+    """Yield faults of births from measurements: state dimension, labels, places of targets, matching of labels."""
     measured, fusion = model.birth.from_measurements, model.fusion
     if measured is None:
         return
@@ -80,7 +80,7 @@ def births_from_measurements(model: ScenarioModel) -> Iterator[Finding]:
 
 
 def matching_of_own_labels(model: ScenarioModel) -> Iterator[Finding]:
-    """Labels are matched where sensors can have different ones for one target."""
+    """Yield a fault if labels are matched although all sensors share them."""
     fusion = model.fusion
     if not isinstance(fusion, Fusion) or fusion.matching == "labels" or fusion.kind not in BY_LABEL:
         return

@@ -1,4 +1,4 @@
-"""Places on the Earth in a scenario that has an origin: where a place in metres is read, one in degrees may stand."""
+"""Places on the Earth in a scenario with an origin: places in degrees may be given in place of metres."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.targets import PoissonTargets, ScriptedTarget
 from vedette.scenarios.sections.world import RegionSection
 
-if TYPE_CHECKING:  # with it come NumPy's friends, which a check may do without
+if TYPE_CHECKING:  # importing it imports further packages, which a check does not need
     from vedette.recorded import Origin
     from vedette.scenarios.sections.scenario import ScenarioModel
 
 _PLACE = {"lon", "lat"}
 _BOX = ("lon_min", "lon_max", "lat_min", "lat_max")
-_NODES = 33  # on each edge of a box of degrees, which is no rectangle in the plane
-# Numbers that are so near to the origin's degrees are degrees, unless the origin is near (0, 0).
+_NODES = 33  # points on each edge of a box of degrees, which is not a rectangle in the plane
+# Numbers this near to the origin's degrees count as degrees, unless the origin is near (0, 0).
 _NEAR_DEG = 2.0
 
 
@@ -40,16 +40,16 @@ class OriginSection(Section):
     lat: float = Field(ge=-90.0, le=90.0, description="Latitude to the north [deg].")
 
     def build(self) -> Origin:
-        """The origin."""
+        """Return the origin."""
         from vedette.recorded import Origin
 
         return Origin(self.lon, self.lat)
 
 
 def in_metres(data: Mapping[str, Any]) -> Mapping[str, Any]:
-    """A scenario's data with its places in metres; as it is where it has no origin, or one that cannot be read.
+    """Return a scenario's data with its places in metres; unchanged without a readable origin.
 
-    A place that is none stays, and is told of where it is read.
+    An invalid place stays, and is reported by the section that reads it.
     """
     origin = origin_of(data)
     if origin is None:
@@ -58,7 +58,7 @@ def in_metres(data: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def origin_of(data: Mapping[str, Any]) -> Origin | None:
-    """The origin of a scenario's data; None where it has none, or one that cannot be read."""
+    """Return the origin of a scenario's data; None if it has none, or one that cannot be read."""
     try:
         return OriginSection.model_validate(data.get("origin")).build()
     except ValueError:
@@ -66,7 +66,7 @@ def origin_of(data: Mapping[str, Any]) -> Origin | None:
 
 
 def is_place(value: Any) -> bool:
-    """Whether it is written as a place in degrees."""
+    """Return True if the value is written as a place in degrees."""
     return isinstance(value, Mapping) and bool(_PLACE & set(value) or set(_BOX) & set(value))
 
 
@@ -100,7 +100,7 @@ def _is_on_earth(place: Mapping[str, Any]) -> bool:
 
 
 def _region(box: Mapping[str, Any], origin: Origin) -> Any:
-    """The rectangle around a box of degrees."""
+    """Return the rectangle around a box of degrees."""
     if _is_on_earth(box) and box["lon_max"] < box["lon_min"] and box["lon_max"] + 180.0 < box["lon_min"]:
         box = {**box, "lon_max": box["lon_max"] + 360.0}  # across 180 degrees
     if not {**box}.keys() or box["lon_max"] <= box["lon_min"] or box["lat_max"] <= box["lat_min"]:
@@ -119,7 +119,7 @@ def _region(box: Mapping[str, Any], origin: Origin) -> Any:
 
 
 def misplaced(model: ScenarioModel) -> Iterator[Finding]:
-    """Places in metres that can only be degrees, near to what the origin's are; and places in no plane with it."""
+    """Yield faults of places in metres that must be degrees, near the origin's degrees, and of places too far away."""
     origin = model.origin
     if origin is None:
         return
@@ -144,7 +144,7 @@ def misplaced(model: ScenarioModel) -> Iterator[Finding]:
 
 
 def _points_of(section: Section) -> Iterator[tuple[Path, Sequence[tuple[float, float]]]]:
-    """The places that a section itself names, each with its path in it."""
+    """Yield the places that a section itself names, each with its path in it."""
     if isinstance(section, Sensor):
         yield ("position",), [section.position]
     elif isinstance(section, RegionSection):

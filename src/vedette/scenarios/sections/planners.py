@@ -1,4 +1,4 @@
-"""The strategies by name: the one place where they are declared, and those of the user's own."""
+"""The strategies by name: their only declarations, and custom ones."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from vedette.scenarios.sections.strategies import (
     watched,
 )
 
-if TYPE_CHECKING:  # with the planners comes the compiler, which a check does without
+if TYPE_CHECKING:  # importing the planners imports the compiler, which a check does not need
     from vedette.control import Plan, Planner
     from vedette.scenarios.sections.scenario import ScenarioModel
     from vedette.simulation import Truth
@@ -38,11 +38,11 @@ class NamedJoint(ValuedStrategy):
     search: AnySearch | None = Field(default=None, description="In place of control.search; none: that one [-].")
 
     def words(self, model: ScenarioModel) -> str:
-        """Joint, and by which reward."""
+        """Return a description: joint, and by which reward."""
         return self.by_reward("joint decisions", model)
 
     def planner(self, parts: Parts, folder: Path) -> Planner:
-        """With the search."""
+        """Return the joint planner with the search."""
         from vedette.control import JointPlanner
 
         search = parts.search if self.search is None else self.search.build(folder)
@@ -55,15 +55,15 @@ class NamedTold(NamedJoint):
     kind: Literal["told"] = Field(default="told", description="Kind of planner [-].")  # type: ignore[assignment]
 
     def misfit(self, model: ScenarioModel, *, labels: bool | None = None) -> str:
-        """Unfit also where the true targets are not known, or lack components of a custom motion."""
+        """Return what is required instead, also if true targets are unknown or lack components of a custom motion."""
         return super().misfit(model, labels=labels) or unknown_truth(model)
 
     def words(self, model: ScenarioModel) -> str:
-        """Joint, with the truth."""
+        """Return a description: joint, with the true targets."""
         return "joint decisions, true targets given"
 
     def planner(self, parts: Parts, folder: Path) -> Planner:
-        """The joint planner on beliefs about the true targets, none of which is undetected."""
+        """Return the joint planner on beliefs about the true targets, without undetected ones."""
         from vedette.simulation import TrueTargetsPlanner
 
         settings = replace(parts.settings, undetected_worth=0.0)
@@ -80,11 +80,11 @@ class NamedIndependent(ValuedStrategy):
     )
 
     def words(self, model: ScenarioModel) -> str:
-        """Independent, by which reward, and what is assumed of other sensors."""
+        """Return a description: independent, by which reward, and the assumption about other sensors."""
         return f"{self.by_reward('independent decisions', model)}, other sensors {self.others or model.control.others}"
 
     def planner(self, parts: Parts, folder: Path) -> Planner:
-        """Watched, as of pairs of sensors it knows nothing."""
+        """Return the planner; its plans report violated constraints, as it ignores those on pairs of sensors."""
         from vedette.control import IndependentPlanner
 
         own = IndependentPlanner(**self.shared(parts, folder), others=self.others or parts.others)
@@ -97,7 +97,7 @@ class NamedLookahead(LookaheadStrategy, Lookahead):
     kind: Literal["lookahead"] = Field(default="lookahead", description="Kind of planner [-].")
 
     def ahead(self, parts: Parts) -> dict[str, Any]:
-        """As it says itself."""
+        """Return the arguments from the section itself."""
         return self.build()
 
 
@@ -125,11 +125,11 @@ class NamedRule(Strategy):
             yield ("targets",), f"none, as the rule is {self.kind}", describe(list(self.targets))
 
     def words(self, model: ScenarioModel) -> str:
-        """Which rule."""
+        """Return a description: the rule."""
         return f"rule of thumb: {_RULES[self.kind]}"
 
     def planner(self, parts: Parts, folder: Path) -> Planner:
-        """By the rule."""
+        """Return the planner of the rule."""
         from vedette.control import RulePlanner
 
         return RulePlanner(parts.sensors, self.kind, parts.settings, parts.constraints, parts.estimate, self.targets)
@@ -142,15 +142,15 @@ class NamedOracle(Strategy, Derived):
     kind: Literal["oracle"] = Field(default="oracle", description="Kind of planner [-].")
 
     def misfit(self, model: ScenarioModel, *, labels: bool | None = None) -> str:
-        """Unfit where the true targets are not known, or lack components of a custom motion."""
+        """Return what is required instead if true targets are unknown or lack components of a custom motion."""
         return unknown_truth(model)
 
     def words(self, model: ScenarioModel) -> str:
-        """With the truth."""
+        """Return a description: with the true targets."""
         return "best decisions for the true targets"
 
     def planner(self, parts: Parts, folder: Path) -> Planner:
-        """Who waits to be told of the targets."""
+        """Return the planner; it receives the true targets later."""
         from vedette.simulation import OraclePlanner
 
         own: dict[str, Any] = {"settings": parts.settings, "constraints": parts.constraints, "estimate": parts.estimate}
@@ -163,15 +163,15 @@ class CustomPlanner(Strategy, Custom):
     wants."""
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of planner [-].")
-    spared: ClassVar[tuple[str, ...]] = ("name",)  # which the scenario gives
+    spared: ClassVar[tuple[str, ...]] = ("name",)  # given by the scenario
     gives: ClassVar[str] = "vedette.control:Planner"
 
     def words(self, model: ScenarioModel) -> str:
-        """Which class or function."""
+        """Return a description: the class or function."""
         return f"custom planner {self.function}"
 
     def planner(self, parts: Parts, folder: Path) -> Planner:
-        """The user's own."""
+        """Return the custom planner."""
         return watched(self.made(folder, **parts._asdict()), parts)
 
 
@@ -179,11 +179,11 @@ class ProgramStrategy(Strategy, ProgramSection):
     """A planner that is a program."""
 
     def words(self, model: ScenarioModel) -> str:
-        """Which command."""
+        """Return a description: the command."""
         return f"external program {self.code}"
 
     def planner(self, parts: Parts, folder: Path) -> Planner:
-        """The one that asks it."""
+        """Return the planner that runs the program."""
         from vedette.control import ProgramPlanner
 
         names = ("sensors", "scene", "settings", "constraints", "estimate")
@@ -192,7 +192,7 @@ class ProgramStrategy(Strategy, ProgramSection):
 
 class _Random(Strategy):
     def words(self, model: ScenarioModel) -> str:
-        """Random."""
+        """Return a description: random."""
         return "random actions"
 
     def planner(self, parts: Parts, folder: Path) -> Planner:
@@ -203,7 +203,7 @@ class _Random(Strategy):
 
 class _Fixed(Strategy):
     def words(self, model: ScenarioModel) -> str:
-        """Without decisions."""
+        """Return a description: no decisions."""
         return "first course kept"
 
     def planner(self, parts: Parts, folder: Path) -> Planner:
@@ -212,7 +212,7 @@ class _Fixed(Strategy):
         return watched(FixedPlanner(parts.first_actions), parts)
 
 
-# Those that every scenario has. Not validated: that would build, at import, what reads rewards and searches.
+# The strategies of every scenario. Not validated: that would build the validators of rewards and searches at import.
 STRATEGIES: dict[str, Strategy] = {
     "jdm": NamedJoint.model_construct(),
     "idm": NamedIndependent.model_construct(),
@@ -229,7 +229,7 @@ STRATEGIES: dict[str, Strategy] = {
 
 
 def strategy_of(model: ScenarioModel, name: str) -> Strategy:
-    """The strategy of a scenario by its name. Raises `KeyError` for an unknown one."""
+    """Return the strategy of a scenario by its name. Raises `KeyError` for an unknown one."""
     return model.planners[name] if name in model.planners else STRATEGIES[name]
 
 
@@ -241,17 +241,17 @@ def strategy_words(model: ScenarioModel, name: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Named:
-    """A planner under the name that the scenario gives it."""
+    """A planner with its name in the scenario."""
 
     name: str
     planner: Planner
 
     def plan(self, *situation: Any, rng: np.random.Generator) -> Plan:
-        """What the planner decides."""
+        """Return the planner's plan, under this name."""
         return replace(self.planner.plan(*situation, rng=rng), planner=self.name)
 
     def with_truth(self, truth: Truth) -> Named:
-        """The same, where the planner is one that knows the targets of a run."""
+        """Return the planner with the true targets, if it requires them; else unchanged."""
         from vedette.simulation import RequiresTruth
 
         return (

@@ -1,4 +1,4 @@
-"""Sections about what carries a sensor: what it may do, and where that takes it."""
+"""Sections about the platforms of sensors: their actions and motion."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from vedette.scenarios.sections.base import HalfWidth, Numbers, Point, Positive,
 from vedette.scenarios.sections.custom import Custom
 from vedette.scenarios.sections.derived import Part, derived, one_of
 
-if TYPE_CHECKING:  # with the platforms come the models, and the compiler, which a check does without
+if TYPE_CHECKING:  # importing the platforms imports the models and the compiler, which a check does not need
     from vedette.platforms import Platform
 
 Row = tuple[float, ...]
@@ -24,16 +24,16 @@ class _PlatformSection(Part):
     """What a platform has unless it says otherwise: no more than a place and a heading, and a rest."""
 
     def components(self) -> Row:
-        """What its pose has at the start beyond place and heading."""
+        """Return the components of its pose at the start after place and heading."""
         return ()
 
     def first_action(self, heading_deg: float) -> Row | None:
-        """What it does where nothing decides: its course at the start; None: the first of its actions."""
+        """Return its action before any decision: its course at the start; None: the first of its actions."""
         return None
 
     @property
     def top_speed(self) -> float:
-        """m/s."""
+        """Largest speed, m/s."""
         return float(self.speed) if "speed" in type(self).model_fields else 0.0
 
 
@@ -65,16 +65,16 @@ class Courses(_PlatformSection):
             yield (), "either speed or speeds", "neither" if self.speed is None else "both"
 
     def given(self) -> dict[str, Any]:
-        """With one speed or several."""
+        """Return the arguments of the platform, with one speed or several."""
         return {**super().given(), "speed": self.top_speed if self.speeds is None else self.speeds}
 
     def first_action(self, heading_deg: float) -> Row | None:
-        """Its heading at the start, at its speed, or the first of several."""
+        """Return its heading at the start, at its speed, or the first of several."""
         return (heading_deg,) if self.speeds is None else (heading_deg, self.speeds[0])
 
     @property
     def top_speed(self) -> float:
-        """m/s."""
+        """Largest speed, m/s."""
         return max(self.speeds) if self.speeds is not None else self.speed or 0.0
 
 
@@ -85,7 +85,7 @@ class Steps(_PlatformSection):
     kind: Literal["steps"] = Field(default="steps", description="Kind of platform [-].")
 
     def first_action(self, heading_deg: float) -> Row | None:
-        """It stays where it may."""
+        """Return the step of length 0 if it may stay, else None."""
         return (0.0, 0.0) if self.stay else None
 
 
@@ -106,17 +106,17 @@ class CustomPlatform(_PlatformSection, Custom):
     gives: ClassVar[str] = "vedette.platforms:Platform"
 
     def build(self, folder: Path | None = None, **_: Any) -> Platform:
-        """The user's own."""
+        """Return the custom platform."""
         made: Platform = self.made(folder or Path())
         return made
 
     def components(self) -> Row:
-        """What its pose has at the start beyond place and heading."""
+        """Return the components of its pose at the start after place and heading."""
         return self.pose
 
     @property
     def top_speed(self) -> float:
-        """m/s; nobody knows how fast it is."""
+        """Largest speed, m/s; unknown for a custom platform."""
         return math.inf
 
 
@@ -137,25 +137,25 @@ class Camera(_PlatformSection):
     carrier: Carrier = Field(default=Still(), description="What carries it [-].")
 
     def build(self, folder: Path | None = None, **_: Any) -> Platform:
-        """A camera, carried where its carrier moves."""
+        """Return a camera, with its carrier if that moves."""
         from vedette.platforms import MountedPlatform
 
         pointing: Platform = super().build(folder)
         return pointing if isinstance(self.carrier, Still) else MountedPlatform(self.carrier.build(folder), pointing)
 
     def components(self) -> Row:
-        """Pointing and half width, rad."""
+        """Return pointing and half width, rad."""
         return math.radians(self.pointing_deg), math.radians(self.half_width_deg)
 
     def first_action(self, heading_deg: float) -> Row | None:
-        """It keeps its pointing."""
+        """Return the action that keeps its pointing."""
         carried = () if isinstance(self.carrier, Still) else self.carrier.first_action(heading_deg)
         zoom = (self.half_width_deg,) if self.half_widths_deg else ()
         return None if carried is None else (*carried, self.pointing_deg, *zoom)
 
     @property
     def top_speed(self) -> float:
-        """m/s."""
+        """Largest speed, m/s."""
         return self.carrier.top_speed
 
 

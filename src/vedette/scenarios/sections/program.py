@@ -1,4 +1,4 @@
-"""Programs of the user's own that a scenario names, which speak JSON lines over a pipe; docs/benchmark.md."""
+"""Custom programs that a scenario names, which exchange lines of JSON over a pipe; see docs/benchmark.md."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pydantic import Field
 
 from vedette.scenarios.sections.base import Name, Positive, Section
 
-if TYPE_CHECKING:  # with the filters comes the compiler, which a check does without
+if TYPE_CHECKING:  # importing the filters imports the compiler, which a check does not need
     from vedette.models import SensorModel, TargetModel
     from vedette.tracking import CentralFilter
 
@@ -28,16 +28,16 @@ class ProgramSection(Section):
 
     @property
     def code(self) -> str:
-        """What it runs, for people."""
+        """Description of the command that it runs."""
         return " ".join(self.command)
 
     def files(self, folder: Path) -> tuple[str, ...]:
-        """The arguments that are files."""
+        """Return the arguments that are files."""
         place = folder / self.folder
         return tuple(str(place / word) for word in self.command if (place / word).is_file())
 
     def asked(self, folder: Path) -> dict[str, Any]:
-        """How to ask it."""
+        """Return the arguments for calling the program."""
         given = {name: getattr(self, name) for name in ("command", "seconds", "start_seconds")}
         return {**given, "folder": (folder / self.folder).resolve()}
 
@@ -53,7 +53,7 @@ class ProgramCentral(ProgramSection):
         sensors: tuple[SensorModel, ...],
         scene: Callable[[], dict[str, Any]],
     ) -> CentralFilter:
-        """The filter that asks it."""
+        """Return the filter that runs the program."""
         from vedette.tracking import ProgramFilter
 
         return ProgramFilter(targets, sensors, scene=scene, **self.asked(folder))

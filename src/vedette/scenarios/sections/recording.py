@@ -1,4 +1,4 @@
-"""The section about scans that were recorded, instead of simulated ones."""
+"""The section about recorded scans, which replace simulated ones."""
 
 from __future__ import annotations
 
@@ -67,9 +67,9 @@ class RecordingSection(Section):
     )
 
     def build(self, world: ScenarioModel, folder: Path, *, as_told: bool = False) -> RecordedScans:
-        """The scans, without the sensors' biases unless as they were told; a file that stays as it was is read once.
+        """Return the scans, without the sensors' biases unless `as_told`; an unchanged file is read only once.
 
-        Raises `InputError` for a file that cannot be read, naming row and column.
+        Raises `InputError` for a file that cannot be read, with row and column.
         """
         file = folder / self.path
         try:
@@ -95,7 +95,7 @@ class RecordingSection(Section):
 def _read(
     file: str, changed: tuple[int, int] | None, section: str, sites: tuple[Site, ...], origin: Origin | None
 ) -> RecordedScans:
-    """The scans of a file as it was when it last changed, read as a section says, in JSON as mappings have no hash."""
+    """Return the scans of a file with this time of change; the section is JSON, as mappings cannot be hashed."""
     from vedette.recorded import Conventions, parse_scans
     from vedette.recorded.tables import read_table
 
@@ -105,7 +105,7 @@ def _read(
 
 
 def noise_stds(sensor: Sensor) -> tuple[float, ...] | None:
-    """Least standard deviation of each component that a sensor measures, rad and m; None of a custom noise."""
+    """Return the lowest standard deviation of each measured component, rad and m; None for custom noise."""
     noise = sensor.noise
     if noise.kind == "range_dependent":
         names = COMPONENTS.get(sensor.measurement.kind, ())
@@ -114,7 +114,7 @@ def noise_stds(sensor: Sensor) -> tuple[float, ...] | None:
 
 
 def sites_of(world: ScenarioModel) -> list[Site]:
-    """The sensors of a recording."""
+    """Return the sensors of a recording."""
     from vedette.recorded import Site
 
     north = world.north()
@@ -135,7 +135,7 @@ def sites_of(world: ScenarioModel) -> list[Site]:
 
 
 def recording_findings(world: ScenarioModel, folder: Path) -> Iterator[Finding]:
-    """What is wrong with recorded scans, and with what a scenario asks beside them."""
+    """Yield faults of recorded scans, and of sections that do not suit them."""
     section = world.recording
     if section is None:
         return

@@ -1,4 +1,4 @@
-"""Section about when a sensor scans, and how its scans come late."""
+"""Section about the times of a sensor's scans, and their delays."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pydantic import Field
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import NonNegative, Positive, Probability, Section, Share, Step, check
 
-if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
+if TYPE_CHECKING:  # importing the models imports the compiler, which a check does not need
     from vedette.kernels.base.types import Bools
     from vedette.scenarios.sections.world import Time
     from vedette.tracking import Delay
@@ -34,7 +34,7 @@ class LateSection(Section):
             yield ("end",), f"a time from start on, {self.start:g} s", describe(self.end)
 
     def build(self) -> Delay:
-        """What a tracker delays its scans by."""
+        """Return the delay of the scans for a tracker."""
         from vedette.tracking import Delay
 
         given = {name: value for name, value in self.model_dump().items() if value is not None}
@@ -72,7 +72,7 @@ class ScanTimes(Section):
             yield ("offset",), wanted, describe(self.offset)
 
     def findings_beside(self, step_period: float) -> Iterator[Finding]:
-        """What is wrong with it where steps are so many seconds apart."""
+        """Yield faults for steps of this period, s."""
         for name in ("period", "offset"):
             value = getattr(self, name)
             if value is not None and abs(value - round(value / step_period) * step_period) > 1e-6 * step_period:
@@ -81,12 +81,12 @@ class ScanTimes(Section):
             yield ("period",), f"at least time.step_period, {step_period:g} s", describe(self.period)
 
     def steps(self, step_period: float) -> tuple[int, int]:
-        """Steps from one scan to the next, and the first of them."""
+        """Return the steps from one scan to the next, and the first of them."""
         if self.period is None:
             return self.every, self.first
         return round(self.period / step_period), 1 + round((self.offset or 0.0) / step_period)
 
     def build(self, time: Time) -> Bools:
-        """(num_steps,) whether it scans, but for drop-outs."""
+        """Return True for each step with a scan, (num_steps,), before drop-outs."""
         every, first = self.steps(time.step_period)
         return np.asarray((np.arange(1, time.num_steps + 1) - first) % every == 0)

@@ -35,15 +35,15 @@ from vedette.scenarios.sections.world import (
     Time,
 )
 
-if TYPE_CHECKING:  # with it come the models, which a check does without
+if TYPE_CHECKING:  # importing it imports the models, which a check does not need
     from vedette.platforms.compass import Compass
 
-# Of a horizon that is as long as it is to the next decision.
+# Largest number of steps of a horizon that ends at the next decision.
 _MOST_STEPS = 100
 
 
 def merge_sensor_defaults(data: Mapping[str, Any]) -> dict[str, Any]:
-    """A copy of a scenario's data in which every sensor has what `sensor_defaults` gives and it does not say itself."""
+    """Return a copy of a scenario's data in which `sensor_defaults` fills in keys that a sensor does not give."""
     merged = dict(data)
     defaults, sensors = data.get("sensor_defaults"), data.get("sensors")
     if isinstance(defaults, Mapping) and isinstance(sensors, list | tuple):
@@ -53,7 +53,7 @@ def merge_sensor_defaults(data: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def with_reward(data: Mapping[str, Any]) -> Mapping[str, Any]:
-    """A scenario's data in which decisions that name no reward go by the error by which they are scored."""
+    """Return a scenario's data in which decisions without a reward use the error of the score."""
     control, score = data.get("control"), data.get("ospa")
     if not isinstance(control, Mapping) or "reward" in control or not isinstance(score, Mapping):
         return data
@@ -133,12 +133,12 @@ class ScenarioModel(Section):
 
     @classmethod
     def in_metres(cls, data: Mapping[str, Any]) -> Mapping[str, Any]:
-        """With places in degrees, as an origin allows them, in metres, and courses as headings."""
+        """Return the mapping with places in degrees converted to metres, by its origin, and courses to headings."""
         return from_east(in_metres(data))
 
     @classmethod
     def prepared(cls, data: Mapping[str, Any]) -> Mapping[str, Any]:
-        """In metres, with what `sensor_defaults` gives in every sensor, and a reward where none is named."""
+        """Return the mapping in metres, with `sensor_defaults` filled in, and a reward if none is given."""
         return with_reward(merge_sensor_defaults(cls.in_metres(data)))
 
     @field_validator("sensor_defaults")
@@ -153,37 +153,37 @@ class ScenarioModel(Section):
 
     @property
     def sensor_names(self) -> tuple[str, ...]:
-        """Name of each sensor; `sensor 1`, `sensor 2`, ... where none is given."""
+        """Name of each sensor; `sensor 1`, `sensor 2`, ... for those without."""
         return tuple(sensor.name or f"sensor {number}" for number, sensor in enumerate(self.sensors, 1))
 
     @property
     def by_compass(self) -> bool:
-        """Whether directions come in and go out as courses, clockwise from true north, as on a chart."""
+        """True if directions are given and returned as courses, clockwise from true north, as on a chart."""
         recorded = self.recording is not None and self.recording.bearings == "north"
         return self.origin is not None or recorded or any(sensor.compass for sensor in self.sensors)
 
     def north(self) -> Compass:
-        """Where true north is: at an origin's place on the Earth, else along y."""
+        """Return the direction of true north: with an origin by the place on the Earth, else along y."""
         from vedette.platforms.compass import PlaneCompass
 
         return PlaneCompass() if self.origin is None else self.origin.build()
 
     @property
     def estimates_by(self) -> Any:
-        """The estimator section in use, whether it was given or not."""
+        """The estimator section in use, given or default."""
         if self.estimator is not None:
             return self.estimator
         return LeastOspaEstimator() if self.filter.kind == "factored_glmb" else MapEstimator()
 
     @property
     def has_heights(self) -> bool:
-        """Whether states are [px, py, vx, vy, pz, vz]."""
+        """True if states are [px, py, vx, vy, pz, vz]."""
         solid = any(sensor.measurement.kind in SOLID for sensor in self.sensors)
         return solid or self.motion.kind == "constant_velocity_height"
 
     @property
     def decision_steps(self) -> tuple[int, ...]:
-        """The scans after which the sensors decide, however the scenario says it."""
+        """The scans after which the sensors decide, from any form of schedule."""
         every = self.control.decision_every
         if every is not None:
             return tuple(range(every, self.time.num_steps, every))
@@ -195,7 +195,7 @@ class ScenarioModel(Section):
 
     @property
     def horizon(self) -> tuple[int, float]:
-        """H and T, s, of decisions: what is said, else scan by scan for as long as mostly is to the next decision."""
+        """H and T, s, of decisions; the default is scan by scan over the usual time to the next decision."""
         control, scan = self.control, self.time.step_period
         period = control.horizon_period or scan
         if control.horizon_steps is not None:

@@ -1,4 +1,4 @@
-"""Sections about the results: how estimates are read off a density, and their score."""
+"""Sections about the results: estimators and scores."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import Chance, Count, Positive, Section, check
 from vedette.scenarios.sections.derived import Part, derived, one_of
 
-if TYPE_CHECKING:  # with the densities comes the compiler, which a check does without
+if TYPE_CHECKING:  # importing the densities imports the compiler, which a check does not need
     from vedette.densities import Estimate, Estimator
     from vedette.filters import Belief
 
@@ -24,7 +24,7 @@ class MapEstimator(Section):
     kind: Literal["map"] = Field(default="map", description="Kind of estimate [-].")
 
     def build(self, folder: Path) -> Estimator:
-        """How estimates are read off a density after a scan, given its number, by which unlabelled ones are named."""
+        """Return a function of a density and the number of its scan, by which unlabelled estimates are named."""
         from vedette.densities import map_or_unlabelled
 
         return map_or_unlabelled
@@ -37,7 +37,7 @@ class LeastOspaEstimator(Section):
     kind: Literal["least_ospa"] = Field(default="least_ospa", description="Kind of estimate [-].")
 
     def build(self, folder: Path) -> Estimator:
-        """How estimates are read off a density after a scan, given its number."""
+        """Return a function of a density and the number of its scan that returns the estimates."""
         from vedette.densities import least_ospa_estimate
 
         return lambda density, step: least_ospa_estimate(density)
@@ -50,7 +50,7 @@ class MarginalEstimator(Section):
     threshold: Chance = Field(default=0.5, description="Least probability of existence [-].")
 
     def build(self, folder: Path) -> Estimator:
-        """How estimates are read off a density after a scan, given its number."""
+        """Return a function of a density and the number of its scan that returns the estimates."""
         from vedette.densities import LabelledDensity, marginal_estimate, unlabelled_estimate
 
         def estimate(density: Belief, step: int) -> Estimate:
@@ -110,5 +110,5 @@ class Ospa(Section):
 
     @property
     def unit(self) -> str:
-        """Of the score: that of a position, or none."""
+        """Unit of the score: that of a position, or none."""
         return "" if self.components == "state" else "m"

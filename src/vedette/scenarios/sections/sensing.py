@@ -1,4 +1,4 @@
-"""Sections about a sensor: what it measures with what noise, what it detects, and what it measures falsely."""
+"""Sections about sensor models: measurement, noise, detection and clutter."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from vedette.scenarios.faults import Finding, Path, describe
 from vedette.scenarios.sections.base import Positive, Section, check
 from vedette.scenarios.sections.derived import Part, derived, one_of
 
-if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
+if TYPE_CHECKING:  # importing the models imports the compiler, which a check does not need
     from vedette.models import NoiseModel
 
 
 def components(measurement: Measurement) -> tuple[int | None, tuple[int, ...]]:
-    """Number of components of a measurement, None of one of the user's own; and which of them are known as angles."""
+    """Return the number of components of a measurement (None for a custom one), and those known to be angles."""
     names = COMPONENTS.get(measurement.kind, ())
     return len(names) or None, angles(names)
 
@@ -46,7 +46,7 @@ class RangeDependentNoise(Section):
     )
 
     def build(self, folder: FilePath, *, kind: str, **_: Any) -> NoiseModel:
-        """Measurement noise: the parts that the kind of measurement has."""
+        """Return the measurement noise: the components that the kind of measurement has."""
         from vedette.models import range_dependent_noise
 
         parts: dict[str, dict[str, float | None]] = {
@@ -104,7 +104,7 @@ _THIRDS = {"range_rate": "range rates", "elevation": "elevations", "altitude": "
 
 
 def noise_findings(measurement: Measurement, noise: Noise, path: Path) -> Iterator[Finding]:
-    """Whether the noise at `path` is for what is measured."""
+    """Yield faults if the noise at `path` does not suit the measurement."""
     kind, (dim, angular) = measurement.kind, components(measurement)
     third = next((name for name in COMPONENTS.get(kind, ())[2:] if name in _THIRDS), None)
     if noise.kind == "range_dependent" and kind in ("position", "position_altitude", "custom"):
@@ -129,7 +129,7 @@ def noise_findings(measurement: Measurement, noise: Noise, path: Path) -> Iterat
 
 
 def clutter_findings(measurement: Measurement, clutter: Clutter, path: Path) -> Iterator[Finding]:
-    """Whether the clutter at `path` is for what is measured."""
+    """Yield faults if the clutter at `path` does not suit the measurement."""
     kind = measurement.kind
     if clutter.kind == "region" and kind == "custom":
         yield path, "measurement_space or custom clutter for a custom measurement", "region clutter"
@@ -139,7 +139,7 @@ def clutter_findings(measurement: Measurement, clutter: Clutter, path: Path) -> 
 
 
 def clutter_box_findings(measurement: Measurement, clutter: Clutter, path: Path) -> Iterator[Finding]:
-    """Whether the bounds of clutter in measurement space are a box of the measurement's components."""
+    """Yield faults if the bounds of clutter in measurement space are not a box of the measurement's components."""
     if clutter.kind != "measurement_space":
         return
     low, high, (dim, angular) = clutter.low, clutter.high, components(measurement)
@@ -156,7 +156,7 @@ def clutter_box_findings(measurement: Measurement, clutter: Clutter, path: Path)
 
 
 def same_measurement_findings(true: Measurement, known: Measurement, path: Path) -> Iterator[Finding]:
-    """Whether the true measurement is one that the filter's model can take for its own."""
+    """Yield faults if the true measurement is not compatible with the filter's model."""
     if "custom" not in (true.kind, known.kind) and components(true) != components(known):
         yield (*path, "kind"), f"{known.kind} or custom, as the filter takes it for that", describe(true.kind)
 

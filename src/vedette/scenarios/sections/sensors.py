@@ -1,4 +1,4 @@
-"""Sections about the sensors: where they are, how they move, what they see, and when."""
+"""Sections about the sensors: position, motion, models and scan times."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from vedette.scenarios.sections.sensing import (
 )
 from vedette.scenarios.sections.true_sensors import BiasSection, TrueSensor, built_parts
 
-if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
+if TYPE_CHECKING:  # importing the models imports the compiler, which a check does not need
     from vedette.models import Region, SensorModel
     from vedette.models.turns import Turn
     from vedette.simulation import TrueSensor as TrueSensorModel
@@ -54,7 +54,7 @@ class TurnSection(Section):
     clockwise: bool = Field(default=True, description="Seen from above, as most radars turn [-].")
 
     def build(self) -> Turn:
-        """As recordings and poses take it."""
+        """Return the turn for recordings and poses."""
         from vedette.models.turns import Turn
 
         return Turn(self.period, self.clockwise)
@@ -192,7 +192,7 @@ class Sensor(Section):
 
     @property
     def pose(self) -> tuple[float, ...]:
-        """Where it starts: [px, py, heading_rad], and what else its platform has."""
+        """Pose at the start: [px, py, heading_rad], and further components of its platform."""
         pose = (*self.position, math.radians(self.heading_deg), *self.platform.components())
         if self.budget is not None:
             pose = (*pose, *(0.0,) * (5 - len(pose)), self.budget.seconds)
@@ -202,12 +202,12 @@ class Sensor(Section):
 
     @property
     def needs_velocity(self) -> bool:
-        """Whether its measurements go by its own velocity, which its poses then have."""
+        """True if its measurements depend on its own velocity, which its poses then contain."""
         return is_doppler(self.measurement.kind) or self.turn is not None
 
     @property
     def turning_pose(self) -> tuple[float, ...]:
-        """Where it starts, with its beam in the middle of a turn."""
+        """Pose at the start, with its beam in the middle of a turn."""
         if self.turn is None:
             return self.pose
         return (*self.pose[:BEAM], 0.0, self.turn.build().rate, *self.pose[OWN_HEIGHT:])
@@ -215,10 +215,10 @@ class Sensor(Section):
     def build(
         self, region: Region, method: GaussianMethod, folder: Path, detection_at: DetectionAt = "centre"
     ) -> SensorModel:
-        """What the filters know of it; `folder` is what a custom model's file is relative to.
+        """Return the model of the sensor in the filters; the file of a custom model is relative to `folder`.
 
         Raises:
-            InputError: a custom model that cannot be had, or parts that do not fit together.
+            InputError: a custom model that cannot be loaded, or parts that do not fit together.
         """
         from vedette.models import SensorModel
 
@@ -227,13 +227,13 @@ class Sensor(Section):
             return SensorModel(**parts, method=method, detection_at=detection_at)
 
     def build_true(self, known: SensorModel, region: Region, folder: Path) -> TrueSensorModel:
-        """What it is, beside what the filters know; errors as of `build`."""
+        """Return the true sensor for the model in the filters; raises like `build`."""
         from vedette.simulation.true_sensors import TrueSensor as Made
 
         if self.truth is None:
             return Made(known)
         made = self.truth.build(known, self.measurement, self.bias, region, folder)
-        # A compass says its bias clockwise; what is simulated is told from the east.
+        # The bias of a compass is clockwise; simulated bearings are from the east.
         return replace(made, bias=replace(made.bias, bearing=-made.bias.bearing)) if self.compass else made
 
 

@@ -1,4 +1,4 @@
-"""What all strategies of a scenario share: what planners are made of, and strategies that value densities."""
+"""Shared parts of all strategies of a scenario: the parts of planners, and strategies that value densities."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from vedette.scenarios.sections.deciding import AnyReward
 from vedette.scenarios.sections.targets import RECORDED_DIM
 from vedette.scenarios.sections.tracking import LABELLING, UNLABELLED
 
-if TYPE_CHECKING:  # with the planners comes the compiler, which a check does without
+if TYPE_CHECKING:  # importing the planners imports the compiler, which a check does not need
     from vedette.control import Constraint, JointSearch, MobileSensor, Planner, PlanningSettings
     from vedette.control.decisions import OthersAssumption
     from vedette.control.preparation import AnyReward as PlannedReward
@@ -24,15 +24,15 @@ if TYPE_CHECKING:  # with the planners comes the compiler, which a check does wi
 
 
 class Parts(NamedTuple):
-    """What planners are made of.
+    """Parts of planners.
 
-    sensors: the sensors that are steered. fusion: how their densities become one; of one sensor, of it alone. settings:
+    sensors: the sensors that are controlled. fusion: of their densities; with one sensor, of that alone. settings:
     horizon, samples, caps, threads. reward: the value of a density. search: which joint actions are evaluated. others:
-    what independent decisions presume of the other sensors. first_actions: what each sensor does where nothing decides.
-    constraints: what they must not do. notes: what plans are to say of the fusion and of who hears whom. lookahead:
-    arguments of `vedette.control.HorizonPlanner` by name, about sequences of decisions. estimate: reads the targets off
-    the fused belief. oracle: arguments of `vedette.simulation.OraclePlanner` by name, about scans and scores. scene:
-    what a program is told of the scenario, as plain data.
+    assumption of independent decisions about the other sensors. first_actions: action of each sensor before any
+    decision. constraints: on the sensors. notes: texts of plans about fusion and network. lookahead: arguments of
+    `vedette.control.HorizonPlanner` by name, about sequences of decisions. estimate: estimates the targets from the
+    fused belief. oracle: arguments of `vedette.simulation.OraclePlanner` by name, about scans and scores. scene:
+    function that returns the data of the scenario that a program receives.
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -56,18 +56,18 @@ class Strategy(Section):
     needs_labels: ClassVar[bool] = False
 
     def misfit(self, model: ScenarioModel, *, labels: bool | None = None) -> str:
-        """What is expected instead, and why, where the planner does not suit a scenario; "" where it does.
+        """Return what is required instead, and why, if the planner does not suit a scenario; "" if it does.
 
-        labels: whether the filter labels its targets, where it was made; None: as its kind says.
+        labels: True if the filter, already built, labels its targets; None: determined from its kind.
         """
         return ""
 
     def words(self, model: ScenarioModel) -> str:
-        """What it is, for a reader of results: `joint decisions, expected loss`."""
+        """Return a description for readers of results: `joint decisions, expected loss`."""
         return "sensors do not move"
 
     def planner(self, parts: Parts, folder: Path) -> Planner | None:
-        """Who decides; None: nobody."""
+        """Return the planner; None if the sensors do not move."""
         return None
 
 
@@ -78,19 +78,19 @@ class ValuedStrategy(Strategy):
     needs_labels: ClassVar[bool] = True
 
     def misfit(self, model: ScenarioModel, *, labels: bool | None = None) -> str:
-        """Unfit where filters have no labels, which its values are of."""
+        """Return what is required instead if filters have no labels, which the values need."""
         kind = model.filter.kind
         if kind not in UNLABELLED if labels is None else labels:
             return ""
         return f"nearest, assigned, centroid, oracle or custom, as {kind} filters have no labels ({LABELLING} do)"
 
     def by_reward(self, decisions: str, model: ScenarioModel) -> str:
-        """Decisions with what they go by."""
+        """Return the description of decisions with their reward."""
         reward = self.reward or model.control.reward
         return f"{decisions}, {reward.words.removeprefix('minus ') or 'custom reward'}"
 
     def shared(self, parts: Parts, folder: Path) -> dict[str, Any]:
-        """What all planners that value densities are made of."""
+        """Return the arguments of all planners that value densities."""
         reward = parts.reward if self.reward is None else self.reward.build(folder)
         names = ("sensors", "fusion", "settings", "constraints", "notes")
         return {"reward": reward, **{name: getattr(parts, name) for name in names}}
@@ -100,11 +100,11 @@ class LookaheadStrategy(ValuedStrategy):
     """Decisions over several periods, as the section about control has it."""
 
     def ahead(self, parts: Parts) -> dict[str, Any]:
-        """How far, and by which search."""
+        """Return the arguments of the depth and the search."""
         return parts.lookahead
 
     def misfit(self, model: ScenarioModel, *, labels: bool | None = None) -> str:
-        """Unfit also where decisions are no sums over labels."""
+        """Return what is required instead, also if decisions are not sums over labels."""
         reward = self.reward or model.control.reward
         if unfit := super().misfit(model, labels=labels):
             return unfit
@@ -113,18 +113,18 @@ class LookaheadStrategy(ValuedStrategy):
         return "joint or another, as with control.association full decisions are no sums over labels (known has them)"
 
     def words(self, model: ScenarioModel) -> str:
-        """Joint over several periods, and by which reward."""
+        """Return a description: joint over several periods, and by which reward."""
         return self.by_reward("joint decisions over several periods", model)
 
     def planner(self, parts: Parts, folder: Path) -> Planner:
-        """With that search."""
+        """Return the planner with that search."""
         from vedette.control import HorizonPlanner
 
         return HorizonPlanner(**self.shared(parts, folder), **self.ahead(parts))
 
 
 def unknown_truth(model: ScenarioModel) -> str:
-    """What is expected instead where a planner needs to know the true targets and does not; "" where it does."""
+    """Return what is required instead of a planner that uses true targets; "" if these are known completely."""
     motion = model.motion
     if model.targets.kind == "unknown":
         return "one that does not know the targets, as these are unknown"
@@ -137,7 +137,7 @@ def unknown_truth(model: ScenarioModel) -> str:
 
 
 def watched(decides: Planner, parts: Parts) -> Planner:
-    """A planner that does not keep to all constraints: its plans say which they violate."""
+    """Return a planner whose plans report violated constraints, for one that does not observe all of them."""
     from vedette.control import ConstraintReportingPlanner
 
     if not parts.constraints:

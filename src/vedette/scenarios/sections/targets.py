@@ -1,4 +1,4 @@
-"""Sections about the true targets: written out, recorded, or drawn."""
+"""Sections about the true targets: scripted, recorded, or drawn."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from vedette.scenarios.sections.base import (
 from vedette.scenarios.sections.derived import Derived, derived
 from vedette.scenarios.sections.world import RegionSection, grouped_order
 
-if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
+if TYPE_CHECKING:  # importing the models imports the compiler, which a check does not need
     from vedette.models import MotionModel
     from vedette.recorded import RecordedTargets as RecordedSource
     from vedette.scenarios.sections.scenario import ScenarioModel
@@ -75,7 +75,7 @@ class ScriptedTargets(Section):
     tracks: Annotated[tuple[ScriptedTarget, ...], Field(strict=False)] = Field(description="The targets [-].")
 
     def expected_number(self, num_steps: int) -> float | None:
-        """Most targets that are there at one scan."""
+        """Return the largest number of targets at one scan."""
         changes = np.zeros(num_steps + 2, np.int64)
         for track in self.tracks:
             changes[min(track.start_step, num_steps + 1)] += 1
@@ -83,7 +83,7 @@ class ScriptedTargets(Section):
         return float(np.cumsum(changes)[: num_steps + 1].max())
 
     def build(self, world: ScenarioModel, motion: MotionModel, folder: Path) -> ScriptedSource:
-        """The targets, as `motion` moves them."""
+        """Return the targets, moved by `motion`."""
         from vedette.simulation import ScriptedTargets
 
         times, tracks = world.time.build(), self.tracks
@@ -123,7 +123,7 @@ class Columns(Section):
             yield (), "either x and y, or longitude and latitude", "both"
 
     def given(self) -> dict[str, str]:
-        """The names that are given: key -> name in the file."""
+        """Return the given names: key -> name in the file."""
         return {key: name for key in type(self).model_fields if (name := getattr(self, key)) is not None}
 
 
@@ -146,15 +146,15 @@ class RecordedTargets(Derived):
     crop: bool = Field(default=True, description="Whether tracks end at the edges of the region [-].")
 
     def expected_number(self, num_steps: int) -> float | None:
-        """None: it takes the file to know."""
+        """Return None: the number is known only from the file."""
         return None
 
     def build(self, world: ScenarioModel, motion: MotionModel, folder: Path) -> RecordedSource:
-        """The targets, as they were recorded. Raises `InputError` for a file that cannot be read, or gives none."""
+        """Return the recorded targets. Raises `InputError` for a file that cannot be read or has no targets."""
         return self.source(world, folder)
 
     def source(self, world: ScenarioModel, folder: Path) -> RecordedSource:
-        """The same; a file that stays as it was is read once."""
+        """Return the recorded targets; an unchanged file is read only once."""
         file = folder / self.path
         try:
             state = os.stat(file)
@@ -207,13 +207,13 @@ class PoissonTargets(Section):
         yield from _negative_stds(self.std)
 
     def expected_number(self, num_steps: int) -> float | None:
-        """Mean number of targets at the last scan, if none has left the region; None of targets that only so go."""
+        """Return the mean number of targets at the last scan, if none leaves the region; None without deaths."""
         if self.death_probability == 0.0:
             return None
         return self.expected * (1.0 - (1.0 - self.death_probability) ** num_steps) / self.death_probability
 
     def build(self, world: ScenarioModel, motion: MotionModel, folder: Path) -> PoissonSource:
-        """The targets, as `motion` moves them."""
+        """Return the targets, moved by `motion`."""
         from vedette.simulation import PoissonTargets
 
         order = grouped_order(world.motion)
@@ -244,14 +244,14 @@ class CrowdTargets(Section):
         yield from _negative_stds(self.std)
 
     def expected_number(self, num_steps: int) -> float | None:
-        """The number at every scan, on average."""
+        """Return the mean number at every scan."""
         return float(self.number)
 
     def build(self, world: ScenarioModel, motion: MotionModel, folder: Path) -> UniformSource:
-        """The targets, as `motion` moves them."""
+        """Return the targets, moved by `motion`."""
         from vedette.simulation import UniformTargets
 
-        # In either order of a file the components but the position follow each other as in the library.
+        # In either order of a file, the components except the position have the order of the library.
         return UniformTargets(motion, self.number, world.region.build(), np.array(self.std), self.death_probability)
 
 
@@ -261,11 +261,11 @@ class UnknownTargets(Section):
     kind: Literal["unknown"] = Field(default="unknown", description="Kind of targets [-].")
 
     def expected_number(self, num_steps: int) -> float | None:
-        """None."""
+        """Return None."""
         return None
 
     def build(self, world: ScenarioModel, motion: MotionModel, folder: Path) -> ScriptedSource:
-        """None."""
+        """Return no targets."""
         from vedette.simulation import ScriptedTargets
 
         return ScriptedTargets(motion, np.empty((0, motion.state_dim)))

@@ -18,7 +18,7 @@ from vedette.scenarios.sections.base import (
 from vedette.scenarios.sections.custom import Custom
 from vedette.scenarios.sections.derived import Derived, Part, derived, of_kind, one_of
 
-if TYPE_CHECKING:  # with the filters comes the compiler, which a check does without
+if TYPE_CHECKING:  # importing the filters imports the compiler, which a check does not need
     from vedette.filters import Filter as LocalFilter
     from vedette.models import SensorModel, TargetModel
     from vedette.tracking import CentralFilter
@@ -35,13 +35,13 @@ class FilterLimits(Part):
     """Caps and thresholds of a filter: what it throws away, and so what it costs."""
 
 
-# Filters that keep no identity of their targets.
+# Filters without labels.
 UNLABELLED = ("phd", "cphd", "cb_member")
-# The others, in messages.
+# Filters with labels, for messages.
 LABELLING = "delta_glmb, m_delta_glmb, lmb and factored_glmb"
-# What filters ask of an assignment, where not both.
+# Kinds of assignment that a filter supports, if not all.
 _ASKED = {"delta_glmb": "choices", "m_delta_glmb": "choices", "lmb": "marginals"}
-# Filters of which `max_labels` bounds how many targets there can be.
+# Filters with a number of targets limited by `max_labels`.
 LABELS_CAPPED = ("lmb", "factored_glmb", "cb_member")
 
 
@@ -62,7 +62,7 @@ class _Sensing(Section):
 
     @property
     def detection_taken_at(self) -> DetectionAt:
-        """Where the probability of detection is taken, whether it was given or not."""
+        """Place at which the probability of detection is taken, given or default."""
         usual: DetectionAt = "mean" if getattr(self, "kind", None) == "factored_glmb" else "centre"
         return self.detection_at or usual
 
@@ -97,7 +97,7 @@ class Filter(_Sensing, Derived):
             )
 
     def build(self, targets: TargetModel, sensor: SensorModel, folder: Path) -> LocalFilter:
-        """The filter of one sensor."""
+        """Return the filter of one sensor."""
         from vedette.filters import (
             CbMemberFilter,
             CphdFilter,
@@ -124,7 +124,7 @@ class Filter(_Sensing, Derived):
     def build_central(
         self, targets: TargetModel, sensors: tuple[SensorModel, ...], folder: Path, *, in_turn: bool
     ) -> CentralFilter:
-        """The filter of all sensors' scans; in_turn: whether they are taken one after the other, else jointly."""
+        """Return the filter of all sensors' scans; in_turn: True for sequential updates, else joint ones."""
         from vedette.filters import (
             MultiSensorGlmbFilter,
             MultiSensorLmbFilter,
@@ -149,7 +149,7 @@ class CustomFilter(_Sensing, Custom):
     gives: ClassVar[str] = "vedette.filters:Filter"
 
     def build(self, targets: TargetModel, sensor: SensorModel, folder: Path) -> LocalFilter:
-        """The filter of one sensor."""
+        """Return the filter of one sensor."""
         made: LocalFilter = self.made(folder, targets=targets, sensor=sensor)
         return made
 

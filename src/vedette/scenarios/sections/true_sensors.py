@@ -1,4 +1,4 @@
-"""Sections about what a sensor is in truth, and what its scans say too much."""
+"""Sections about the true models of a sensor, and the biases of its scans."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ from vedette.scenarios.sections.sensing import (
     same_measurement_findings,
 )
 
-if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
+if TYPE_CHECKING:  # importing the models imports the compiler, which a check does not need
     from vedette.models import Bias, Region, SensorModel
     from vedette.simulation import TrueSensor as TrueSensorModel
 
 
 def built_parts(section: Any, like: Measurement, region: Region, folder: Path, known: Any = None) -> dict[str, Any]:
-    """What a section says of measurement, noise, detection and clutter, by these names.
+    """Return the models of measurement, noise, detection and clutter that a section gives, by these names.
 
-    like: the measurement that noise and clutter are for. known: the measurement model where the section names none.
+    like: the measurement to which noise and clutter apply. known: the measurement model if the section gives none.
     """
     measured = known if section.measurement is None else section.measurement.build(folder)
     given = {"measurement": measured, "angular": measured.angular, "kind": like.kind, "region": region}
@@ -62,7 +62,7 @@ class BiasSection(Section):
     altitude: float = Field(default=0.0, description="Of altitudes [m].")
 
     def findings_beside(self, measurement: Measurement) -> Iterator[Finding]:
-        """What is wrong with it where a sensor measures so."""
+        """Yield faults of the bias for a sensor with this measurement."""
         measured = COMPONENTS.get(measurement.kind, ())
         for component in (name for name in ONLY_MEASURED if name not in measured):
             if value := getattr(self, name := in_file(component)):
@@ -70,7 +70,7 @@ class BiasSection(Section):
                 yield (name,), f"0, as no {words} is measured ({measurement.kind})", describe(value)
 
     def build(self) -> Bias:
-        """In SI units."""
+        """Return the bias in SI units."""
         from vedette.models import Bias
 
         angles = math.radians(self.bearing_deg), math.radians(self.elevation_deg)
@@ -98,7 +98,7 @@ class TrueSensor(Section):
     )
 
     def findings_beside(self, known: Measurement) -> Iterator[Finding]:
-        """What is wrong with it beside the measurement that the filters know."""
+        """Yield faults of the true sensor for the measurement that the filters assume."""
         if self.measurement is not None:
             yield from same_measurement_findings(self.measurement, known, ("truth", "measurement"))
         if self.bias is not None:
@@ -115,16 +115,16 @@ class TrueSensor(Section):
             yield ("truth", "detection_of"), wanted, describe(self.detection_of)
 
     def _like(self, known: Measurement) -> Measurement:
-        """What noise and clutter are for: the filters' kind, which a measurement of the user's own stands in for."""
+        """Return the measurement for noise and clutter: the filters' or, in place of a custom one, the true one."""
         return known if self.measurement is None or known.kind != "custom" else self.measurement
 
     def build(
         self, known: SensorModel, measurement: Measurement, bias: BiasSection, region: Region, folder: Path
     ) -> TrueSensorModel:
-        """The sensor, beside the filters' model, their section of the measurement, and what they take off.
+        """Return the true sensor, given the filters' model, the section of their measurement, and the bias they remove.
 
         Raises:
-            InputError: a custom model that cannot be had, or parts that do not fit together.
+            InputError: a custom model that cannot be loaded, or parts that do not fit together.
         """
         from vedette.models.bias import NO_BIAS
         from vedette.simulation.true_sensors import TrueSensor as Made

@@ -1,4 +1,4 @@
-"""The targets that no sensor has found yet: the cells of the filter, and of planners that search for them."""
+"""Undetected targets: the cells of their intensity, for filters and for planners that search."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from vedette.scenarios.sections.fusion import ONE_BELIEF
 from vedette.scenarios.sections.tracking import Filter
 from vedette.scenarios.sections.world import RegionSection
 
-if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
+if TYPE_CHECKING:  # importing the models imports the compiler, which a check does not need
     from vedette.models import BirthModel, UndetectedModel
     from vedette.scenarios.sections.scenario import ScenarioModel
 
-# Of every sensor, P_D is asked at nine places in each at every scan: some 40 ms for so many.
+# P_D of every sensor is evaluated at nine places in each cell at every scan: about 40 ms for this number.
 MAX_CELLS = 250_000
-# Without a section: cells along each side of the region, and from a sensor to where it sees no more.
+# Without a section: fewest and most cells along each side of the region, and cells along the range of a sensor.
 _LEAST_CELLS, _MOST_CELLS, _CELLS_A_REACH = 16, 64, 2.0
-_PRIOR_A_SCAN = 0.1  # births, where their rate is learnt and no prior is given
+_PRIOR_A_SCAN = 0.1  # births per scan if their rate is learnt and no prior is given
 
 
 @derived("vedette.models.undetected:UndetectedModel", first=("cell",))
@@ -59,7 +59,7 @@ class UndetectedSection(Derived):
             yield ("prior_rate",), "none, as birth_rate is not learnt", describe(self.prior_rate)
 
     def build(self, region: RegionSection) -> UndetectedModel:
-        """The model; region: of the scenario, for want of one of its own."""
+        """Return the model; region: of the scenario, used if the section has none."""
         from vedette.models import CellGrid, UndetectedModel
 
         grid = CellGrid.covering((self.region or region).build(), self.cell)
@@ -67,12 +67,11 @@ class UndetectedSection(Derived):
 
 
 def undetected_anywhere(model: ScenarioModel, birth: BirthModel) -> UndetectedModel | None:
-    """The targets that appear anywhere, for filters whose undetected targets are an intensity.
+    """Return the targets that appear anywhere, for filters with an intensity of undetected targets; None if not needed.
 
-    Their birth rate is learnt where the section does not give it and tracks start from measurements, and where planners
-    search: with a fixed rate that is too high they never stop searching. Of births at sites alone there are none, and
-    the cells serve planners, to which undetected targets are an intensity on these. None where `birth` says all there
-    is to say. birth: of the filters, without them.
+    Their birth rate is learnt if the section does not give it and tracks start from measurements, or if planners
+    search: with a fixed rate that is too high they never stop searching. With births only at sites there are none, and
+    the cells serve planners, which use an intensity of undetected targets on them. birth: of the filters, without them.
     """
     section, measured, scan = model.undetected, birth.from_measurements, model.time.step_period
     if section is not None:
@@ -94,7 +93,7 @@ def undetected_anywhere(model: ScenarioModel, birth: BirthModel) -> UndetectedMo
 
 
 def _cells_alone(model: ScenarioModel) -> UndetectedModel:
-    """Cells of the region in which no target appears."""
+    """Return cells of the region in which no target appears."""
     from vedette.models import CellGrid, UndetectedModel
 
     num = _cells_a_side(model)
@@ -102,14 +101,14 @@ def _cells_alone(model: ScenarioModel) -> UndetectedModel:
 
 
 def searches(model: ScenarioModel) -> bool:
-    """Whether planners look for undetected targets without a section that says how many there are."""
+    """Return True if planners search for undetected targets without a section that gives their number."""
     if model.undetected is not None or not _may_be_found(model):
         return False
     return bool(model.decision_steps) and model.control.undetected_worth != 0.0
 
 
 def _may_be_found(model: ScenarioModel) -> bool:
-    """Whether there is an intensity to search by: of targets born anywhere, or at sites where a view has an edge."""
+    """Return True if there is an intensity to search: of births anywhere, or at sites if a view has an edge."""
     if not _has_intensity(model):
         return False
     at_sites = bool(model.birth.sites) and any(field_of_view(sensor) is not None for sensor in model.sensors)
@@ -117,14 +116,14 @@ def _may_be_found(model: ScenarioModel) -> bool:
 
 
 def _cells_a_side(model: ScenarioModel) -> int:
-    """Cells along each side of the region: a few within the view of the sensor that sees least far."""
+    """Return the number of cells along each side of the region: a few within the shortest range of a sensor."""
     region, reach = model.region, min(map(reach_of, model.sensors))
     side: float = max(region.x_max - region.x_min, region.y_max - region.y_min)
     return min(max(math.ceil(_CELLS_A_REACH * side / reach), _LEAST_CELLS), _MOST_CELLS)
 
 
 def learnt_births(model: ScenarioModel) -> Iterator[Finding]:
-    """A birth rate is learnt by beliefs that have an intensity of undetected targets."""
+    """Yield faults of learnt birth rates if beliefs have no intensity of undetected targets."""
     measured, section = model.birth.from_measurements, model.undetected
     if _has_intensity(model):
         return
@@ -136,7 +135,7 @@ def learnt_births(model: ScenarioModel) -> Iterator[Finding]:
 
 
 def _has_intensity(model: ScenarioModel) -> bool:
-    """Whether undetected targets are an intensity of the one belief of all scans."""
+    """Return True if undetected targets are an intensity of the single belief of all scans."""
     filters, fusion = model.filter, model.fusion
     if fusion.kind not in ONE_BELIEF or model.network is not None or getattr(fusion, "filter", None) is not None:
         return False
@@ -144,7 +143,7 @@ def _has_intensity(model: ScenarioModel) -> bool:
 
 
 def cells_of_undetected(model: ScenarioModel) -> Iterator[Finding]:
-    """The region is cut into a number of cells that can be held and worked on; what is worth finding may be there."""
+    """Yield faults of too many cells, and of a worth of undetected targets without an intensity of them."""
     section = model.undetected
     if section is None:
         worth = model.control.undetected_worth
@@ -162,6 +161,6 @@ def cells_of_undetected(model: ScenarioModel) -> Iterator[Finding]:
 
 
 def _enough(width: float, height: float) -> float:
-    """A size that is large enough and stays so when it is rounded to three digits."""
+    """Return a size that is large enough, also after rounding to three digits."""
     half = 0.5 * (width + height) / (MAX_CELLS - 1)  # (width / size + 1) (height / size + 1) = MAX_CELLS
     return 1.005 * (half + math.sqrt(half * half + width * height / (MAX_CELLS - 1)))

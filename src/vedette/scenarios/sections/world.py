@@ -22,7 +22,7 @@ from vedette.scenarios.sections.base import (
 from vedette.scenarios.sections.custom import Custom, NotGiven
 from vedette.scenarios.sections.derived import Part, derived, one_of
 
-if TYPE_CHECKING:  # with the models comes the compiler, which a check does without
+if TYPE_CHECKING:  # importing the models imports the compiler, which a check does not need
     from vedette.kernels.base.types import Floats
     from vedette.models import MotionModel
 
@@ -41,7 +41,7 @@ class Time(Section):
             yield ("step_period",), f"a period that can be told apart at {latest:g} s", describe(self.step_period)
 
     def build(self) -> Floats:
-        """(num_steps,) times of the scans in s; that of step k is entry k - 1."""
+        """Return the times of the scans in s, (num_steps,); that of step k is entry k - 1."""
         return self.start + self.step_period * np.arange(self.num_steps, dtype=np.float64)
 
 
@@ -93,11 +93,11 @@ class CustomMotion(Custom):
 
     @property
     def state_order(self) -> Literal["grouped"]:
-        """States are written as the model has them."""
+        """Order of states: that of the model."""
         return "grouped"
 
     def build(self, folder: Path, method: GaussianMethod = "auto") -> MotionModel:
-        """The motion model. Raises `InputError` where it has another state dimension than it says."""
+        """Return the motion model. Raises `InputError` if its state dimension differs from the given one."""
         motion: MotionModel = self.made(folder)
         if motion.state_dim != self.state_dim:
             raise NotGiven(self, "state_dim", f"that of {self.function}, {motion.state_dim}", str(self.state_dim))
@@ -113,7 +113,7 @@ else:
 
 
 def grouped_order(motion: Motion) -> list[int]:
-    """Place in the file's states of each component of the library's states [px, py, vx, vy, ...]."""
+    """Return the index in the file's states of each component of the library's states [px, py, vx, vy, ...]."""
     if motion.state_order == "grouped":
         return list(range(motion.state_dim))
     return [0, 2, 1, 3, *range(4, motion.state_dim)]
