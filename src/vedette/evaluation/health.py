@@ -23,10 +23,10 @@ class HealthSums(NamedTuple):
     cap_met: int  # scans
     search_cut: int  # scans
     inexact: int  # scans
-    discarded: float  # sum over scans and sensors where it is known
+    discarded: float  # sum over scans and sensors with a known value
     num_discarded: int  # of these
     worst_discarded: float
-    factoring: float  # sum over scans and sensors where it is known
+    factoring: float  # sum over scans and sensors with a known value
     num_factoring: int  # of these
     worst_factoring: float
     worst_dropped: float

@@ -17,7 +17,7 @@ from vedette.scenarios.sections import ScenarioModel
 
 _FASTER = 1.5  # a neighbour may move at up to this number of times the speed that targets hardly exceed
 _NEAR = 2.5 * math.sqrt(2.0)  # noise stds between two measurements of a target that stands still
-_WIDER = 3.0  # times the radius of a neighbourhood, up to which chance neighbours are counted
+_WIDER = 3.0  # radius of the ring in which chance neighbours are counted, in radii of a neighbourhood
 _WORST = 0.25  # standard error of the share of measurements that are of targets, at most
 _ESTIMATED = "estimated from the measurements without a neighbour in the scans before and after"
 _HALF = "half of the measurements, as the recording is too short, or has no positions, to estimate it"

@@ -20,7 +20,7 @@ from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sensors_file import EXPECTED_BIRTHS, HEIGHT_STD, measured_birth, measures_heights
 
 _LOST_PER_SECOND = 0.001
-_BIRTH_STDS = 2.0  # times the noise across the line of sight, where most measurements are
+_BIRTH_STDS = 2.0  # times the upper quartile of the noise of measured places
 
 
 def assumed_sections(

@@ -204,7 +204,7 @@ def calibrated_text(scenario: Scenario, sensors: FilePath, calibration: Calibrat
     said = dict(read_yaml(read_text(sensors, "sensors file", MOST_BYTES), str(sensors)).data)
     biases = [sensor.bias.model_dump(exclude_defaults=True) for sensor in scenario.model.sensors]
     parameters = [each.parameter for each in calibration.estimates]
-    values = [float(f"{each.value:.7g}") for each in calibration.estimates]  # digits far beyond what is known
+    values = [float(f"{each.value:.7g}") for each in calibration.estimates]  # far more digits than are accurate
     for each, value in zip(calibration.estimates, values, strict=True):
         if each.parameter.kind == "bias" and not each.reason:
             biases[each.parameter.sensor][each.parameter.name] = value

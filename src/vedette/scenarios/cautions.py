@@ -42,7 +42,7 @@ HANDFUL = 4
 # above.
 NEAR_SITES = 4.0
 _POINTS_A_SIDE = 21
-_MOST_WORTH = 20.0  # of an undetected target, as a share of what a missed one costs
+_MOST_WORTH = 20.0  # largest plausible worth of an undetected target, in costs of a missed one
 
 
 def cautions(scenario: Scenario, further: Iterable[tuple[Path, str]] = ()) -> tuple[str, ...]:

@@ -83,6 +83,6 @@ def scans_in_words(steps: Sequence[int], num_steps: int) -> str:
 
 
 def _ordinal(gap: int) -> str:
-    """Return "" of 1, and else the number with its ending and a space: `5th `."""
+    """Return "" for 1, else the number with its ending and a space: `5th `."""
     ending = "th" if gap % 100 in (11, 12, 13) else {1: "st", 2: "nd", 3: "rd"}.get(gap % 10, "th")
     return "" if gap == 1 else f"{gap}{ending} "

@@ -26,7 +26,7 @@ CAPPED = ("delta_glmb", "m_delta_glmb")
 
 
 def share_cut(num_labels: float, probability: float, most: int) -> float:
-    """Return the share of the expected births that is cut if the heaviest `most` label sets are retained.
+    """Return the share of the expected births that is cut if the `most` heaviest sets of labels are retained.
 
     For n labels of probability q each, the sets of k labels have the probability q^k (1 - q)^(n - k). Small sets are
     the heaviest, and the retained ones are normalised.
