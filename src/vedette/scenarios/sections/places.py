@@ -103,7 +103,7 @@ def _region(box: Mapping[str, Any], origin: Origin) -> Any:
     """Return the rectangle around a box of degrees."""
     if _is_on_earth(box) and box["lon_max"] < box["lon_min"] and box["lon_max"] + 180.0 < box["lon_min"]:
         box = {**box, "lon_max": box["lon_max"] + 360.0}  # across 180 degrees
-    if not {**box}.keys() or box["lon_max"] <= box["lon_min"] or box["lat_max"] <= box["lat_min"]:
+    if box["lon_max"] <= box["lon_min"] or box["lat_max"] <= box["lat_min"]:
         return box
     shares = np.linspace(0.0, 1.0, _NODES)
     lon, lat = (box[f"{name}_min"] + shares * (box[f"{name}_max"] - box[f"{name}_min"]) for name in ("lon", "lat"))
