@@ -27,7 +27,8 @@ def test_every_quantity_has_a_bias_in_models_and_files():
 
 def test_units_are_of_one_table():
     assert {name: UNITS[name] for name in QUANTITIES} == {name: each.units for name, each in QUANTITIES.items()}
-    assert [si_column(name) for name in QUANTITIES] == ["bearing_rad", "range_m", "range_rate_mps", "x_m", "y_m"]
+    columns = ["bearing_rad", "range_m", "range_rate_mps", "x_m", "y_m", "elevation_rad", "altitude_m"]
+    assert [si_column(name) for name in QUANTITIES] == columns
     for each in QUANTITIES.values():
         assert each.in_si * each.per_si == pytest.approx(1.0, rel=1e-15)
         assert next(iter(each.units.values())) == 1.0
@@ -44,7 +45,7 @@ def test_a_model_takes_angles_and_least_values_from_its_components(kind):
 
 def test_an_unknown_component_is_refused():
     with pytest.raises(InputError, match=r"MeasurementModel.components: expected 2 names among bearing, range, "):
-        models.MeasurementModel(2, models.position().function, components=("x", "elevation"))
+        models.MeasurementModel(2, models.position().function, components=("x", "depth"))
 
 
 def test_offsets_keep_bearings_on_the_circle_and_ranges_above_the_least():
