@@ -101,9 +101,9 @@ def test_mistakes_are_named() -> None:
         Patrolling(Stationary(), [], 3.0)
     with pytest.raises(InputError, match="every"):
         Revisit(PLACES, 3.0, 0.0)
-    with pytest.raises(InputError, match=r"expected poses of 12 components.*see Patrolling.*got 3"):
+    with pytest.raises(InputError, match=r"expected poses of 13 components.*see Patrolling.*got 3"):
         Revisit(PLACES, 3.0, 9.0).courses(ConstraintContext((np.zeros((2, 5, 3)),), TIMES[:5], poses=np.zeros((1, 3))))
-    with pytest.raises(InputError, match="pose: expected 12 components"):
+    with pytest.raises(InputError, match="pose: expected 13 components"):
         options_at("platform", Patrolling(Stationary(), PLACES, 3.0), np.zeros(CLOCKS), TIMES)
     twice = [{"kind": "revisit", "places": [[0.0, 0.0]], "radius": 3.0, "every": 9.0}] * 2
     with pytest.raises(ScenarioError, match="one constraint revisit with all places"):
