@@ -1,7 +1,7 @@
 """What a live loop takes up after 10^4, 10^5 and 10^6 scans: memory, its snapshot and its open files.
 
     python benchmarks/live_endless.py [--scans N]
-    python benchmarks/live_endless.py --write docs/live.md
+    python benchmarks/live_endless.py --write docs/evidence/live-scans.md
 
 Two sensors that measure positions see four targets, each of which comes and goes every few minutes; one scan in ten is
 late by up to 20 s, some beyond the window, and one line in a thousand is damaged. `vedette.live.Keeping` takes the

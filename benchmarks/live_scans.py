@@ -1,7 +1,7 @@
 """How long it is from a line to its estimates and to a plan, and how many scans a second a live loop takes.
 
     python benchmarks/live_scans.py [--sensors N] [--targets N] [--scans N] [--runs N]
-    python benchmarks/live_scans.py --write docs/live.md
+    python benchmarks/live_scans.py --write docs/evidence/live-scans.md
 
 Sensors of a generated scene (`vedette generate`) scan every second, all at one time (`together`) or each at its own
 part of the second (`apart`); every line is taken by `vedette.live.Live.take` and its answers made lines, in wall time
