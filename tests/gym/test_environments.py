@@ -156,14 +156,14 @@ def test_beliefs_are_laid_out_by_existence() -> None:
 
 @pytest.mark.parametrize("name", ["paper-a", "six-cameras", "one moves"])
 def test_the_page_has_the_layout(name: str) -> None:
-    """Names, shapes and types of the table of docs/gym.md, in its order."""
+    """Names, shapes and types of the table of docs/gym-observations.md, in its order."""
     env = ScenarioEnv(scene(name))
     env.reset(seed=1)
     layout, (num_sensors, pose_dim) = env.episodes.layout, env.world.experiment.poses.shape
     sizes = {"L": 10, "d": env.world.truth.states.shape[1], "S": num_sensors, "p": pose_dim, "2": 2}
     sizes |= {"D": len(layout.deciding), "A": max(layout.num_actions)}
     sizes["U"] = math.prod(layout.shapes.get("undetected", ()))
-    page = (Path(__file__).parents[2] / "docs/gym.md").read_text("utf-8")
+    page = (Path(__file__).parents[2] / "docs/gym-observations.md").read_text("utf-8")
     rows = re.findall(r"^\| `(\w+)` \| ([LdSpDAU2, ]+) \| (float32|int8) \|", page, re.MULTILINE)
     told = {name: (tuple(sizes[own] for own in shape.split(", ")), kind) for name, shape, kind in rows}
     spaces = dict(env.observation_space.items())  # type: ignore[attr-defined]
