@@ -14,7 +14,8 @@ import pytest
 from vedette.campaigns import open_results
 from waiting import PATIENCE
 
-PAGE = (Path(__file__).resolve().parents[1] / "docs/extending.md").read_text("utf-8")
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+PAGE = "\n".join((DOCS / name).read_text("utf-8") for name in ("extending.md", "custom-filters.md"))
 FILES = dict(re.findall(r'^```\w+ title="([^"]+)"\n(.*?)^```$', PAGE, re.DOTALL | re.MULTILINE))
 COMMANDS = re.findall(r"^vedette .*$", PAGE, re.MULTILINE)
 
