@@ -75,7 +75,7 @@ def test_the_search_finds_pages_from_disk(tmp_path: Path, docs: ModuleType, brow
         ("late", "Late scans"),
         ("LateInfo", "LateInfo"),
         ("late scans", "Late scans"),
-        ("vedette live", "Scans while they come in: vedette live"),
+        ("vedette live", "Live scans: vedette live"),
         ("vedette track", "Recorded scans: vedette track"),
         ("keep_out", "keep_out"),
         ("own reward", "A reward of your own"),
