@@ -300,7 +300,7 @@ def test_an_oracle_takes_turn_rates_that_were_not_recorded_as_zero(tmp_path: Pat
     scenario = load_scenario(file)
     record = run_scenario(scenario, "known", seed=0)
     assert len(record.decisions) == 1
-    told = build_planner(scenario, "oracle").told(record.truth)  # type: ignore[union-attr]
+    told = build_planner(scenario, "oracle").with_truth(record.truth)  # type: ignore[union-attr]
     assert record.truth.states.shape[1] == 4
     np.testing.assert_array_equal(told.truth.states[:, :4], record.truth.states)
     np.testing.assert_array_equal(told.truth.states[:, 4], 0.0)

@@ -24,6 +24,7 @@ from vedette.evaluation.metrics.assignment import (
     point_sets,
     power_mean,
 )
+from vedette.internal.text import join_alternatives
 from vedette.kernels.base.types import HEIGHT, Floats
 from vedette.models.arguments import reject
 from vedette.simulation.truth import Truth
@@ -89,7 +90,7 @@ def ospa_of_run(
     check_parameters(cutoff, order)
     check_scans(truth, estimates)
     if components not in _COUNTED:
-        raise reject("components", ", ".join(_COUNTED), components)
+        raise reject("components", join_alternatives(list(_COUNTED)), components)
     counted = _COUNTED[components]
     parts = np.empty((len(estimates), 3))
     for scan, estimate in enumerate(estimates):
