@@ -50,13 +50,14 @@ def test_values_are_those_of_the_geometry(seed: int) -> None:
 def test_places_are_where_the_target_was(kind: str) -> None:
     rng = np.random.default_rng(1)
     model, pose, state = getattr(models, kind)(), random_pose(rng, turns=False), random_state(rng)
-    found = model.positions(model.measure(state[np.newaxis], pose), pose)
-    np.testing.assert_allclose(found, state[np.newaxis, [0, 1, 4]], rtol=1e-9)
+    found = model.states_at(model.measure(state[np.newaxis], pose), pose, 6)
+    np.testing.assert_allclose(found[:, [0, 1, 4]], state[np.newaxis, [0, 1, 4]], rtol=1e-9)
+    assert not found[:, [2, 3, 5]].any()
 
 
 def test_a_slant_range_alone_is_placed_at_an_assumed_height() -> None:
     model, pose = models.bearing_slant_range(), np.zeros(3)
-    far, near = model.positions(np.array([[0.0, 13_000.0], [0.0, 1_000.0]]), pose)
+    far, near = model.states_at(np.array([[0.0, 13_000.0], [0.0, 1_000.0]]), pose, 6)[:, [0, 1, 4]]
     np.testing.assert_allclose(far, [12_000.0, 0.0, 5_000.0])
     np.testing.assert_allclose(near, [math.sqrt(0.5) * 1e3, 0.0, math.sqrt(0.5) * 1e3])
 

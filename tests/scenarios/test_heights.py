@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
-from heights import KINDS, Aircraft, scene, write
+from heights import KINDS, Aircraft, scene, track, write
 
 from vedette.errors import InputError, ScenarioError
 from vedette.evaluation import run_scenario, track_recording
@@ -35,6 +36,18 @@ def test_aircraft_are_tracked_with_their_heights(tmp_path: Path, kind: str, num_
     assert height < (300.0 if kind == "bearing_slant_range" else 100.0)
     assert share > 0.97
     assert 0.8 < squared < 4.7  # 2.37 is right
+
+
+@pytest.mark.parametrize(("kind", "num_radars"), [(kind, num) for kind in SOLID for num in (1, 2)])
+@pytest.mark.parametrize("name", ["lmb", "delta_glmb"])
+def test_other_filters_start_tracks_at_heights(tmp_path: Path, name: str, kind: str, num_radars: int) -> None:
+    aircraft = Aircraft(np.random.default_rng(3))
+    write(tmp_path, aircraft, kind, num_radars)
+    sensors = tmp_path / "radars.yaml"
+    sensors.write_text(f"filter: {{kind: {name}}}\n{sensors.read_text('utf-8')}", "utf-8")
+    error, _, share, _ = track(tmp_path, aircraft).tolist()
+    assert error < (1000.0 if (kind, num_radars) == ("bearing_slant_range", 1) else 100.0)
+    assert share > 0.97
 
 
 def test_slant_ranges_in_the_plane_are_far_off(tmp_path: Path) -> None:
@@ -102,6 +115,15 @@ def test_written_scans_are_read_again() -> None:
             assert one is not None
             assert other is not None
             np.testing.assert_allclose(other, one.measurements, atol=1e-9)
+
+
+def test_detection_is_decided_where_was_measured_and_a_search_counts_what_is_unexplained() -> None:
+    text = SIMULATED.replace("  height: 100.0\n", "  height: 100.0\n  truth: {detection_of: measurement}\n")
+    measured = "{sites: [], from_measurements: {expected: 0.5, max_existence: 0.1, std: [500, 500, 200, 200, 3000, 5]}}"
+    text = re.sub(r"^birth: .*$", f"birth: {measured}\nundetected: {{cell: 5000.0, expected: 1.0, speed: 200.0}}", text, flags=re.M)
+    text = f"{text}filter: {{kind: lmb}}\n"
+    record = run_scenario(Scenario(parse_scenario(text, "air.yaml")), "still", seed=1)
+    assert abs(record.estimates[-1].means[0, 4] - record.truth.at(5)[1][0, 4]) < 100.0
 
 
 def test_flight_levels_and_feet_are_read_and_a_moving_height(tmp_path: Path) -> None:

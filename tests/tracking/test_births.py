@@ -71,13 +71,13 @@ def pooled_one_by_one(found: Unexplained) -> tuple[list[np.ndarray], list[float]
     members: list[list[int]] = []
     for i in np.argsort(-found.probabilities, kind="stable"):
         free = [g for g in range(len(places)) if found.sensors[i] not in members[g]]
-        apart = [(((places[g] - found.positions[i]) / STD[:2]) ** 2).sum() for g in free]
+        apart = [(((places[g] - found.states[i]) / STD[:2]) ** 2).sum() for g in free]
         if apart and min(apart) <= 9.21:
             group = free[int(np.argmin(apart))]
             members[group].append(int(found.sensors[i]))
-            places[group] = places[group] + (found.positions[i] - places[group]) / len(members[group])
+            places[group] = places[group] + (found.states[i] - places[group]) / len(members[group])
         else:
-            places.append(found.positions[i])
+            places.append(found.states[i])
             probabilities.append(float(found.probabilities[i]))
             members.append([int(found.sensors[i])])
     return places, probabilities
@@ -95,7 +95,7 @@ def test_pools_are_the_same_to_the_bit_as_where_every_measurement_meets_every_gr
         found = Unexplained(positions, probabilities, rng.integers(0, num_sensors, num))
         made = _pool(found, MEASURED)
         places, least = pooled_one_by_one(found)
-        np.testing.assert_array_equal(made.positions, np.reshape(places, (-1, 2)))
+        np.testing.assert_array_equal(made.states, np.reshape(places, (-1, 2)))
         np.testing.assert_array_equal(made.probabilities, least)
 
 

@@ -32,7 +32,7 @@ _COMPONENTS_A_SITE = 3
 def no_undetected(state_dim: int) -> Undetected:
     """Return the kernel input for an empty intensity of undetected targets."""
     none, cells = no_births(state_dim).undetected, no_cells(state_dim)
-    return Undetected(none, np.empty((0, 0)), cells, np.empty((0, 2)), np.zeros(state_dim), 0, 0, 0.0)
+    return Undetected(none, np.empty((0, 0)), cells, np.empty((0, state_dim)), np.zeros(state_dim), 0, 0, 0.0)
 
 
 @cache
@@ -114,7 +114,7 @@ def before_scan(
     std = measured.std
     if is_turn(pose) and len(std) >= 4:  # a target moves until the beam passes it
         std = np.concatenate([np.hypot(std[:2], longest_lag(pose) * std[2:4]), std[2:]])
-    return before._replace(places=sensor.measurement.positions(scan, pose), std=std)
+    return before._replace(places=sensor.measurement.states_at(scan, pose, len(std)), std=std)
 
 
 def after_scan(before: UndetectedTargets, missed: Mixture, left: Left, num_measurements: int) -> UndetectedTargets:

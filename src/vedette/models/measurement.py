@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from vedette.errors import ModelError
 from vedette.internal.quantities import QUANTITIES
-from vedette.kernels.base.types import Bools, Floats
+from vedette.kernels.base.types import HEIGHT, Bools, Floats
 from vedette.kernels.gaussian.beam import passage, to_scan_time, turns
 from vedette.kernels.gaussian.scans import put_on_circle
 from vedette.models.arguments import dimension, float_array, params_vector, pose_vector, reject, state_table
@@ -134,12 +134,24 @@ class MeasurementModel:
         return out
 
     def positions(self, measurements: Floats, pose: ArrayLike) -> Floats:
-        """Return the positions of (n, meas_dim) measurements in m, shape (n, 2), or (n, 3) with heights.
+        """Return the (n, 2) positions of (n, meas_dim) measurements in the plane, m.
 
         Raises:
-            InputError: a model without `places`.
-            ModelError: its function raised, or returned something else.
+            InputError: the model has no `places`.
+            ModelError: its function raised, or returned a wrong shape or values.
         """
+        return self._located(measurements, pose)[:, :2]
+
+    def states_at(self, measurements: Floats, pose: ArrayLike, state_dim: int) -> Floats:
+        """Return (n, state_dim) states at rest where (n, meas_dim) measurements were taken; raises like `positions`."""
+        located = self._located(measurements, pose)
+        states = np.zeros((len(located), state_dim))
+        states[:, :2] = located[:, :2]
+        if located.shape[1] > 2 and state_dim > HEIGHT:
+            states[:, HEIGHT] = located[:, 2]
+        return states
+
+    def _located(self, measurements: Floats, pose: ArrayLike) -> Floats:
         if self.places is None:
             raise reject("MeasurementModel.places", "a function, as births from measurements need a position", None)
         at = pose_vector("pose", pose)

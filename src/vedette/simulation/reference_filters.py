@@ -113,8 +113,9 @@ class LastScanFilter(_Reference):
         """Return a target at every measurement of the largest scan."""
         there = [(scan, s) for s, scan in enumerate(scans) if scan is not None]
         scan, s = max(there, key=lambda each: len(each[0]), default=(np.empty((0, 2)), 0))
-        means = np.zeros((len(scan), self.targets.state_dim))
-        if len(scan):
-            means[:, :2] = self.sensors[s].measurement.positions(np.asarray(scan), np.asarray(poses[s], np.float64))
-        covs = np.tile(UNKNOWN_VARIANCE * np.eye(self.targets.state_dim), (len(scan), 1, 1))
+        dim = self.targets.state_dim
+        means = (
+            self.sensors[s].measurement.states_at(np.asarray(scan), poses[s], dim) if len(scan) else np.empty((0, dim))
+        )
+        covs = np.tile(UNKNOWN_VARIANCE * np.eye(dim), (len(scan), 1, 1))
         return self._believed([(1, i) for i in range(len(scan))], means, covs)

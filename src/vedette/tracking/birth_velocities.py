@@ -71,8 +71,8 @@ def at_scan_time(born: LMB, poses: Sequence[Floats]) -> LMB:
 
 def _condition(means: Floats, covs: Floats, std: Floats, sensor: SensorModel, scan: Floats, pose: Floats) -> None:
     """Update means (num, state_dim) and covariances (num, state_dim, state_dim) by a scan, in place."""
-    model, rest = sensor.measurement, np.zeros((len(scan), len(std)))
-    rest[:, :2] = model.positions(scan, pose)
+    model = sensor.measurement
+    rest = model.states_at(scan, pose, len(std))
     slopes = np.empty((len(scan), sensor.meas_dim, len(std)))
     assert model.jacobian is not None
     write_rows(model.jacobian, rest, pose, model.params, slopes)

@@ -37,7 +37,7 @@ _SAME_TARGET = 9.21
 class Unexplained(NamedTuple):
     """Measurements that no track explains with certainty."""
 
-    positions: Floats  # (num, 2) m
+    states: Floats  # (num, state_dim) at rest where it was taken
     probabilities: Floats  # (num,) probability that no track explains the measurement
     sensors: Ints  # (num,) number of the sensor that measured it
 
@@ -143,7 +143,7 @@ def unexplained(
         _unexplained(lmb, sensor, scans[s], poses[s], s) for s, sensor in enumerate(sensors) if scans[s] is not None
     ]
     if not found:
-        return Unexplained(np.empty((0, 2)), np.empty(0), np.empty(0, np.int64))
+        return Unexplained(np.empty((0, len(model.std))), np.empty(0), np.empty(0, np.int64))
     return _pool(Unexplained(*map(np.concatenate, zip(*found, strict=True))), model)
 
 
@@ -181,8 +181,8 @@ def _unexplained(belief: Lmb, sensor: SensorModel, scan: Any, pose: Any, number:
     with model_errors():
         explained = prob_explained(belief, given, sensor.to_kernel(), _truncation(sensor.meas_dim))
     free = np.flatnonzero(explained < 1.0 - LEAST_UNEXPLAINED)
-    positions = sensor.measurement.positions(given.measurements[free], given.pose)
-    return Unexplained(positions, 1.0 - explained[free], np.full(len(free), number))
+    states = sensor.measurement.states_at(given.measurements[free], given.pose, belief.tracks.components.means.shape[1])
+    return Unexplained(states, 1.0 - explained[free], np.full(len(free), number))
 
 
 def _born_of_one(
@@ -191,10 +191,10 @@ def _born_of_one(
     """Return the birth candidates from the scan of a single sensor."""
     lmb = _as_kernel(belief)
     given = _look(lmb, sensor, scan, pose)
-    places = sensor.measurement.positions(given.measurements, given.pose)
+    states = sensor.measurement.states_at(given.measurements, given.pose, len(begin.std))
     models = sensor.to_kernel(), _truncation(sensor.meas_dim)
     with model_errors():
-        return LMB.from_kernel(births_unexplained(lmb, given, places, *models, LEAST_UNEXPLAINED, begin))
+        return LMB.from_kernel(births_unexplained(lmb, given, states, *models, LEAST_UNEXPLAINED, begin))
 
 
 @cache
@@ -206,31 +206,31 @@ def _truncation(meas_dim: int) -> Truncation:
 def _pool(found: Unexplained, model: MeasurementBirth) -> Unexplained:
     """Return one entry for measurements of different sensors that are close together, the least explained first.
 
-    A group has at most one measurement per sensor. Its position is their mean, and its probability that of the least
+    A group has at most one measurement per sensor. Its state is their mean, and its probability that of the least
     explained measurement.
     """
     order = np.argsort(-found.probabilities, kind="stable")
     if (found.sensors == found.sensors[:1]).all():  # every measurement by itself
-        return Unexplained(found.positions[order], found.probabilities[order], np.empty(0, np.int64))
-    places, totals = np.empty((len(order), 2)), np.zeros(len(order))
+        return Unexplained(found.states[order], found.probabilities[order], np.empty(0, np.int64))
+    states, totals = np.empty(found.states.shape), np.zeros(len(order))
     probabilities, members = np.empty(len(order)), np.zeros((len(order), int(found.sensors.max(initial=0)) + 1), bool)
     cells, num = _Cells(model.std[:2] * math.sqrt(_SAME_TARGET)), 0
     for i in order.tolist():
-        near = cells.near(found.positions[i])
+        near = cells.near(found.states[i, :2])
         near = near[~members[near, found.sensors[i]]]
-        distances = (((places[near] - found.positions[i]) / model.std[:2]) ** 2).sum(axis=1)
+        distances = (((states[near, :2] - found.states[i, :2]) / model.std[:2]) ** 2).sum(axis=1)
         nearest = int(distances.argmin()) if len(near) else -1
         if len(near) and distances[nearest] <= _SAME_TARGET:
             group = int(near[nearest])
-            cells.remove(group, places[group])
+            cells.remove(group, states[group, :2])
         else:
             group = num
-            places[num], probabilities[num], num = found.positions[i], found.probabilities[i], num + 1
+            states[num], probabilities[num], num = found.states[i], found.probabilities[i], num + 1
         totals[group] += 1.0
-        places[group] += (found.positions[i] - places[group]) / totals[group]
+        states[group] += (found.states[i] - states[group]) / totals[group]
         members[group, found.sensors[i]] = True
-        cells.add(group, places[group])
-    return Unexplained(places[:num], probabilities[:num], np.empty(0, np.int64))
+        cells.add(group, states[group, :2])
+    return Unexplained(states[:num], probabilities[:num], np.empty(0, np.int64))
 
 
 class _Cells:
@@ -261,4 +261,4 @@ class _Cells:
 
 
 def _born(found: Unexplained, begin: BirthsOfMeasurements) -> LMB:
-    return LMB.from_kernel(births_of_measurements(found.positions, found.probabilities, begin))
+    return LMB.from_kernel(births_of_measurements(found.states, found.probabilities, begin))

@@ -116,4 +116,4 @@ class Searching(AroundTracker):
         if birth is None:
             return 0.0
         found = unexplained(birth, after.fused, self.sensors, scans, poses)
-        return expected_in_cells(found.positions, birth.max_existence * found.probabilities, self.model.grid)
+        return expected_in_cells(found.states[:, :2], birth.max_existence * found.probabilities, self.model.grid)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.kernels.base.compile import kernel
-from vedette.kernels.base.types import HEIGHT, Floats, Lmb, Tracks
+from vedette.kernels.base.types import Floats, Lmb, Tracks
 from vedette.kernels.gaussian.components import make_components, stacked_mixtures
 
 
@@ -23,11 +23,11 @@ class BirthsOfMeasurements(NamedTuple):
 
 
 @kernel
-def births_of_measurements(positions: Floats, unexplained: Floats, begin: BirthsOfMeasurements) -> Lmb:
+def births_of_measurements(states: Floats, unexplained: Floats, begin: BirthsOfMeasurements) -> Lmb:
     """Return an LMB of one target at rest for each measured position, in their order.
 
     Args:
-        positions: (num, 2) m; (num, 3) with heights, in states [px, py, vx, vy, pz, ...].
+        states: (num, state_dim) of the targets, at rest where they were measured.
         unexplained: (num,) probabilities that no track explains the measurement; the expected number of births is
             divided in proportion to them.
         begin: the other parameters.
@@ -40,11 +40,9 @@ def births_of_measurements(positions: Floats, unexplained: Floats, begin: Births
         labels[i, 0], labels[i, 1] = begin.step, begin.first + i
         out.log_weights[i] = 0.0
         for d in range(dim):
-            out.means[i, d] = positions[i, d] if d < 2 else 0.0
+            out.means[i, d] = states[i, d]
             for e in range(dim):
                 out.covs[i, d, e] = begin.std[d] ** 2 if d == e else 0.0
-        if positions.shape[1] > 2 and dim > HEIGHT:
-            out.means[i, HEIGHT] = positions[i, 2]
         existence = min(begin.max_existence, begin.expected * unexplained[i] / total)
         # A share may underflow to 0.
         logits[i] = math.log(existence) - math.log1p(-existence) if existence > 0.0 else -math.inf

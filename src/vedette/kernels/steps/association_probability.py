@@ -42,7 +42,7 @@ def prob_explained(belief: Lmb, scan: ScanInput, sensor: Sensor, truncation: Tru
 def births_unexplained(
     belief: Lmb,
     scan: ScanInput,
-    places: Floats,
+    states: Floats,
     sensor: Sensor,
     truncation: Truncation,
     least_unexplained: float,
@@ -50,9 +50,9 @@ def births_unexplained(
 ) -> Lmb:
     """Return births at the measurements of one sensor that tracks do not surely explain, least explained first.
 
-    places: (num_measurements, 2) position of each, m.
+    states: (num_measurements, state_dim) at rest where each was taken.
     """
     unexplained = 1.0 - prob_explained(belief, scan, sensor, truncation)
     order = descending_order(unexplained)
     free = order[unexplained[order] > least_unexplained]
-    return births_of_measurements(places[free], unexplained[free], begin)
+    return births_of_measurements(states[free], unexplained[free], begin)

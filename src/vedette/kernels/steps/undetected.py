@@ -12,7 +12,7 @@ import numpy as np
 
 from vedette.errors import ModelError
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import HEIGHT, Floats, Mixture, Motion, Sensor
+from vedette.kernels.base.types import Floats, Mixture, Motion, Sensor
 from vedette.kernels.gaussian.components import make_components
 from vedette.kernels.gaussian.intensities import predicted_intensity
 
@@ -52,7 +52,7 @@ class Undetected(NamedTuple):
     intensity: Mixture
     tables: Floats  # (num_tables, num_cells) expected numbers; the first is of the targets, others move as they do
     cells: Cells
-    places: Floats  # (num_measurements, 2 or 3) positions, with heights; empty: no first detections in cells
+    places: Floats  # (num_measurements, state_dim) states at rest at them; empty: no first detections in cells
     std: Floats  # (state_dim,) of a target that appears in a cell, about its place and at rest
     step: int  # of the labels
     first_index: int  # of the label of the scan's first measurement
@@ -181,10 +181,7 @@ def intensity_at_places(undetected: Undetected) -> Mixture:
         density = _density_at(undetected.places[j], undetected.cells, undetected.tables[0])
         log_area = math.log(2.0 * math.pi * std[0] * std[1])
         out.log_weights[j] = math.log(density) + log_area if density > 0.0 else -math.inf
-        out.means[j], out.covs[j] = 0.0, 0.0
-        out.means[j, :2] = undetected.places[j, :2]
-        if undetected.places.shape[1] > 2 and dim > HEIGHT:
-            out.means[j, HEIGHT] = undetected.places[j, 2]
+        out.means[j], out.covs[j] = undetected.places[j], 0.0
         for d in range(dim):
             out.covs[j, d, d] = std[d] ** 2
     return out
