@@ -88,7 +88,25 @@ def test_steps_are_those_of_one_gaussian_at_a_time(name: str, motion: models.Mot
     moves, sees = models.kernel_motion(motion, models.constant_survival(1.0)), sensor.to_kernel()
     forms = forms_of(moves, sees, DT, dim)
     assert forms.is_linear == (dim == 4)
-    means, covs = gaussians(dim, 4.0 if "wide" in name else 1.0)
+    check_against_one_at_a_time(sensor, moves, forms, *gaussians(dim, 4.0 if "wide" in name else 1.0))
+
+
+@pytest.mark.parametrize(("height", "std"), [(3000.0, 40.0), (3000.0, 2000.0), (200.0, 500.0)])
+def test_a_slant_range_bends_over_a_height_in_a_batch_too(height: float, std: float) -> None:
+    parts = models.bearing_slant_range(), models.constant_noise([0.02, 40.0]), models.constant_detection(0.9)
+    sensor = models.SensorModel(*parts, models.region_clutter(5.0, REGION, "bearing_slant_range"))
+    motion, rng = models.constant_velocity_height(2.0, 0.5), np.random.default_rng(2)
+    means = rng.normal(size=(NUM, 6)) * np.array([6000.0, 6000.0, 10.0, 10.0, 0.1 * height, 1.0])
+    means[:, 4] += height
+    covs = np.tile(np.diag(np.array([20.0, 30.0, 4.0, 5.0, std, 2.0]) ** 2), (NUM, 1, 1))
+    moves = models.kernel_motion(motion, models.constant_survival(1.0))
+    work = check_against_one_at_a_time(sensor, moves, forms_of(moves, sensor.to_kernel(), DT, 6), means, covs)
+    assert work.bends[:NUM].any() == (std > 40.0)
+
+
+def check_against_one_at_a_time(sensor: models.SensorModel, moves: Any, forms: Any, means: Any, covs: Any) -> Any:
+    """Predict and expect side by side and one by one; returns the working arrays."""
+    dim, sees = means.shape[1], sensor.to_kernel()
     batch, work = make_batch(dim, sensor.meas_dim, ROOM), make_batch_work(dim, sensor.meas_dim, ROOM)
     predict_batch(moves, forms, DT, side_by_side(means), side_by_side(covs), NUM, batch, work)
     expect_batch(sees, forms, POSE, NUM, batch, work)
@@ -106,6 +124,8 @@ def test_steps_are_those_of_one_gaussian_at_a_time(name: str, motion: models.Mot
         np.testing.assert_allclose(batch.posterior[:, s], expected.covs[0][lower], rtol=1e-10, atol=1e-12)
         np.testing.assert_allclose(batch.log_norm[s], expected.log_norm[0], **close)
         np.testing.assert_allclose(batch.prob_detection[s], expected.prob_detection[0], **close)
+        assert work.bends[s] == expected.bends[0]
+    return work
 
 
 @pytest.mark.parametrize("name", ["wide", "one component", "own parts"])

@@ -120,7 +120,12 @@ def test_written_scans_are_read_again() -> None:
 def test_detection_is_decided_where_was_measured_and_a_search_counts_what_is_unexplained() -> None:
     text = SIMULATED.replace("  height: 100.0\n", "  height: 100.0\n  truth: {detection_of: measurement}\n")
     measured = "{sites: [], from_measurements: {expected: 0.5, max_existence: 0.1, std: [500, 500, 200, 200, 3000, 5]}}"
-    text = re.sub(r"^birth: .*$", f"birth: {measured}\nundetected: {{cell: 5000.0, expected: 1.0, speed: 200.0}}", text, flags=re.M)
+    text = re.sub(
+        r"^birth: .*$",
+        f"birth: {measured}\nundetected: {{cell: 5000.0, expected: 1.0, speed: 200.0}}",
+        text,
+        flags=re.M,
+    )
     text = f"{text}filter: {{kind: lmb}}\n"
     record = run_scenario(Scenario(parse_scenario(text, "air.yaml")), "still", seed=1)
     assert abs(record.estimates[-1].means[0, 4] - record.truth.at(5)[1][0, 4]) < 100.0

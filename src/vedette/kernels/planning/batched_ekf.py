@@ -19,6 +19,7 @@ from vedette.kernels.gaussian.innovation import (
     LARGEST_BEND,
     LEAST_SHRINKAGE,
     Innovation,
+    bends_over,
     expect,
     expect_measurement,
     make_innovation,
@@ -29,6 +30,7 @@ from vedette.kernels.gaussian.relinearisation import Pair, PairWork, relinearise
 from vedette.kernels.gaussian.scratch import Scratch, make_scratch
 from vedette.kernels.gaussian.sigma_points import LINEARISED, SWITCHED
 from vedette.kernels.planning.batched_models import (
+    ANY,
     ModelForms,
     Offsets,
     fill_detection_of_gaussians,
@@ -245,18 +247,29 @@ def _condition(num: int, batch: BatchedGaussians, work: BatchWork) -> None:
 
 
 @inlined
-def _mark_bent(width: int, num: int, batch: BatchedGaussians, work: BatchWork) -> None:
-    """Set the volumes of Gaussians with too nonlinear measurements to NaN, see `innovation`."""
-    volume, squares, first, second = work.volume, work.offsets.squares, batch.covs[0], batch.covs[place(1, 1)]
-    dim, scale = batch.means.shape[0], 4.0 * LARGEST_BEND * LARGEST_BEND
-    for a in range(batch.predicted.shape[0]):
-        along, across, noise = work.jacobian[a * dim], work.jacobian[a * dim + 1], work.noise[place(a, a)]
+def _mark_bent(form: int, pose: Floats, num: int, batch: BatchedGaussians, work: BatchWork) -> None:
+    """Set the volumes of Gaussians with too nonlinear measurements to NaN, see `innovation.bends_over`."""
+    volume, dim, meas_dim = work.volume, batch.means.shape[0], batch.predicted.shape[0]
+    if form == ANY:
+        jacobian, noise = work.scratch.measurement_jacobian, work.scratch.measurement_noise
+        for s in range(num):
+            take_state(batch.means, s, work.mean)
+            take_matrix(batch.covs, s, work.cov)
+            take_matrix(work.noise, s, noise)
+            for a in range(meas_dim):
+                for j in range(dim):
+                    jacobian[a, j] = work.jacobian[a * dim + j, s]
+            if bends_over(pose, work.mean, work.cov, jacobian, noise, dim, meas_dim):
+                volume[s] = math.nan
+        return
+    squares, first, second = work.offsets.squares, batch.covs[0], batch.covs[place(1, 1)]
+    scale = 4.0 * LARGEST_BEND * LARGEST_BEND
+    for a in range(meas_dim):
+        along, across, own = work.jacobian[a * dim], work.jacobian[a * dim + 1], work.noise[place(a, a)]
         for s in range(num):
             variance = first[s] + second[s]
             slope = (along[s] * along[s] + across[s] * across[s]) * variance
-            for j in range(2, width):
-                slope += 4.0 * work.jacobian[a * dim + j, s] ** 2 * batch.covs[place(j, j), s]
-            volume[s] = math.nan if variance * slope > scale * squares[s] * noise[s] else volume[s]
+            volume[s] = math.nan if variance * slope > scale * squares[s] * own[s] else volume[s]
 
 
 @inlined
@@ -323,7 +336,7 @@ def expect_batch(
     _project(width, num, batch, work)
     _condition(num, batch, work)
     if sensor.method == SWITCHED:
-        _mark_bent(width, num, batch, work)
+        _mark_bent(forms.measurement, pose, num, batch, work)
     wrong = _mark_cancelled(num, batch, work)
     for s in range(num):
         batch.log_norm[s] = work.volume[s]
