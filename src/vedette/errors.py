@@ -48,7 +48,8 @@ class ScenarioError(VedetteError):
 def _message(faults: list[str]) -> str:
     """Return the first faults, cut to a bearable length, and the number of the others."""
     shown = [
-        fault if len(fault) <= _LONGEST_LINE else f"{fault[:_LONGEST_LINE]}\N{HORIZONTAL ELLIPSIS}" for fault in faults
+        fault if len(fault) <= _LONGEST_LINE else f"{fault[:_LONGEST_LINE]}\N{HORIZONTAL ELLIPSIS}"
+        for fault in faults[:_MOST_LINES]
     ]
-    more = len(faults) - _MOST_LINES
-    return "\n".join([*shown[:_MOST_LINES], *([f"and {more} more"] if more > 0 else [])])
+    more = len(faults) - len(shown)
+    return "\n".join([*shown, *([f"and {more} more"] if more else [])])

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import vedette.models as models
+from vedette.errors import InputError
 from vedette.kernels.base.types import BEAM, OWN_HEIGHT, OWN_VELOCITY, Floats
 from vedette.models import MotionModel, Region, constant_velocity_height, region_clutter
 from vedette.models.functions import write_rows
@@ -107,3 +108,8 @@ def test_two_steps_have_the_noise_of_one_of_their_length() -> None:
     moved = np.empty(6)
     motion.transition(np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0]), 3.0, motion.transition_params, moved)
     np.testing.assert_allclose(moved, [10.0, 14.0, 3.0, 4.0, 23.0, 6.0])
+
+
+def test_noise_is_of_one_third_component() -> None:
+    with pytest.raises(InputError, match="sigma_altitude: expected None beside sigma_elevation"):
+        models.range_dependent_noise(10.0, 0.0, 0.01, 0.0, sigma_elevation=0.01, sigma_altitude=30.0)

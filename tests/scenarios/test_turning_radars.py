@@ -81,6 +81,20 @@ def test_rows_that_are_gathered_too_far_apart_are_warned_of(tmp_path: Path, gath
         assert re.match(r"R: rows of one scan are [23]\.\d+ s apart \(median\), in which a target of 250 m/s", told[0])
 
 
+def test_a_line_of_a_turning_radar_may_have_its_velocity(tmp_path: Path) -> None:
+    (tmp_path / "radars.yaml").write_text(
+        "region: {x_min: -9000, x_max: 9000, y_min: -9000, y_max: 9000}\nsensors:\n"
+        "  - {name: R, position: [0, 0], turn: {period: 4.0}, noise: {kind: constant, std: [0.01, 20]}}\n",
+        "utf-8",
+    )
+    told = scenario_of_sensors(tmp_path / "radars.yaml")
+    line = b'{"sensor": "R", "time": 10.0, "velocity": [3, -4], "times": [9.0], "measurements": [[0.5, 4000.0]]}'
+    pose = read_message(line, "line 1", sites_of(told.scenario.model), told.conventions).scan.pose
+    np.testing.assert_array_equal(pose[6:8], [3.0, -4.0])
+    assert is_turn(pose)
+    np.testing.assert_allclose(lags(np.array([0.5]), pose), [-1.0], atol=1e-12)
+
+
 def test_every_row_is_in_one_turn_and_its_time_that_of_the_beam() -> None:
     flights, turn = Flights(np.random.default_rng(2), 7, 0.0), Turn(5.0)
     rows = np.array(flights.rows((0.0, 0.0), turn, 1.0, True))

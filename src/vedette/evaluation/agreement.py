@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from vedette.evaluation.scans import Scans, scans_of_record
-from vedette.internal.quantities import PLACED, SOLID
+from vedette.internal.quantities import HEIGHT_DEPENDENT, PLACED
 from vedette.kernels.base.types import Bools, Floats
 from vedette.scenarios import Scenario
 from vedette.scenarios.sections.field_of_view import field_of_view
@@ -50,7 +50,7 @@ def disagreements(record: RunRecord, scenario: Scenario) -> tuple[str, ...]:
     """
     model = scenario.model
     kinds = [sensor.measurement.kind for sensor in model.sensors]
-    placed = [s for s, kind in enumerate(kinds) if kind in PLACED and kind not in SOLID]
+    placed = [s for s, kind in enumerate(kinds) if kind in PLACED and kind not in HEIGHT_DEPENDENT]
     if model.recording is None or len(placed) < 2:
         return ()
     lives = _lives(record, scenario, scans_of_record(record, scenario), placed)

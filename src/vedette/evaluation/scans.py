@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.internal.quantities import COMPONENTS, PLACED, QUANTITIES, SOLID, is_doppler, si_column
+from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT, PLACED, QUANTITIES, is_doppler, si_column
 from vedette.kernels.base.types import BEAM, OWN_HEIGHT, OWN_VELOCITY, Floats
 from vedette.models.arguments import reject
 from vedette.models.turns import is_turn, lags
@@ -110,8 +110,8 @@ def scan_table(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
     own = ["own_x_m", "own_y_m", f"own_heading_{unit}"]
     if any(is_doppler(site.kind) for site in sites):
         own += [f"{name}_mps" for name in OWN_SPEEDS]
-    solid = ["own_height_m"] if any(site.kind in SOLID for site in sites) else []
-    table: dict[str, list[Any]] = {name: [] for name in ("time", "sensor", *wanted, *own, *solid)}
+    own_heights = ["own_height_m"] if any(site.kind in HEIGHT_DEPENDENT for site in sites) else []
+    table: dict[str, list[Any]] = {name: [] for name in ("time", "sensor", *wanted, *own, *own_heights)}
     for time, scans, poses in zip(record.times.tolist(), scans_of_record(record, scenario), record.poses, strict=True):
         for site, scan, pose in zip(sites, scans, poses, strict=True):
             if scan is None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from vedette.evaluation.agreement import measured_by, noise_stds
 from vedette.evaluation.scans import LIE, scans_of_record
-from vedette.internal.quantities import PLACED, SOLID
+from vedette.internal.quantities import HEIGHT_DEPENDENT, PLACED
 from vedette.internal.text import pluralise
 from vedette.kernels.base.types import Bools, Floats
 from vedette.recorded.extents import places_of
@@ -55,7 +55,7 @@ def unexplained(record: RunRecord, scenario: Scenario) -> tuple[str, ...]:
     model = scenario.model
     births = model.birth.from_measurements
     kinds = [sensor.measurement.kind for sensor in model.sensors]
-    placed = [s for s, kind in enumerate(kinds) if kind in PLACED and kind not in SOLID]
+    placed = [s for s, kind in enumerate(kinds) if kind in PLACED and kind not in HEIGHT_DEPENDENT]
     if model.recording is None or births is None or not placed:
         return ()
     assumed, warnings, left = max(births.std[2:4]), list[str](), _left(record, scenario, placed)

@@ -71,7 +71,7 @@ COMPONENTS = {
     "position_altitude": ("x", "y", "altitude"),
 }
 # The kinds that depend on the height of a target; their ranges are slant ranges.
-SOLID = ("bearing_slant_range", "bearing_range_elevation", "bearing_range_altitude", "position_altitude")
+HEIGHT_DEPENDENT = ("bearing_slant_range", "bearing_range_elevation", "bearing_range_altitude", "position_altitude")
 # The kinds that say where a target is.
 PLACED = tuple(kind for kind, names in COMPONENTS.items() if names[:2] in (("bearing", "range"), ("x", "y")))
 

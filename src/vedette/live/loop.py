@@ -14,7 +14,7 @@ from vedette.control import Planner
 from vedette.densities import Estimator
 from vedette.errors import VedetteError
 from vedette.evaluation.track_formats import utc_text
-from vedette.internal.quantities import COMPONENTS, PLACED, SOLID
+from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT, PLACED
 from vedette.kernels.base.types import Floats
 from vedette.live.messages import Message, read_message
 from vedette.models.arguments import reject
@@ -179,7 +179,7 @@ class Live:
         assert belief.time is not None  # a scan was taken, or one before it
         found = self.estimate(belief.fused, belief.step)
         names = ("x", "y", "vx", "vy")[: 4 if found.means.shape[1] >= 4 else 2]
-        names = (*names, "z", "vz") if any(site.kind in SOLID for site in self.sites) else names
+        names = (*names, "z", "vz") if any(site.kind in HEIGHT_DEPENDENT for site in self.sites) else names
         stds = np.sqrt(np.diagonal(found.covs, axis1=1, axis2=2))[:, : len(names)]
         tracks: list[Answer] = []
         for label, mean, std, existence in zip(

@@ -95,6 +95,8 @@ def read_message(
     )
     at = read.poses[0, 0].copy()
     at[3 : 3 + len(more)] = more
+    if "velocity.x" in pose and len(at) >= BEAM:  # rows have a velocity for range rates only
+        at[OWN_VELOCITY:BEAM] = pose["velocity.x"], pose["velocity.y"]
     if course is not None and origin is not None:  # a position in degrees needed an origin
         at[2] = origin.angle(math.radians(course), at)
     scan = read.scans[0][0]
@@ -203,8 +205,8 @@ def _velocity(given: Any, field: str, site: Site) -> dict[str, float]:
     """Return the velocity as columns of a table."""
     if given is None:
         return {}
-    if not is_doppler(site.kind):
-        raise reject(field, f"none, as sensor {shown(site.name)} measures no range rates", given)
+    if not (is_doppler(site.kind) or isinstance(site.turn, Turn)):
+        raise reject(field, f"none, as sensor {shown(site.name)} measures no range rates and has no `turn`", given)
     if not isinstance(given, list) or len(given) != 2 or not all(map(_is_number, given)):
         raise reject(field, "numbers [vx, vy]", given)
     return dict(zip(("velocity.x", "velocity.y"), given, strict=True))

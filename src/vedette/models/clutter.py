@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.errors import InputError, ModelError
-from vedette.internal.quantities import COMPONENTS, QUANTITIES, SOLID, is_doppler
+from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT, QUANTITIES, is_doppler
 from vedette.kernels.base.compile import inlined
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models.arguments import (
@@ -182,7 +182,7 @@ def plane_params(kind: str, max_range_rate: float | None, max_height: float | No
     """
     rate = _LARGEST_RATE if max_range_rate is None else positive("max_range_rate", max_range_rate)
     height = _LARGEST_HEIGHT if max_height is None else positive("max_height", max_height)
-    return np.array([height if kind in SOLID else rate, 0.0, 0.0, 0.0, 0.0, 0.0])
+    return np.array([height if kind in HEIGHT_DEPENDENT else rate, 0.0, 0.0, 0.0, 0.0, 0.0])
 
 
 @inlined

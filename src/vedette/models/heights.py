@@ -137,6 +137,10 @@ def _at_position(measurements: Floats, pose: Floats) -> Floats:
     return measurements
 
 
+# Positions with heights of the kinds whose measurements determine them.
+PLACES_WITH_HEIGHT = {"bearing_range_elevation": _at_elevation, "bearing_range_altitude": _at_altitude}
+
+
 @part("bearing_slant_range", "measurement")
 def bearing_slant_range() -> MeasurementModel:
     """z = [bearing in rad, slant range in m] of a radar that measures no heights; two radars' ranges determine them.

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vedette.internal.quantities import SOLID
+from vedette.internal.quantities import HEIGHT_DEPENDENT
 from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import HEIGHT, Floats
 from vedette.kernels.gaussian.beam import own_height, own_place
@@ -194,7 +194,7 @@ class _RegionSampler:
         num = int(rng.poisson(self.rate))
         states = np.zeros((num, state_dim))
         states[:, :2] = self.region.sample(num, rng=rng)
-        if self.kind in SOLID:
+        if self.kind in HEIGHT_DEPENDENT:
             states[:, HEIGHT] = rng.uniform(0.0, self.largest, num)
         drawn = np.empty((num, measurement.meas_dim))
         write_rows(measurement.function, states, pose, measurement.params, drawn)

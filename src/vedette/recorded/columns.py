@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.internal.quantities import ANGLES, COMPONENTS, SOLID, is_doppler, is_position
+from vedette.internal.quantities import ANGLES, COMPONENTS, HEIGHT_DEPENDENT, is_doppler, is_position
 from vedette.internal.text import shown
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import reject
@@ -48,7 +48,7 @@ class ScanColumns:
         measured |= {"lon", "lat"} if "x" in measured else set()
         own = {"own_x", "own_y", "own_lon", "own_lat", "own_heading"}
         own |= {*OWN_SPEEDS} if any(is_doppler(site.kind) for site in self.sites) else set()
-        own |= {"own_height"} if any(site.kind in SOLID for site in self.sites) else set()
+        own |= {"own_height"} if any(site.kind in HEIGHT_DEPENDENT for site in self.sites) else set()
         used = {self._columns[name][0] for name in measured | own if name in self._columns} | {self._time, self._sensor}
         return tuple(name for name in self.table.columns if name not in used)
 
@@ -80,7 +80,11 @@ class ScanColumns:
         if (named := self.conventions.columns.get(quantity)) is not None:
             self.table.column(named)
             return named, self._unit(quantity, named, units)
-        slant = ("slant_range",) if quantity == "range" and all(site.kind in SOLID for site in self.sites) else ()
+        slant = (
+            ("slant_range",)
+            if quantity == "range" and all(site.kind in HEIGHT_DEPENDENT for site in self.sites)
+            else ()
+        )
         for stem in (*slant, quantity, *OTHER_NAMES.get(quantity, ())):
             for name in (stem, *(f"{stem}_{unit}" for unit in units)):
                 if name in self.table.columns:

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.internal.quantities import PLACED, is_position
-from vedette.kernels.base.types import OWN_HEIGHT, Bools, Floats
+from vedette.kernels.base.types import Bools, Floats
+from vedette.models.heights import PLACES_WITH_HEIGHT
 from vedette.models.turns import own_places
 
 MARGIN = 0.05  # around an extent, as a share of its longer side
@@ -26,13 +27,9 @@ def places_of(scan: Floats, pose: Floats, kind: str) -> Floats:
         return np.empty((0, 2))
     if is_position(kind):
         return scan[:, :2]
-    ground = scan[:, 1]
-    if kind == "bearing_range_elevation":
-        ground = ground * np.cos(scan[:, 2])
-    elif kind == "bearing_range_altitude":
-        own_height = pose[..., OWN_HEIGHT] if pose.shape[-1] > OWN_HEIGHT else 0.0
-        ground = np.sqrt(np.maximum(ground**2 - (scan[:, 2] - own_height) ** 2, 0.0))
-    away = np.column_stack([ground * np.cos(scan[:, 0]), ground * np.sin(scan[:, 0])])
+    if kind in PLACES_WITH_HEIGHT:
+        return PLACES_WITH_HEIGHT[kind](scan, pose)[:, :2]
+    away = scan[:, 1:2] * np.column_stack([np.cos(scan[:, 0]), np.sin(scan[:, 0])])
     return np.asarray(own_places(scan[:, 0], pose) + away)
 
 

@@ -108,8 +108,8 @@ class RecordedScans(SummaryRepr):
         unused: columns that were not read.
         notes: warnings: slant ranges; for a sensor whose measurements were merged, their number and spread.
         file: of the rows.
-        gathered: for each sensor, the median time between the first and the last row of a gathered scan, s; () if none
-            were gathered.
+        gathered: for each sensor, the median time between the first and the last row of its scans of several rows, s; 0
+            for a sensor without such scans or whose scans are turns; () if the scans are not from rows.
     """
 
     times: Floats

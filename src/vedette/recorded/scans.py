@@ -10,7 +10,15 @@ from pathlib import Path
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.internal.quantities import ANGLES, COMPONENTS, PLACED, QUANTITIES, SOLID, is_doppler, is_position
+from vedette.internal.quantities import (
+    ANGLES,
+    COMPONENTS,
+    HEIGHT_DEPENDENT,
+    PLACED,
+    QUANTITIES,
+    is_doppler,
+    is_position,
+)
 from vedette.internal.text import shown
 from vedette.kernels.base.types import OWN_HEIGHT, OWN_VELOCITY, Floats
 from vedette.models.bias import NO_BIAS
@@ -63,10 +71,10 @@ def parse_scans(
     found, beyond = _without_wild(found, table, sites)
     recording = _at_instants(found, rows, skipped + beyond)
     notes = (*table.notes, *rows.without_velocity(recording.poses))
+    gathered, file = recording.gathered, ScansFile(Path(table.source).name, table.sha256)
     if any(site.bias != NO_BIAS for site in sites):
         recording = without_biases(recording, sites)
-    file = ScansFile(Path(table.source).name, table.sha256)
-    return replace(recording, unused=rows.unused, notes=notes, file=file, gathered=_gathered(found, rows))
+    return replace(recording, unused=rows.unused, notes=notes, file=file, gathered=gathered)
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,14 +180,13 @@ class _Rows(ScanColumns):
             place = self._value(i, "own_x"), self._value(i, "own_y")
         has_heading = "own_heading" in self._columns
         heading = self._angle(i, "own_heading", s, place) if has_heading else site.pose[2]
-        rest = site.pose[3:]
+        pose = [*place, heading, *site.pose[3:]]
         if is_doppler(site.kind) and {*OWN_SPEEDS} <= set(self._columns):
-            velocity = tuple(self._value(i, quantity) for quantity in OWN_SPEEDS)
-            rest = (*rest[: OWN_VELOCITY - 3], *velocity, *rest[OWN_VELOCITY - 1 :])
-        if site.kind in SOLID and "own_height" in self._columns:
-            rest = (*rest, *(0.0,) * (OWN_HEIGHT - 3 - len(rest)))
-            rest = (*rest[: OWN_HEIGHT - 3], self._value(i, "own_height"), *rest[OWN_HEIGHT - 2 :])
-        return (*place, heading, *rest)
+            pose[OWN_VELOCITY : OWN_VELOCITY + 2] = (self._value(i, quantity) for quantity in OWN_SPEEDS)
+        if site.kind in HEIGHT_DEPENDENT and "own_height" in self._columns:
+            pose += [0.0] * (OWN_HEIGHT + 1 - len(pose))
+            pose[OWN_HEIGHT] = self._value(i, "own_height")
+        return tuple(pose)
 
     def _agreed(self, i: int, place: tuple[float, ...], x: str, y: str) -> tuple[float, ...]:
         """Return a place given in degrees; raises if the row has one in metres, too, that does not agree."""
@@ -231,19 +238,24 @@ def _without_wild(rows: list[_Row], table: Table, sites: Sequence[Site]) -> tupl
 def _at_instants(rows: list[_Row], how: _Rows, skipped: tuple[str, ...]) -> RecordedScans:
     """Return rows with one sensor and time as scans, scans with one time as instants."""
     looks, sites, gather = [], how.sites, how.conventions.gather
+    spans = [0.0] * len(sites)
     for s, site in enumerate(sites):
         own = sorted((row for row in rows if row.sensor == s), key=lambda row: row.time)
         turning = _looks_of_turns(own, s, site)
         if turning is not None:
             looks += turning
             continue
-        for group in _groups(own, gather):
+        groups = _groups(own, gather)
+        if several := [group[-1].time - group[0].time for group in groups if len(group) > 1]:
+            spans[s] = float(np.median(several))
+        for group in groups:
             time = math.fsum(row.time for row in group) / len(group) if gather > 0.0 else group[0].time
             looks.append(Look(time, s, _scan(group, site), np.array(group[-1].pose)))
     first = np.zeros((len(sites), max([*map(len, (site.pose for site in sites)), *(len(look.pose) for look in looks)])))
     for s, site in enumerate(sites):
         first[s, : len(site.pose)] = site.pose
-    return in_order(looks, first, 0.0, how.is_utc, skipped, how.bearings)
+    found = in_order(looks, first, 0.0, how.is_utc, skipped, how.bearings)
+    return replace(found, gathered=tuple(spans))
 
 
 def _looks_of_turns(rows: list[_Row], sensor: int, site: Site) -> list[Look] | None:
@@ -256,20 +268,6 @@ def _looks_of_turns(rows: list[_Row], sensor: int, site: Site) -> list[Look] | N
     if scans is None:
         return None
     return [Look(each.time, sensor, scan[each.rows], each.pose) for each in scans]
-
-
-def _gathered(rows: list[_Row], how: _Rows) -> tuple[float, ...]:
-    """Return `RecordedScans.gathered`."""
-    if how.conventions.gather == 0.0:
-        return ()
-    spans = []
-    for s in range(len(how.sites)):
-        groups = _groups(
-            sorted((row for row in rows if row.sensor == s), key=lambda row: row.time), how.conventions.gather
-        )
-        several = [group[-1].time - group[0].time for group in groups if len(group) > 1]
-        spans.append(float(np.median(several)) if several else 0.0)
-    return tuple(spans)
 
 
 def _groups(rows: list[_Row], gather: float) -> list[list[_Row]]:

@@ -89,7 +89,6 @@ class _Beam:
         self.rate, self._start = turn.rate, float(times[0])
         left = bearings - self.rate * (times - self._start)
         turn_of = np.floor((times - self._start) / turn.period).astype(np.int64)
-        self._at, self._phases = np.empty(0), np.empty(0)
         centres, phases = list[float](), list[float]()
         for number in np.unique(turn_of).tolist():
             lows, highs = np.searchsorted(turn_of, [number - 1, number + 2])

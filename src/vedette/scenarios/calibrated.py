@@ -11,7 +11,7 @@ import numpy as np
 from vedette.calibration import Calibration, Parameter, Problem
 from vedette.calibration.parameters import with_biases
 from vedette.filters import Limits, SequentialLmbFilter, common_target_model
-from vedette.internal.quantities import COMPONENTS, QUANTITIES, SOLID, in_file
+from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT, QUANTITIES, in_file
 from vedette.internal.reading import read_text
 from vedette.internal.unit_warnings import suppress_unit_warnings
 from vedette.kernels.base.types import Floats
@@ -53,7 +53,7 @@ def problem_of(scenario: Scenario, *, position: bool = False, bearings: Bearings
     model, folder = scenario.model, scenario.folder
     sites = tuple(sites_of(model))
     for site in sites:
-        if site.kind in SOLID:
+        if site.kind in HEIGHT_DEPENDENT:
             wanted = "measurements in the plane, as calibration knows no heights"
             raise reject(f"sensor {site.name}", wanted, site.kind)
     recording = RecordedScans(np.empty(0), 0.0, False, (), np.empty((0, len(sites), 3)), (), (bearings,) * len(sites))

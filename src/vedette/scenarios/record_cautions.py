@@ -8,7 +8,6 @@ import numpy as np
 
 from vedette.internal.quantities import PLACED
 from vedette.internal.text import pluralise
-from vedette.models.turns import is_turn
 from vedette.recorded import RecordedScans
 from vedette.recorded import RecordedTargets as RecordedSource
 from vedette.recorded.merging import crowded
@@ -87,8 +86,8 @@ def _far_apart(model: ScenarioModel, recording: RecordedScans) -> Iterator[tuple
         return
     speed = max(births.std[2:4])
     for s, (sensor, apart) in enumerate(zip(model.sensors, recording.gathered, strict=False)):
-        stds, turns = noise_stds(sensor), any(is_turn(poses[s]) for poses in recording.poses)
-        if stds is None or turns or sensor.measurement.kind not in PLACED or speed * apart <= stds[1]:
+        stds = noise_stds(sensor)
+        if stds is None or sensor.measurement.kind not in PLACED or speed * apart <= stds[1]:
             continue
         yield (
             ("recording", "gather"),

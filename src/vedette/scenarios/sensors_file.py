@@ -8,7 +8,7 @@ from pathlib import Path as FilePath
 from typing import Any, NamedTuple
 
 from vedette.errors import InputError, ScenarioError
-from vedette.internal.quantities import COMPONENTS, SOLID
+from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT
 from vedette.internal.reading import read_text
 from vedette.internal.text import pluralise
 from vedette.scenarios.diagnostics import read_section
@@ -16,6 +16,7 @@ from vedette.scenarios.faults import Fault, describe
 from vedette.scenarios.loading import diagnose, place_fault
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.recording import RecordingSection
+from vedette.scenarios.sections.world import STATE_DIMS
 from vedette.scenarios.wording import in_words
 from vedette.scenarios.yaml_reader import MOST_BYTES, Document, read_yaml
 
@@ -82,11 +83,12 @@ def check_sensors_file(path: FilePath) -> SensorsFile:
 
 def stand_ins(given: Mapping[str, Any], speed: float) -> dict[str, Any]:
     """Return sections that a sensors file does not give, before scans are read; speed: std of velocities, m/s."""
-    motion = given.get("motion")
-    kind, dim = (motion.get("kind"), motion.get("state_dim")) if isinstance(motion, Mapping) else (None, None)
     has_height = measures_heights(given)
-    state_dim = {"coordinated_turn": 5, "constant_velocity_height": 6}.get(str(kind), 6 if has_height else 4)
-    birth = measured_birth(100.0, speed, dim if isinstance(dim, int) else state_dim, has_height)
+    own = given.get("motion")
+    motion: Mapping[str, Any] = own if isinstance(own, Mapping) else {}
+    kind = motion.get("kind", "constant_velocity_height" if has_height else "constant_velocity")
+    dim = motion.get("state_dim", STATE_DIMS.get(kind) if isinstance(kind, str) else None)
+    birth = measured_birth(100.0, speed, dim if isinstance(dim, int) else 4, has_height)
     return {**_STAND_INS, "birth": birth, **({"motion": {"kind": "constant_velocity_height"}} if has_height else {})}
 
 
@@ -95,7 +97,7 @@ def measures_heights(given: Mapping[str, Any]) -> bool:
     sensors, defaults = given.get("sensors"), given.get("sensor_defaults")
     sections = [defaults, *(sensors if isinstance(sensors, list) else ())]
     measured = [section.get("measurement") for section in sections if isinstance(section, Mapping)]
-    return any(isinstance(each, Mapping) and each.get("kind") in SOLID for each in measured)
+    return any(isinstance(each, Mapping) and each.get("kind") in HEIGHT_DEPENDENT for each in measured)
 
 
 def measured_birth(std: float, speed: float, state_dim: int, has_height: bool = False) -> dict[str, Any]:
@@ -107,8 +109,8 @@ def measured_birth(std: float, speed: float, state_dim: int, has_height: bool = 
         state_dim: of states.
         has_height: True if height and vertical velocity follow in them; else a turn rate may.
     """
-    rest = [HEIGHT_STD, _CLIMB_STD, *[1.0] * (state_dim - 6)] if has_height else [0.1] * (state_dim - 4)
-    stds = [std, std, speed, speed, *rest]
+    rest = [HEIGHT_STD, _CLIMB_STD] if has_height and state_dim > 5 else []
+    stds = [std, std, speed, speed, *rest, *[0.1] * (state_dim - 4 - len(rest))]
     return {"sites": [], "from_measurements": {"expected": EXPECTED_BIRTHS, "max_existence": _EXISTENCE, "std": stds}}
 
 

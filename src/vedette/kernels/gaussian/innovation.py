@@ -189,18 +189,18 @@ def bends_over(pose: Floats, mean: Floats, cov: Floats, jacobian: Floats, noise:
     |H_aj| sqrt(V P_jj) / d with another component j of the state. A height that is measured is part of the position.
     """
     dx, dy, variance = mean[0] - pose[0], mean[1] - pose[1], cov[0, 0] + cov[1, 1]
-    square, solid = dx * dx + dy * dy, _has_height(jacobian, n, m)
-    if solid:
+    square, has_height = dx * dx + dy * dy, _has_height(jacobian, n, m)
+    if has_height:
         dz = mean[HEIGHT] - own_height(pose)
         square, variance = square + dz * dz, variance + cov[HEIGHT, HEIGHT]
     limit = 4.0 * LARGEST_BEND * LARGEST_BEND * square
     for a in range(m):
         slope = jacobian[a, 0] * jacobian[a, 0] + jacobian[a, 1] * jacobian[a, 1]
-        if solid:
+        if has_height:
             slope += jacobian[a, HEIGHT] * jacobian[a, HEIGHT]
         slope *= variance
         for j in range(2, n):
-            if not (solid and j == HEIGHT):
+            if not (has_height and j == HEIGHT):
                 slope += 4.0 * jacobian[a, j] * jacobian[a, j] * cov[j, j]
         if variance * slope > limit * noise[a, a]:
             return True

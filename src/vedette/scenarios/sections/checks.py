@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vedette.internal.covariances import covariance_fault
-from vedette.internal.quantities import COMPONENTS, SOLID
+from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT
 from vedette.kernels.base.types import HEIGHT
 from vedette.scenarios.faults import Finding, Path, describe
 from vedette.scenarios.sections.base import attempt
@@ -136,11 +136,12 @@ def _combinations(model: ScenarioModel) -> Iterator[Finding]:
 def _heights(model: ScenarioModel) -> Iterator[Finding]:
     """Yield faults if measurements depend on a height but states of the filters or the simulated truth have none."""
     kinds = [(i, sensor.measurement.kind) for i, sensor in enumerate(model.sensors)]
-    for i, kind in ((i, kind) for i, kind in kinds if kind in SOLID):
+    for i, kind in ((i, kind) for i, kind in kinds if kind in HEIGHT_DEPENDENT):
         path: Path = ("sensors", i, "measurement", "kind")
         motion = model.motion.kind
         if motion not in ("constant_velocity_height", "custom"):
-            wanted = f"one of {', '.join(k for k in COMPONENTS if k not in SOLID)}, or motion: constant_velocity_height"
+            others = ", ".join(each for each in COMPONENTS if each not in HEIGHT_DEPENDENT)
+            wanted = f"one of {others}, or motion: constant_velocity_height"
             yield path, f"{wanted} (as targets have no height)", describe(kind)
         elif model.targets.kind == "recorded" and model.recording is None:
             yield path, "a measurement in the plane, as recorded targets have no height", describe(kind)

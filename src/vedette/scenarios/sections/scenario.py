@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, field_validator
 
-from vedette.internal.quantities import SOLID
+from vedette.internal.quantities import HEIGHT_DEPENDENT
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import Name, Section, attempt, check
 from vedette.scenarios.sections.birth import Birth
@@ -178,8 +178,8 @@ class ScenarioModel(Section):
     @property
     def has_heights(self) -> bool:
         """True if states are [px, py, vx, vy, pz, vz]."""
-        solid = any(sensor.measurement.kind in SOLID for sensor in self.sensors)
-        return solid or self.motion.kind == "constant_velocity_height"
+        depends = any(sensor.measurement.kind in HEIGHT_DEPENDENT for sensor in self.sensors)
+        return depends or self.motion.kind == "constant_velocity_height"
 
     @property
     def decision_steps(self) -> tuple[int, ...]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field
 
-from vedette.internal.quantities import COMPONENTS, PLACED, SOLID, angles, in_file
+from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT, PLACED, angles, in_file
 from vedette.scenarios.faults import Finding, Path, describe
 from vedette.scenarios.sections.base import Positive, Section, check
 from vedette.scenarios.sections.derived import Part, derived, one_of
@@ -133,7 +133,7 @@ def clutter_findings(measurement: Measurement, clutter: Clutter, path: Path) -> 
     kind = measurement.kind
     if clutter.kind == "region" and kind == "custom":
         yield path, "measurement_space or custom clutter for a custom measurement", "region clutter"
-    if clutter.kind == "around_sensor" and (kind not in PLACED or kind in SOLID):
+    if clutter.kind == "around_sensor" and (kind not in PLACED or kind in HEIGHT_DEPENDENT):
         wanted = f"region, measurement_space or custom clutter for a {kind} measurement"
         yield path, wanted if kind != "custom" else wanted.replace("region, ", ""), "around_sensor clutter"
 

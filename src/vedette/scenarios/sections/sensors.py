@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field, create_model
 
-from vedette.internal.quantities import SOLID, is_doppler
+from vedette.internal.quantities import HEIGHT_DEPENDENT, is_doppler
 from vedette.internal.unit_warnings import suppress_unit_warnings
 from vedette.kernels.base.types import BEAM, OWN_HEIGHT
 from vedette.scenarios.faults import Finding, describe
@@ -165,7 +165,7 @@ class Sensor(Section):
     @check
     def _a_height_counts(self) -> Iterator[Finding]:
         kind = self.measurement.kind
-        if self.height and kind not in (*SOLID, "custom"):
+        if self.height and kind not in (*HEIGHT_DEPENDENT, "custom"):
             yield ("height",), f"0, as a {kind} measurement does not depend on heights", describe(self.height)
 
     @check

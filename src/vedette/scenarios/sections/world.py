@@ -78,10 +78,10 @@ class _Motion(Part):
     @property
     def state_dim(self) -> int:
         """Number of components of a state."""
-        return _STATE_DIMS[self.kind]
+        return STATE_DIMS[self.kind]
 
 
-_STATE_DIMS = {"constant_velocity": 4, "coordinated_turn": 5, "constant_velocity_height": 6}
+STATE_DIMS = {"constant_velocity": 4, "coordinated_turn": 5, "constant_velocity_height": 6}
 
 
 class CustomMotion(Custom):
