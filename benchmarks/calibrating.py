@@ -6,8 +6,8 @@
 
 Three radars of 5, 8 and 11 s, one of them on a boat, see six ships or aircraft for ten minutes; they have biases of up
 to 300 m, 2 degrees and 0.5 s, none of which anybody knows, and noise and clutter are told wrongly. Each redraw is a
-recording of its own: other targets, noise, clutter. It is calibrated, and tracked with what was found, with
-the truth, and with what was told. Prints for each parameter the truth, the mean and spread of what was found, the
+recording of its own: other targets, noise, clutter. It is calibrated, and tracked with the estimates, with
+the truth, and with the given parameters. Prints for each parameter the truth, the mean and spread of the estimates, the
 greatest error, and how many of the intervals of 95 % cover the truth; then OSPA. With --position two radars are not
 where they are said to be, either, and the first, with which they are compared, is not turned. Equal arguments print
 equal tables, but for the times.
@@ -130,7 +130,7 @@ def _write(path: Path, header: list[str], rows: list[list[Any]]) -> None:
 
 
 class Redraw(NamedTuple):
-    """What was found; mean OSPA, m, with it, with the truth, with what was told; CPU s and passes of the filter."""
+    """A calibration; mean OSPA, m, with it, the truth and the given parameters; CPU s and passes of the filter."""
 
     calibration: Calibration
     ospa: tuple[float, float, float]
@@ -188,8 +188,8 @@ def table(redraws: list[Redraw], biases: ByRadar = BIASES) -> Iterator[str]:
     error = 1.96 * np.std(by_redraw[0] / by_redraw[1], ddof=1) / math.sqrt(len(redraws))
     covered = f"{total[0]} of {total[1]}, {total[0] / total[1]:.1%} ± {error:.1%}"
     yield f"Intervals that cover the truth: {covered} (1.96 standard errors between recordings)."
-    yield f"OSPA, m: {found:.2f} with what was found, {true:.2f} with the truth, {told:.2f} with what was told;"
-    yield f"with what was found {share.mean():+.1%} against the truth, {share.min():+.1%} to {share.max():+.1%}."
+    yield f"OSPA, m: {found:.2f} with the estimates, {true:.2f} with the truth, {told:.2f} with the given parameters;"
+    yield f"with the estimates {share.mean():+.1%} against the truth, {share.min():+.1%} to {share.max():+.1%}."
     seconds, passes = np.mean([(each.seconds, each.passes) for each in redraws], axis=0)
     yield f"CPU time: {seconds:.0f} s a recording, {passes:.0f} passes of the filter."
 

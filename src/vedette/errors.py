@@ -14,7 +14,7 @@ class InputError(VedetteError, ValueError):
 
 
 class MissingPackageError(InputError, ImportError):
-    """What is asked for needs a package that is not installed; the message names the extra that brings it."""
+    """A required package is not installed; the message names the extra that installs it."""
 
 
 class ModelError(VedetteError):
@@ -26,11 +26,11 @@ class NumericalError(VedetteError, ArithmeticError):
 
 
 class SlowRewardWarning(UserWarning):
-    """A planner computes rewards one by one, because the reward or the fusion does not say how to lay them out."""
+    """A planner computes rewards one by one, because the reward or the fusion has no method to precompute them."""
 
 
 class ImplausibleWarning(UserWarning):
-    """An argument that is valid, but can hardly be meant so: in another unit, or with its numbers exchanged."""
+    """A valid argument that is probably a mistake: another unit, or exchanged numbers."""
 
 
 class ScenarioError(VedetteError):

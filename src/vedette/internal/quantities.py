@@ -16,10 +16,10 @@ SPEEDS = {"mps": 1.0, "kmh": 1.0 / 3.6, "kn": 1852.0 / 3600.0}
 class Quantity(NamedTuple):
     """A quantity that sensors measure.
 
-    units: one of `LENGTHS`, `HEIGHTS`, `ANGLES`, `SPEEDS`. unit: in scenario files and messages, of which `per_si` make
-    one SI unit. least: least value without noise or bias, SI. most: largest size in a recording, SI; inf: as of places.
-    far: SI, of measurements whose bias is unknown, the standard deviation. unknown: standard deviation from which on
-    nothing is known of a bias, in `unit`.
+    units: one of `LENGTHS`, `HEIGHTS`, `ANGLES`, `SPEEDS`. unit: unit in scenario files and messages. per_si: number of
+    these units in one SI unit. least: smallest value without noise and bias, SI. most: largest size in a recording, SI,
+    or inf if it is limited like positions. far: standard deviation of measurements with an unknown bias, SI. unknown:
+    standard deviation of a bias above which it counts as not found, in `unit`.
     """
 
     units: Mapping[str, float]
@@ -32,17 +32,17 @@ class Quantity(NamedTuple):
 
     @property
     def is_angle(self) -> bool:
-        """Whether it is an angle: residuals are then wrapped."""
+        """True for an angle, whose residuals are wrapped."""
         return self.units is ANGLES
 
     @property
     def in_si(self) -> float:
-        """How many SI units one of `unit` is."""
+        """Number of SI units in one `unit`."""
         return self.units.get(self.unit, 1.0)
 
     @property
     def si(self) -> str:
-        """The SI unit in messages."""
+        """SI unit in messages."""
         return "rad" if self.is_angle else self.unit
 
 
@@ -82,7 +82,7 @@ def is_position(kind: str) -> bool:
 
 
 def is_doppler(kind: str) -> bool:
-    """Whether measurements of a kind have a range rate, which is relative to the velocity of the sensor."""
+    """Return True if measurements of a kind have a range rate, relative to the velocity of the sensor."""
     return "range_rate" in COMPONENTS.get(kind, ())
 
 

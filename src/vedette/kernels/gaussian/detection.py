@@ -1,4 +1,4 @@
-"""With what probability a sensor detects a target of which a Gaussian is believed."""
+"""Probability that a sensor detects a target whose state has a Gaussian density."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def _over_nodes(
 
 @inlined
 def detection_and_edge(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, state: Floats) -> tuple[float, bool]:
-    """Probability of detection of a Gaussian, and whether the edge of what the sensor sees passes through it.
+    """Return the detection probability of a Gaussian, and True if an edge of the field of view passes through it.
 
     `sensor.detection_rule` selects P_D at the mean, or its mean over the Gaussian in closed form or by nodes. With
     AT_EDGES it is the mean by nodes where P_D differs between nodes, and P_D at the mean elsewhere; only this rule
@@ -89,7 +89,7 @@ def detection_and_edge(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, 
 
 @inlined
 def detection_probability(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, state: Floats) -> float:
-    """The first of `detection_and_edge`."""
+    """Return the detection probability of a Gaussian, see `detection_and_edge`."""
     return detection_and_edge(sensor, pose, mean, cov, state)[0]
 
 
@@ -137,7 +137,7 @@ def moments_if_missed(
 
 @kernel
 def detection_probabilities(sensor: Sensor, pose: Floats, means: Floats, covs: Floats) -> Floats:
-    """(num,) of each of (num, state_dim) means and (num, state_dim, state_dim) covariances."""
+    """Return detection probabilities (num,) for means (num, state_dim) and covariances (num, state_dim, state_dim)."""
     out, state = np.empty(len(means)), np.empty(means.shape[1])
     for i in range(len(means)):
         out[i] = detection_probability(sensor, pose, means[i], covs[i], state)

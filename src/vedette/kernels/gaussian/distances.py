@@ -29,7 +29,7 @@ class NearPairs(NamedTuple):
 def _may_be_near(
     means: Floats, covs: Floats, a: int, other_means: Floats, other_covs: Floats, b: int, gate: float
 ) -> bool:
-    """Whether no axis by itself puts a pair out of the gate: d'S^-1 d is at least d_i^2 / S_ii."""
+    """Return True if no single axis puts a pair outside the gate: d'S^-1 d is at least d_i^2 / S_ii."""
     for i in range(means.shape[1]):
         off = means[a, i] - other_means[b, i]
         if off * off > gate * (covs[a, i, i] + other_covs[b, i, i]):
@@ -70,7 +70,7 @@ def l1_bound(mean: Floats, cov: Floats, other_mean: Floats, other_cov: Floats, f
 
 @kernel
 def _candidates(means: Floats, covs: Floats, other_means: Floats, other_covs: Floats, gate: float) -> Ints:
-    """(num,) pairs that may be near, counted row by row."""
+    """Return the number of pairs (num,) that may be near, row by row."""
     num, filled = len(other_means), 0
     found = np.empty(4 * len(means), np.int64)
     for a in range(len(means)):
@@ -87,7 +87,7 @@ def _candidates(means: Floats, covs: Floats, other_means: Floats, other_covs: Fl
 def _distance(
     mean: Floats, cov: Floats, other_mean: Floats, other_cov: Floats, total: Floats, factor: Floats, offset: Floats
 ) -> tuple[float, float]:
-    """d'S^-1 d and log det S, infinite where S is not positive definite; the last three are to work in."""
+    """Return d'S^-1 d and log det S, infinite if S is not positive definite; the last three are working arrays."""
     for i in range(len(mean)):
         offset[i] = mean[i] - other_mean[i]
         for j in range(len(mean)):
@@ -153,7 +153,7 @@ def pair_distances(means: Floats, covs: Floats, other_means: Floats, other_covs:
 
 @kernel
 def near_pairs(means: Floats, covs: Floats, other_means: Floats, other_covs: Floats, gate: float) -> NearPairs:
-    """The pairs with d'S^-1 d up to `gate`; none whose S is not positive definite.
+    """Return the pairs with d'S^-1 d up to `gate` and a positive definite S.
 
     means: (n, dim), covs: (n, dim, dim). other_means: (m, dim), other_covs: (m, dim, dim).
     """

@@ -73,7 +73,7 @@ def to_information(
 
 @inlined
 def log_integral(row: Floats, dim: int) -> float:
-    """log of the integral over all states of what `row` describes; NaN where its Y is not positive definite.
+    """Return the log integral of `row` over all states; NaN if its Y is not positive definite.
 
     `row` is used up: afterwards it holds the elimination, with the pivots of Y and s - y'Y^-1 y on its diagonal.
     """
@@ -107,7 +107,7 @@ def log_integral(row: Floats, dim: int) -> float:
 
 @borrowing
 def log_value(row: Floats, offset: Floats) -> float:
-    """log of what `row` describes at the state reference + `offset`."""
+    """Return the log value of `row` at the state reference + `offset`."""
     n = offset.shape[0]
     at, quadratic, linear, last = 0, 0.0, 0.0, n * (n + 1) // 2
     for i in range(n):
@@ -122,7 +122,7 @@ def log_value(row: Floats, offset: Floats) -> float:
 
 @borrowing
 def to_moments(row: Floats, reference: Floats, mean: Floats, cov: Floats, factor: Floats) -> bool:
-    """Mean and covariance of the normalised Gaussian that `row` describes. False where Y is not positive definite.
+    """Write mean and covariance of the normalised Gaussian of `row`. Returns False if Y is not positive definite.
 
     factor: (dim, dim) working array.
     """

@@ -1,4 +1,4 @@
-"""What a Gaussian expects of a measurement, and its update by one: extended, unscented and cubature Kalman filters."""
+"""Expected measurement of a Gaussian and its update: extended, unscented and cubature Kalman filters."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ LARGEST_BEND = 0.3
 
 
 class Innovation(NamedTuple):
-    """What each component expects of a scan: everything that an update needs but the measurement.
+    """Expected measurements of components: everything that an update needs except the measurement.
 
     With the state-measurement covariance C and the innovation covariance S = L L', the whitened cross W = L^-1 C' gives
     the gain K = W' L^-1, the posterior covariance P - W'W, and the posterior mean m + W' v of a whitened residual v.
@@ -120,7 +120,7 @@ def project(jacobian: Floats, cov: Floats, cross: Floats, innovation: Floats, n:
 
 @inlined
 def _has_volume(noise: Floats, factor: Floats, work: Floats, m: int) -> bool:
-    """Whether the noise has at least `LEAST_SHRINKAGE` of the determinant of the innovation covariance L L'.
+    """Return True if det(noise) is at least `LEAST_SHRINKAGE` times that of the innovation covariance L L'.
 
     That share bounds from below what any direction of the state keeps of its variance. work: to be written.
     """
@@ -182,7 +182,7 @@ def _has_height(jacobian: Floats, n: int, m: int) -> bool:
 
 @inlined
 def bends_over(pose: Floats, mean: Floats, cov: Floats, jacobian: Floats, noise: Floats, n: int, m: int) -> bool:
-    """Whether the second-order error of some component exceeds `LARGEST_BEND` standard deviations of its noise.
+    """Return True if the second-order error of a component exceeds `LARGEST_BEND` standard deviations of its noise.
 
     A measurement of a position at distance d has second derivatives of about |H| / d. Over a position of variance V,
     both axes together, component a is then off by |H_a| V / (2 d), which is the sagitta V / (2 d) of a range; and by
@@ -224,7 +224,7 @@ def expect(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, at: int, out
 def expect_measurement(
     sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, at: int, out: Innovation, scratch: Scratch
 ) -> None:
-    """As `expect`, but for the probability of detection."""
+    """Fill entry `at` of `out` except the detection probability, see `expect`."""
     n, m = mean.shape[0], out.predicted.shape[1]
     jacobian, noise, innovation = scratch.measurement_jacobian, scratch.measurement_noise, scratch.innovation_cov
     factor, cross, posterior = out.factor[at], out.whitened_cross[at], out.covs[at]

@@ -37,7 +37,7 @@ def make_integrals(num: int) -> Integrals:
 
 @inlined
 def _eliminate(rows: Floats, dim: int, out: Integrals) -> None:
-    """As `information.log_integral`; the inverse of the product of the pivots goes to the factors."""
+    """Eliminate all rows as in `information.log_integral`; write the inverse product of the pivots to the factors."""
     product, inverses, num, diagonal = out.factors, out.inverses, rows.shape[1], 0
     for s in range(num):
         product[s] = 1.0
@@ -60,7 +60,7 @@ def _eliminate(rows: Floats, dim: int, out: Integrals) -> None:
 
 @borrowing
 def _take_logs(rows: Floats, dim: int, out: Integrals) -> None:
-    """Where products of pivots leave the range of a double, their logarithms go to the exponents."""
+    """Move the logarithms of products of pivots outside the range of a double to the exponents."""
     for s in range(rows.shape[1]):
         if out.factors[s] <= 1e-250 or out.factors[s] >= 1e250:
             out.factors[s], diagonal = 1.0, 0
@@ -71,7 +71,7 @@ def _take_logs(rows: Floats, dim: int, out: Integrals) -> None:
 
 @borrowing
 def integrate_rows(rows: Floats, dim: int, out: Integrals) -> None:
-    """Integrals over all states of what rows (row_size(dim), num) describe; NaN where Y is not positive definite.
+    """Write the integrals of rows (row_size(dim), num) over all states; NaN if Y is not positive definite.
 
     `rows` are used up: entry (dim + 1) (dim + 2) / 2 - 1 of each holds s - y'Y^-1 y afterwards.
     """

@@ -29,7 +29,7 @@ _LIGHTEST = 1e-9  # expected number of targets below which a component is merged
 
 @kernel
 def predicted_intensity(intensity: Mixture, motion: Motion, dt: float, born: Mixture, max_components: int) -> Mixture:
-    """The intensity `dt` seconds later with those born since, condensed."""
+    """Return the intensity `dt` seconds later, with births in between, condensed."""
     return condensed(stacked_mixtures(moved(intensity, motion, dt), born), max_components)
 
 
@@ -77,7 +77,7 @@ def _divergence(
 
 @borrowing
 def _near(mixture: Mixture, left: Ints, heaviest: int, reach: float, inverse: Floats, factor: Floats, out: Ints) -> int:
-    """The components (-> out) still left that `heaviest` stands for, itself first; their number."""
+    """Write the remaining components that `heaviest` represents to `out`, itself first; returns their number."""
     out[0] = heaviest
     if not cholesky(mixture.covs[heaviest], factor):
         return 1

@@ -1,4 +1,4 @@
-"""The posterior covariance as a sum of squares, in which nothing cancels (Joseph's form)."""
+"""Posterior covariance as a sum of squares, without cancellation (Joseph's form)."""
 
 from __future__ import annotations
 

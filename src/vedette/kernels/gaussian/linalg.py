@@ -22,7 +22,7 @@ def cholesky(matrix: Floats, factor: Floats) -> bool:
 
 @inlined
 def cholesky_of_size(matrix: Floats, factor: Floats, n: int) -> bool:
-    """As `cholesky`; the loops are unrolled where the caller's `n` is a constant."""
+    """Write the Cholesky factor, see `cholesky`; the loops are unrolled if the caller's `n` is a constant."""
     for i in range(n):
         for j in range(i + 1):
             total = matrix[i, j]
@@ -124,7 +124,7 @@ def log_add(a: float, b: float) -> float:
 
 @borrowing
 def normalise_logs(values: Floats) -> float:
-    """Make the exponentials sum to one and return the log of what they summed to; -inf, and nothing done, for none.
+    """Make the exponentials sum to one and return the log of their sum; -inf, without a change, for no values.
 
     Taken from the largest, not from the sum: logs of -1e12 keep their differences, and so still sum to one.
     """

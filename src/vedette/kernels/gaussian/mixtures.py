@@ -15,7 +15,7 @@ _RUN = 16  # values that are sorted by insertion before runs are merged
 
 @inlined
 def _is_definite(cov: Floats, factor: Floats, n: int) -> bool:
-    """Whether `cov` is positive definite beyond rounding, so that any other Cholesky factorisation finds it so too.
+    """Return True if `cov` is positive definite beyond rounding, for any Cholesky factorisation.
 
     Its correlations are factored with a diagonal lessened by twice what n (n + 2) roundings may take from it.
     """
@@ -166,7 +166,7 @@ def match_all(
 
 @kernel
 def heaviest_of_runs(log_weights: Floats, offsets: Ints, chosen: Ints) -> Ints:
-    """(len(chosen),) the heaviest component of each chosen mixture, the first of several; none is empty."""
+    """Return the heaviest component (len(chosen),) of each chosen mixture, the first if equal; none is empty."""
     heaviest = np.empty(len(chosen), np.int64)
     for i in range(len(chosen)):
         best = offsets[chosen[i]]

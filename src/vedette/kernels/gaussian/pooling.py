@@ -1,4 +1,4 @@
-"""Tracks as single Gaussians, and pools of weighted tracks that become one each: their mixture, reduced."""
+"""Tracks as single Gaussians, and pools of weighted tracks, each reduced to one track."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Moments(NamedTuple):
 
 @kernel
 def moments_of(tracks: Tracks, first: int, last: int) -> Moments:
-    """Of the tracks `first` to `last`."""
+    """Return the moments of tracks `first:last`."""
     components = tracks.components
     dim = components.means.shape[1]
     out = Moments(np.empty((last - first, dim)), np.empty((last - first, dim, dim)))

@@ -1,4 +1,4 @@
-"""Means over a Gaussian of what depends on the position alone: in closed form, along rays, and by nodes."""
+"""Means over a Gaussian of functions of the position: in closed form, along rays, and by nodes."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def _near(start: float, stop: float, distance: float, toward: float, a: float, b
 
 @kernel
 def _share(total: float) -> float:
-    """Rounding leaves next to nothing below 0 or above 1."""
+    """Return a share limited to [0, 1], which rounding may leave slightly."""
     return min(max(total, 0.0), 1.0)
 
 

@@ -21,7 +21,7 @@ from vedette.kernels.gaussian.mixtures import sort_descending
 
 
 class MixtureCaps(NamedTuple):
-    """How a mixture is kept small."""
+    """Limits of mixture reduction."""
 
     log_min_weight: float  # components below this, relative to the mixture's total weight, are dropped
     merge_distance: float  # Mahalanobis distance within which components are merged; 0 merges none

@@ -54,7 +54,7 @@ class Pair(NamedTuple):
 
 
 class PairWork(NamedTuple):
-    """Arrays to update one pair in."""
+    """Working arrays of the update of one pair."""
 
     innovation: Innovation  # of one entry
     scratch: Scratch
@@ -247,7 +247,7 @@ def learn_at_mean(sensor: Sensor, pair: Pair, share: float, work: PairWork) -> N
 
 @inlined
 def update_pair(sensor: Sensor, pair: Pair, work: PairWork, out: Floats) -> float:
-    """As `relinearise`; mean and covariance after the update are written to the rows of `out`, mean first."""
+    """Update a pair, see `relinearise`, and write posterior mean and covariance to the rows of `out`, mean first."""
     distance = relinearise(sensor, pair, work)
     write_posterior(work.innovation, 0, work.scratch.residual, pair.mean, out)
     return distance
@@ -255,7 +255,7 @@ def update_pair(sensor: Sensor, pair: Pair, work: PairWork, out: Floats) -> floa
 
 @inlined
 def copy_updated(updated: Floats, mean: Floats, cov: Floats) -> None:
-    """Copy what `update_pair` wrote."""
+    """Copy mean and covariance from the rows that `update_pair` wrote."""
     for i in range(mean.shape[0]):
         mean[i] = updated[0, i]
         for j in range(mean.shape[0]):

@@ -1,4 +1,4 @@
-"""What is done to true measurements until they are a scan (random numbers are drawn outside), and a look at scans."""
+"""Simulated scans from true measurements (random numbers are drawn outside), and checks of scans."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def put_on_circle(angles: Floats) -> None:
 
 @kernel
 def add_noise(measured: Floats, noise: Floats, angular: Bools) -> int:
-    """z_i += v_i in place, angles in (-pi, pi]; the first row that is not finite, where all stops; -1: none."""
+    """Add z_i += v_i in place, angles in (-pi, pi]; returns the first row that is not finite, where it stops, or -1."""
     num, dim = measured.shape
     for i in range(num):
         for j in range(dim):
@@ -44,7 +44,7 @@ def add_noise(measured: Floats, noise: Floats, angular: Bools) -> int:
 
 @kernel
 def seen_with(chances: Floats, luck: Floats) -> tuple[Bools, int]:
-    """(num,) whether luck lies below the probability of detection, and the first that is none; -1: all are."""
+    """Return detections (num,), luck below probability, and the index of the first invalid probability, or -1."""
     seen = np.empty(len(chances), np.bool_)
     for i in range(len(chances)):
         if not 0.0 <= chances[i] <= 1.0:
@@ -55,7 +55,7 @@ def seen_with(chances: Floats, luck: Floats) -> tuple[Bools, int]:
 
 @kernel
 def mixed_scan(measured: Floats, ids: Ints, seen: Bools, clutter: Floats, order: Ints) -> tuple[Floats, Ints]:
-    """The measurements of targets that are seen and the clutter, in the order of places in both together.
+    """Return the measurements of detected targets and the clutter, in the given joint order.
 
     Returns (n, meas_dim) measurements and the (n,) ids of the targets behind them, or `CLUTTER`.
     """

@@ -24,7 +24,7 @@ UNSCENTED_KAPPA = 1.0
 
 
 class PointWeights(NamedTuple):
-    """How many sigma points there are, and what they weigh."""
+    """Number and weights of sigma points."""
 
     num: int  # 0 where a model is linearised
     first: float  # of the mean; 0 where it is no point of the rule
