@@ -14,6 +14,7 @@ from vedette.calibration.calibrating import Calibration, calibrate
 from vedette.calibration.parameters import Parameter, Problem
 from vedette.internal.quantities import COMPONENTS
 from vedette.kernels.base.types import Floats
+from vedette.kernels.gaussian.row_noise import row_length
 from vedette.models.arguments import float_array, instance, positive
 from vedette.recorded.instants import Look, in_order, without_bias
 from vedette.tracking import SensorScan
@@ -161,9 +162,10 @@ class OnlineBiasEstimator:
 
     def _checked(self, scan: SensorScan) -> SensorScan:
         own = own_scan(scan, len(self.problem.sites))
-        shape = None, len(COMPONENTS[self.problem.sites[own.sensor].kind])
-        measured = own.measurements if own.measurements.size else np.empty((0, shape[1]))
-        return replace(own, measurements=float_array(f"{name_of(own)}: scan", measured, shape))
+        dim = len(COMPONENTS[self.problem.sites[own.sensor].kind])
+        measured = own.measurements if own.measurements.size else np.empty((0, dim))
+        length = row_length(dim) if measured.shape[-1] == row_length(dim) else dim
+        return replace(own, measurements=float_array(f"{name_of(own)}: scan", measured, (None, length)))
 
     def biases(self, state: BiasEstimatorState, time: float) -> Floats:
         """(num_parameters,) values of the parameters at a time.

@@ -16,6 +16,7 @@ from scipy.optimize import linear_sum_assignment
 from vedette.densities import as_lmb, track_moments
 from vedette.internal.quantities import COMPONENTS
 from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.models.row_noise import measured_part
 from vedette.recorded import RecordedScans, Site
 from vedette.recorded.instants import with_wrapped_angles
 from vedette.tracking import Tracker
@@ -79,7 +80,7 @@ def match_measurements(
             pairs = _assigned(scan, means[:, :2] - poses[s, :2], poses[s, :2], sites[s].kind, stds[s])
             counts[:, s] += len(means) - len(pairs), len(scan) - len(pairs), 1
             for i, j in pairs:
-                measured = (*scan[i].tolist(), math.nan)[:2]
+                measured = (*measured_part(scan, len(COMPONENTS[sites[s].kind]))[i].tolist(), math.nan)[:2]
                 rows.append((time, s, labels[j], *measured, *poses[s, :2].tolist(), *means[j].tolist()))
         state = tracker.step(state, list(scans), poses, time, rngs=rngs)[0]
     table = np.array(rows, np.float64).reshape(len(rows), 11)

@@ -11,6 +11,7 @@ from vedette.errors import InputError
 from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT, PLACED, QUANTITIES, is_doppler, si_column
 from vedette.kernels.base.types import BEAM, OWN_HEIGHT, OWN_VELOCITY, Floats
 from vedette.models.arguments import reject
+from vedette.models.row_noise import measured_part
 from vedette.models.turns import is_turn, lags
 from vedette.platforms.compass import course_deg
 from vedette.recorded.conventions import OWN_SPEEDS
@@ -77,8 +78,12 @@ def _recorded(record: RunRecord, section: RecordingSection, scenario: Scenario) 
     recording = section.build(scenario.model, scenario.folder)
     if not np.array_equal(recording.times[: record.num_scans], record.times):
         raise InputError(f"{section.path}: expected the scans of the run; got others")
+    dims = [len(COMPONENTS[sensor.measurement.kind]) for sensor in scenario.model.sensors]
     return tuple(
-        tuple(None if scan is None else Scan(scan, np.full(len(scan), UNKNOWN)) for scan in scans)
+        tuple(
+            None if scan is None else Scan(measured_part(scan, dim), np.full(len(scan), UNKNOWN))
+            for dim, scan in zip(dims, scans, strict=True)
+        )
         for scans in recording.scans[: record.num_scans]
     )
 

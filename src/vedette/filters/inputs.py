@@ -19,11 +19,13 @@ from vedette.densities.tracks import gaussian_tracks, relabelled_tracks
 from vedette.errors import InputError, ModelError, VedetteError
 from vedette.internal.unit_warnings import warn_implausible
 from vedette.kernels.base.types import Bools, Floats, Ints, Lmb
+from vedette.kernels.gaussian.row_noise import row_length
 from vedette.kernels.gaussian.scans import examined_scan
 from vedette.kernels.labelled import births as kernels
 from vedette.models import BirthModel, SensorModel
 from vedette.models.arguments import as_array, reject, step_number
 from vedette.models.measurement import MeasurementModel, wrap_angular
+from vedette.models.row_noise import check_row_noise, measured_part
 
 _MOST_STDS = 10.0  # standard deviations of noise below the least noise-free measurement
 _NO_ROWS = np.empty(0, np.int64)
@@ -34,8 +36,8 @@ _Density = TypeVar("_Density", GLMB, LMB, FactoredGLMB, Poisson, IidCluster, Mul
 def check_scan(scan: Any, sensor: SensorModel) -> tuple[Floats, Ints]:
     """Return the scan as a contiguous (num, meas_dim) array without repeated rows, and the rows that were repeats.
 
-    Angles are returned in (-pi, pi]. Warns of values too far below the least possible value for noise, such as a
-    negative range.
+    Rows that bring their noise (`vedette.models.with_row_noise`) are longer. Angles are returned in (-pi, pi]. Warns of
+    values too far below the least possible value for noise, such as a negative range.
 
     Raises:
         InputError: not an array of that shape, a value that is not finite, or an angle beyond a full turn either way,
@@ -44,6 +46,7 @@ def check_scan(scan: Any, sensor: SensorModel) -> tuple[Floats, Ints]:
     """
     measurement, meas_dim = sensor.measurement, sensor.meas_dim
     expected = f"an array of shape (num_measurements, {meas_dim}), empty for a scan without measurements"
+    wider = row_length(meas_dim)
     if scan is None:
         raise InputError(f"scan: expected {expected}; got None")
     given = scan
@@ -51,12 +54,14 @@ def check_scan(scan: Any, sensor: SensorModel) -> tuple[Floats, Ints]:
         given = as_array("scan", scan, "fiu", f"numbers in {expected}")
     if given.size == 0 and given.ndim <= 2:
         return np.empty((0, meas_dim)), _NO_ROWS
-    if given.ndim != 2 or given.shape[1] != meas_dim:
+    if given.ndim != 2 or given.shape[1] not in (meas_dim, wider):
         raise InputError(f"scan: expected {expected}; got shape {given.shape}")
     array = np.array(given, dtype=np.float64, order="C")
     bad, is_below, largest, may_repeat = examined_scan(array, measurement.least, measurement.angular)
     if bad >= 0:
         raise InputError(f"scan: expected finite numbers; got {array[bad].tolist()} in row {bad}")
+    if given.shape[1] == wider:
+        check_row_noise("scan", array, meas_dim)
     if is_below:
         _warn_negative(array, measurement, sensor.noise.least_stds)
     if largest > 3.14:  # rare
@@ -69,7 +74,9 @@ def check_scan(scan: Any, sensor: SensorModel) -> tuple[Floats, Ints]:
 
 
 def _warn_negative(scan: Floats, measurement: MeasurementModel, stds: Floats | None) -> None:
-    below = measurement.least - scan > _MOST_STDS * (np.inf if stds is None else stds)
+    below = measurement.least - measured_part(scan, measurement.meas_dim) > _MOST_STDS * (
+        np.inf if stds is None else stds
+    )
     for row, component in np.argwhere(below)[:1].tolist():
         got = f"{scan[row, component]:g} in row {row}, component {component}"
         least = f"at least {measurement.least[component]:g}, but for noise"
@@ -77,14 +84,15 @@ def _warn_negative(scan: Floats, measurement: MeasurementModel, stds: Floats | N
 
 
 def _wrap_angles(scan: Floats, angular: Bools) -> Floats:
-    sizes = np.abs(scan[:, angular])
+    measured = measured_part(scan, len(angular))
+    sizes = np.abs(measured[:, angular])
     if sizes.max() > 2.0 * math.pi:
         row = int(np.argmax(sizes.max(axis=1)))
         raise InputError(
             f"scan: expected angles in radians, in (-pi, pi]; got {scan[row].tolist()} in row {row}, whose component "
             f"{int(np.flatnonzero(angular)[np.argmax(sizes[row])])} is an angle (is it in degrees?)"
         )
-    return wrap_angular(scan, angular)
+    return np.column_stack([wrap_angular(measured, angular), scan[:, len(angular) :]])
 
 
 def check_belief(belief: object, kind: type[_Density], state_dim: int, name: str = "belief") -> _Density:

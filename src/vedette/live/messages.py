@@ -23,7 +23,7 @@ from vedette.tracking import SensorScan
 
 MOST_BYTES = 1_000_000  # per line
 MOST_MEASUREMENTS = 2000  # per scan
-_KEYS = ("sensor", "time", "measurements", "pose", "velocity", "times")
+_KEYS = ("sensor", "time", "measurements", "pose", "velocity", "times", "stds", "snr_db")
 
 
 def is_message(line: bytes) -> bool:
@@ -54,7 +54,9 @@ def read_message(
     clockwise from true north as in plans, is optional; or with `heading_deg`, which has the direction of bearings and
     needs `bearings` or a compass. For a sensor that measures range rates or turns, `"velocity": [vx, vy]` is its own
     velocity in m/s. For a sensor that turns, `"times"` has the time of each measurement, and `time` is the middle of
-    the turn; without `"times"`, all measurements are of one time.
+    the turn; without `"times"`, all measurements are of one time. `"stds"` has a row of standard deviations for each
+    measurement, in its units, null where the sensor's noise model holds; `"snr_db"` the signal-to-noise ratio of each
+    measurement of a sensor with `signal`, or null.
 
     Args:
         line: line of UTF-8 text.
@@ -81,12 +83,14 @@ def read_message(
     columns: dict[str, list[Any]] = {"time": [time] * num, "sensor": [site.name] * num}
     columns |= {name: [row[j] for row in rows] if rows else [None] for j, name in enumerate(names)}
     columns |= {name: [value] * num for name, value in pose.items()}
+    columns |= _accuracy(data, len(rows), site, place)
     unit = "deg" if site.compass else "rad"
     units = {
         "bearing": unit,
         "elevation": unit,
         **{name: unit for name, unit in conventions.units.items() if name in names},
     }
+    units |= {f"{name}_std": units[name] for name in names if name in units}
     named = {_OF_POSE[name]: name for name in pose}
     # The loop removes measurements beyond the reach, and counts them.
     everywhere = replace(site, reach=math.inf, turn="none")
@@ -178,6 +182,28 @@ def _rows(given: Any, field: str, site: Site) -> list[list[float]]:
         if not isinstance(row, list) or len(row) != len(names) or not all(map(_is_number, row)):
             raise reject(f"{field}[{i}]", f"numbers [{', '.join(names)}]", row)
     return given
+
+
+def _accuracy(data: Mapping[str, Any], num: int, site: Site, place: str) -> dict[str, list[Any]]:
+    """Return standard deviations and signal-to-noise ratios as columns of a table."""
+    names, found = COMPONENTS[site.kind], dict[str, list[Any]]()
+    if (stds := data.get("stds")) is not None:
+        wanted = f"for each of {pluralise(num, 'measurement')} [{', '.join(names)}], numbers above 0 or null"
+        shaped = isinstance(stds, list) and len(stds) == num and all(isinstance(row, list) for row in stds)
+        if not shaped or not all(
+            len(row) == len(names) and all(each is None or (_is_number(each) and each > 0.0) for each in row)
+            for row in stds
+        ):
+            raise reject(f"{place}, stds", wanted, stds)
+        found |= {f"{name}_std": [row[j] for row in stds] or [None] for j, name in enumerate(names)}
+    if (ratios := data.get("snr_db")) is not None:
+        if site.signal is None:
+            raise reject(f"{place}, snr_db", f"none, as the sensors file gives no `signal` of {site.name}", "some")
+        numbers = isinstance(ratios, list) and all(each is None or _is_number(each) for each in ratios)
+        if not numbers or len(ratios) != num:
+            raise reject(f"{place}, snr_db", f"{pluralise(num, 'number')} or null, one for each measurement", ratios)
+        found["snr"] = ratios or [None]
+    return found
 
 
 def _pose(given: Any, field: str, site: Site) -> tuple[dict[str, float], list[float]]:

@@ -28,6 +28,7 @@ from vedette.models.noise import axis_noise, constant_noise, range_dependent_noi
 from vedette.models.polar import bearing_only, bearing_range, bearing_range_rate, range_only
 from vedette.models.region import Region
 from vedette.models.region_clutter import region_clutter
+from vedette.models.row_noise import SignalModel, with_row_noise
 from vedette.models.sensor import SensorModel
 from vedette.models.sensor_clutter import around_sensor
 from vedette.models.targets import TargetModel
@@ -48,6 +49,7 @@ __all__ = [
     "NoiseModel",
     "Region",
     "SensorModel",
+    "SignalModel",
     "SurvivalModel",
     "TargetModel",
     "UndetectedModel",
@@ -78,4 +80,5 @@ __all__ = [
     "range_only",
     "region_clutter",
     "soft_sector",
+    "with_row_noise",
 ]

@@ -14,6 +14,7 @@ from vedette.errors import InputError, ModelError
 from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT, QUANTITIES, is_doppler
 from vedette.kernels.base.compile import inlined
 from vedette.kernels.base.types import Bools, Floats
+from vedette.kernels.gaussian.row_noise import is_missing
 from vedette.models.arguments import (
     dimension,
     float_array,
@@ -125,15 +126,18 @@ class ClutterModel:
 
 @model_function("log_clutter_intensity")
 def _box(measurement: Floats, pose: Floats, params: Floats) -> float:
-    dim = measurement.shape[0]
+    dim, level = params.shape[0] // 3, params[0]
     for i in range(dim):
         low, width, period = params[1 + i], params[1 + dim + i], params[1 + 2 * dim + i]
+        if is_missing(measurement, i, dim):
+            level += math.log(width)
+            continue
         offset = measurement[i] - low
         if period > 0.0:
             offset -= period * math.floor(offset / period)
         if not 0.0 <= offset <= width:
             return -math.inf
-    return params[0]  # type: ignore[no-any-return]
+    return level  # type: ignore[no-any-return]
 
 
 _LARGEST_RATE = 300.0  # m/s, the default largest range rate of clutter
@@ -187,7 +191,12 @@ def plane_params(kind: str, max_range_rate: float | None, max_height: float | No
 
 @inlined
 def log_density_of_rate(measurement: Floats, params: Floats) -> float:
-    """Log density of the third component, a range rate, in s/m: uniform. params: end with `plane_params`."""
+    """Log density of the third component, a range rate, in s/m: uniform; 0 if it is missing.
+
+    params: end with `plane_params`.
+    """
+    if is_missing(measurement, 2, 3):
+        return 0.0
     return -math.log(2.0 * params[-6]) if abs(measurement[2] + params[-3]) <= params[-6] else -math.inf
 
 

@@ -15,6 +15,7 @@ from vedette.internal.quantities import HEIGHT_DEPENDENT
 from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import HEIGHT, Floats
 from vedette.kernels.gaussian.beam import own_height, own_place
+from vedette.kernels.gaussian.row_noise import is_missing
 from vedette.models.arguments import non_negative, one_of, reject
 from vedette.models.clutter import (
     ClutterModel,
@@ -117,8 +118,9 @@ def _share_of_heights(least: float, most: float, sensor: float, highest: float) 
     return (above + max(0.0, min(sensor, most) - least)) / highest
 
 
-@model_function("log_clutter_intensity")
-def _bearing_slant_range(measurement: Floats, pose: Floats, params: Floats) -> float:
+@inlined
+def _at_slant_range(measurement: Floats, pose: Floats, params: Floats) -> float:
+    """Log intensity over bearing and slant range, whatever the height."""
     bearing, distance = measurement[0] + params[6], measurement[1] + params[7]
     own_x, own_y = own_place(bearing, pose)
     near, far = _clip_ray(own_x + params[9], math.cos(bearing), params[1], params[2], 0.0, math.inf)
@@ -128,6 +130,11 @@ def _bearing_slant_range(measurement: Floats, pose: Floats, params: Floats) -> f
     least = math.sqrt(max(0.0, distance * distance - far * far))
     share = _share_of_heights(least, math.sqrt(distance * distance - near * near), own_height(pose), params[5])
     return params[0] + math.log(distance * share) if share > 0.0 else -math.inf
+
+
+@model_function("log_clutter_intensity")
+def _bearing_slant_range(measurement: Floats, pose: Floats, params: Floats) -> float:
+    return _at_slant_range(measurement, pose, params)
 
 
 @inlined
@@ -143,6 +150,8 @@ def _at_height(bearing: float, ground: float, height: float, pose: Floats, param
 
 @model_function("log_clutter_intensity")
 def _bearing_range_elevation(measurement: Floats, pose: Floats, params: Floats) -> float:
+    if is_missing(measurement, 2, 3):
+        return _at_slant_range(measurement, pose, params)
     distance, elevation = measurement[1] + params[7], measurement[2] + params[8]
     ground = distance * math.cos(elevation)
     if not (distance > 0.0 and ground > 0.0):
@@ -153,6 +162,8 @@ def _bearing_range_elevation(measurement: Floats, pose: Floats, params: Floats) 
 
 @model_function("log_clutter_intensity")
 def _bearing_range_altitude(measurement: Floats, pose: Floats, params: Floats) -> float:
+    if is_missing(measurement, 2, 3):
+        return _at_slant_range(measurement, pose, params)
     distance, height = measurement[1] + params[7], measurement[2] + params[8]
     square = distance * distance - (height - own_height(pose)) ** 2
     if not (distance > 0.0 and square > 0.0):
@@ -163,6 +174,8 @@ def _bearing_range_altitude(measurement: Floats, pose: Floats, params: Floats) -
 @model_function("log_clutter_intensity")
 def _position_altitude(measurement: Floats, pose: Floats, params: Floats) -> float:
     inside = _inside(measurement[0] + params[6], measurement[1] + params[7], params)
+    if inside and is_missing(measurement, 2, 3):
+        return params[0]  # type: ignore[no-any-return]
     if not (inside and 0.0 <= measurement[2] + params[8] <= params[5]):
         return -math.inf
     return params[0] - math.log(params[5])  # type: ignore[no-any-return]

@@ -12,10 +12,10 @@ from vedette.internal.text import shown
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import reject
 from vedette.platforms.compass import PlaneCompass
-from vedette.recorded.conventions import OTHER_NAMES, OWN_SPEEDS, UNITS, Conventions
+from vedette.recorded.conventions import GAPS, OTHER_NAMES, OWN_SPEEDS, UNITS, Conventions
 from vedette.recorded.geography import Origin
 from vedette.recorded.instants import Site
-from vedette.recorded.tables import Table, are_dates, column_names
+from vedette.recorded.tables import Table, are_dates, column_names, is_empty
 
 
 class ScanColumns:
@@ -34,12 +34,24 @@ class ScanColumns:
         self._numbers = {site.name: s for s, site in enumerate(sites)} | {
             str(s): s - 1 for s in range(1, len(sites) + 1) if str(s) not in {site.name for site in sites}
         }
+        self._with_gaps = {name for name in GAPS if name in self._columns and self._has_gaps(name)}
         self.is_utc = are_dates(table.columns[self._time])
         self._check()
 
     def _has_sensor(self) -> bool:
         """Return True if there is a column of sensors, or one is named; for a single sensor there need not be one."""
         return "sensor" in self.conventions.columns or "sensor" in self.table.columns
+
+    def _has_gaps(self, quantity: str) -> bool:
+        """Return True if a row with a measurement has an empty cell of a third component."""
+        pairs = ("bearing", "range", "x", "y", "lon", "lat")
+        names = (quantity, *(name for name in pairs if name in self._columns))
+        columns = (self.table.columns[self._columns[name][0]] for name in names)
+        return any(is_empty(cell) and not all(map(is_empty, others)) for cell, *others in zip(*columns, strict=True))
+
+    def rows_bring_noise(self, site: Site) -> bool:
+        """Return True if the rows of a sensor have their own noise, or miss a component of the measurement."""
+        return bool(self.own_accuracy(site)) or not self._with_gaps.isdisjoint(COMPONENTS[site.kind])
 
     @property
     def unused(self) -> tuple[str, ...]:
@@ -49,8 +61,17 @@ class ScanColumns:
         own = {"own_x", "own_y", "own_lon", "own_lat", "own_heading"}
         own |= {*OWN_SPEEDS} if any(is_doppler(site.kind) for site in self.sites) else set()
         own |= {"own_height"} if any(site.kind in HEIGHT_DEPENDENT for site in self.sites) else set()
+        own |= {name for site in self.sites for name in self.own_accuracy(site)}
         used = {self._columns[name][0] for name in measured | own if name in self._columns} | {self._time, self._sensor}
         return tuple(name for name in self.table.columns if name not in used)
+
+    def own_accuracy(self, site: Site) -> tuple[str, ...]:
+        """Return the columns that say how accurate, and how strong, the rows of a sensor are."""
+        names = [f"{name}_std" for name in COMPONENTS[site.kind]]
+        if {"x_std", "y_std"} <= set(self._columns):
+            names += ["xy_correlation"] * is_position(site.kind)
+        names += ["snr"] * (site.signal is not None)
+        return tuple(name for name in names if name in self._columns)
 
     def without_velocity(self, poses: Floats) -> tuple[str, ...]:
         """Return a note of each moving sensor that measures range rates but has no columns of its velocity.

@@ -9,6 +9,7 @@ from typing import Literal
 
 from vedette.internal.quantities import ANGLES, HEIGHTS, LENGTHS, QUANTITIES, SPEEDS
 from vedette.models.arguments import reject
+from vedette.models.heights import ASSUMED_HEIGHT
 from vedette.recorded.instants import Bearings
 
 # Quantities of a row, and the units that may follow at the end of a column's name.
@@ -24,8 +25,13 @@ UNITS: dict[str, Mapping[str, float]] = {
     "own_vx": SPEEDS,
     "own_vy": SPEEDS,
     "own_height": HEIGHTS,
+    **{f"{name}_std": each.units for name, each in QUANTITIES.items()},
+    "xy_correlation": {"": 1.0},
+    "snr": {"db": 1.0},
 }
 OWN_SPEEDS = ("own_vx", "own_vy")  # velocity of a sensor, east and north, read if it measures range rates
+# Third components of measurements, which single rows need not have, and what stands in for them until births.
+GAPS = {"altitude": ASSUMED_HEIGHT, "elevation": 0.0, "range_rate": 0.0}
 OTHER_NAMES = {
     "lon": ("longitude",),
     "lat": ("latitude",),
@@ -45,6 +51,9 @@ MOST = {
     "own_height": QUANTITIES["altitude"].most,
     **dict.fromkeys(OWN_SPEEDS, QUANTITIES["range_rate"].most),
     **{name: each.most for name, each in QUANTITIES.items() if each.most < math.inf},
+    **{f"{name}_std": math.pi for name, each in QUANTITIES.items() if each.is_angle},
+    "xy_correlation": 1.0,
+    "snr": 200.0,
 }
 OVER_A_TURN = math.radians(10.0)  # largest excess of an angle from bias or noise
 

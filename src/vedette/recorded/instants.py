@@ -17,6 +17,7 @@ from vedette.kernels.base.types import BEAM, Floats
 from vedette.models import Bias
 from vedette.models.arguments import float_array
 from vedette.models.bias import NO_BIAS, with_offsets
+from vedette.models.row_noise import SignalModel
 from vedette.models.turns import is_turn
 from vedette.platforms.compass import Compass, PlaneCompass, course_deg, wrapped
 from vedette.recorded.turns import Turning
@@ -53,6 +54,7 @@ class Site:
         reach: m, beyond which it measures nothing; inf: unknown.
         north: direction of true north; an `Origin` gives it at every place, the default is along y.
         turn: how its beam turns, if its scans are turns; "found": from its rows, if they show one; "none": no turn.
+        signal: signal-to-noise ratios of its measurements; None: a column of these is not read.
     """
 
     name: str
@@ -63,6 +65,7 @@ class Site:
     reach: float = math.inf
     north: Compass = field(default_factory=PlaneCompass)
     turn: Turning = "found"
+    signal: SignalModel | None = None
 
     def measured(self, told: ArrayLike, pose: ArrayLike | None = None) -> Floats:
         """Return (num, meas_dim) measurements for filters, bias included, from the sensor's own measurements.
@@ -99,8 +102,8 @@ class RecordedScans(SummaryRepr):
         times: (num_instants,) s after the first, increasing.
         start: s; the recorded time of the first: since 1970 UTC if times were dates.
         is_utc: True if times were dates.
-        scans: for each instant one per sensor: (num, meas_dim) measurements as filters take them; None: it did not
-            scan.
+        scans: for each instant one per sensor: (num, meas_dim) measurements as filters take them, with their noise
+            (`vedette.models.with_row_noise`) if the rows have it; None: it did not scan.
         poses: (num_instants, num_sensors, 3 or more), each sensor at its last scan, or before it at its first one.
         skipped: faults of the rows that were left out.
         bearings: for each sensor, the convention of bearings in its rows, in which a bearing's bias counts; None: it

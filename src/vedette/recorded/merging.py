@@ -11,6 +11,7 @@ from vedette.errors import InputError
 from vedette.internal.quantities import COMPONENTS, QUANTITIES
 from vedette.internal.text import pluralise, shown
 from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.models.row_noise import measured_part
 from vedette.recorded.instants import RecordedScans, Site, with_wrapped_angles
 
 _CLOSE = 3.0  # noise standard deviations between two measurements of one target
@@ -64,14 +65,17 @@ def _told(site: Site, before: int, after: int, offsets: Floats) -> str:
 
 
 def _means(scan: Floats, kind: str, stds: Floats, distance: float) -> tuple[Floats, Floats]:
-    """Return the mean of each cluster of a scan, and offsets from it in clusters of several measurements."""
-    clusters, means, offsets = _clusters(scan, kind, stds, distance), list[Floats](), [np.empty((0, scan.shape[1]))]
+    """Return the mean of each cluster of a scan, and offsets from it in clusters of several measurements.
+
+    Noise that rows bring is averaged, too: the measurements of an extended target are not independent.
+    """
+    clusters, means, offsets = _clusters(scan, kind, stds, distance), list[Floats](), [np.empty((0, len(stds)))]
     for cluster in range(int(clusters.max(initial=-1)) + 1):
         own = scan[clusters == cluster]
         off = with_wrapped_angles(own - own[0], kind)
         means.append(with_wrapped_angles(own[:1] + off.mean(axis=0), kind)[0])
         if len(own) > 1:
-            offsets.append(off - off.mean(axis=0))
+            offsets.append(measured_part(off - off.mean(axis=0), len(stds)))
     return np.array(means).reshape(-1, scan.shape[1]), np.concatenate(offsets)
 
 
@@ -86,7 +90,8 @@ def _clusters(scan: Floats, kind: str, stds: Floats, distance: float) -> Ints:
 
 def _close(scan: Floats, kind: str, stds: Floats, distance: float) -> Bools:
     """Return True for each pair of measurements within a number of standard deviations, (num, num)."""
-    gaps = with_wrapped_angles(scan[:, None] - scan[None], kind) / stds
+    measured = measured_part(scan, len(stds))
+    gaps = with_wrapped_angles(measured[:, None] - measured[None], kind) / stds
     return np.asarray((gaps**2).sum(axis=2) <= distance**2)
 
 

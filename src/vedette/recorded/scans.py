@@ -21,9 +21,20 @@ from vedette.internal.quantities import (
 )
 from vedette.internal.text import shown
 from vedette.kernels.base.types import OWN_HEIGHT, OWN_VELOCITY, Floats
+from vedette.kernels.gaussian.row_noise import MISSING
 from vedette.models.bias import NO_BIAS
+from vedette.models.row_noise import LOG_RATIO_OF_MISSING
 from vedette.recorded.columns import ScanColumns
-from vedette.recorded.conventions import MOST, ONE_PLACE, ONE_PLACE_SHARE, OVER_A_TURN, OWN_SPEEDS, UNITS, Conventions
+from vedette.recorded.conventions import (
+    GAPS,
+    MOST,
+    ONE_PLACE,
+    ONE_PLACE_SHARE,
+    OVER_A_TURN,
+    OWN_SPEEDS,
+    UNITS,
+    Conventions,
+)
 from vedette.recorded.extents import places_of, wild
 from vedette.recorded.geography import PLANE_REACH, Origin
 from vedette.recorded.instants import (
@@ -164,11 +175,51 @@ class _Rows(ScanColumns):
             return None
         if quantities[0] == "lon":
             place = self._agreed(i, self._plane(i, "lon", "lat"), "x", "y")
-            return (*place, *(self._value(i, quantity) for quantity in quantities[2:]))
-        return tuple(
-            self._angle(i, quantity, s, pose) if quantity == "bearing" else self._value(i, quantity)
+            return (*place, *(self._third(i, quantity) for quantity in quantities[2:]), *self._row_noise(i, site))
+        measured = (
+            self._angle(i, quantity, s, pose) if quantity == "bearing" else self._third(i, quantity)
             for quantity in quantities
         )
+        return (*measured, *self._row_noise(i, site))
+
+    def _third(self, i: int, quantity: str) -> float:
+        """Return a measured value; of a third component that the row does not have, what stands in for it."""
+        return GAPS[quantity] if quantity in GAPS and self._is_blank(i, quantity) else self._value(i, quantity)
+
+    def _row_noise(self, i: int, site: Site) -> tuple[float, ...]:
+        """Return what a row says of its noise and signal, as behind its measurement in `row_noise`; () without any."""
+        if not self.rows_bring_noise(site):
+            return ()
+        own = self.own_accuracy(site)
+        names = COMPONENTS[site.kind]
+        missing = [name in GAPS and self._is_blank(i, name) for name in names]
+        stds = [
+            math.sqrt(MISSING) if gap else self._std(i, f"{name}_std") if f"{name}_std" in own else 0.0
+            for name, gap in zip(names, missing, strict=True)
+        ]
+        covs = [stds[a] * stds[b] if a == b else 0.0 for a in range(len(names)) for b in range(a + 1)]
+        if "xy_correlation" in own and not self._is_blank(i, "xy_correlation"):
+            covs[1] = self._correlation(i) * stds[0] * stds[1]
+        ratio = LOG_RATIO_OF_MISSING * sum(missing)
+        if site.signal is not None and "snr" in own and not self._is_blank(i, "snr"):
+            ratio += site.signal.log_likelihood_ratio(self._value(i, "snr"))
+        return (*covs, ratio)
+
+    def _is_blank(self, i: int, quantity: str) -> bool:
+        return is_empty(self.table.columns[self._columns[quantity][0]][i])
+
+    def _std(self, i: int, quantity: str) -> float:
+        """Return the standard deviation in a cell; 0 for an empty one."""
+        if self._is_blank(i, quantity):
+            return 0.0
+        if (value := self._value(i, quantity)) <= 0.0:
+            raise self.table.fault(i, self._columns[quantity][0], "a standard deviation above 0, or an empty cell")
+        return value
+
+    def _correlation(self, i: int) -> float:
+        if abs(value := self._value(i, "xy_correlation")) >= 1.0:
+            raise self.table.fault(i, self._columns["xy_correlation"][0], "a correlation above -1 and below 1")
+        return value
 
     def _pose(self, i: int, s: int) -> tuple[float, ...]:
         """Return the pose of the sensor; the site gives what is not in the row."""
@@ -282,4 +333,5 @@ def _groups(rows: list[_Row], gather: float) -> list[list[_Row]]:
 
 def _scan(rows: list[_Row], site: Site) -> Floats:
     measured = [row.measured for row in rows if row.measured is not None]
-    return np.array(measured, np.float64).reshape(len(measured), len(COMPONENTS[site.kind]))
+    length = len(measured[0]) if measured else len(COMPONENTS[site.kind])
+    return np.array(measured, np.float64).reshape(len(measured), length)

@@ -12,6 +12,7 @@ from vedette.kernels.base.types import Floats
 from vedette.models import SensorModel
 from vedette.models.arguments import pose_vector
 from vedette.models.functions import write_rows
+from vedette.models.row_noise import measured_part, noise_of_rows
 from vedette.models.turns import is_turn, lags
 
 
@@ -83,8 +84,10 @@ def _condition(means: Floats, covs: Floats, std: Floats, sensor: SensorModel, sc
     if not len(rows) or not len(births):
         return
     of = nearest[births]
-    slope, noise = slopes[of][:, rows, 2:4], sensor.noise.covs(rest, pose, sensor.meas_dim)[of][:, rows][:, :, rows]
-    residual = (scan - model.measure(rest, pose))[of][:, rows] - (slope @ means[births, 2:4, np.newaxis])[..., 0]
+    covs_of_noise = noise_of_rows(scan, sensor.noise.covs(rest, pose, sensor.meas_dim))
+    slope, noise = slopes[of][:, rows, 2:4], covs_of_noise[of][:, rows][:, :, rows]
+    off = measured_part(scan, sensor.meas_dim) - model.measure(rest, pose)
+    residual = off[of][:, rows] - (slope @ means[births, 2:4, np.newaxis])[..., 0]
     prior = covs[births, 2:4, 2:4]
     innovation = slope @ prior @ slope.swapaxes(1, 2) + noise
     gain = np.linalg.solve(innovation, slope @ prior).swapaxes(1, 2)

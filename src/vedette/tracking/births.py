@@ -170,7 +170,9 @@ def _as_kernel(belief: LabelledDensity) -> Lmb:
 
 def _look(belief: Lmb, sensor: SensorModel, scan: Any, pose: Any) -> ScanInput:
     """Return a scan, already checked by the filters, as input of kernels."""
-    measurements = np.ascontiguousarray(scan, np.float64).reshape(-1, sensor.meas_dim)
+    measurements = np.ascontiguousarray(scan, np.float64)
+    if not len(measurements):
+        measurements = np.empty((0, sensor.meas_dim))
     return ScanInput(
         no_births_for_kernel(belief.tracks.components.means.shape[1]), measurements, pose_vector("pose", pose), 0.0
     )

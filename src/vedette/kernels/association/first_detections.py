@@ -67,7 +67,7 @@ def seen_intensity(intensity: Mixture, scan: ScanInput, sensor: Sensor) -> Rows:
         rows.labels[c, 0], rows.labels[c, 1] = 0, 0
         rows.offsets[c + 1], rows.log_absent[c] = c + 1, -math.inf
     copy_components(intensity, 0, num, rows.components, 0)
-    expect_rows(sensor, scan.pose, rows, make_scratch(state_dim, meas_dim))
+    expect_rows(sensor, scan, rows, make_scratch(state_dim, meas_dim))
     return rows
 
 
@@ -96,7 +96,7 @@ def missed_intensity(seen: Rows, scan: ScanInput, sensor: Sensor, num: int) -> t
 def _gated_pairs(seen: Rows, num_local: int, scan: Floats, log_clutter: Floats, sight: Sight, gate: float) -> _Pairs:
     near = near_measurements(seen, scan, sight.sensor.angular, gate)
     num, num_rows = near.offsets[len(near.offsets) - 1], len(seen.log_absent)
-    options = make_room(0, num, num, len(scan), scan.shape[1], room_for_updated(seen, num))
+    options = make_room(0, num, num, len(scan), len(sight.sensor.angular), room_for_updated(seen, num))
     components, filled = np.empty(num, np.int64), 0
     for c in range(num_rows):
         own = c - (num_rows - num_local)

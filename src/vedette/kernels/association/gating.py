@@ -18,6 +18,7 @@ from vedette.kernels.base.arrays import grown_ints
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.gaussian.mixtures import descending_order
+from vedette.kernels.gaussian.row_noise import place_of_variance
 from vedette.kernels.gaussian.scratch import wrap_angle
 
 # Margin of the ends of gates for rounding of distances.
@@ -38,14 +39,28 @@ def all_measurements() -> Near:
 
 
 @kernel
-def _gate_reaches(rows: Rows, gate: float) -> Floats:
-    """Half-width of the gate of each component along each axis, shape (num_components, meas_dim)."""
+def _largest_variances(scan: Floats, dim: int) -> Floats:
+    """Return the largest variance of each component of the noise that measurements bring, shape (meas_dim,)."""
+    out = np.zeros(dim)
+    if scan.shape[1] > dim:
+        for a in range(dim):
+            for j in range(len(scan)):
+                out[a] = max(out[a], scan[j, place_of_variance(a, dim)])
+    return out
+
+
+@kernel
+def _gate_reaches(rows: Rows, scan: Floats, gate: float) -> Floats:
+    """Half-width of the gate of each component along each axis, shape (num_components, meas_dim).
+
+    With the noise of the model and the largest that a measurement brings.
+    """
     factor = rows.innovation.factor
     num, dim = rows.innovation.predicted.shape
-    out = np.empty((num, dim))
+    out, own = np.empty((num, dim)), _largest_variances(scan, dim)
     for c in range(num):
         for a in range(dim):
-            variance = 0.0
+            variance = own[a]
             for k in range(a + 1):
                 variance += factor[c, a, k] * factor[c, a, k]
             out[c, a] = _SLACK * math.sqrt(gate * variance)
@@ -56,7 +71,7 @@ def _gate_reaches(rows: Rows, gate: float) -> Floats:
 def _finest_axis(scan: Floats, reaches: Floats) -> int:
     """Return the axis along which the scan spreads over the largest number of gates."""
     best, most = 0, -1.0
-    for a in range(scan.shape[1]):
+    for a in range(reaches.shape[1]):
         low, high, reach = math.inf, -math.inf, 0.0
         for j in range(scan.shape[0]):
             low, high = min(low, scan[j, a]), max(high, scan[j, a])
@@ -85,7 +100,7 @@ def _may_be_gated(rows: Rows, row: int, measurement: Floats, angular: Bools, rea
     """Return True if a measurement is within the gate of some component of the row along every axis."""
     for c in range(rows.offsets[row], rows.offsets[row + 1]):
         inside = True
-        for a in range(measurement.shape[0]):
+        for a in range(reaches.shape[1]):
             off = measurement[a] - rows.innovation.predicted[c, a]
             if angular[a]:
                 off = wrap_angle(off)
@@ -135,7 +150,7 @@ def _increasing(scan: Floats, axis: int) -> tuple[Ints, Floats]:
 def near_measurements(rows: Rows, scan: Floats, angular: Bools, gate: float) -> Near:
     """Return the measurements that may be in the gates of each row: all that are, and few others."""
     num, num_rows = len(scan), len(rows.log_absent)
-    reaches = _gate_reaches(rows, gate)
+    reaches = _gate_reaches(rows, scan, gate)
     axis = _finest_axis(scan, reaches)
     order, values = _increasing(scan, axis)
     offsets, found, filled = np.zeros(num_rows + 1, np.int64), np.empty(4 * num_rows + num, np.int64), 0

@@ -20,6 +20,7 @@ from vedette.kernels.base.types import Floats, Ints, ScanInput, Sensor
 from vedette.kernels.gaussian.detection import detection_probability, moments_if_missed
 from vedette.kernels.gaussian.innovation import copy_innovation, whiten, write_posterior
 from vedette.kernels.gaussian.relinearisation import Pair, PairWork, make_pair_work, update_pair
+from vedette.kernels.gaussian.row_noise import has_own_noise, log_likelihood_ratio
 
 
 class Sight(NamedTuple):
@@ -92,11 +93,14 @@ def view_options(options: Options, num_rows: int, num_measurements: int) -> Opti
 
 @inlined
 def log_clutter_at(sensor: Sensor, measurement: Floats, pose: Floats) -> float:
-    """Return the log clutter intensity at a measurement, -inf if clutter is impossible."""
+    """Return the log clutter intensity at a measurement, over the likelihood ratio of its features.
+
+    -inf if clutter is impossible there.
+    """
     level = sensor.log_clutter_intensity(measurement, pose, sensor.clutter_params)
     if math.isnan(level) or level == math.inf:
         raise ModelError("clutter model: log intensity is not a number below infinity")
-    return float(level)
+    return float(level - log_likelihood_ratio(measurement, len(sensor.angular)))
 
 
 @borrowing
@@ -142,12 +146,13 @@ def weigh_detection(
     Writes its whitened residual, and its updated moments if it bends, at `entry`.
     """
     innovation = rows.innovation
-    distance = whiten(innovation, c, measurement, sight.sensor.angular, gate, out.whitened[entry])
-    log_norm = innovation.log_norm[c]
+    distance, log_norm = 0.0, innovation.log_norm[c]
+    if not has_own_noise(measurement, innovation.predicted.shape[1]):
+        distance = whiten(innovation, c, measurement, sight.sensor.angular, gate, out.whitened[entry])
     if innovation.bends[c] and distance <= gate:
         copy_innovation(innovation, c, sight.work.innovation, 0)
         pair = Pair(sight.pose, rows.components.means[c], rows.components.covs[c], measurement)
-        distance = update_pair(sight.sensor, pair, sight.work, out.updated[entry])
+        distance = update_pair(sight.sensor, pair, gate, sight.work, out.updated[entry])
         log_norm = sight.work.innovation.log_norm[0]
     if not distance <= gate:
         return -math.inf

@@ -109,11 +109,15 @@ def fill_births(birth: Lmb, first_row: int, rows: Rows) -> None:
 
 
 @borrowing
-def expect_rows(sensor: Sensor, pose: Floats, rows: Rows, scratch: Scratch) -> None:
-    """Write the expected measurement of every component of the rows for a scan taken from `pose`."""
-    components = rows.components
+def expect_rows(sensor: Sensor, scan: ScanInput, rows: Rows, scratch: Scratch) -> None:
+    """Write the expected measurement of every component of the rows for a scan; its measurements are not used.
+
+    If these bring noise of their own, each has an update of its own, as for a component over which the sensor bends.
+    """
+    components, by_pair = rows.components, scan.measurements.shape[1] > len(sensor.angular)
     for c in range(len(components.log_weights)):
-        expect(sensor, pose, components.means[c], components.covs[c], c, rows.innovation, scratch)
+        expect(sensor, scan.pose, components.means[c], components.covs[c], c, rows.innovation, scratch)
+        rows.innovation.bends[c] = rows.innovation.bends[c] or by_pair
 
 
 @inlined
@@ -121,7 +125,7 @@ def predict_rows(tracks: Tracks, scan: ScanInput, motion: Motion, sensor: Sensor
     """Write the rows of a scan, up to the size of `rows`, without using the measurements."""
     fill_survivors(tracks, motion, scan.dt, rows, scratch)
     fill_births(scan.birth, len(tracks.labels), rows)
-    expect_rows(sensor, scan.pose, rows, scratch)
+    expect_rows(sensor, scan, rows, scratch)
 
 
 @inlined
@@ -137,7 +141,7 @@ def rows_of_scan(tracks: Tracks, scan: ScanInput, motion: Motion | None, sensor:
     sites, state_dim, meas_dim = scan.birth.tracks, tracks.components.means.shape[1], len(sensor.angular)
     if motion is None:
         standing = standing_rows(tracks, meas_dim)
-        expect_rows(sensor, scan.pose, standing, make_scratch(state_dim, meas_dim))
+        expect_rows(sensor, scan, standing, make_scratch(state_dim, meas_dim))
         return standing
     # Every component has its innovation here once, for any number of hypotheses with its track.
     num_rows = len(tracks.labels) + len(sites.labels)

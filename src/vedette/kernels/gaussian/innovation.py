@@ -13,6 +13,7 @@ from vedette.kernels.gaussian.beam import own_height
 from vedette.kernels.gaussian.detection import detection_and_edge
 from vedette.kernels.gaussian.joseph import posterior_of_squares
 from vedette.kernels.gaussian.linalg import LOG_2PI, cholesky_of_size, log_det_from_factor
+from vedette.kernels.gaussian.row_noise import replace_noise
 from vedette.kernels.gaussian.scratch import Scratch, wrap_angle
 from vedette.kernels.gaussian.sigma_points import (
     LINEARISED,
@@ -44,7 +45,7 @@ class Innovation(NamedTuple):
     log_norm: Floats  # (num,) log of the normalising constant of the predicted measurement's Gaussian
     prob_detection: Floats  # (num,)
     at_edge: Bools  # (num,) whether the probability of detection differs over it, see `detection`
-    bends: Bools  # (num,) whether updates linearise again at each measurement, see `relinearisation`
+    bends: Bools  # (num,) whether each measurement has an update of its own, see `relinearisation`
 
 
 @kernel
@@ -216,20 +217,31 @@ def log_norm_of_factor(factor: Floats) -> float:
 @inlined
 def expect(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, at: int, out: Innovation, scratch: Scratch) -> None:
     """Fill entry `at` of `out`; noise is taken at the predicted mean (paper-notes 3), detection as the sensor says."""
-    expect_measurement(sensor, pose, mean, cov, at, out, scratch)
+    expect_measurement(sensor, pose, mean, cov, out.predicted[at], at, out, scratch)
     out.prob_detection[at], out.at_edge[at] = detection_and_edge(sensor, pose, mean, cov, scratch.points[0])
 
 
 @inlined
 def expect_measurement(
-    sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, at: int, out: Innovation, scratch: Scratch
+    sensor: Sensor,
+    pose: Floats,
+    mean: Floats,
+    cov: Floats,
+    measurement: Floats,
+    at: int,
+    out: Innovation,
+    scratch: Scratch,
 ) -> None:
-    """Fill entry `at` of `out` except the detection probability, see `expect`."""
+    """Fill entry `at` of `out` except the detection probability, see `expect`.
+
+    measurement: its noise is used if it brings one (`row_noise`), else the model's, as for `out.predicted[at]`.
+    """
     n, m = mean.shape[0], out.predicted.shape[1]
     jacobian, noise, innovation = scratch.measurement_jacobian, scratch.measurement_noise, scratch.innovation_cov
     factor, cross, posterior = out.factor[at], out.whitened_cross[at], out.covs[at]
     linearised, weights = sensor.method == LINEARISED or sensor.method == SWITCHED, PointWeights(0, 0.0, 0.0)
     sensor.measurement_noise_cov(mean, pose, sensor.noise_params, noise)
+    replace_noise(measurement, noise)
     if linearised:
         sensor.measurement(mean, pose, sensor.measurement_params, out.predicted[at])
         sensor.measurement_jacobian(mean, pose, sensor.measurement_params, jacobian)
@@ -258,7 +270,7 @@ def whiten(innovation: Innovation, at: int, measurement: Floats, angular: Bools,
     """
     factor = innovation.factor[at]
     distance = 0.0
-    for a in range(measurement.shape[0]):
+    for a in range(innovation.predicted.shape[1]):
         total = measurement[a] - innovation.predicted[at, a]
         if angular[a]:
             total = wrap_angle(total)

@@ -28,6 +28,7 @@ from vedette.kernels.gaussian.innovation import (
 )
 from vedette.kernels.gaussian.joseph import posterior_of_squares
 from vedette.kernels.gaussian.linalg import cholesky, solve_lower, solve_upper
+from vedette.kernels.gaussian.row_noise import has_own_noise, replace_noise
 from vedette.kernels.gaussian.scratch import Scratch, make_scratch, wrap_angle
 from vedette.kernels.gaussian.sigma_points import (
     SWITCHED,
@@ -50,7 +51,7 @@ class Pair(NamedTuple):
     pose: Floats  # (pose_dim,)
     mean: Floats  # (state_dim,)
     cov: Floats  # (state_dim, state_dim)
-    measurement: Floats  # (meas_dim,)
+    measurement: Floats  # (meas_dim,), or with the noise of the row, see `row_noise`
 
 
 class PairWork(NamedTuple):
@@ -93,7 +94,7 @@ def _update(sensor: Sensor, pair: Pair, state: Floats, work: PairWork) -> float:
     H and the covariance of the noise are those of the scratch, where the whitened residual is left. Only the nonlinear
     part of the residual is wrapped.
     """
-    innovation, scratch, n, m = work.innovation, work.scratch, pair.mean.shape[0], pair.measurement.shape[0]
+    innovation, scratch, n, m = work.innovation, work.scratch, pair.mean.shape[0], work.innovation.predicted.shape[1]
     jacobian, noise, residual = scratch.measurement_jacobian, scratch.measurement_noise, scratch.residual
     factor, cross, posterior = innovation.factor[0], innovation.whitened_cross[0], innovation.covs[0]
     project(jacobian, pair.cov, cross, scratch.innovation_cov, n, m)
@@ -173,7 +174,7 @@ def _regress(sensor: Sensor, pair: Pair, work: PairWork) -> None:
     H L = B, B_i = (z(+i) - z(-i)) / (2 s), and the covariance of the images exceeds H P H' = B B' by what is left.
     """
     scratch, predicted, n = work.scratch, work.innovation.predicted[0], pair.mean.shape[0]
-    points, images, noise, m = scratch.points, scratch.images, scratch.measurement_noise, pair.measurement.shape[0]
+    points, images, noise, m = scratch.points, scratch.images, scratch.measurement_noise, predicted.shape[0]
     weights = fill_sigma_points(UNSCENTED, points[0], work.innovation.covs[0], points, scratch.factor)
     for i in range(weights.num):
         sensor.measurement(points[i], pair.pose, sensor.measurement_params, scratch.residual)
@@ -194,6 +195,13 @@ def _regress(sensor: Sensor, pair: Pair, work: PairWork) -> None:
 
 
 @borrowing
+def _expect_and_whiten(sensor: Sensor, pair: Pair, work: PairWork) -> float:
+    """Fill the innovation of the Gaussian (noise of the pair); returns the squared distance of the measurement."""
+    expect_measurement(sensor, pair.pose, pair.mean, pair.cov, pair.measurement, 0, work.innovation, work.scratch)
+    return whiten(work.innovation, 0, pair.measurement, sensor.angular, math.inf, work.scratch.residual)
+
+
+@borrowing
 def relinearise(sensor: Sensor, pair: Pair, work: PairWork) -> float:
     """Update a pair; returns the squared distance of its measurement under the last linearisation.
 
@@ -204,13 +212,13 @@ def relinearise(sensor: Sensor, pair: Pair, work: PairWork) -> float:
     whiten(innovation, 0, pair.measurement, sensor.angular, math.inf, scratch.residual)
     update_mean(innovation, 0, scratch.residual, pair.mean, scratch.points[0])
     sensor.measurement_noise_cov(pair.mean, pair.pose, sensor.noise_params, scratch.measurement_noise)
+    replace_noise(pair.measurement, scratch.measurement_noise)
     if not cholesky(pair.cov, scratch.factor):
         raise NumericalError("covariance of a track is not positive definite")
     if not cholesky(scratch.measurement_noise, scratch.noise_factor):
         raise NumericalError("measurement noise: covariance is not positive definite")
     if _climb(sensor, pair, work) > _LOST:
-        expect_measurement(sensor, pair.pose, pair.mean, pair.cov, 0, innovation, scratch)
-        return whiten(innovation, 0, pair.measurement, sensor.angular, math.inf, scratch.residual)
+        return _expect_and_whiten(sensor, pair, work)
     _leave_sensor(pair, scratch.points[0], innovation.covs[0])
     _linearise(sensor, pair, scratch.points[0], work)
     _regress(sensor, pair, work)
@@ -226,7 +234,7 @@ def learn_at_mean(sensor: Sensor, pair: Pair, share: float, work: PairWork) -> N
     For linearised measurements. The peak of prior times likelihood is then the mean, and a `share` of the information
     of a linear measurement is a measurement with so much more noise. pair: with the measurement at its mean.
     """
-    innovation, scratch, n, m = work.innovation, work.scratch, pair.mean.shape[0], pair.measurement.shape[0]
+    innovation, scratch, n, m = work.innovation, work.scratch, pair.mean.shape[0], work.innovation.predicted.shape[1]
     state, jacobian, noise = scratch.points[0], scratch.measurement_jacobian, scratch.measurement_noise
     for j in range(n):
         state[j] = pair.mean[j]
@@ -246,10 +254,20 @@ def learn_at_mean(sensor: Sensor, pair: Pair, share: float, work: PairWork) -> N
 
 
 @inlined
-def update_pair(sensor: Sensor, pair: Pair, work: PairWork, out: Floats) -> float:
-    """Update a pair, see `relinearise`, and write posterior mean and covariance to the rows of `out`, mean first."""
-    distance = relinearise(sensor, pair, work)
-    write_posterior(work.innovation, 0, work.scratch.residual, pair.mean, out)
+def update_pair(sensor: Sensor, pair: Pair, gate: float, work: PairWork, out: Floats) -> float:
+    """Update a pair and write posterior mean and covariance to the rows of `out`, mean first.
+
+    By `relinearise`, but by the linear update if the measurement brings a noise with which it does not bend. Returns
+    the squared distance of the measurement; above `gate` nothing is written.
+    """
+    distance, bends = 0.0, True
+    if has_own_noise(pair.measurement, work.innovation.predicted.shape[1]):
+        distance = _expect_and_whiten(sensor, pair, work)
+        bends = work.innovation.bends[0]
+    if bends and distance <= gate:
+        distance = relinearise(sensor, pair, work)
+    if distance <= gate:
+        write_posterior(work.innovation, 0, work.scratch.residual, pair.mean, out)
     return distance
 
 

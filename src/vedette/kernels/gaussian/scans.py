@@ -75,12 +75,15 @@ def mixed_scan(measured: Floats, ids: Ints, seen: Bools, clutter: Floats, order:
 def examined_scan(scan: Floats, least: Floats, angular: Bools) -> tuple[int, bool, float, bool]:
     """The first row that is not finite, or -1; whether any component is below its least value; the largest angle;
     whether two rows begin with the same number.
+
+    scan: rows of measurements, which may be followed by their noise (`row_noise`).
     """
     is_below, largest = False, 0.0
     for i in range(scan.shape[0]):
         for j in range(scan.shape[1]):
             if not math.isfinite(scan[i, j]):
                 return i, is_below, largest, False
+        for j in range(least.shape[0]):
             is_below = is_below or scan[i, j] < least[j]
             if angular[j]:
                 largest = max(largest, abs(scan[i, j]))

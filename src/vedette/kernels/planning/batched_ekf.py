@@ -371,7 +371,7 @@ def relinearise_batch(
         take_state(batch.means, s, work.mean)
         take_matrix(batch.covs, s, work.cov)
         take_state(measurements, s, work.measurement)
-        expect_measurement(sensor, pose, work.mean, work.cov, 0, work.innovation, work.scratch)
+        expect_measurement(sensor, pose, work.mean, work.cov, work.measurement, 0, work.innovation, work.scratch)
         pair = Pair(pose, work.mean, work.cov, work.measurement)
         relinearise(sensor, pair, PairWork(work.innovation, work.scratch))
         _put_innovation(s, batch, work)

@@ -77,7 +77,7 @@ def _update_cov(
             for j in range(n):
                 out[i, j] = work.seen.covs[0, i, j]
         return
-    expect_measurement(sensor, pose, mean, cov, 0, work.seen, work.scratch)
+    expect_measurement(sensor, pose, mean, cov, work.seen.predicted[0], 0, work.seen, work.scratch)
     _invert(cov, work.factor, prior)
     _invert(work.seen.covs[0], work.factor, updated)
     for i in range(n):

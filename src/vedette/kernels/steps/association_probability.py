@@ -26,7 +26,7 @@ def prob_explained(belief: Lmb, scan: ScanInput, sensor: Sensor, truncation: Tru
     """
     seen = marked(belief, in_view(belief.tracks, scan, sensor, truncation))
     rows = standing_rows(seen.tracks, len(sensor.angular))
-    expect_rows(sensor, scan.pose, rows, make_scratch(belief.tracks.components.means.shape[1], len(sensor.angular)))
+    expect_rows(sensor, scan, rows, make_scratch(belief.tracks.components.means.shape[1], len(sensor.angular)))
     weigh_by_existence(seen.existence_logit, rows)
     options, _, _ = weighed_options(rows, scan, sensor, truncation)
     odds = np.zeros(len(scan.measurements))

@@ -38,11 +38,12 @@ def _may_change(
 ) -> bool:
     """Return True if the scan may change a component.
 
-    The bound on the likelihood of a measurement is the peak of the measurement noise alone.
+    The bound on the likelihood of a measurement is the peak of the measurement noise alone; measurements that bring
+    their noise have no bound.
     """
     mean, noise = tracks.components.means[c], scratch.measurement_noise
     chance = detection_probability(sensor, scan.pose, mean, tracks.components.covs[c], scratch.points[0])
-    if chance == 0.0 or chance > _NOTHING:
+    if chance == 0.0 or chance > _NOTHING or scan.measurements.shape[1] > len(sensor.angular):
         return chance > 0.0
     if least_log_clutter == math.inf:
         return False

@@ -162,7 +162,7 @@ def extend_combinations(
         given.components,
         make_innovation(len(given.components.log_weights), given.components.means.shape[1], meas_dim),
     )
-    expect_rows(sensor, scan.pose, rows, make_scratch(given.components.means.shape[1], meas_dim))
+    expect_rows(sensor, scan, rows, make_scratch(given.components.means.shape[1], meas_dim))
     options, log_clutter, num_raised = weighed_options(rows, scan, sensor, truncation)
     kept, log_kept = _options_to_keep(combinations, options, truncation.search.max_hypotheses)
     return _taken(combinations, rows, options, kept, at, shift), SensorReport(log_clutter, num_raised, log_kept)

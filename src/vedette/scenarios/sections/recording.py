@@ -27,7 +27,10 @@ class RecordingSection(Section):
     """Scans from a CSV or Parquet file with a row a measurement: time, sensor, and what it measured.
 
     The sensors are as `sensors` says, at their positions unless a row has `own_x` and `own_y`, or `own_lon` and
-    `own_lat`, and `own_heading`. Of range rates `own_vx` and `own_vy` say how the sensor moves; else it is at rest.
+    `own_lat`, and `own_heading`. Standard deviations of a row (`range_std_m`, `bearing_std_deg`, `x_std_m`, ... and
+    `xy_correlation`) replace the noise of the sensor; `snr_db` counts for a sensor with `signal`; a row may lack an
+    altitude, elevation or range rate. Of range rates `own_vx` and `own_vy` say how the sensor moves; else it is at
+    rest.
     A row with empty cells says that a sensor scanned and found nothing.
     Rows beyond a sensor's reach, or far beyond all others, are left out and named.
     """
@@ -129,6 +132,7 @@ def sites_of(world: ScenarioModel) -> list[Site]:
             reach_of(sensor),
             north,
             shown_by_rows if sensor.turn is None else sensor.turn.build(),
+            None if sensor.signal is None else sensor.signal.build(),
         )
         for name, sensor in zip(world.sensor_names, world.sensors, strict=True)
     ]

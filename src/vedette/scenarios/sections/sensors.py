@@ -38,7 +38,7 @@ from vedette.scenarios.sections.sensing import (
 from vedette.scenarios.sections.true_sensors import BiasSection, TrueSensor, built_parts
 
 if TYPE_CHECKING:  # importing the models imports the compiler, which a check does not need
-    from vedette.models import Region, SensorModel
+    from vedette.models import Region, SensorModel, SignalModel
     from vedette.models.turns import Turn
     from vedette.simulation import TrueSensor as TrueSensorModel
 
@@ -73,6 +73,19 @@ class Budget(Section):
         ge=0.0,
         description="What is added each second, up to `seconds`: 0.1 lets it scan a tenth of the time [-].",
     )
+
+
+class SignalSection(Section):
+    """Signal-to-noise ratios of a sensor's measurements: of targets that fluctuate (Swerling I), and of noise."""
+
+    mean_db: float = Field(description="Mean ratio of targets [dB].")
+    threshold_db: float = Field(description="Threshold above which the sensor reports a measurement [dB].")
+
+    def build(self) -> SignalModel:
+        """Return the model of the ratios."""
+        from vedette.models import SignalModel
+
+        return SignalModel(self.mean_db, self.threshold_db)
 
 
 class Sensor(Section):
@@ -120,7 +133,14 @@ class Sensor(Section):
         description="How its beam turns; none: its measurements are of one time, in a recording unless their bearings "
         "and times show a turn [-].",
     )
-    noise: Noise = Field(default=of_kind("range_dependent"), description="Measurement noise [-].")
+    noise: Noise = Field(
+        default=of_kind("range_dependent"),
+        description="Measurement noise; of a recorded row that gives standard deviations, these [-].",
+    )
+    signal: SignalSection | None = Field(
+        default=None,
+        description="What the column `snr_db` of a recording says of a row; none: the column is not read [-].",
+    )
     detection: Detection = Field(default=of_kind("gaussian"), description="Probability of detection [-].")
     clutter: Clutter = Field(default=of_kind("region"), description="False measurements [-].")
 

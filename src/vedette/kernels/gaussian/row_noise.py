@@ -1,0 +1,65 @@
+"""Noise and likelihood ratio that single measurements bring with them.
+
+The rows of such a scan are longer than a measurement of m components: behind these stand the lower triangle of the
+covariance of the row's noise, row by row, and the log likelihood ratio of its features (target over clutter), such as
+a signal-to-noise ratio. A variance of 0 leaves the component to the sensor's noise model. With a variance of `MISSING`
+a component was not measured; the likelihood ratio then makes up for the density of so wide a Gaussian, and clutter has
+the density of the other components.
+"""
+
+from __future__ import annotations
+
+from vedette.kernels.base.compile import inlined
+from vedette.kernels.base.types import Floats
+
+MISSING = 1e16  # variance of a component that was not measured, SI: far above that of any state
+
+
+def row_length(meas_dim: int) -> int:
+    """Return the length of a row with noise and likelihood ratio."""
+    return meas_dim + meas_dim * (meas_dim + 1) // 2 + 1
+
+
+@inlined
+def has_own_noise(measurement: Floats, meas_dim: int) -> bool:
+    """Return True if a row of a scan, of any length, brings its noise."""
+    return measurement.shape[0] > meas_dim
+
+
+@inlined
+def place_of_variance(component: int, meas_dim: int) -> int:
+    """Return the place of the variance of a component in a row."""
+    return meas_dim + component * (component + 1) // 2 + component
+
+
+@inlined
+def is_missing(measurement: Floats, component: int, meas_dim: int) -> bool:
+    """Return True if a component of a row of any length was not measured."""
+    return measurement.shape[0] > meas_dim and measurement[place_of_variance(component, meas_dim)] >= MISSING
+
+
+@inlined
+def replace_noise(measurement: Floats, noise: Floats) -> None:
+    """Write a measurement's own covariance over that of the noise model (m, m), for the components that have one.
+
+    Components with a noise of their own are uncorrelated with the others.
+    """
+    m = noise.shape[0]
+    if not has_own_noise(measurement, m):
+        return
+    for a in range(m):
+        for b in range(a + 1):
+            own = measurement[place_of_variance(a, m)] > 0.0
+            also = measurement[place_of_variance(b, m)] > 0.0
+            if own and also:
+                noise[a, b] = measurement[place_of_variance(a, m) - a + b]
+                noise[b, a] = noise[a, b]
+            elif own or also:
+                noise[a, b] = 0.0
+                noise[b, a] = 0.0
+
+
+@inlined
+def log_likelihood_ratio(measurement: Floats, meas_dim: int) -> float:
+    """Return the log likelihood ratio of a measurement's features; 0 without any."""
+    return measurement[-1] if has_own_noise(measurement, meas_dim) else 0.0

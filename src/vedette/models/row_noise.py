@@ -1,0 +1,122 @@
+"""Measurements that bring the covariance of their noise and the likelihood ratio of their features."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from vedette.errors import InputError
+from vedette.kernels.base.compile import kernel
+from vedette.kernels.base.types import Floats
+from vedette.kernels.gaussian.row_noise import MISSING, replace_noise
+from vedette.models.arguments import float_array, real
+
+LOG_RATIO_OF_MISSING = 0.5 * math.log(2.0 * math.pi * MISSING)  # makes up for the density of the wide Gaussian
+_STRONG_CLUTTER = 1e-3  # share of false measurements with the signal of a target
+
+
+def with_row_noise(measurements: ArrayLike, covs: ArrayLike, log_likelihood_ratios: ArrayLike | None = None) -> Floats:
+    """Return a scan whose measurements bring their noise, (num, m + m (m + 1) / 2 + 1), as all filters take it.
+
+    Args:
+        measurements: (num, m). A component after the second may be NaN: it was not measured.
+        covs: (num, m, m) covariances of the noise, or (num, m) standard deviations; SI units. A variance of 0 leaves a
+            component to the sensor's noise model.
+        log_likelihood_ratios: (num,) log ratio of the probability densities of a measurement's features, such as its
+            signal-to-noise ratio, if it is of a target and if it is false; None: 0.
+
+    Raises:
+        InputError: an array of another shape, a number that is not finite, a covariance that is not symmetric and
+            positive definite.
+    """
+    table = np.array(measurements, np.float64)
+    if table.ndim != 2:
+        raise InputError(f"measurements: expected shape (num, meas_dim); got {table.shape}")
+    num, dim = table.shape
+    given = np.asarray(covs, np.float64)
+    if given.ndim == 2:
+        given = float_array("covs", given, (num, dim))
+        given = given[:, :, np.newaxis] ** 2 * np.eye(dim)
+    given = float_array("covs", given, (num, dim, dim)).copy()
+    if not np.array_equal(given, given.swapaxes(1, 2)):
+        raise InputError("covs: expected symmetric covariances; got others")
+    ratios = np.zeros(num) if log_likelihood_ratios is None else log_likelihood_ratios
+    first, second = np.tril_indices(dim)
+    ratios = float_array("log_likelihood_ratios", ratios, (num,)).copy()
+    missing = np.isnan(table)
+    missing[:, :2] = False
+    for row, component in np.argwhere(missing).tolist():
+        table[row, component], given[row, component], given[row, :, component] = 0.0, 0.0, 0.0
+        given[row, component, component] = MISSING
+        ratios[row] += LOG_RATIO_OF_MISSING
+    scan = np.column_stack([table, given[:, first, second], ratios])
+    check_row_noise("covs", scan, dim)
+    return scan
+
+
+@dataclass(frozen=True, slots=True)
+class SignalModel:
+    """Signal-to-noise ratios of measurements: of targets that fluctuate from scan to scan (Swerling I) in noise.
+
+    Above the threshold t, in units of the noise power, the power s has the density exp(-(s - t)) if the measurement is
+    false and exp(-(s - t) / (1 + d)) / (1 + d) if it is of a target with the mean ratio d (Lerro and Bar-Shalom 1993).
+    One false measurement in a thousand is taken to be as strong as targets are, which bounds the likelihood ratio.
+
+    Attributes:
+        mean_db: mean ratio of targets, d, dB.
+        threshold_db: threshold of detection, t, dB.
+
+    Raises:
+        InputError: a number that is not finite.
+    """
+
+    mean_db: float
+    threshold_db: float
+
+    def __post_init__(self) -> None:
+        for name in ("mean_db", "threshold_db"):
+            object.__setattr__(self, name, real(f"SignalModel.{name}", getattr(self, name)))
+
+    def log_likelihood_ratio(self, snr_db: float) -> float:
+        """Return the log likelihood ratio, target over false measurement, of a ratio in dB; below t that at t."""
+        mean, threshold = 10.0 ** (self.mean_db / 10.0), 10.0 ** (self.threshold_db / 10.0)
+        above = max(10.0 ** (snr_db / 10.0) - threshold, 0.0)
+        exact = above * mean / (1.0 + mean) - math.log1p(mean)
+        # log of 1 / (share + (1 - share) / ratio)
+        return -float(np.logaddexp(math.log(_STRONG_CLUTTER), math.log1p(-_STRONG_CLUTTER) - exact))
+
+
+def measured_part(scan: Floats, meas_dim: int) -> Floats:
+    """Return the measurements of a scan, (num, meas_dim), whose rows may bring their noise."""
+    return scan if scan.shape[1] == meas_dim else scan[:, :meas_dim]
+
+
+def noise_of_rows(scan: Floats, covs: Floats) -> Floats:
+    """Return the covariances of the rows' noise, (num, m, m). covs: those of the sensor's noise model, (num, m, m)."""
+    return covs if scan.shape[1] == covs.shape[1] else _replaced(scan, covs)
+
+
+@kernel
+def _replaced(scan: Floats, covs: Floats) -> Floats:
+    out = covs.copy()
+    for i in range(len(scan)):
+        replace_noise(scan[i], out[i])
+    return out
+
+
+def check_row_noise(place: str, scan: Floats, meas_dim: int) -> None:
+    """Raise `InputError` unless the covariances that rows bring are positive definite (variances of 0 are left out)."""
+    if not len(scan):
+        return
+    covs = noise_of_rows(scan, np.tile(np.eye(meas_dim), (len(scan), 1, 1)))
+    stds = np.sqrt(np.maximum(np.diagonal(covs, axis1=1, axis2=2), np.finfo(np.float64).tiny))
+    correlations = covs / (stds[:, :, np.newaxis] * stds[:, np.newaxis])
+    diagonal = meas_dim + np.cumsum(np.arange(1, meas_dim + 1)) - 1
+    wrong = (np.linalg.eigvalsh(correlations)[:, 0] <= 0.0) | (scan[:, diagonal] < 0.0).any(axis=1)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        got = scan[row, meas_dim:-1].tolist()
+        raise InputError(f"{place}: expected positive definite covariances of rows; got {got} in row {row}")
