@@ -116,6 +116,12 @@ def test_a_stamp_covers_every_kernel_file_that_is_reached() -> None:
     assert "base/disk_cache.py" not in reached
 
 
+def test_a_stamp_of_a_model_covers_the_models_whose_kernels_it_calls() -> None:
+    """Clutter around a sensor calls the density of range rates, which is in another file of models."""
+    models = KERNELS.parent / "models"
+    assert models / "clutter.py" in sources.source_closure(models / "sensor_clutter.py")
+
+
 IMPORTS = """
 from vedette.kernels.gaussian.linalg import cholesky
 from vedette.kernels.planning.known_association import (  # a comment

@@ -101,7 +101,7 @@ def test_every_row_is_in_one_turn_and_its_time_that_of_the_beam() -> None:
     gone = np.flatnonzero((rows[:, 0] < 100.0) | (rows[:, 0] > 113.0))  # two turns and more without a row
     rows = rows[gone]
     poses = np.column_stack([10.0 * rows[:, 0], -4.0 * rows[:, 0], np.zeros(len(rows))])
-    scans = swept(rows[:, 0], rows[:, 1], poses, turn)
+    scans = swept(rows[:, 0], rows[:, 1], poses, turn, rows[[0, -1], 0])
     assert sorted(np.concatenate([scan.rows for scan in scans]).tolist()) == list(range(len(rows)))
     assert any(len(scan.rows) == 0 for scan in scans)
     for scan in scans:

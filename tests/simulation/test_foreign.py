@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -330,3 +331,44 @@ def test_other_bytes_are_refused(tmp_path: Path, name: str, content: bytes, mess
     with pytest.raises(InputError) as error:
         read_table(tmp_path / name)
     assert message in str(error.value)
+
+
+def service(time: float, kind: int = 1, sic: int = 2, period: float | None = None) -> bytes:
+    """A data block of one service message: the beam passes the north (1), or enters a sector (2)."""
+    category = CATS[34][-1]
+    said: dict[str, Any] = {"000": kind, "010": (("SAC", 1), ("SIC", sic)), "030": ((time, "s"))}
+    if period is not None:
+        said["041"] = (period, "s")
+    block: bytes = category.create([category.cv_record.create(said)]).unparse().to_bytes()
+    return block
+
+
+@pytest.mark.parametrize("tells_period", [True, False])
+def test_service_messages_tell_the_turn_and_empty_turns_of_a_radar(tmp_path: Path, tells_period: bool) -> None:
+    """Three plots in ten turns of 4 s are too few to find a turn; whole turns before and after are empty scans."""
+    norths = [1000.0 + 4.0 * k for k in range(11)]
+    content = b"".join(service(time, period=4.0 if tells_period else None) for time in norths)
+    content += b"".join(plot(time + 1.0, 20.0, 90.0) for time in (1012.0, 1016.0, 1024.0))
+    content += service(1001.0, kind=2, sic=7) + service(1002.0, kind=3)
+    (tmp_path / "radar.ast").write_bytes(content)
+    site = Site("1/2", "bearing_range", (0.0, 0.0, 0.0))
+    found = parse_scans(read_table(tmp_path / "radar.ast"), [site], Conventions({}, {}))
+    sizes = [0 if scans[0] is None else len(scans[0]) for scans in found.scans]
+    assert 9 <= len(sizes) <= 10
+    assert sum(sizes) == 3
+    assert np.diff(found.times) == pytest.approx(4.0, abs=1e-6)
+    alone = parse_scans(read_table(tmp_path / "radar.ast"), [replace(site, turn="none")], Conventions({}, {}))
+    assert len(alone.times) == 3
+
+
+def test_measured_flight_levels_of_tracks_are_altitudes(tmp_path: Path) -> None:
+    category = CATS[62][-1]
+    said = {
+        "010": (("SAC", 1), ("SIC", 9)),
+        "070": ((1000.0, "s")),
+        "105": (("LAT", (50.0, "°")), ("LON", (4.0, "°"))),
+        "040": 7,
+    }
+    records = [category.cv_record.create(said | more) for more in ({"136": ((100.0, "FL"))}, {})]
+    (tmp_path / "tracks.ast").write_bytes(category.create(records).unparse().to_bytes())
+    assert read_table(tmp_path / "tracks.ast").columns["altitude_m"] == [pytest.approx(3048.0), None]

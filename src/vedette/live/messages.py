@@ -17,6 +17,7 @@ from vedette.kernels.base.types import BEAM, OWN_VELOCITY, Floats
 from vedette.models.arguments import reject
 from vedette.models.turns import Turn, with_beam
 from vedette.recorded import Conventions, Origin, Site, parse_scans
+from vedette.recorded.conventions import GAPS
 from vedette.recorded.tables import Table, is_number, seconds
 from vedette.recorded.turns import bearings_of
 from vedette.tracking import SensorScan
@@ -179,7 +180,9 @@ def _rows(given: Any, field: str, site: Site) -> list[list[float]]:
     if len(given) > MOST_MEASUREMENTS:
         raise reject(field, f"at most {MOST_MEASUREMENTS} of a scan", len(given))
     for i, row in enumerate(given):
-        if not isinstance(row, list) or len(row) != len(names) or not all(map(_is_number, row)):
+        third = row[2:] if isinstance(row, list) else []
+        measured = [each for each, name in zip(third, names[2:], strict=False) if not (each is None and name in GAPS)]
+        if not isinstance(row, list) or len(row) != len(names) or not all(map(_is_number, [*row[:2], *measured])):
             raise reject(f"{field}[{i}]", f"numbers [{', '.join(names)}]", row)
     return given
 

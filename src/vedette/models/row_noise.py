@@ -61,13 +61,15 @@ def with_row_noise(measurements: ArrayLike, covs: ArrayLike, log_likelihood_rati
 class SignalModel:
     """Signal-to-noise ratios of measurements: of targets that fluctuate from scan to scan (Swerling I) in noise.
 
-    Above the threshold t, in units of the noise power, the power s has the density exp(-(s - t)) if the measurement is
-    false and exp(-(s - t) / (1 + d)) / (1 + d) if it is of a target with the mean ratio d (Lerro and Bar-Shalom 1993).
-    One false measurement in a thousand is taken to be as strong as targets are, which bounds the likelihood ratio.
+    Above the threshold t, in units of the noise power, the power s has the density exp(-(s - t) / c) / c if the
+    measurement is false, with the mean power c of clutter, and exp(-(s - t) / (1 + d)) / (1 + d) if it is of a target
+    with the mean ratio d (Lerro and Bar-Shalom 1993, where c is 1). One false measurement in a thousand is taken to be
+    as strong as targets are, which bounds the likelihood ratio.
 
     Attributes:
         mean_db: mean ratio of targets, d, dB.
         threshold_db: threshold of detection, t, dB.
+        clutter_db: mean power of clutter over that of the noise, c, dB; 0: false measurements are noise.
 
     Raises:
         InputError: a number that is not finite.
@@ -75,16 +77,19 @@ class SignalModel:
 
     mean_db: float
     threshold_db: float
+    clutter_db: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("mean_db", "threshold_db"):
+        for name in ("mean_db", "threshold_db", "clutter_db"):
             object.__setattr__(self, name, real(f"SignalModel.{name}", getattr(self, name)))
 
     def log_likelihood_ratio(self, snr_db: float) -> float:
         """Return the log likelihood ratio, target over false measurement, of a ratio in dB; below t that at t."""
-        mean, threshold = 10.0 ** (self.mean_db / 10.0), 10.0 ** (self.threshold_db / 10.0)
-        above = max(10.0 ** (snr_db / 10.0) - threshold, 0.0)
-        exact = above * mean / (1.0 + mean) - math.log1p(mean)
+        target, threshold, clutter, power = (
+            10.0 ** (each / 10.0) for each in (self.mean_db, self.threshold_db, self.clutter_db, snr_db)
+        )
+        target += 1.0
+        exact = max(power - threshold, 0.0) * (1.0 / clutter - 1.0 / target) - math.log(target / clutter)
         # log of 1 / (share + (1 - share) / ratio)
         return -float(np.logaddexp(math.log(_STRONG_CLUTTER), math.log1p(-_STRONG_CLUTTER) - exact))
 

@@ -1,25 +1,40 @@
-"""Plots and tracks of radars (ASTERIX) as tables."""
+"""Plots, service messages and tracks of radars (ASTERIX) as tables."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from vedette.errors import InputError
 from vedette.internal.extras import require_packages
 from vedette.internal.text import pluralise, shown
+from vedette.models.turns import Turn
+from vedette.recorded.turns import RadarService
 
 ASTERIX_ENDINGS = (".ast", ".asterix", ".raw")
 CAPTURE_ENDINGS = (".pcap", ".pcapng")
 _HALF_DAY = 43_200.0  # s
 _MILE, _FLIGHT_LEVEL, _EARTH = 1852.0, 30.48, 6_371_000.0  # m
-_PLOTS, _TRACKS = 48, 62  # categories of plots of a rotating radar, and of tracks of a tracker
+# Categories of plots of a rotating radar, of its service messages, and of tracks of a tracker.
+_PLOTS, _SERVICE, _TRACKS = 48, 34, 62
+_NORTH, _SECTOR = 1, 2  # types of service messages: the beam passes the north, or enters a sector
 _DEGREE = "\N{DEGREE SIGN}"
 
 
-def read_asterix(file: Path, *, reports: bool = False) -> tuple[dict[str, list[Any]], list[int], tuple[str, ...]]:
+class AsterixTable(NamedTuple):
+    """The columns of a file, the number of each record, warnings, and the turn of each radar by its service messages."""
+
+    columns: dict[str, list[Any]]
+    numbers: list[int]
+    notes: tuple[str, ...]
+    service: dict[str, RadarService]
+
+
+def read_asterix(file: Path, *, reports: bool = False) -> AsterixTable:
     """Read plots of rotating radars, category 048, or tracks of a system, category 062; a sensor is "SAC/SIC".
 
     Columns of plots are `time`, `sensor`, `bearing_deg` from the north, `range_nmi` and `slant_range_nmi`; if any plot
@@ -27,19 +42,20 @@ def read_asterix(file: Path, *, reports: bool = False) -> tuple[dict[str, list[A
     Doppler speed (I048/120, CAL), `range_rate_mps`, taken as positive for growing ranges, as the standard gives no
     sign. `range_nmi` is along the ground if a plot has a flight level, else it is the slant range. Columns of tracks,
     which are read if there are no plots or if `reports` is True, are `time`, `sensor`, `longitude`, `latitude`, `id`
-    (the number of the track), and `vx`, `vy` if every track has them. Times are seconds from midnight UTC of the day of
-    the first one. Other categories are skipped, and records without a time and place are left out. Returns the columns,
-    the number of each record, and warnings of plots without a flight level and of records left out.
+    (the number of the track), `vx`, `vy` if every track has them, and `altitude_m` if any has a measured flight level
+    (I062/136). Times are seconds from midnight UTC of the day of the first one. Service messages of category 034 tell
+    when a radar turned, and how fast. Other categories are skipped, and records without a time and place are left out.
+    There are warnings of plots without a flight level and of records left out.
 
     Raises:
         MissingPackageError: libasterix is not installed.
         InputError: bytes that are not ASTERIX, or contain no plots and tracks.
     """
     require_packages(f"{file}, which is an ASTERIX file,", "asterix")
-    found: dict[int, tuple[list[dict[str, Any]], list[int]]] = {_PLOTS: ([], []), _TRACKS: ([], [])}
+    found: dict[int, tuple[list[dict[str, Any]], list[int]]] = {name: ([], []) for name in _READ}
     days, without = dict.fromkeys(found, 0.0), list[int]()
     for number, (category, record) in enumerate(_records(file), start=1):
-        row = _plot(record) if category == _PLOTS else _track(record)
+        row = _READ[category](record)
         if row is None:
             without.append(category)
             continue
@@ -63,7 +79,19 @@ def read_asterix(file: Path, *, reports: bool = False) -> tuple[dict[str, list[A
         if set(columns.get(name, ())) == {None}:
             del columns[name]
     kept = {name: cells for name, cells in columns.items() if name not in ("vx", "vy") or None not in cells}
-    return kept, numbers, notes
+    return AsterixTable(kept, numbers, notes, _service_of(found[_SERVICE][0]))
+
+
+def _service_of(messages: list[dict[str, Any]]) -> dict[str, RadarService]:
+    """Return for each radar its turn, from messages of one radar in order of time."""
+    found: dict[str, RadarService] = {}
+    for radar in dict.fromkeys(message["sensor"] for message in messages):
+        own = [message for message in messages if message["sensor"] == radar]
+        norths = np.array([message["time"] for message in own if message["kind"] == _NORTH])
+        periods = [message["period"] for message in own if message["period"]] or np.diff(norths).tolist()
+        if periods and (period := float(np.median(periods))) > 0.0:
+            found[radar] = RadarService(Turn(period), own[0]["time"], own[-1]["time"])
+    return found
 
 
 def _of_slant_ranges(number: int, total: int) -> str:
@@ -75,7 +103,7 @@ def _of_slant_ranges(number: int, total: int) -> str:
 
 
 def _records(file: Path) -> Iterator[tuple[int, Any]]:
-    """Yield category and content of every plot and track."""
+    """Yield category and content of every plot, service message and track."""
     from asterix.base import Bits, RawDatablock
     from asterix.generated import manifest
 
@@ -84,7 +112,7 @@ def _records(file: Path) -> Iterator[tuple[int, Any]]:
     if isinstance(blocks, ValueError):
         raise InputError(f"{file}: expected ASTERIX data blocks; got other bytes")
     for place, block in enumerate(blocks, start=1):
-        if (category := block.get_category()) not in (_PLOTS, _TRACKS):
+        if (category := block.get_category()) not in _READ:
             continue
         records = editions[category][-1].cv_uap.parse(block.get_raw_records())  # by the newest edition
         if isinstance(records, ValueError):
@@ -141,7 +169,21 @@ def _track(record: Any) -> dict[str, Any] | None:
         return None
     lon, lat = _quantity(place, "LON", _DEGREE), _quantity(place, "LAT", _DEGREE)
     speeds = {name.lower(): None if velocity is None else _quantity(velocity, name, "m/s") for name in ("VX", "VY")}
-    return {**_source(source, time), "longitude": lon, "latitude": lat, "id": str(number.variation.as_uint()), **speeds}
+    level = record.get_item("136")
+    height = None if level is None else _FLIGHT_LEVEL * float(level.variation.content.as_quantity("FL"))
+    own = {"longitude": lon, "latitude": lat, "id": str(number.variation.as_uint()), "altitude_m": height}
+    return {**_source(source, time), **own, **speeds}
+
+
+def _service(record: Any) -> dict[str, Any] | None:
+    source, time, kind, period = (record.get_item(name) for name in ("010", "030", "000", "041"))
+    if source is None or time is None or kind is None or kind.variation.as_uint() not in (_NORTH, _SECTOR):
+        return None
+    seconds = None if period is None else float(period.variation.content.as_quantity("s"))
+    return {**_source(source, time), "kind": kind.variation.as_uint(), "period": seconds}
+
+
+_READ: dict[int, Callable[[Any], dict[str, Any] | None]] = {_PLOTS: _plot, _SERVICE: _service, _TRACKS: _track}
 
 
 def _source(source: Any, time: Any) -> dict[str, Any]:

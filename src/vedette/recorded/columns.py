@@ -16,6 +16,7 @@ from vedette.recorded.conventions import GAPS, OTHER_NAMES, OWN_SPEEDS, UNITS, C
 from vedette.recorded.geography import Origin
 from vedette.recorded.instants import Site
 from vedette.recorded.tables import Table, are_dates, column_names, is_empty
+from vedette.recorded.turns import RadarService
 
 
 class ScanColumns:
@@ -37,6 +38,10 @@ class ScanColumns:
         self._with_gaps = {name for name in GAPS if name in self._columns and self._has_gaps(name)}
         self.is_utc = are_dates(table.columns[self._time])
         self._check()
+
+    def service_of(self, sensor: int) -> RadarService | None:
+        """Return the turn of a sensor by its service messages; None without any."""
+        return next((own for name, own in self.table.service.items() if self._numbers.get(name) == sensor), None)
 
     def _has_sensor(self) -> bool:
         """Return True if there is a column of sensors, or one is named; for a single sensor there need not be one."""
@@ -66,7 +71,7 @@ class ScanColumns:
         return tuple(name for name in self.table.columns if name not in used)
 
     def own_accuracy(self, site: Site) -> tuple[str, ...]:
-        """Return the columns that say how accurate, and how strong, the rows of a sensor are."""
+        """Return the columns with the accuracy and signal-to-noise ratio of the rows of a sensor."""
         names = [f"{name}_std" for name in COMPONENTS[site.kind]]
         if {"x_std", "y_std"} <= set(self._columns):
             names += ["xy_correlation"] * is_position(site.kind)

@@ -54,7 +54,7 @@ from vedette.recorded.tables import (
     number,
     seconds,
 )
-from vedette.recorded.turns import bearings_of, scans_of_turns
+from vedette.recorded.turns import RadarService, bearings_of, scans_of_turns
 from vedette.simulation.records import ScansFile
 
 
@@ -187,7 +187,7 @@ class _Rows(ScanColumns):
         return GAPS[quantity] if quantity in GAPS and self._is_blank(i, quantity) else self._value(i, quantity)
 
     def _row_noise(self, i: int, site: Site) -> tuple[float, ...]:
-        """Return what a row says of its noise and signal, as behind its measurement in `row_noise`; () without any."""
+        """Return covariance and log likelihood ratio of a row in the order of `row_noise`; () for rows without them."""
         if not self.rows_bring_noise(site):
             return ()
         own = self.own_accuracy(site)
@@ -292,7 +292,7 @@ def _at_instants(rows: list[_Row], how: _Rows, skipped: tuple[str, ...]) -> Reco
     spans = [0.0] * len(sites)
     for s, site in enumerate(sites):
         own = sorted((row for row in rows if row.sensor == s), key=lambda row: row.time)
-        turning = _looks_of_turns(own, s, site)
+        turning = _looks_of_turns(own, s, site, how.service_of(s))
         if turning is not None:
             looks += turning
             continue
@@ -309,13 +309,13 @@ def _at_instants(rows: list[_Row], how: _Rows, skipped: tuple[str, ...]) -> Reco
     return replace(found, gathered=tuple(spans))
 
 
-def _looks_of_turns(rows: list[_Row], sensor: int, site: Site) -> list[Look] | None:
+def _looks_of_turns(rows: list[_Row], sensor: int, site: Site, service: RadarService | None) -> list[Look] | None:
     """Return the scans of a turning radar; None without a turn."""
     own = [row for row in rows if row.measured is not None]
     if not own:
         return None
     times, poses, scan = np.array([row.time for row in own]), np.array([row.pose for row in own]), _scan(own, site)
-    scans = scans_of_turns(times, bearings_of(scan, poses, site.kind), poses, site.turn)
+    scans = scans_of_turns(times, bearings_of(scan, poses, site.kind), poses, site.turn, service)
     if scans is None:
         return None
     return [Look(each.time, sensor, scan[each.rows], each.pose) for each in scans]

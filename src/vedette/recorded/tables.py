@@ -8,7 +8,7 @@ import io
 import numbers
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from decimal import Decimal
 from pathlib import Path
@@ -23,6 +23,7 @@ from vedette.kernels.base.types import Floats
 from vedette.recorded.ais import AIS_ENDINGS, read_ais
 from vedette.recorded.asterix import ASTERIX_ENDINGS, CAPTURE_ENDINGS, read_asterix
 from vedette.recorded.bags import BAG_ENDINGS, read_bag
+from vedette.recorded.turns import RadarService
 
 # Beyond these values, differences and speeds of reports are meaningless.
 FARTHEST = 1e9  # m, m/s
@@ -40,7 +41,7 @@ class Table:
     """Unchanged columns, the row number of each entry in its file, and a name for messages.
 
     bearings: their zero in the format, "north" or "east"; None: not defined. notes: warnings. sha256: of the file, in
-    hexadecimal digits; "" for columns in memory.
+    hexadecimal digits; "" for columns in memory. service: turns of sensors by their service messages.
     """
 
     columns: Mapping[str, Sequence[Any]]
@@ -49,6 +50,7 @@ class Table:
     bearings: Literal["east", "north"] | None = None
     notes: tuple[str, ...] = ()
     sha256: str = ""
+    service: Mapping[str, RadarService] = field(default_factory=dict)
 
     def column(self, name: str) -> Sequence[Any]:
         """Return the cells of a column; raises `InputError` with the names of all columns if it is missing."""
@@ -226,8 +228,8 @@ def _parsed(file: Path, content: bytes, reports: bool) -> Table:
         columns, rows, notes = read_ais(file)
         return Table(columns, rows, str(file), notes=notes)
     if ending in ASTERIX_ENDINGS:
-        columns, rows, notes = read_asterix(file, reports=reports)
-        return Table(columns, rows, str(file), "north", notes)
+        columns, rows, notes, service = read_asterix(file, reports=reports)
+        return Table(columns, rows, str(file), "north", notes, service=service)
     if ending in BAG_ENDINGS:
         return Table(*read_bag(file, reports=reports), str(file))
     return _csv(file, content) if ending == ".csv" else _parquet(file, content)

@@ -34,6 +34,14 @@ def bearings_of(scan: Floats, poses: Floats, kind: str) -> Floats:
     return scan[:, 0] if "bearing" in COMPONENTS.get(kind, ()) else np.empty(0)
 
 
+class RadarService(NamedTuple):
+    """Turn of a radar by its service messages, with the first and last time (s) of these."""
+
+    turn: Turn
+    first: float
+    last: float
+
+
 class Swept(NamedTuple):
     """A scan of one turn: its time (s), the indices of its rows, and the pose with the beam."""
 
@@ -111,16 +119,21 @@ class _Beam:
         return float(time)
 
 
-def scans_of_turns(times: Floats, bearings: Floats, poses: Floats, turning: Turning) -> list[Swept] | None:
+def scans_of_turns(
+    times: Floats, bearings: Floats, poses: Floats, turning: Turning, service: RadarService | None = None
+) -> list[Swept] | None:
     """Return the scans of a turning radar; None if it does not turn, or no turn is given or found. See `swept`."""
     if turning == "none" or not len(bearings):
         return None
+    if service is not None and turning == "found":
+        turning = service.turn
     turn = found_turn(times, bearings) if turning == "found" else turning
-    return None if turn is None else swept(times, bearings, poses, turn)
+    span = times[[0, -1]] if service is None else np.array([min(times[0], service.first), max(times[-1], service.last)])
+    return None if turn is None else swept(times, bearings, poses, turn, span)
 
 
-def swept(times: Floats, bearings: Floats, poses: Floats, turn: Turn) -> list[Swept]:
-    """Return the scans of a turning radar from the first row to the last, including turns without rows.
+def swept(times: Floats, bearings: Floats, poses: Floats, turn: Turn, span: Floats) -> list[Swept]:
+    """Return the scans of a turning radar, including turns without rows.
 
     Turns begin in the direction with the fewest rows, because a target there may be measured in either of two turns.
 
@@ -129,6 +142,7 @@ def swept(times: Floats, bearings: Floats, poses: Floats, turn: Turn) -> list[Sw
         bearings: (num_rows,) rad from east.
         poses: (num_rows, 3 or more) of the sensor at each row.
         turn: nominal turn; the rows refine it.
+        span: (2,) s, the turns from the first to the last of these times, which include those of all rows.
     """
     beam = _Beam(times, bearings, turn)
     sense, whole = math.copysign(1.0, beam.rate), 2.0 * math.pi
@@ -136,8 +150,11 @@ def swept(times: Floats, bearings: Floats, poses: Floats, turn: Turn) -> list[Sw
     expected = beam.at(times)
     exact = expected + np.remainder(bearings - expected + math.pi, whole) - math.pi
     numbers = np.floor(sense * (exact - seam) / whole).astype(np.int64)
+    outer = np.floor(sense * (beam.at(span) - seam) / whole).astype(np.int64)
+    # Turns without rows count only if the span contains them completely.
+    first, last = min(int(numbers.min()), int(outer[0]) + 1), max(int(numbers.max()), int(outer[1]) - 1)
     found = []
-    for number in range(int(numbers.min()), int(numbers.max()) + 1):
+    for number in range(first, last + 1):
         edges = [seam + sense * whole * (number + part) for part in (0.0, 0.5, 1.0)]
         begin, middle, end = map(beam.when, edges)
         pose = _moving(times, poses, middle, end - begin)

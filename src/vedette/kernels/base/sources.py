@@ -1,4 +1,4 @@
-"""Sources of a compiled kernel: its file and every kernel module that this reaches by imports.
+"""Sources of a compiled kernel: its file and every module of kernels or models that this reaches by imports.
 
 Numba stamps cache entries only with the source file of the function itself, and so misses edits in imported files.
 """
@@ -16,14 +16,20 @@ PACKAGE_ROOT = Path(__file__).parents[2].resolve()
 
 
 @cache
+def kernel_files() -> tuple[Path, ...]:
+    """Return the files of all kernel modules."""
+    return tuple((PACKAGE_ROOT / "kernels").rglob("*.py"))
+
+
+@cache
 def _modules() -> dict[str, Path]:
-    """Return the files of all kernel modules, by their import names."""
-    files = (PACKAGE_ROOT / "kernels").rglob("*.py")
+    """Return the files of all modules with compiled functions, by their import names."""
+    files = (*kernel_files(), *(PACKAGE_ROOT / "models").rglob("*.py"))
     return {".".join(("vedette", *file.relative_to(PACKAGE_ROOT).with_suffix("").parts)): file for file in files}
 
 
 # Found by a pattern, as parsing all kernels took longer than the rest of a start.
-_IMPORT = re.compile(r"^[ \t]*from (vedette\.kernels[\w.]*) import (\([^)]*\)|.*)$", re.MULTILINE)
+_IMPORT = re.compile(r"^[ \t]*from (vedette\.(?:kernels|models)[\w.]*) import (\([^)]*\)|.*)$", re.MULTILINE)
 
 
 @cache
@@ -47,7 +53,7 @@ def note_source(function: Callable[..., Any]) -> None:
 
 @cache
 def _kernel_imports(path: Path) -> frozenset[Path]:
-    """Return the kernel modules that a file imports; extra ones would be harmless."""
+    """Return the modules of kernels and models that a file imports; extra ones would be harmless."""
     found: set[Path] = set()
     for module, names in _IMPORT.findall(_content(path).decode()):
         named = (module, *(f"{module}.{name}" for name in re.findall(r"\w+", names)))
@@ -75,7 +81,7 @@ _APART = frozenset(
 
 @cache
 def source_closure(path: Path) -> frozenset[Path]:
-    """Return the file and every kernel module that it reaches by imports and that affects the compiled code."""
+    """Return the file and every module that it reaches by imports and that affects the compiled code."""
     pending = [path, *_ALL]
     found = set(pending)
     while pending:
@@ -92,8 +98,3 @@ def source_stamp(path: Path) -> str:
     for file in sorted(source_closure(path)):
         digest.update(_content(file))
     return digest.hexdigest()
-
-
-def kernel_files() -> tuple[Path, ...]:
-    """Return the files of all kernel modules."""
-    return tuple(_modules().values())

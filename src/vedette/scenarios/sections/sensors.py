@@ -80,12 +80,15 @@ class SignalSection(Section):
 
     mean_db: float = Field(description="Mean ratio of targets [dB].")
     threshold_db: float = Field(description="Threshold above which the sensor reports a measurement [dB].")
+    clutter_db: float = Field(
+        default=0.0, description="Mean power of clutter over that of the noise; 0: false measurements are noise [dB]."
+    )
 
     def build(self) -> SignalModel:
         """Return the model of the ratios."""
         from vedette.models import SignalModel
 
-        return SignalModel(self.mean_db, self.threshold_db)
+        return SignalModel(self.mean_db, self.threshold_db, self.clutter_db)
 
 
 class Sensor(Section):

@@ -1,0 +1,202 @@
+"""Recordings and lines whose rows bring their own accuracy and signal, or lack a component."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import expon
+
+from vedette.errors import InputError
+from vedette.live.messages import read_message
+from vedette.models import (
+    Bias,
+    Region,
+    SignalModel,
+    around_sensor,
+    measurement_space_clutter,
+    region_clutter,
+    with_row_noise,
+)
+from vedette.models.functions import numbers_at
+from vedette.recorded import Conventions, Origin, Site, parse_scans
+from vedette.recorded.merging import merged
+from vedette.recorded.tables import table_of
+from vedette.scenarios.of_recording import scenario_of_recording
+
+EAST = Conventions({}, {}, "east")
+RADAR = Site("R", "bearing_range", (0.0, 0.0, 0.0), turn="none")
+SIGNAL = SignalModel(16.0, 10.0)
+ROWS = {
+    "time": [0.0, 0.0, 1.0],
+    "bearing_rad": [0.5, 1.0, None],
+    "range_km": [1.0, 2.0, None],
+    "range_std_km": [0.05, "", None],
+    "bearing_std_deg": [1.0, 2.0, None],
+}
+
+
+def scans_of(columns: dict[str, Any], site: Site = RADAR, conventions: Conventions = EAST) -> list[Any]:
+    recording = parse_scans(table_of(columns), [site], conventions, Origin(0.0, 0.0))
+    assert recording.unused == ()
+    return [scan for (scan,) in recording.scans]
+
+
+def test_standard_deviations_of_rows_are_read_in_their_units() -> None:
+    first, second = scans_of(ROWS)
+    stds = [[math.radians(1.0), 50.0], [math.radians(2.0), 0.0]]
+    np.testing.assert_allclose(first, with_row_noise([[0.5, 1000.0], [1.0, 2000.0]], stds))
+    assert second.shape == (0, 2)
+
+
+def test_positions_have_correlations_and_degrees_have_metres() -> None:
+    accuracy = {"x_std_m": [3.0, 3.0], "y_std_m": [4.0, 4.0], "xy_correlation": [-0.5, None]}
+    covs = [[[9.0, -6.0], [-6.0, 16.0]], [[9.0, 0.0], [0.0, 16.0]]]
+    place = replace(RADAR, kind="position")
+    (scan,) = scans_of({"time": [0.0, 0.0], "x": [1.0, 2.0], "y": [5.0, 6.0], **accuracy}, place)
+    np.testing.assert_allclose(scan, with_row_noise([[1.0, 5.0], [2.0, 6.0]], covs))
+    (scan,) = scans_of({"time": [0.0, 0.0], "lon": [0.0, 0.001], "lat": [0.0, 0.0], **accuracy}, place)
+    np.testing.assert_allclose(scan[:, 2:5], [[9.0, -6.0, 16.0], [9.0, 0.0, 16.0]])
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({"range_std_km": [-0.05, "", None]}, "row 1, column .range_std_km.: expected a standard deviation above 0"),
+        ({"range_std_km": ["x", "", None]}, "row 1, column .range_std_km.: expected a finite number"),
+        ({"bearing_std_deg": [400.0, 2.0, None]}, "row 1, column .bearing_std_deg.: expected a number from"),
+    ],
+)
+def test_bad_standard_deviations_are_named(change: dict[str, Any], expected: str) -> None:
+    with pytest.raises(InputError, match=expected):
+        scans_of(ROWS | change)
+
+
+def test_a_correlation_of_one_is_refused() -> None:
+    columns = {"time": [0.0], "x": [1.0], "y": [5.0], "x_std": [3.0], "y_std": [4.0], "xy_correlation": [1.0]}
+    with pytest.raises(InputError, match=r"column .xy_correlation.: expected a correlation above -1 and below 1"):
+        scans_of(columns, replace(RADAR, kind="position"))
+
+
+def test_a_ratio_without_a_signal_is_a_column_that_is_not_read() -> None:
+    columns = ROWS | {"snr_db": [12.0, 20.0, None]}
+    assert parse_scans(table_of(columns), [RADAR], EAST).unused == ("snr_db",)
+    first, _ = scans_of(columns, replace(RADAR, signal=SIGNAL))
+    np.testing.assert_allclose(first[:, -1], [SIGNAL.log_likelihood_ratio(each) for each in (12.0, 20.0)])
+
+
+@pytest.mark.parametrize("snr", [10.0, 11.0, 12.5])
+@pytest.mark.parametrize("clutter", [0.0, 3.0])
+def test_a_likelihood_ratio_is_that_of_the_densities(snr: float, clutter: float) -> None:
+    """But for one false measurement in a thousand that is as strong as targets are."""
+    power, threshold = 10.0 ** (snr / 10.0), 10.0
+    target = expon.pdf(power - threshold, scale=1.0 + 10.0**1.6)
+    false = 0.999 * expon.pdf(power - threshold, scale=10.0 ** (clutter / 10.0)) + 0.001 * target
+    found = SignalModel(16.0, 10.0, clutter).log_likelihood_ratio(snr)
+    assert found == pytest.approx(math.log(target / false), rel=1e-12)
+
+
+def test_a_likelihood_ratio_is_bounded() -> None:
+    assert SIGNAL.log_likelihood_ratio(60.0) == pytest.approx(math.log(1000.0))
+    assert SIGNAL.log_likelihood_ratio(-60.0) == SIGNAL.log_likelihood_ratio(10.0)
+
+
+def test_a_bias_is_removed_and_the_accuracy_stays() -> None:
+    first, _ = scans_of(ROWS, replace(RADAR, bias=Bias(range=100.0)))
+    plain, _ = scans_of(ROWS)
+    np.testing.assert_allclose(first, plain - [0.0, 100.0, 0.0, 0.0, 0.0, 0.0])
+
+
+def test_rows_of_one_target_are_merged_with_their_mean_covariance() -> None:
+    columns = ROWS | {"bearing_rad": [0.5, 0.501, None], "range_km": [1.0, 1.01, None]}
+    recording = parse_scans(table_of(columns), [RADAR], EAST)
+    (scan,) = merged(recording, [RADAR], [(0.02, 30.0)], 4.0).scans[0]
+    assert scan is not None
+    np.testing.assert_allclose(scan, recording.scans[0][0].mean(axis=0, keepdims=True))  # type: ignore[union-attr]
+
+
+def test_rows_may_lack_an_altitude() -> None:
+    site = replace(RADAR, kind="bearing_range_altitude")
+    columns = {"time": [0.0, 0.0], "bearing_rad": [0.5, 1.0], "range_m": [9e3, 8e3], "altitude_fl": [100.0, None]}
+    (scan,) = scans_of(columns, site)
+    missing = with_row_noise([[1.0, 8e3, np.nan]], np.zeros((1, 3)))[0]
+    assert scan[0, 2] == pytest.approx(3048.0)
+    np.testing.assert_allclose(scan[1, 3:], missing[3:])
+    assert not scan[0, 3:].any()
+    with pytest.raises(InputError, match=r"row 2, column .range_m.: expected a finite number"):
+        scans_of(columns | {"range_m": [9e3, None]}, site)
+
+
+def line(**more: Any) -> bytes:
+    return json.dumps({"sensor": "R", "time": 5.0, "measurements": [[0.5, 1000.0], [1.0, 2000.0]], **more}).encode()
+
+
+def test_lines_have_standard_deviations_and_ratios() -> None:
+    site = replace(RADAR, signal=SIGNAL)
+    given = line(stds=[[0.01, 50.0], [None, 20.0]], snr_db=[12.0, None])
+    scan = read_message(given, "line 1", [site], Conventions({}, {})).scan.measurements
+    ratios = [SIGNAL.log_likelihood_ratio(12.0), 0.0]
+    expected = with_row_noise([[0.5, 1000.0], [1.0, 2000.0]], [[0.01, 50.0], [0.0, 20.0]], ratios)
+    np.testing.assert_allclose(scan, expected)
+
+
+@pytest.mark.parametrize(
+    ("more", "expected"),
+    [
+        ({"stds": [[0.01, 50.0]]}, "stds: expected for each of 2 measurements"),
+        ({"stds": [[0.01, 50.0], [0.01, -1.0]]}, "stds: expected for each of 2 measurements"),
+        ({"stds": 3}, "stds: expected for each of 2 measurements"),
+        ({"snr_db": [1.0, 2.0]}, "snr_db: expected none, as the sensors file gives no `signal`"),
+    ],
+)
+def test_bad_accuracy_in_lines_is_named(more: dict[str, Any], expected: str) -> None:
+    with pytest.raises(InputError, match=expected):
+        read_message(line(**more), "line 1", [RADAR], Conventions({}, {}))
+
+
+def test_a_line_may_lack_an_altitude_and_no_range() -> None:
+    site = replace(RADAR, kind="bearing_range_altitude")
+    scan = read_message(line(measurements=[[0.5, 9e3, None]]), "line 1", [site], Conventions({}, {})).scan
+    assert scan.measurements.shape == (1, 10)
+    with pytest.raises(InputError, match="numbers"):
+        read_message(line(measurements=[[0.5, None, 100.0]]), "line 1", [site], Conventions({}, {}))
+
+
+def test_a_sensors_file_reads_accuracy_and_signal(tmp_path: Path) -> None:
+    (tmp_path / "radar.yaml").write_text(
+        "recording: {bearings: east}\nsensors:\n"
+        "  - {name: R, position: [0, 0], signal: {mean_db: 16.0, threshold_db: 10.0, clutter_db: 3.0}}\n"
+    )
+    rows = "".join(f"{k},{0.5 + 0.001 * k},1000,50,1.0,{11 + k % 3}\n" for k in range(12))
+    (tmp_path / "scans.csv").write_text("time,bearing_rad,range_m,range_std_m,bearing_std_deg,snr_db\n" + rows)
+    found = scenario_of_recording(tmp_path / "radar.yaml", tmp_path / "scans.csv", speed=10.0).recording
+    assert all(scan.shape == (1, 6) for (scan,) in found.scans if scan is not None)
+
+
+@pytest.mark.parametrize(
+    ("clutter", "without"),
+    [
+        (
+            measurement_space_clutter(2.0, [-1.0, 0.0, -50.0], [1.0, 100.0, 50.0]),
+            measurement_space_clutter(2.0, [-1.0, 0.0], [1.0, 100.0]),
+        ),
+        (
+            around_sensor(2.0, radius=100.0, kind="bearing_range_rate"),
+            around_sensor(2.0, radius=100.0, kind="bearing_range"),
+        ),
+        (
+            region_clutter(2.0, Region(-90.0, 90.0, -90.0, 90.0), "position_altitude"),
+            region_clutter(2.0, Region(-90.0, 90.0, -90.0, 90.0), "position"),
+        ),
+    ],
+)
+def test_clutter_of_rows_without_a_component_has_the_density_of_the_others(clutter: Any, without: Any) -> None:
+    scan = np.array([[0.5, 20.0], [-0.3, 70.0], [0.9, 120.0]])
+    rows = with_row_noise(np.column_stack([scan, np.full(3, np.nan)]), np.zeros((3, 3)))
+    found = numbers_at(clutter.log_intensity, rows, np.zeros(3), clutter.params)
+    np.testing.assert_allclose(found, without.log_intensity_at(scan, np.zeros(3)), rtol=1e-12)
