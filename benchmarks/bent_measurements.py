@@ -45,7 +45,7 @@ class Updater:
     def __call__(self, mean: Any, cov: Any, measurement: Any) -> tuple[Any, Any, bool]:
         """Mean and covariance after a measurement, and whether it bends."""
         innovation, scratch, out = self.work.innovation, self.work.scratch, np.empty(4)
-        expect_measurement(self.kernel, self.pose, mean, cov, 0, innovation, scratch)
+        expect_measurement(self.kernel, self.pose, mean, cov, innovation.predicted[0], 0, innovation, scratch)
         if innovation.bends[0]:
             relinearise(self.kernel, Pair(self.pose, mean, cov, measurement), self.work)
         else:

@@ -50,7 +50,7 @@ def given(state, pose, params):
     return params[0]
 
 
-def birth(num: int = 2, dim: int = 4, existence: float = 0.3) -> models.BirthModel:
+def birth(num: int = 2, dim: int = 4, existence: Any = 0.3) -> models.BirthModel:
     means = np.full((num, dim), 10.0) + 40.0 * np.arange(num)[:, None]
     return models.BirthModel(np.full(num, existence), means, np.tile(20.0 * np.eye(dim), (num, 1, 1)))
 

@@ -66,7 +66,7 @@ def test_one_noise_of_all_rows_is_that_of_another_model(kind: Any, scan: Any, st
 def test_a_correlated_row_updates_as_a_kalman_filter(kind: Any) -> None:
     prior, cov = np.array([10.0, 10.0, 1.0, 0.0]), np.diag([20.0, 30.0, 4.0, 4.0])
     noise, z = np.array([[9.0, -5.0], [-5.0, 4.0]]), np.array([12.0, 8.0])
-    parts = {"birth": NOBODY, "detection": SURE, "survival": models.constant_survival(1.0)}
+    parts: dict[str, Any] = {"birth": NOBODY, "detection": SURE, "survival": models.constant_survival(1.0)}
     filter = make(kind, clutter=models.region_clutter(1e-9, REGION, "position"), **parts)
     found, _ = step(filter, with_row_noise([z], [noise]), believed(kind, 0.999, [prior], [cov]), dt=0.0)
     gain = cov[:, :2] @ np.linalg.inv(cov[:2, :2] + noise)
@@ -111,7 +111,7 @@ def test_a_row_without_its_third_component_is_that_of_a_sensor_without(
         }
         rows = with_row_noise(scan, np.zeros((3, 3))) if name == third else scan[:, :2]
         found.append(step(make(kind, motion=motion, birth=born, **own), rows)[0])
-    close(*found, rtol=1e-7)
+    close(found[0], found[1], rtol=1e-7)
 
 
 @every_kind

@@ -66,7 +66,7 @@ def test_sigma_points_agree_with_the_jacobian_on_a_narrow_gaussian():
     cov, found = np.diag([4.0, 4.0, 0.25, 0.25]), []
     for method in ("ekf", "ukf", "ckf"):
         out = make_innovation(1, 4, 3)
-        expect_measurement(sensor(method).to_kernel(), POSE, STATES[0], cov, 0, out, make_scratch(4, 3))
+        expect_measurement(sensor(method).to_kernel(), POSE, STATES[0], cov, np.zeros(3), 0, out, make_scratch(4, 3))
         found.append((out.predicted[0], out.covs[0]))
     for predicted, posterior in found[1:]:
         np.testing.assert_allclose(predicted, found[0][0], rtol=1e-4)
@@ -76,7 +76,7 @@ def test_sigma_points_agree_with_the_jacobian_on_a_narrow_gaussian():
 def test_the_velocity_after_one_measurement_is_known_along_the_line_of_sight_alone():
     mean, cov = np.array([3000.0, 0.0, 0.0, 0.0]), np.diag([1e-6, 1e-6, 400.0, 400.0])
     out = make_innovation(1, 4, 3)
-    expect_measurement(sensor("ekf").to_kernel(), np.zeros(3), mean, cov, 0, out, make_scratch(4, 3))
+    expect_measurement(sensor("ekf").to_kernel(), np.zeros(3), mean, cov, np.zeros(3), 0, out, make_scratch(4, 3))
     along = 1.0 / (1.0 / 400.0 + 1.0 / 0.25)
     np.testing.assert_allclose(np.diag(out.covs[0])[2:], [along, 400.0], rtol=1e-6)
 

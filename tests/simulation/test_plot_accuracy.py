@@ -117,7 +117,8 @@ def test_rows_of_one_target_are_merged_with_their_mean_covariance() -> None:
     recording = parse_scans(table_of(columns), [RADAR], EAST)
     (scan,) = merged(recording, [RADAR], [(0.02, 30.0)], 4.0).scans[0]
     assert scan is not None
-    np.testing.assert_allclose(scan, recording.scans[0][0].mean(axis=0, keepdims=True))  # type: ignore[union-attr]
+    before: Any = recording.scans[0][0]
+    np.testing.assert_allclose(scan, before.mean(axis=0, keepdims=True))
 
 
 def test_rows_may_lack_an_altitude() -> None:

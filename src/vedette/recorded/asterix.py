@@ -26,7 +26,7 @@ _DEGREE = "\N{DEGREE SIGN}"
 
 
 class AsterixTable(NamedTuple):
-    """The columns of a file, the number of each record, warnings, and the turn of each radar by its service messages."""
+    """Columns of a file, number of each record, warnings, and turns of radars by their service messages."""
 
     columns: dict[str, list[Any]]
     numbers: list[int]
