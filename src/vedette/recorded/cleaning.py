@@ -24,12 +24,14 @@ class RecordedTrack:
         times: (n,) s, increasing, at least two.
         positions: (n, 2) m.
         velocities: (n, 2) m/s, as recorded or from finite differences.
+        altitudes: (n,) m; None if they are not recorded.
     """
 
     name: str
     times: Floats
     positions: Floats
     velocities: Floats
+    altitudes: Floats | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,4 +152,5 @@ def _track(reports: Reports, run: Ints) -> RecordedTrack:
     else:
         before, after = np.maximum(np.arange(len(run)) - 1, 0), np.minimum(np.arange(len(run)) + 1, len(run) - 1)
         velocities = (positions[after] - positions[before]) / (times[after] - times[before])[:, None]
-    return RecordedTrack(reports.names[reports.tracks[run[0]]], times, positions, velocities)
+    altitudes = None if reports.altitudes is None else reports.altitudes[run]
+    return RecordedTrack(reports.names[reports.tracks[run[0]]], times, positions, velocities, altitudes)

@@ -9,13 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from vedette.errors import InputError
+from vedette.internal.quantities import HEIGHTS
+from vedette.internal.text import join_alternatives
 from vedette.kernels.base.types import Floats, Ints
 from vedette.recorded.conventions import ONE_PLACE, ONE_PLACE_SHARE, OTHER_NAMES
 from vedette.recorded.geography import Origin
 from vedette.recorded.opensky import is_opensky, of_opensky
-from vedette.recorded.tables import FARTHEST, Table
+from vedette.recorded.tables import FARTHEST, Table, is_empty
 
-_USED = ("time", "id", "x", "y", "longitude", "latitude", "vx", "vy")
+_USED = ("time", "id", "x", "y", "longitude", "latitude", "vx", "vy", "altitude")
 _SAME_TIME = 1e-6  # s; two reports of one target nearer in time than this count as one
 
 
@@ -28,6 +30,7 @@ class Reports:
         tracks: (n,) index into `names`.
         positions: (n, 2) m.
         velocities: (n, 2) m/s along x and y of the plane, or None if the record has none.
+        altitudes: (n,) m, or None if the record has none.
         names: of each target in the record.
         origin_deg: longitude and latitude of (0, 0) if the record was geographic, else None.
         bounds_deg: its smallest and largest longitude and latitude if it was geographic, else None.
@@ -41,6 +44,7 @@ class Reports:
     tracks: Ints
     positions: Floats
     velocities: Floats | None
+    altitudes: Floats | None
     names: tuple[str, ...]
     origin_deg: tuple[float, float] | None
     bounds_deg: tuple[tuple[float, float], tuple[float, float]] | None = None
@@ -57,7 +61,7 @@ def parse_reports(
     origin_deg: tuple[float, float] | None = None,
     usual_origin_deg: tuple[float, float] | None = None,
 ) -> Reports:
-    """Return reports from a table with columns time, id and x, y or longitude, latitude; vx, vy if there are any.
+    """Return reports from a table with columns time, id and x, y or longitude, latitude; vx, vy, altitude if given.
 
     In a geographic record `vx` and `vy` are to true east and north at the place of each report.
 
@@ -74,8 +78,8 @@ def parse_reports(
     given = dict(columns or {})
     if is_known := not given and is_opensky(table.columns):
         table, given = of_opensky(table)
-    if unknown := set(given) - {"time", "id", "x", "y", "longitude", "latitude", "vx", "vy"}:
-        raise InputError(f"columns: expected time, id, x, y, longitude, latitude, vx or vy; got {', '.join(unknown)}")
+    if unknown := set(given) - {*_USED}:
+        raise InputError(f"columns: expected {join_alternatives(_USED)}; got {', '.join(unknown)}")
     given = {**usual_names(table.columns), **given}
     times, labels = table.times(given.get("time", "time")), table.labels(given.get("id", "id"))
     positions, origin, bounds = _positions(table, given, origin_deg, usual_origin_deg)
@@ -84,20 +88,24 @@ def parse_reports(
     speed_columns = [given.get(name, name) for name in ("vx", "vy")]
     has_velocity = any(name in given for name in ("vx", "vy")) or all(name in table.columns for name in speed_columns)
     velocities = _velocities(table, given, speed_columns, origin) if has_velocity else None
+    altitudes = _altitudes(table, given)
     names, tracks = np.unique(labels, return_inverse=True)
     order = np.lexsort((times, tracks))  # equal ones stay in the order of the file
     again = (np.diff(times[order], prepend=-np.inf) < _SAME_TIME) & (np.diff(tracks[order], prepend=-1) == 0)
     repeats = tuple((table.rows[order[i - 1]], table.rows[order[i]]) for i in np.flatnonzero(again))
     order = order[~again]
     velocities = None if velocities is None else velocities[order]
+    altitudes = None if altitudes is None else altitudes[order]
     tracks = tracks[order].astype(np.int64)
     used = {given.get(name, name) for name in _USED} - ({"x", "y"} if origin is not None else set())
+    used.add(_altitude_column(table, given)[0])
     unused = () if is_known else tuple(name for name in table.columns if name not in used)
     return Reports(
         times[order],
         tracks,
         positions[order],
         velocities,
+        altitudes,
         tuple(map(str, names)),
         origin,
         bounds,
@@ -106,6 +114,22 @@ def parse_reports(
         table.notes,
         table.sha256,
     )
+
+
+def _altitude_column(table: Table, given: Mapping[str, str]) -> tuple[str, float]:
+    """Return the column of altitudes and the size of its unit in m; "" if there is none."""
+    if name := given.get("altitude"):
+        return name, next((size for unit, size in HEIGHTS.items() if name.endswith(f"_{unit}")), 1.0)
+    named = ((f"altitude_{unit}", size) for unit, size in HEIGHTS.items())
+    return next((each for each in named if each[0] in table.columns), ("", 1.0))
+
+
+def _altitudes(table: Table, given: Mapping[str, str]) -> Floats | None:
+    """Return the altitudes of all reports, m; None without a column, or if a report that needs none has none."""
+    name, unit = _altitude_column(table, given)
+    if not name or (not given.get("altitude") and any(map(is_empty, table.column(name)))):
+        return None
+    return unit * table.numbers(name, FARTHEST)
 
 
 def usual_names(columns: Iterable[str]) -> dict[str, str]:

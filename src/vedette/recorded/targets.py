@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.errors import InputError
+from vedette.kernels.base.types import HEIGHT
 from vedette.models.arguments import real, reject
 from vedette.recorded.cleaning import Cleaning, CleaningCounts, RecordedTrack
 from vedette.recorded.reports import Reports, parse_reports
@@ -25,23 +26,25 @@ _FIRST_DATE, _LAST_DATE = 1e8, 1e10  # s of the Unix epoch, 1973 and 2286
 class RecordedTargets:
     """Targets that follow recorded reports; between them, a cubic through positions and velocities (Hermite).
 
-    A target exists from its first report to its last. States are [px, py, vx, vy]; ids count the tracks in order of
-    their first report.
+    A target exists from its first report to its last. States are [px, py, vx, vy], or [px, py, vx, vy, pz, vz] with
+    `with_height`; ids count the tracks in order of their first report.
 
     Attributes:
         reports: see `from_file` and `from_columns`.
         time_origin: recorded time of the first scan: seconds, or an ISO 8601 time; None: the earliest report.
         cleaning: settings of the steps from reports to tracks.
+        with_height: True for states with the recorded altitudes, between which heights change steadily.
         tracks: the tracks, in order of target id.
         counts: of what the cleaning left out.
 
     Raises:
-        InputError: no track is left after the cleaning.
+        InputError: no track is left after the cleaning; heights are wanted, and no altitudes are recorded.
     """
 
     reports: Reports
     time_origin: float | str | None = None
     cleaning: Cleaning = field(default_factory=Cleaning)
+    with_height: bool = False
     tracks: tuple[RecordedTrack, ...] = field(init=False)
     counts: CleaningCounts = field(init=False)
 
@@ -51,6 +54,8 @@ class RecordedTargets:
             raise InputError(
                 f"recorded targets: expected at least one track after cleaning; got none of {counts.in_words()}"
             )
+        if self.with_height and self.reports.altitudes is None:
+            raise InputError("recorded targets: expected a column altitude_m of every report, for heights; got none")
         try:
             origin = float(self.reports.times.min()) if self.time_origin is None else seconds(self.time_origin)
         except (TypeError, ValueError):
@@ -115,12 +120,18 @@ class RecordedTargets:
         scans = scan_times(times)
         recorded = real("time_origin", self.time_origin) + (scans - scans[0])
         alive = np.zeros((len(self.tracks), len(scans)), np.bool_)
-        states = np.zeros((len(self.tracks), len(scans), 4))
+        states = np.zeros((len(self.tracks), len(scans), HEIGHT + 2 if self.with_height else 4))
         for i, track in enumerate(self.tracks):
             alive[i] = (recorded >= track.times[0] - TIME_TOLERANCE) & (recorded <= track.times[-1] + TIME_TOLERANCE)
             path = CubicHermiteSpline(track.times, track.positions, track.velocities)
             states[i, alive[i], :2] = path(recorded[alive[i]])
-            states[i, alive[i], 2:] = path(recorded[alive[i]], 1)
+            states[i, alive[i], 2:4] = path(recorded[alive[i]], 1)
+            if self.with_height and track.altitudes is not None:
+                at = recorded[alive[i]]
+                states[i, alive[i], HEIGHT] = np.interp(at, track.times, track.altitudes)
+                climbs = np.diff(track.altitudes) / np.diff(track.times)
+                leg = np.clip(np.searchsorted(track.times, at, side="right") - 1, 0, len(climbs) - 1)
+                states[i, alive[i], HEIGHT + 1] = climbs[leg]
         if not alive.any():
             first, last = min(track.times[0] for track in self.tracks), max(track.times[-1] for track in self.tracks)
             expected = f"scans between the first and last report, {_span(first, last)}"

@@ -143,8 +143,6 @@ def _heights(model: ScenarioModel) -> Iterator[Finding]:
             others = ", ".join(each for each in COMPONENTS if each not in HEIGHT_DEPENDENT)
             wanted = f"one of {others}, or motion: constant_velocity_height"
             yield path, f"{wanted} (as targets have no height)", describe(kind)
-        elif model.targets.kind == "recorded" and model.recording is None:
-            yield path, "a measurement in the plane, as recorded targets have no height", describe(kind)
 
 
 def _birth_steps(model: ScenarioModel) -> Iterator[Finding]:
@@ -257,9 +255,7 @@ def _score(model: ScenarioModel) -> Iterator[Finding]:
     if model.ospa.components == "state" and model.targets.kind == "recorded" and model.motion.state_dim != RECORDED_DIM:
         wanted = f"position, as states have {model.motion.state_dim} components and recorded targets {RECORDED_DIM}"
         yield ("ospa", "components"), wanted, '"state"'
-    if model.ospa.components == "position_and_height" and (
-        model.targets.kind == "recorded" or (model.motion.state_dim <= HEIGHT + 1)
-    ):
+    if model.ospa.components == "position_and_height" and model.motion.state_dim <= HEIGHT + 1:
         yield ("ospa", "components"), "position, as targets have no height", '"position_and_height"'
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -12,6 +13,7 @@ import numpy as np
 from pydantic import Field
 
 from vedette.errors import InputError
+from vedette.internal.quantities import HEIGHT_DEPENDENT
 from vedette.scenarios.faults import Finding, describe
 from vedette.scenarios.sections.base import (
     SHA256_FIELD,
@@ -111,6 +113,9 @@ class Columns(Section):
     latitude: str | None = Field(default=None, description="Latitude, WGS84 [deg].")
     vx: str | None = Field(default=None, description="Velocity to the east, if it is recorded [m/s].")
     vy: str | None = Field(default=None, description="Velocity to the north, if it is recorded [m/s].")
+    altitude: str | None = Field(
+        default=None, description="Altitude, if it is recorded, in m or the unit at the end of the name (_ft, _fl) [m]."
+    )
 
     @check
     def _pairs(self) -> Iterator[Finding]:
@@ -154,14 +159,22 @@ class RecordedTargets(Derived):
         return self.source(world, folder)
 
     def source(self, world: ScenarioModel, folder: Path) -> RecordedSource:
-        """Return the recorded targets; an unchanged file is read only once."""
+        """Return the recorded targets, with heights if the states of the scenario and the file have them.
+
+        An unchanged file is read only once.
+        """
         file = folder / self.path
         try:
             state = os.stat(file)
         except (OSError, ValueError):
             raise InputError(f"{self.path}: expected a readable file of recorded targets; got none") from None
         origin = None if world.origin is None else (world.origin.lon, world.origin.lat)
-        return _read(str(file.resolve()), state.st_mtime_ns, state.st_size, self, world.region, origin)
+        has_height = world.motion.kind == "constant_velocity_height"
+        found = _read(str(file.resolve()), state.st_mtime_ns, state.st_size, self, world.region, origin, has_height)
+        if not found.with_height and needs_true_heights(world):
+            wanted = "a column altitude_m of every report, as true heights are measured or compared"
+            raise InputError(f"{self.path}: expected {wanted}; got none")
+        return found
 
 
 @lru_cache(maxsize=16)
@@ -172,12 +185,13 @@ def _read(
     section: RecordedTargets,
     region: RegionSection,
     origin: tuple[float, float] | None,
+    has_height: bool,
 ) -> RecordedSource:
     from vedette.recorded import Cleaning
     from vedette.recorded import RecordedTargets as RecordedSource
 
     edges = region.build()
-    return RecordedSource.from_file(
+    found = RecordedSource.from_file(
         file,
         columns=section.columns.given(),
         origin_deg=section.origin_deg,
@@ -186,6 +200,13 @@ def _read(
         cleaning=Cleaning(**section.given(), region=edges if section.crop else None),
         sha256=section.sha256,
     )
+    return replace(found, with_height=True) if has_height and found.reports.altitudes is not None else found
+
+
+def needs_true_heights(world: ScenarioModel) -> bool:
+    """Return True if sensors are simulated that measure heights, or the errors of heights count."""
+    measured = world.recording is None and any(each.measurement.kind in HEIGHT_DEPENDENT for each in world.sensors)
+    return measured or world.ospa.components == "position_and_height"
 
 
 class PoissonTargets(Section):
