@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import json
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from vedette.cli import app
 from vedette.errors import InputError, ScenarioError
 from vedette.evaluation import track_recording
 from vedette.recorded import RecordedTargets
@@ -91,3 +95,19 @@ def test_sensors_of_heights_measure_recorded_targets_that_have_them(tmp_path: Pa
     )
     scenario = load_scenario(tmp_path / "scenario.yaml")
     assert scenario.model.targets.source(scenario.model, tmp_path).with_height  # type: ignore[union-attr]
+
+
+def test_the_replay_of_a_recording_has_heights(tmp_path: Path) -> None:
+    sensors = recording(tmp_path, "altitude_m")
+    words = ["track", str(tmp_path / "scans.csv"), "--sensors", str(sensors), "--truth", str(tmp_path / "truth.csv")]
+    out = tmp_path / "out"
+    for command in ([*words, "--max-target-speed", "250", "--out", str(out)], ["report", str(out)]):
+        result = CliRunner().invoke(app, command)
+        assert result.exit_code == 0, result.output
+    page = (out / "report.html").read_text(encoding="utf-8")
+    found = re.search(r'<script[^>]*id="runs"[^>]*>(.*?)</script>', page, re.DOTALL)
+    assert found is not None
+    heights = json.loads(found.group(1))[0]["heights"]
+    assert heights["truth"][10] == [3200.0]
+    ((height, std),) = heights["estimates"][10]
+    assert abs(height - 3200.0) < 5.0 * std < 200.0

@@ -17,7 +17,7 @@ from vedette.evaluation.ensembles import choice_of
 from vedette.evaluation.figures.rewards import best_over_others, best_over_pair, first_pair
 from vedette.evaluation.scans import LIE, code_of_sensors, in_plane, scans_of_record
 from vedette.evaluation.told import told_by
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import HEIGHT, Floats
 from vedette.reports.decision_explanations import explanation_data
 from vedette.reports.groups import Strategy
 from vedette.scenarios import Scenario
@@ -64,6 +64,7 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
         "times": rounded_list(record.times, 6),
         "truth": [_targets(record, scan, places, has_velocity) for scan in range(record.num_scans)],
         "estimates": _estimates(record, scenario, places),
+        **({"heights": _heights(record)} if scenario.model.has_heights else {}),
         "poses": [
             [pose_data(pose, section, places) for pose, section in zip(poses, sections, strict=True)]
             for poses in record.poses
@@ -175,6 +176,21 @@ def _estimates(record: RunRecord, scenario: Scenario, places: int) -> list[list[
             partner = partners.get((scan, *label, *estimate.means[place, :2].tolist()), (0, 0.0))
             rows.append([*estimate_data(estimate, place, places), *partner])
         found.append(rows)
+    return found
+
+
+def _heights(record: RunRecord) -> dict[str, Any]:
+    """Return for each scan the heights of the estimates with their standard deviations, and those of the targets, m.
+
+    Targets without heights have none.
+    """
+    found: dict[str, Any] = {"estimates": [], "truth": []}
+    for scan, estimate in enumerate(record.estimates):
+        stds = np.sqrt(estimate.covs[:, HEIGHT, HEIGHT])
+        pairs = zip(estimate.means[:, HEIGHT], stds, strict=True)
+        found["estimates"].append([rounded_list(pair, 0) for pair in pairs])
+        _, states = record.truth.at(scan)
+        found["truth"].append(rounded_list(states[:, HEIGHT], 0) if states.shape[1] > HEIGHT else [])
     return found
 
 

@@ -27,7 +27,7 @@ function placeNames(context, view, names, marks) {
   }
 }
 
-// The names of a scan: sensors, targets, and estimates by their labels.
+// The names of a scan: sensors, targets, and estimates by their labels, with flight levels if they have heights.
 function drawNames(context, run, view, step, show) {
   const at = (x, y) => [view.x(x), view.y(y)];
   const names = [];
@@ -36,9 +36,11 @@ function drawNames(context, run, view, step, show) {
   for (const [target, x, y] of run.truth[step]) {
     add(clipped(run.names[target - 1] ?? `T${target}`, 20), at(x, y), 6, colours.ink);
   }
-  for (const estimate of run.labelled ? run.estimates[step] : []) {
-    add(estimate[0], at(estimate[1], estimate[2]), 5, estimateShade(run, estimate, show));
-  }
+  (run.labelled ? run.estimates[step] : []).forEach((estimate, place) => {
+    const height = run.heights?.estimates[step][place][0];
+    const text = height === undefined ? estimate[0] : `${estimate[0]} ${flightLevel(height)}`;
+    add(text, at(estimate[1], estimate[2]), 5, estimateShade(run, estimate, show));
+  });
   const marks = [
     ...run.poses[step].map(([x, y]) => boxAround(...at(x, y), 7)),
     ...run.truth[step].map(([, x, y]) => boxAround(...at(x, y), 5)),

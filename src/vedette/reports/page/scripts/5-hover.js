@@ -4,12 +4,12 @@ const REACH = 12; // pixels
 function describeAt(run, step, view, x, y, show) {
   const found = [];
   const near = (east, north, reach = REACH) => Math.hypot(view.x(east) - x, view.y(north) - y) <= reach;
-  for (const [target, east, north, ...velocity] of run.truth[step]) {
-    if (near(east, north)) found.push(describeTarget(run, target, east, north, velocity));
-  }
-  for (const estimate of run.estimates[step]) {
-    if (near(estimate[1], estimate[2])) found.push(describeEstimate(run, estimate));
-  }
+  run.truth[step].forEach(([target, east, north, ...velocity], place) => {
+    if (near(east, north)) found.push(describeTarget(run, target, east, north, velocity) + heightWords(run.heights?.truth[step][place]));
+  });
+  run.estimates[step].forEach((estimate, place) => {
+    if (near(estimate[1], estimate[2])) found.push(describeEstimate(run, estimate) + heightWords(...(run.heights?.estimates[step][place] ?? [])));
+  });
   run.poses[step].forEach(([east, north, heading, pointing], s) => {
     if (near(east, north)) {
       const at = `${metres(east, run)}, ${metres(north, run)}`;
@@ -20,6 +20,13 @@ function describeAt(run, step, view, x, y, show) {
   });
   if (show.measurements && found.length < 3) found.push(...measurementsAt(run, step, view, x, y).slice(0, 3));
   return found;
+}
+
+const flightLevel = (height) => `FL${String(Math.max(0, Math.round(height / 30.48))).padStart(3, "0")}`;
+
+function heightWords(height, std) {
+  if (height === undefined) return "";
+  return `; height ${fixed(height, 0)} m${std === undefined ? "" : ` \u00b1 ${fixed(std, 0)}`} (${flightLevel(height)})`;
 }
 
 function describeTarget(run, target, east, north, velocity) {

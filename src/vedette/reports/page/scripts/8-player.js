@@ -29,6 +29,8 @@ function startReplay(root) {
     part("gains").hidden = !decision?.why;
     drawRewards(part("rewards"), decision, run());
     drawTimeline(part("errors"), run(), state.step, paired(), state.ghost ?? runs[part("beside").value || -1]);
+    part("heights").hidden = !run().heights;
+    if (run().heights) drawHeights(part("heights"), run(), state.step);
     tell();
   }
 
@@ -105,8 +107,12 @@ function startReplay(root) {
 
   function fillValues() {
     const rows = [
-      ...run().truth[state.step].map(([target, x, y, ...velocity]) => describeTarget(run(), target, x, y, velocity)),
-      ...run().estimates[state.step].map((estimate) => describeEstimate(run(), estimate)),
+      ...run().truth[state.step].map(([target, x, y, ...velocity], place) => (
+        describeTarget(run(), target, x, y, velocity) + heightWords(run().heights?.truth[state.step][place])
+      )),
+      ...run().estimates[state.step].map((estimate, place) => (
+        describeEstimate(run(), estimate) + heightWords(...(run().heights?.estimates[state.step][place] ?? []))
+      )),
     ];
     part("rows").replaceChildren(...rows.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
   }
