@@ -1,10 +1,11 @@
 """Every example of README and documentation, as a stranger runs it: in a process of its own, warnings as errors.
 
-The blocks of a page are one program, in the order of the page.
+The blocks of a page are one program, in the order of the page. The pages of the Python API share one process.
 """
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import re
 import subprocess
@@ -29,8 +30,9 @@ def blocks(page: Path) -> list[str]:
 PAGES = {
     path.relative_to(ROOT).as_posix(): found
     for path in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
-    if (found := blocks(path))
+    if path.parent.name != "reference" and (found := blocks(path))
 }
+REFERENCE = sorted(path for path in (ROOT / "docs" / "reference").glob("*.md") if path.name != "index.md")
 SCRIPTS = [
     path.relative_to(ROOT).as_posix()
     for path in sorted((ROOT / "examples").glob("*.py"))
@@ -144,3 +146,23 @@ def test_an_example_runs_by_itself(name: str, tmp_path: Path) -> None:
         assert (tmp_path / "drawn.png").read_bytes().startswith(b"\x89PNG")
     for words in SHOWN[name]:
         assert words in printed
+
+
+def test_the_examples_of_the_python_api_run(tmp_path: Path) -> None:
+    """Each page has examples, and starts without the names of the others."""
+    for page in REFERENCE:
+        (tmp_path / f"{page.stem}_page.py").write_text("\n".join(blocks(page)), "utf-8")
+    pages = [f"{page.stem}_page.py" for page in REFERENCE]
+    assert all((tmp_path / page).stat().st_size for page in pages)
+    (tmp_path / "all.py").write_text(f"import runpy\nfor page in {pages}:\n    runpy.run_path(page)\n", "utf-8")
+    run(tmp_path, "all.py")
+
+
+@pytest.mark.parametrize("page", REFERENCE, ids=lambda page: page.stem)
+def test_a_page_of_the_python_api_lists_every_name_by_its_task(page: Path) -> None:
+    text = page.read_text("utf-8")
+    package = importlib.import_module(re.findall(r"^::: (\S+)$", text, re.MULTILINE)[0])
+    rows = re.findall(r"^\| [^|`]+ \| (`.*)$", text, re.MULTILINE)
+    own = [name for name, one in vars(package).items() if getattr(one, "__module__", "") == package.__name__]
+    public = getattr(package, "__all__", [name for name in own if not name.startswith("_")])
+    assert sorted(name for row in rows for name in re.findall(r"`(\w+)`", row)) == sorted(public)

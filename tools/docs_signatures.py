@@ -1,6 +1,7 @@
-"""Signatures of what a user may write, out of the source, for the page that asks for them.
+"""Signatures from the source for pages of the documentation, and links in pages of the Python API.
 
-`<!-- model functions -->` stands for the table of compiled functions, `<!-- protocols -->` for all public protocols.
+`<!-- model functions -->` is replaced by the table of compiled functions, `<!-- protocols -->` by all public protocols.
+In a page with the line `::: PACKAGE`, names in the last column of tables link to their descriptions below.
 """
 
 from __future__ import annotations
@@ -30,11 +31,23 @@ TAKEN_BY = {
 
 
 def fill(markdown: str) -> str:
-    """A page with what its marks stand for."""
+    """Return a page with its marks replaced, and with links in the tables of a page of the Python API."""
     for mark, make in (("<!-- model functions -->", model_functions), ("<!-- protocols -->", protocols)):
         if mark in markdown:
             markdown = markdown.replace(mark, make())
-    return markdown
+    package = re.search(r"^::: (\S+)$", markdown, re.MULTILINE)
+    return markdown if package is None else with_links(markdown, package[1])
+
+
+def with_links(markdown: str, package: str) -> str:
+    """Return a page in which each row of a table links the names of a package in its last column."""
+    link = rf"[`\1`](#{package}.\1)"
+    return re.sub(
+        r"^(\| [^|`]+ \| )(.*)$",
+        lambda row: row[1] + re.sub(r"`(\w+)`", link, row[2]),
+        markdown,
+        flags=re.MULTILINE,
+    )
 
 
 def model_functions() -> str:
