@@ -21,6 +21,7 @@ import docs_signatures
 from docs_fields import FieldPages
 
 ROOT = Path(__file__).resolve().parents[1]
+CHANGELOG = "CHANGELOG.md"
 PORT = 8000
 
 
@@ -45,23 +46,35 @@ class Page(HTMLParser):
 
 
 def lay_out(root: Path) -> list[str]:
-    """Put the pages of docs/ into build/pages/ with the tables for which they have marks; returns the names of pages.
+    """Write the pages of docs/ into build/pages/, with their marks replaced by tables, and the changelog.
 
-    A file that is the same already is left alone, so that what watches them does nothing.
+    Files that have not changed are left alone, so that a server does not build them again. Returns the names of pages.
     """
     fields, target, kept = FieldPages(root / "docs"), root / "build" / "pages", set()
-    for source in sorted(path for path in (root / "docs").rglob("*") if path.is_file()):
-        content = source.read_bytes()
-        if source.suffix == ".md":
-            content = docs_signatures.fill(fields.fill(content.decode())).encode()
-        copy = target / source.relative_to(root / "docs")
+    contents = {path.relative_to(root / "docs"): path.read_bytes() for path in _files(root / "docs")}
+    for name, content in contents.items():
+        if name.suffix == ".md":
+            contents[name] = docs_signatures.fill(fields.fill(content.decode())).encode()
+    if (root / CHANGELOG).is_file():
+        contents[Path("changelog.md")] = changelog((root / CHANGELOG).read_text("utf-8")).encode()
+    for name, content in contents.items():
+        copy = target / name
         kept.add(copy)
         if not copy.is_file() or copy.read_bytes() != content:
             copy.parent.mkdir(parents=True, exist_ok=True)
             copy.write_bytes(content)
-    for left in [path for path in target.rglob("*") if path.is_file() and path not in kept]:
+    for left in [path for path in _files(target) if path not in kept]:
         left.unlink()
     return sorted(path.relative_to(target).as_posix() for path in kept if path.suffix == ".md")
+
+
+def _files(folder: Path) -> list[Path]:
+    return sorted(path for path in folder.rglob("*") if path.is_file())
+
+
+def changelog(text: str) -> str:
+    """Return the changelog as a page: links count from docs/, and the search leaves it out."""
+    return "---\nsearch:\n  exclude: true\n---\n\n" + text.replace("](docs/", "](")
 
 
 def build(root: Path) -> list[str]:

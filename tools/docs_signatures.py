@@ -1,7 +1,8 @@
 """Signatures from the source for pages of the documentation, and links in pages of the Python API.
 
 `<!-- model functions -->` is replaced by the table of compiled functions, `<!-- protocols -->` by all public protocols.
-In a page with the line `::: PACKAGE`, names in the last column of tables link to their descriptions below.
+In a page with the line `::: PACKAGE`, names in the last column of tables link to their descriptions below, except
+types and constants, which have none.
 """
 
 from __future__ import annotations
@@ -43,8 +44,8 @@ def with_links(markdown: str, package: str) -> str:
     """Return a page in which each row of a table links the names of a package in its last column."""
     link = rf"[`\1`](#{package}.\1)"
     return re.sub(
-        r"^(\| [^|`]+ \| )(.*)$",
-        lambda row: row[1] + re.sub(r"`(\w+)`", link, row[2]),
+        r"^(\| (?!types and constants)[^|`]+ \| )(.*)$",
+        lambda row: row[1] + re.sub(r"(?<!\[)`(\w+)`", link, row[2]),
         markdown,
         flags=re.MULTILINE,
     )
