@@ -169,7 +169,7 @@ def _ospa(estimate: Estimate, states: np.ndarray) -> float:
 def table(rows: Sequence[Row]) -> str:
     """As Markdown."""
     lines = [
-        "| filter | targets | ms a scan | µs a target and scan | with births | OSPA, m | error of number | MB more |",
+        "| filter | targets | ms per scan | µs per target and scan | with births, ms | OSPA, m | cardinality error | memory, MB |",
         "|---|---:|---:|---:|---:|---:|---:|---:|",
     ]
     lines += [

@@ -159,7 +159,7 @@ def all_rows(python: str, sizes: Sequence[int], objects: Sequence[int], num_step
 
 def table(rows: Sequence[Row]) -> str:
     """As Markdown."""
-    lines = ["| scene | targets | filter | ms a scan | OSPA, m |", "|---|---:|---|---:|---:|"]
+    lines = ["| scene | targets | filter | ms per scan | OSPA, m |", "|---|---:|---|---:|---:|"]
     lines += [
         f"| {row.scene} | {row.num_targets:,} | {row.filter} | {row.milliseconds:,.2f} | {row.ospa:.2f} |"
         for row in rows
