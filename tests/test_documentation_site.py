@@ -79,7 +79,7 @@ def test_the_search_finds_pages_from_disk(tmp_path: Path, docs: ModuleType, brow
         ("vedette live", "Live scans: vedette live"),
         ("vedette track", "Recorded scans: vedette track"),
         ("keep_out", "keep_out"),
-        ("own reward", "A reward of your own"),
+        ("custom reward", "A custom reward"),
     ],
 )
 def test_a_thing_is_found_before_what_mentions_it(site: Path, browser: Browser, words: str, first: str) -> None:
