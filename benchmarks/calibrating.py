@@ -191,7 +191,7 @@ def table(redraws: list[Redraw], biases: ByRadar = BIASES) -> Iterator[str]:
     yield f"OSPA, m: {found:.2f} with the estimates, {true:.2f} with the truth, {told:.2f} with the given parameters;"
     yield f"with the estimates {share.mean():+.1%} against the truth, {share.min():+.1%} to {share.max():+.1%}."
     seconds, passes = np.mean([(each.seconds, each.passes) for each in redraws], axis=0)
-    yield f"CPU time: {seconds:.0f} s a recording, {passes:.0f} passes of the filter."
+    yield f"CPU time: {seconds:.0f} s per recording, {passes:.0f} passes of the filter."
 
 
 def main() -> None:

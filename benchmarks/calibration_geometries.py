@@ -4,7 +4,7 @@
     python benchmarks/calibration_geometries.py --write docs/evidence/calibration.md
 
 Two or three radars in five arrangements see four to six ships of up to 8 m/s for five minutes. They have biases of up
-to 100 m and 1.5 degrees, and noise, detection and clutter are told wrongly. Each redraw is a recording of its own:
+to 100 m and 1.5 degrees, and noise, detection and clutter are told wrongly. Each redraw is per recording of its own:
 other ships, noise, clutter. For each arrangement prints how many searches converged, how many of their intervals of
 95 % cover the truth, and those of biases alone. A search that did not converge has no intervals. Equal arguments print
 equal tables.
@@ -43,7 +43,7 @@ sensors:
 
 
 class Geometry(NamedTuple):
-    """m, where radars stand; false measurements a scan; ships, and where: all around, on a lane or to the north."""
+    """m, where radars stand; false measurements per scan; ships, and where: all around, on a lane or to the north."""
 
     places: tuple[tuple[float, float], ...]
     clutter: float

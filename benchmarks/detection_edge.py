@@ -97,7 +97,7 @@ def main() -> None:
                 error = change.std(ddof=1) / math.sqrt(num_runs)
                 both = ", ".join(f"{value:.{digits}f}" for value in table[:, :, j].mean(axis=0))
                 words.append(f"{both} ({change.mean():+.{digits}f} +- {error:.{digits}f})")
-            print(f"{name:5s} {std:6.0f}  {'   '.join(words)}   {spent[0]:.0f}, {spent[1]:.0f} us a scan", flush=True)
+            print(f"{name:5s} {std:6.0f}  {'   '.join(words)}   {spent[0]:.0f}, {spent[1]:.0f} us per scan", flush=True)
 
 
 if __name__ == "__main__":

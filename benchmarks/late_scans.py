@@ -94,7 +94,7 @@ def table(name: str, runs: int, delay: float, window: float) -> Iterator[str]:
     """The lines of the table."""
     experiment = build_experiment(load_scenario(name))
     run(experiment, 0, 0.5, delay, window)  # compiles
-    yield "| late | put in place, OSPA, m | dropped, m | steps a scan | ms a scan | kB a second of window |"
+    yield "| late | put in place, OSPA, m | dropped, m | steps per scan | ms per scan | kB per second of window |"
     yield "| ---: | ---: | ---: | ---: | ---: | ---: |"
     tails = []
     for share in SHARES:

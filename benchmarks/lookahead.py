@@ -179,7 +179,7 @@ def gain(gains: Floats) -> str:
 
 def table(scene: str, rows: dict[str, Floats], against: str) -> Iterator[str]:
     """The lines of a scene's table, of scores (num_runs, 4) by strategy."""
-    names = ["OSPA (m)", *tail_header("m"), "GOSPA (m)", "CPU ms a decision"]
+    names = ["OSPA (m)", *tail_header("m"), "GOSPA (m)", "CPU ms per decision"]
     names += [f"OSPA gained on {against} (m)", "GOSPA gained (m)"]
     yield "| Strategy | " + " | ".join(names) + " |"
     yield "| --- |" + " ---: |" * len(names)

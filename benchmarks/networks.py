@@ -7,7 +7,7 @@ Runs each campaign, in a folder that is kept (`--out`), and goes on with one tha
 table for each of its settings. Runs are paired: at the same number every rule meets the same truth and the same
 scans. OSPA and its parts are means over scans and runs, with one standard error over the runs; "N bias" is the number
 of estimates minus that of targets; "tracked" the share of the targets seen by some sensor that have an estimate;
-times are wall time of filters and fusion, all sensors together, in a process of one thread; "kB a scan" what all
+times are wall time of filters and fusion, all sensors together, in a process of one thread; "kB per scan" what all
 sensors together send, in units of 1000 bytes, numbers of 8 bytes uncompressed.
 """
 
@@ -35,7 +35,7 @@ def table(results: CampaignResults, group: GroupComparison) -> Iterator[str]:
     first = group.cells[0].name
     shares = [name for name in results.metrics(first, results.finished(first)[0]).own if name == TRACKED]
     names = ["Rule", named_in("OSPA", comparison.unit), "Localisation", "Cardinality", "N bias"]
-    names += [*(["tracked"] * len(shares)), "ms a scan", "kB a scan"]
+    names += [*(["tracked"] * len(shares)), "ms per scan", "kB per scan"]
     yield "| " + " | ".join(names) + " |"
     yield "| --- |" + " ---: |" * (len(names) - 1)
     for label, cell in zip(group.labels, group.cells, strict=True):

@@ -71,7 +71,7 @@ def compare(name: str, built_in: Filter, user_made: Filter, scans: list[np.ndarr
     ratios = seconds[:, 0] / seconds[:, 1]
     first, second = 1e3 * np.median(seconds, axis=0) / len(scans)
     print(
-        f"{name:<22} built-in {first:7.3f} ms a scan, user-made {second:7.3f} ms; "
+        f"{name:<22} built-in {first:7.3f} ms per scan, user-made {second:7.3f} ms; "
         f"ratio {np.median(ratios):.3f} ({ratios.min():.3f} to {ratios.max():.3f})"
     )
     return float(np.median(ratios))

@@ -98,7 +98,7 @@ def main() -> None:
     parser.add_argument("--redraws", type=int, default=0, metavar="N", help="see the targets of each file anew N times")
     options = parser.parse_args()
     families = [options.family] if options.family else list(FAMILIES)
-    rows = [["files", "family", "filter", "OSPA m (sd)", "each file", "ms a scan", "toolboxes"]]
+    rows = [["files", "family", "filter", "OSPA m (sd)", "each file", "ms per scan", "toolboxes"]]
     for source, folder in recorded.sources().items():
         for family in families:
             if recorded.seeds(family, folder):

@@ -191,7 +191,7 @@ def calibration_table(folder: Path) -> Iterator[str]:
         own, probability = truth[name], found["detection"]["probability"]
         rows.append(("detection", TOLD_PROBABILITY, own.detection.model_dump()["probability"], probability))
         rows.append(
-            ("false measurements a scan", TOLD_RATE, own.clutter.model_dump()["rate"], found["clutter"]["rate"])
+            ("false measurements per scan", TOLD_RATE, own.clutter.model_dump()["rate"], found["clutter"]["rate"])
         )
         for words, *numbers in rows:
             yield f"| {name} | {words} | " + " | ".join(f"{number:.3g}" for number in numbers) + " |"

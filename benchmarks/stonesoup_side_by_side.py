@@ -181,7 +181,7 @@ def rows(options: argparse.Namespace) -> Iterator[str]:
         "OSPA at the time (m)",
         *tail_header("m"),
         "less than GNN (m)",
-        "CPU, ms a scan",
+        "CPU, ms per scan",
     ]
     yield "| tracker | " + " | ".join(names) + " |"
     yield "| --- |" + " ---: |" * len(names)

@@ -49,7 +49,7 @@ def main() -> None:
     seeds = recorded.seeds(options.family, folder)
     original = recorded.load(options.family, seeds[0], folder)
     draws = [recorded.redraw(original, rng=np.random.default_rng(draw)) for draw in range(options.draws)]
-    print(f"{'hypotheses kept':28s}  OSPA m          worst  ms a scan")
+    print(f"{'hypotheses kept':28s}  OSPA m          worst  ms per scan")
     for name, (kind, parts) in ROWS.items():
         ospas, seconds = [], []
         for recording in draws:
