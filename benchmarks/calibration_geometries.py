@@ -4,7 +4,7 @@
     python benchmarks/calibration_geometries.py --write docs/evidence/calibration.md
 
 Two or three radars in five arrangements see four to six ships of up to 8 m/s for five minutes. They have biases of up
-to 100 m and 1.5 degrees, and noise, detection and clutter are told wrongly. Each redraw is per recording of its own:
+to 100 m and 1.5 degrees, and noise, detection and clutter are told wrongly. Each redraw is a separate recording:
 other ships, noise, clutter. For each arrangement prints how many searches converged, how many of their intervals of
 95 % cover the truth, and those of biases alone. A search that did not converge has no intervals. Equal arguments print
 equal tables.

@@ -169,7 +169,8 @@ def _ospa(estimate: Estimate, states: np.ndarray) -> float:
 def table(rows: Sequence[Row]) -> str:
     """As Markdown."""
     lines = [
-        "| filter | targets | ms per scan | µs per target and scan | with births, ms | OSPA, m | cardinality error | memory, MB |",
+        "| filter | targets | ms per scan | µs per target and scan | with births, ms | OSPA, m | cardinality error |"
+        " memory, MB |",
         "|---|---:|---:|---:|---:|---:|---:|---:|",
     ]
     lines += [
