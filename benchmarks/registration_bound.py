@@ -66,7 +66,7 @@ def bound(scene: str, seed: int, seconds: float, sigma: float) -> Floats:
 
 def table(redraws: int, seconds: float) -> Iterator[str]:
     """The lines of the table."""
-    yield "| bias | ships: straight | as told | aircraft: straight | as told |"
+    yield "| bias | ships: straight | with process noise | aircraft: straight | with process noise |"
     yield "| --- | ---: | ---: | ---: | ---: |"
     columns = []
     for scene in SCENES:

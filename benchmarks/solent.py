@@ -125,7 +125,7 @@ def write_scene(data: Data, beside: Path, folder: Path, runs: int) -> None:
         "calibrated": [
             own | {part: each[part] for part in PARTS} for own, each in zip(data["sensors"], found, strict=True)
         ],
-        "as told": told(data),
+        "as assumed": told(data),
     }
     scene = {**data, "name": "solent", "sensors": in_truth(data, sensors["calibrated"])}
     scene["ospa"] = {**data["ospa"], "from_step": 1 + round(FROM_TIME / data["time"]["step_period"])}
@@ -170,7 +170,7 @@ def picture(folder: Path) -> None:
     """The same half hour with what was told of the radars and with what was found."""
     results = open_results(folder / "biases-results")
     cells = {str(cell.settings["variant"]): cell.name for cell in results.campaign.cells}
-    records = [results.record(cells[name], 0) for name in ("as told", "calibrated")]
+    records = [results.record(cells[name], 0) for name in ("as assumed", "calibrated")]
     scene = scene_of(load_scenario(folder / "scene.yaml"), "jdm")
     figure = tracks_figure(*records, titles=["biases unknown", "calibrated by its own scans"], scene=scene)
     save_figure(figure, folder / "solent", formats=("png",))
@@ -180,7 +180,7 @@ def calibration_table(folder: Path) -> Iterator[str]:
     """What was found of the radars, beside what is true."""
     sensors = read_yaml((folder / "calibrated.yaml").read_text("utf-8"), "calibrated.yaml").data["sensors"]
     truth = {own.name: own for own in load_scenario("solent-patrol").model.sensors}
-    yield "| radar | parameter | told | truth | found |"
+    yield "| radar | parameter | assumed | truth | estimate |"
     yield "| --- | --- | ---: | ---: | ---: |"
     for found in sensors:
         name, rows = found["name"], list[tuple[str, float, float, float]]()
@@ -221,7 +221,7 @@ def peer_table(folder: Path, python: str, runs: int) -> Iterator[str]:
     for number in results.finished(cell.name)[:runs]:
         record = results.record(cell.name, number)
         spent = sum(record.timings[stage].sum() for stage in ("filter", "fusion"))
-        scores.setdefault("Vedette, with what is late", []).append((counted(record, record.estimates, scenario), spent))
+        scores.setdefault("Vedette, with late scans", []).append((counted(record, record.estimates, scenario), spent))
         write_peer_scans(folder / "peer-scans.npz", record, scans_of(record, experiment), experiment)
         subprocess.run([python, str(PEER), "peer-scans.npz", "peer-found.npz"], cwd=folder, check=True)
         with np.load(folder / "peer-found.npz") as found:
