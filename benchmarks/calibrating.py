@@ -164,7 +164,7 @@ def redraw(
 
 def table(redraws: list[Redraw], biases: ByRadar = BIASES) -> Iterator[str]:
     """The lines of the tables."""
-    yield "| parameter | truth | mean estimate | root mean square error | interval std (mean) | largest error | covered |"
+    yield "| parameter | truth | mean estimate | root mean square error | interval std | largest error | covered |"
     yield "| --- | ---: | ---: | ---: | ---: | ---: | ---: |"
     total, by_redraw = [0, 0], np.zeros((2, len(redraws)))
     for i, first in enumerate(redraws[0].calibration.estimates):

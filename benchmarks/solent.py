@@ -201,7 +201,7 @@ def table_of(folder: Path, name: str) -> Iterator[str]:
     """Error, and share of the ships in sight that are tracked, of each cell of a campaign, and against the first."""
     [group] = open_results(folder / f"{name}-results").comparisons()
     comparison, [first, *_] = group.comparison, group.labels
-    yield f"| {'of the radars' if name == 'biases' else 'strategy'} | OSPA (m) | more (m) | in sight and tracked |"
+    yield f"| {'radars' if name == 'biases' else 'strategy'} | OSPA (m) | more (m) | in sight and tracked |"
     yield "| --- | ---: | ---: | ---: |"
     for label in group.labels:
         total, tracked = comparison.summary(label), comparison.summary(label, "tracked_share")
