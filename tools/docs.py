@@ -1,7 +1,7 @@
-"""Make the site of the documentation in build/site/, from the pages of docs/ and from tables made of the source.
+"""Build the site of the documentation in build/site/, from the pages of docs/ and tables generated from the source.
 
-usage: docs.py                        make it; any fault is an error
-       docs.py serve [PORT] [--open]  show it on this machine, made again when a page changes, until Ctrl-C
+usage: docs.py                        build it; any fault is an error
+       docs.py serve [PORT] [--open]  serve it on this machine, rebuilt when a page changes, until Ctrl-C
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ PORT = 8000
 
 
 class Page(HTMLParser):
-    """What a built page names, and what it asks for."""
+    """The anchors, links and loaded files of a built page."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -78,7 +78,7 @@ def changelog(text: str) -> str:
 
 
 def build(root: Path) -> list[str]:
-    """Make the site; returns its faults."""
+    """Build the site and return its faults."""
     pages = lay_out(root)
     missing = FieldPages(root / "docs").faults() if (root / "docs" / "fields").is_dir() else []
     command = [sys.executable, "-m", "zensical", "build", "--strict", "--clean"]
@@ -91,13 +91,13 @@ def build(root: Path) -> list[str]:
 
 
 def _environment() -> dict[str, str]:
-    """In which Markdown finds `formulas`."""
+    """Return an environment in which Markdown finds the module `formulas`."""
     paths = [str(Path(__file__).parent), *filter(None, [os.environ.get("PYTHONPATH")])]
     return {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
 
 
 def unlisted(root: Path, pages: list[str]) -> list[str]:
-    """Pages that the navigation leaves out."""
+    """Return a message for each page that is missing in the navigation."""
     from ruamel.yaml import YAML
 
     listed = set(_leaves(YAML(typ="safe").load(root / "mkdocs.yml")["nav"]))
@@ -113,7 +113,7 @@ def _leaves(entry: Any) -> Iterator[str]:
 
 
 def faults(site: Path) -> list[str]:
-    """What of a built site leads nowhere, or would be fetched from elsewhere."""
+    """Return a message for each broken link, and each file that a browser would download."""
     pages = {path: Page(path.read_text("utf-8")) for path in sorted(site.rglob("*.html")) if path.name != "404.html"}
     found = []
     for path, page in pages.items():
@@ -133,7 +133,7 @@ def faults(site: Path) -> list[str]:
 
 
 def serve(root: Path, port: int, *, show: bool) -> None:
-    """Show the site at an address of this machine until Ctrl-C, and lay its pages out again when one is changed."""
+    """Serve the site at an address of this machine until Ctrl-C, and copy pages again when they change."""
     lay_out(root)
     address = f"127.0.0.1:{free_port(port)}"
     command = [sys.executable, "-m", "zensical", "serve", "--dev-addr", address, *(["--open"] if show else [])]
@@ -150,7 +150,7 @@ def serve(root: Path, port: int, *, show: bool) -> None:
 
 
 def free_port(wanted: int) -> int:
-    """The port wanted, or another where something listens there already."""
+    """Return the port, or another one if it is in use."""
     with socket.socket() as trial:
         taken = trial.connect_ex(("127.0.0.1", wanted)) == 0
     with socket.socket() as trial:
@@ -159,7 +159,7 @@ def free_port(wanted: int) -> int:
 
 
 def main(arguments: list[str]) -> int:
-    """Make or serve the site; returns the exit status."""
+    """Build or serve the site; return the exit status."""
     if arguments[:1] == ["serve"]:
         ports = [int(one) for one in arguments[1:] if one != "--open"]
         serve(ROOT, ports[0] if ports else PORT, show="--open" in arguments)

@@ -1,8 +1,8 @@
-"""Tables of the fields of scenario files, for the pages of docs/fields/ that ask for them.
+"""Tables of the fields of scenario files, for the pages of docs/fields/.
 
-A page has a mark such as `<!-- fields: motion survival ScanTimes -->`. It stands for the sections that may stand in
-these fields (`motion`, `sensors.noise`), and those of these names; `Scenario` is the file itself. In place of
-`<!-- every section -->` comes an index.
+A mark such as `<!-- fields: motion survival ScanTimes -->` is replaced by tables of the sections that are allowed in
+these fields (`motion`, `sensors.noise`) or have these names; `Scenario` is the file itself.
+`<!-- every section -->` is replaced by an index.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ INDEX_MARK = "<!-- every section -->"
 
 
 class FieldPages:
-    """Which page has which section."""
+    """The sections on each page."""
 
     def __init__(self, docs: Path) -> None:
         self.pages = {
@@ -31,7 +31,7 @@ class FieldPages:
         self._home = {name: page for page, names in self.pages.items() for name in names}
 
     def faults(self) -> list[str]:
-        """Sections that no page has, or more than one."""
+        """Return messages on sections that no page has, or several pages have."""
         every = [name for names in self.pages.values() for name in names]
         twice = [name for name in dict.fromkeys(every) if every.count(name) > 1]
         return [
@@ -40,7 +40,7 @@ class FieldPages:
         ]
 
     def fill(self, markdown: str) -> str:
-        """A page with tables in place of its marks."""
+        """Return a page with its marks replaced by tables."""
         markdown = MARK.sub(lambda mark: "\n\n".join(map(self._section, expand(mark[1]))), markdown)
         return markdown.replace(INDEX_MARK, self._index()) if INDEX_MARK in markdown else markdown
 
@@ -55,7 +55,7 @@ class FieldPages:
 
     def _index(self) -> str:
         rows = [f"| {self._link(name)} | {_cell(sections()[name].get('description', ''))} |" for name in self._home]
-        return "\n".join(["| section | what it is |", "| --- | --- |", *rows])
+        return "\n".join(["| section | meaning |", "| --- | --- |", *rows])
 
     def _link(self, name: str) -> str:
         return f"[{title(name)}]({self._home[name]}#{name.lower()})" if name in self._home else title(name)
@@ -80,7 +80,7 @@ class FieldPages:
 
 @cache
 def sections() -> dict[str, Any]:
-    """Every section of a scenario file that has fields, from its JSON schema."""
+    """Return every section of a scenario file with fields, from the JSON schema."""
     from vedette.scenarios import json_schema
 
     schema = json_schema()
@@ -88,12 +88,12 @@ def sections() -> dict[str, Any]:
 
 
 def expand(mark: str) -> list[str]:
-    """Names of the sections that a mark stands for."""
+    """Return the names of the sections of a mark."""
     return [name for word in mark.split() for name in ([word] if word in sections() else standing_in(word))]
 
 
 def standing_in(path: str) -> list[str]:
-    """Names of the sections that may stand in a field, given by its path from the top of a file."""
+    """Return the names of the sections that are allowed in a field, given by its path from the top of a file."""
     names = ["Scenario"]
     for part in path.split("."):
         holders = [sections()[name]["properties"] for name in names]
@@ -104,7 +104,7 @@ def standing_in(path: str) -> list[str]:
 
 
 def title(name: str) -> str:
-    """What a section is called in a file: its kind, where it has one of its own."""
+    """Return the name of a section in a file: its kind, if it has one."""
     kind = sections()[name]["properties"].get("kind", {})
     return f"`{kind['const']}`" if "const" in kind else {"Scenario": "The file"}.get(name, name.removesuffix("Section"))
 
@@ -122,7 +122,7 @@ def _named(details: Any) -> Iterator[str]:
 
 def _default(details: Mapping[str, Any]) -> str:
     default = json.dumps(details.get("default"))
-    return f"`{default}`" if len(default) <= 60 else "as its section says"
+    return f"`{default}`" if len(default) <= 60 else "see its section"
 
 
 def _cell(text: str) -> str:

@@ -52,12 +52,12 @@ def with_links(markdown: str, package: str) -> str:
 
 
 def model_functions() -> str:
-    """A row for each kind of compiled function: what it is called with, what it gives, and what takes it."""
+    """Return a table of the kinds of compiled functions, with arguments, result and the class that takes them."""
     from vedette.kernels.base.compile import SIGNATURES
     from vedette.models import functions
 
     results = dict(re.findall(r"^\| `(\w+)` \| [^|]+ \| ([^|]+) \|$", functions.__doc__ or "", re.MULTILINE))
-    rows = ["| kind | function of | result | stands in |", "| --- | --- | --- | --- |"]
+    rows = ["| kind | function of | result | used in |", "| --- | --- | --- | --- |"]
     for kind, place in TAKEN_BY.items():
         room, taker, attribute = place.split(".")
         named = inspect.getattr_static(getattr(importlib.import_module(f"vedette.{room}"), taker), attribute)
@@ -70,7 +70,7 @@ def model_functions() -> str:
 
 
 def protocols() -> str:
-    """Each public protocol: what it is, and its members with their types."""
+    """Return each public protocol with a summary, and its members with their types."""
     parts = []
     for room in ROOMS:
         module = importlib.import_module(f"vedette.{room}")
@@ -85,12 +85,12 @@ def protocols() -> str:
 
 
 def is_protocol(one: Any) -> bool:
-    """Whether this is a protocol."""
+    """Return True if this is a protocol."""
     return isinstance(one, type) and bool(getattr(one, "_is_protocol", False))
 
 
 def members(protocol: type) -> list[str]:
-    """Lines of a protocol's attributes and methods, those it inherits first."""
+    """Return the lines of a protocol's attributes and methods, inherited ones first."""
     found: dict[str, str] = {}
     for base in reversed(protocol.__mro__):
         if not is_protocol(base):
@@ -105,7 +105,7 @@ def members(protocol: type) -> list[str]:
 
 
 def _method(name: str, function: FunctionType) -> str:
-    """`def name(...) -> ...: ...`, with an argument a line where it is long."""
+    """Return `def name(...) -> ...: ...`, with one argument per line if it is long."""
     line = f"def {name}{inspect.signature(function)}: ...".replace("'", "")
     if len(line) <= 88:
         return line
