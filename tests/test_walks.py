@@ -82,7 +82,7 @@ def test_every_file_on_the_way_is_in_the_lists(walks: dict[str, Counter[str]]) -
 @pytest.mark.parametrize(
     ("begins", "ends", "most"),
     [
-        ("A scan of `paper-a`", "Inside the compiled", 15),
+        ("A scan of `paper-a`", "[Steps and workspaces]", 15),
         ("When a decision by the expected loss", "Other decisions", 25),
     ],
 )
