@@ -147,10 +147,10 @@ def redraw(
     begun, passes = time.process_time(), [0]
     scenario = scenario_of_recording(folder / "told.yaml", scans, speed=scene.speed).scenario
 
-    def watch() -> None:
+    def progress() -> None:
         passes[0] += 1
 
-    calibration = calibrate(problem_of(scenario, position=position), watch)
+    calibration = calibrate(problem_of(scenario, position=position), progress)
     spent = time.process_time() - begun
     text = calibrated_text(scenario, folder / "told.yaml", calibration, folder)
     (folder / "found.yaml").write_text(text, "utf-8")

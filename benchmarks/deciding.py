@@ -36,7 +36,7 @@ from timed_planner import Timed
 
 from vedette.evaluation.metrics import match_run, ospa_of_run
 from vedette.evaluation.statistics import paired_difference, summarise
-from vedette.evaluation.tails import tail, tail_header
+from vedette.evaluation.tail_summary import summarise_tail, tail_header
 from vedette.internal.processes import end_with_parent
 from vedette.kernels.base.types import Floats
 from vedette.scenarios import Scenario, with_fields
@@ -189,7 +189,7 @@ def table(runs: Runs) -> Iterator[str]:
             star = "*" if clear[name] else ""
             cells += [f"{more.mean:+.2f} ± {more.standard_error:.2f}{star}", f"{np.mean(differences[name] > 0):.0%}"]
         cells += [
-            *tail(scores[:, 0], scores[:, 4]).cells(),
+            *summarise_tail(scores[:, 0], scores[:, 4]).cells(),
             f"{scores[:, 1].mean():.2f}",
             place(runs, name),
             shortfall(runs, name),

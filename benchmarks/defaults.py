@@ -36,7 +36,7 @@ from scenes import Scene, all_scenes
 
 from vedette.errors import VedetteError
 from vedette.evaluation import Summary, match_run, measure_run, ospa_of_run, summarise
-from vedette.evaluation.tails import tail, tail_header
+from vedette.evaluation.tail_summary import summarise_tail, tail_header
 from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.simulation import Experiment, RunRecord, simulate
@@ -142,7 +142,7 @@ def table(scene: str, rows: Sequence[Row]) -> Iterator[str]:
         rest = (np.mean(row.ospa2), 100.0 * np.mean(row.near), np.mean(row.switches), np.median(row.milliseconds))
         yield (
             f"| {row.filter} | {len(row.ospa)} | {ospa.mean:.2f} ± {ospa.standard_error:.2f} | "
-            + " | ".join(tail(row.ospa, row.ends_lost).cells())
+            + " | ".join(summarise_tail(row.ospa, row.ends_lost).cells())
             + f" | {more.mean:+.2f} ± {more.standard_error:.2f} | {ratios[row.filter]} | "
             + " | ".join(f"{value:.2f}" for value in rest)
             + " |"

@@ -34,8 +34,8 @@ from pages import write_between
 from vedette import models
 from vedette.densities import Estimate, best_estimate, track_histories
 from vedette.evaluation import match_run
-from vedette.evaluation.joining import PROB_HIDDEN, THRESHOLD, Join, joins_of, track_names
-from vedette.evaluation.watch import Watch
+from vedette.evaluation.joining import PROB_HIDDEN, THRESHOLD, Join, find_joins, track_names
+from vedette.evaluation.observation_history import ObservationHistory
 from vedette.filters import FactoredGlmbFilter
 from vedette.kernels.base.types import Bools, Floats
 from vedette.simulation.truth import Truth
@@ -198,11 +198,11 @@ def compared(kind: str, gap: int, numbers: Sequence[int], hidden: float, thresho
         given, rng = scene(number, kind, gap)
         estimates = tracked(given, rng)
         poses, scanned = np.tile(POSE, (NUM_SCANS, 1, 1)), np.ones((NUM_SCANS, 1), np.bool_)
-        watch = Watch(given.targets, (given.sensor,), given.times, poses, scanned, hidden)
+        observations = ObservationHistory(given.targets, (given.sensor,), given.times, poses, scanned, hidden)
         ways: dict[str, tuple[Join, ...]] = {
             "no": (),
             "nearest": nearest(estimates, given.times),
-            "joined": joins_of(estimates, watch, threshold=threshold),
+            "joined": find_joins(estimates, observations, threshold=threshold),
         }
         for name, joins in ways.items():
             keeps, errors, number_of_joins = outcome(given, estimates, joins, gap)

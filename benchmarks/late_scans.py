@@ -25,7 +25,7 @@ import numpy as np
 from pages import write_between
 
 from vedette.evaluation import match_run, ospa_of_run
-from vedette.evaluation.tails import tail, tail_header
+from vedette.evaluation.tail_summary import summarise_tail, tail_header
 from vedette.scenarios import load_scenario
 from vedette.scenarios.build import build_experiment
 from vedette.simulation.experiment import Experiment
@@ -116,7 +116,7 @@ def table(name: str, runs: int, delay: float, window: float) -> Iterator[str]:
 
 def tail_cells(outcomes: list[Outcome]) -> tuple[str, str, str]:
     """Median, worst run, and share of runs that end with a lost target."""
-    return tail([outcome.ospa for outcome in outcomes], [outcome.ends_lost for outcome in outcomes]).cells()
+    return summarise_tail([outcome.ospa for outcome in outcomes], [outcome.ends_lost for outcome in outcomes]).cells()
 
 
 def with_error(outcomes: list[Outcome]) -> str:

@@ -39,7 +39,7 @@ from timed_planner import Timed
 
 from vedette.evaluation.metrics import ospa_of_run
 from vedette.evaluation.runs import measure_run
-from vedette.evaluation.tails import tail, tail_header
+from vedette.evaluation.tail_summary import summarise_tail, tail_header
 from vedette.internal.processes import end_with_parent
 from vedette.kernels.base.types import Floats
 from vedette.scenarios import Scenario, load_scenario, with_fields
@@ -185,7 +185,7 @@ def table(scene: str, rows: dict[str, Floats], against: str) -> Iterator[str]:
     yield "| --- |" + " ---: |" * len(names)
     single = rows[against]
     for name, scores in rows.items():
-        own = [with_error(scores[:, 0]), *tail(scores[:, 0], scores[:, 3]).cells()]
+        own = [with_error(scores[:, 0]), *summarise_tail(scores[:, 0], scores[:, 3]).cells()]
         own += [with_error(scores[:, 1]), f"{1e3 * np.median(scores[:, 2]):.0f}"]
         gained = ["", ""] if scores is single else [gain(single[:, i] - scores[:, i]) for i in (0, 1)]
         yield "| " + " | ".join([name, *own, *gained]) + " |"

@@ -21,7 +21,7 @@ import numpy as np
 
 from vedette.campaigns import CampaignResults, load_spec
 from vedette.campaigns.results import GroupComparison
-from vedette.evaluation.tails import tails
+from vedette.evaluation.tail_summary import tail_sentence
 from vedette.internal.text import named_in
 
 CAMPAIGNS = Path(__file__).parents[1] / "examples/campaigns"
@@ -33,7 +33,7 @@ def table(results: CampaignResults, group: GroupComparison) -> Iterator[str]:
     """The lines of the table of one setting."""
     comparison = group.comparison
     first = group.cells[0].name
-    shares = [name for name in results.metrics(first, results.finished(first)[0]).own if name == TRACKED]
+    shares = [name for name in results.metrics(first, results.finished(first)[0]).custom if name == TRACKED]
     names = ["Rule", named_in("OSPA", comparison.unit), "Localisation", "Cardinality", "N bias"]
     names += [*(["tracked"] * len(shares)), "ms per scan", "kB per scan"]
     yield "| " + " | ".join(names) + " |"
@@ -47,7 +47,7 @@ def table(results: CampaignResults, group: GroupComparison) -> Iterator[str]:
         costs = (f"{scan_ms(results, cell.name):.1f}", f"{scan_kilobytes(results, cell.name):.1f}")
         yield "| " + " | ".join([label, error, *parts, bias, *tracked, *costs]) + " |"
     yield ""
-    yield f"{comparison.num_runs} paired runs of {comparison.scenario}. {tails(comparison)}"
+    yield f"{comparison.num_runs} paired runs of {comparison.scenario}. {tail_sentence(comparison)}"
 
 
 def scan_ms(results: CampaignResults, cell: str) -> float:

@@ -31,10 +31,10 @@ from pages import write_between
 
 from vedette.campaigns import open_results
 from vedette.evaluation import ospa
-from vedette.evaluation.figures import save_figure, scene_of, tracks_figure
+from vedette.evaluation.figures import build_scene, save_figure, tracks_figure
 from vedette.evaluation.runs import run_scenario
 from vedette.evaluation.statistics import summarise
-from vedette.evaluation.tails import tails
+from vedette.evaluation.tail_summary import tail_sentence
 from vedette.evaluation.track_table import table_of_run, write_tracks
 from vedette.scenarios import Scenario, load_scenario
 from vedette.scenarios.build import build_experiment
@@ -171,7 +171,7 @@ def picture(folder: Path) -> None:
     results = open_results(folder / "biases-results")
     cells = {str(cell.settings["variant"]): cell.name for cell in results.campaign.cells}
     records = [results.record(cells[name], 0) for name in ("as assumed", "calibrated")]
-    scene = scene_of(load_scenario(folder / "scene.yaml"), "jdm")
+    scene = build_scene(load_scenario(folder / "scene.yaml"), "jdm")
     figure = tracks_figure(*records, titles=["biases unknown", "calibrated by its own scans"], scene=scene)
     save_figure(figure, folder / "solent", formats=("png",))
 
@@ -210,7 +210,7 @@ def table_of(folder: Path, name: str) -> Iterator[str]:
         cells += ["" if more is None else f"{more.mean:+.2f} ± {more.standard_error:.2f}", f"{tracked.mean:.1%}"]
         yield "| " + " | ".join(cells) + " |"
     yield ""
-    yield f"{comparison.num_runs} paired runs. {tails(comparison)}"
+    yield f"{comparison.num_runs} paired runs. {tail_sentence(comparison)}"
 
 
 def peer_table(folder: Path, python: str, runs: int) -> Iterator[str]:

@@ -40,7 +40,7 @@ from stonesoup.types.track import Track
 from stonesoup.updater.kalman import ExtendedKalmanUpdater
 
 from vedette.evaluation import gospa
-from vedette.evaluation.tails import tail, tail_header
+from vedette.evaluation.tail_summary import summarise_tail, tail_header
 from vedette.stonesoup import LabelledTracker, convert
 
 START = datetime.datetime(2026, 1, 1)
@@ -188,7 +188,7 @@ def rows(options: argparse.Namespace) -> Iterator[str]:
     base = np.array(found["Stone Soup, GNN"])[:, 1]
     for name, each in found.items():
         whole, now, lost, seconds = np.array(each).T
-        cells = [_with_error(whole), _with_error(now), *tail(now, lost).cells(), _with_error(base - now)]
+        cells = [_with_error(whole), _with_error(now), *summarise_tail(now, lost).cells(), _with_error(base - now)]
         yield f"| {name} | {' | '.join(cells)} | {1e3 * seconds.mean() / options.steps:.2f} |"
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vedette.evaluation import measure_run, own_metrics, run_scenario
+from vedette.evaluation import custom_metrics, measure_run, run_scenario
 from vedette.scenarios import load_scenario
 from vedette.simulation import RunRecord
 
@@ -22,16 +22,16 @@ def main() -> dict[str, RunRecord]:
         planner: run_scenario(SCENARIO, planner, seed=1, num_threads=1) for planner in ("still", "random", "jdm")
     }
     for planner, record in records.items():
-        tracked = measure_run(record, SCENARIO, own_metrics(SCENARIO)).own["tracked_of_all"]
+        tracked = measure_run(record, SCENARIO, custom_metrics(SCENARIO)).custom["tracked_of_all"]
         print(f"{planner:7} OSPA {record.ospa[:, 0].mean():5.1f} m, of all targets tracked {np.nanmean(tracked):4.0%}")
     return records
 
 
 def draw(records: dict[str, RunRecord]):
-    from vedette.evaluation.figures import scene_of, tracks_figure
+    from vedette.evaluation.figures import build_scene, tracks_figure
 
     shown = [records["still"], records["jdm"]]
-    return tracks_figure(*shown, titles=["Never turned", "Turned jointly"], scene=scene_of(SCENARIO, "jdm"))
+    return tracks_figure(*shown, titles=["Never turned", "Turned jointly"], scene=build_scene(SCENARIO, "jdm"))
 
 
 if __name__ == "__main__":

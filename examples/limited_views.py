@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vedette.evaluation import measure_run, own_metrics, run_scenario
+from vedette.evaluation import custom_metrics, measure_run, run_scenario
 from vedette.scenarios import load_scenario, with_fields
 from vedette.simulation import RunRecord
 
@@ -27,18 +27,18 @@ def main() -> dict[str, RunRecord]:
     for name, fusion in FUSIONS.items():
         scenario = with_fields(SCENARIO, {"fusion": fusion})
         record = records[name] = run_scenario(scenario, "still", seed=1)
-        tracked = measure_run(record, scenario, own_metrics(scenario)).own["tracked_share"]
+        tracked = measure_run(record, scenario, custom_metrics(scenario)).custom["tracked_share"]
         error = record.ospa[:, 0].mean()
         print(f"{name:18} OSPA {error:5.1f} m, of the targets in sight tracked {np.nanmean(tracked):4.0%}")
     return records
 
 
 def draw(records: dict[str, RunRecord]):
-    from vedette.evaluation.figures import scene_of, tracks_figure
+    from vedette.evaluation.figures import build_scene, tracks_figure
 
     shown = list(FUSIONS)[:2]
     titles = [f"Covariance intersection, {name}" for name in shown]
-    return tracks_figure(*(records[name] for name in shown), titles=titles, scene=scene_of(SCENARIO, "still"))
+    return tracks_figure(*(records[name] for name in shown), titles=titles, scene=build_scene(SCENARIO, "still"))
 
 
 if __name__ == "__main__":

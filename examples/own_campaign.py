@@ -69,7 +69,7 @@ def main() -> Comparison:
         results = open_results(folder)
         near: dict[str, list[float]] = {planner: [] for planner in PLANNERS}
         for run in results.runs():
-            near[run.record.planner].append(run.metrics.own["nearest_sensor_m"][10:].mean())
+            near[run.record.planner].append(run.metrics.custom["nearest_sensor_m"][10:].mean())
         (group,) = results.comparisons()
     comparison = group.comparison
     for planner in PLANNERS:

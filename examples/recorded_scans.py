@@ -28,10 +28,10 @@ def main() -> tuple[OfRecording, RunRecord]:
 
 
 def draw(result: tuple[OfRecording, RunRecord]):
-    from vedette.evaluation.figures import scene_of, tracks_figure
+    from vedette.evaluation.figures import build_scene, tracks_figure
 
     found, record = result
-    return tracks_figure(record, titles=["Recorded scans"], scene=scene_of(found.scenario, record.planner))
+    return tracks_figure(record, titles=["Recorded scans"], scene=build_scene(found.scenario, record.planner))
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from fuzz.objects import Made, everything, sensor
 from vedette import models
 from vedette.control import planning_limits
 from vedette.errors import InputError
-from vedette.evaluation import TimeToTrack, TrackedShare
+from vedette.evaluation import TimeToTrack, TrackedFraction
 from vedette.filters import Limits
 from vedette.recorded import Cleaning
 from vedette.scenarios import GeneratedCrowd
@@ -27,7 +27,7 @@ GOOD = everything() | {  # and what is made of files and settings
     "ScriptedTargets": Made(
         ScriptedTargets, {"motion": models.constant_velocity(5.0), "initial_states": np.ones((3, 4))}
     ),
-    "TrackedShare": Made(TrackedShare, {"sensors": (sensor(),) * 2, "cutoff": 2.0, "order": 1.0}),
+    "TrackedFraction": Made(TrackedFraction, {"sensors": (sensor(),) * 2, "cutoff": 2.0, "order": 1.0}),
     "TimeToTrack": Made(TimeToTrack, {"cutoff": 2.0, "order": 1.0}),
 }
 NAN, INF = math.nan, math.inf
@@ -131,9 +131,9 @@ REFUSED: list[Case] = [
     ("ScriptedTargets", {"start_times": [1.0, 2.0, 3.0], "end_times": [9.0, 9.0, 2.0]}, "ScriptedTargets.end_times"),
     *each("ScriptedTargets", "process_noise", [True], 3),
     *each("ScriptedTargets", "initial_stds", np.ones((2, 4)), -np.ones((3, 4))),
-    *each("TrackedShare", "cutoff", 0.0, INF),
-    *each("TrackedShare", "order", 0.5),
-    *each("TrackedShare", "min_detection", 1.5),
+    *each("TrackedFraction", "cutoff", 0.0, INF),
+    *each("TrackedFraction", "order", 0.5),
+    *each("TrackedFraction", "min_detection", 1.5),
     *each("TimeToTrack", "cutoff", 0.0, INF),
     *each("TimeToTrack", "from_step", 0),
     *each("HorizonPlanner", "depth", 0),

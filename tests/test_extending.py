@@ -44,7 +44,7 @@ def test_every_part_is_used_and_kept(folder: Path) -> None:
     runs = list(results.runs())
     assert {run.record.planner for run in runs} == {"jdm", "tree"}
     assert {run.cell.split("-")[-1] for run in runs} == {"average", "fading", "alone", "corrector"}
-    assert all(np.isfinite(run.metrics.own["nearest_sensor_m"]).all() for run in runs)
+    assert all(np.isfinite(run.metrics.custom["nearest_sensor_m"]).all() for run in runs)
     for run in runs:
         for decision in run.record.decisions:
             assert {own.columns for own in decision.plan.actions} == {("pointing_deg",)}

@@ -64,7 +64,7 @@ def run_killed(folder: Path, runs: str, count: str, every: str = "10") -> None:
         while True:
             child = os.fork()
             if child == 0:
-                run_campaign(campaign, folder / campaign.shard.folder, watch=_Killed(int(every)))
+                run_campaign(campaign, folder / campaign.shard.folder, progress=_Killed(int(every)))
                 os._exit(0)
             if os.waitpid(child, 0)[1] == 0:
                 break

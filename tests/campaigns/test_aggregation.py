@@ -19,8 +19,8 @@ from evaluation.synthetic import ACTIONS, make_record
 from vedette.campaigns import aggregation, open_results
 from vedette.errors import InputError, VedetteError
 from vedette.evaluation import ensembles
-from vedette.evaluation.ensembles import Ensemble, ensemble_of, joined
-from vedette.evaluation.health import added, health_sums
+from vedette.evaluation.ensembles import Ensemble, build_ensemble, concatenate_ensembles
+from vedette.evaluation.health import add_health_sums, health_sums
 from vedette.evaluation.rewards import RewardSums
 from vedette.platforms import Actions
 from vedette.simulation.records import Decision, RunRecord, RunSummary
@@ -95,7 +95,7 @@ def test_a_summary_is_the_same_from_the_record_and_from_its_bytes(folder: Path) 
     for each in fields(RunSummary):
         if each.name not in ("decisions", "health", "timings"):
             assert plain(np.asarray(getattr(read, each.name))) == plain(np.asarray(getattr(of_record, each.name)))
-    assert contents(ensemble_of([(read, metrics)])) == contents(ensemble_of([(of_record, run.metrics)]))
+    assert contents(build_ensemble([(read, metrics)])) == contents(build_ensemble([(of_record, run.metrics)]))
 
 
 @pytest.mark.usefixtures("small_parts")
@@ -143,15 +143,15 @@ def test_runs_of_other_scenarios_and_times_are_refused() -> None:
     later = replace(other[0], times=other[0].times + 1.0), None
     for wrong, message in ((elsewhere, "run 1 is of elsewhere"), (later, "same scan times in every run; run 1")):
         with pytest.raises(InputError, match=message):
-            ensemble_of([first, wrong])
+            build_ensemble([first, wrong])
         with pytest.raises(InputError, match=message):
-            joined([ensemble_of([first]), ensemble_of([wrong])])
+            concatenate_ensembles([build_ensemble([first]), build_ensemble([wrong])])
 
 
 def test_health_adds_up_whatever_the_parts() -> None:
     healths = [make_record("jdm", run).health for run in range(5)]
     healths[3].discarded_weight_bound[:] = np.nan
-    whole, parts = health_sums(healths), added([health_sums(healths[:3]), health_sums(healths[3:])])
+    whole, parts = health_sums(healths), add_health_sums([health_sums(healths[:3]), health_sums(healths[3:])])
     for mine, theirs in zip(whole, parts, strict=True):
         np.testing.assert_allclose(np.asarray(mine), np.asarray(theirs), rtol=1e-13)
     with pytest.raises(InputError, match="equally many sensors"):
@@ -171,10 +171,10 @@ def test_rewards_add_up_whatever_the_parts() -> None:
     gapped[:3] = np.nan
     tables = (replace(made[4].plan.tables[0], mean=gapped), made[4].plan.tables[1])
     made[4] = replace(made[4], plan=replace(made[4].plan, tables=tables))
-    whole = RewardSums.of(0, made).mean()
+    whole = RewardSums.from_decisions(0, made).mean()
     for cuts in ([3], [1, 2, 6]):
         few = np.split(np.array(made, object), cuts)
-        parts = RewardSums.added([RewardSums.of(0, list(part)) for part in few]).mean()
+        parts = RewardSums.combine([RewardSums.from_decisions(0, list(part)) for part in few]).mean()
         assert parts.num_runs == whole.num_runs == 7
         for mine, theirs in zip(parts.tables, whole.tables, strict=True):
             np.testing.assert_allclose(mine.mean, theirs.mean, rtol=1e-13)
@@ -184,16 +184,16 @@ def test_rewards_add_up_whatever_the_parts() -> None:
 
 def test_no_more_rewards_are_held_than_memory_has_room_for(monkeypatch: pytest.MonkeyPatch) -> None:
     summaries = [make_record("jdm", run).summary() for run in range(5)]
-    whole = ensemble_of((each, None) for each in summaries)
+    whole = build_ensemble((each, None) for each in summaries)
     monkeypatch.setattr(ensembles, "_MOST_REWARDS", 2 * 3 * 169)  # two runs of three decisions
     held: list[int] = []
 
     def noted(parts: Sequence[Ensemble]) -> Ensemble:
         held.extend(each.num_runs for each in parts)
-        return joined(parts)
+        return concatenate_ensembles(parts)
 
-    monkeypatch.setattr(ensembles, "joined", noted)
-    parts = ensemble_of((each, None) for each in summaries)
+    monkeypatch.setattr(ensembles, "concatenate_ensembles", noted)
+    parts = build_ensemble((each, None) for each in summaries)
     assert held == [2, 2, 1]
     np.testing.assert_array_equal(parts.ospa, whole.ospa)
     np.testing.assert_allclose(parts.rewards[1].mean().tables[0].mean, whole.rewards[1].mean().tables[0].mean)
@@ -202,14 +202,14 @@ def test_no_more_rewards_are_held_than_memory_has_room_for(monkeypatch: pytest.M
 def test_rewards_of_parts_are_over_turns_where_headings_differ() -> None:
     records = [make_record("idm", run) for run in range(3)]
     made = [turned(record, angle) for record, angle in zip(records, (0.0, 0.5, 1.1), strict=True)]
-    whole = RewardSums.of(0, made)
-    parts = RewardSums.added([RewardSums.of(0, [each]) for each in made])
+    whole = RewardSums.from_decisions(0, made)
+    parts = RewardSums.combine([RewardSums.from_decisions(0, [each]) for each in made])
     for found in (whole, parts):
         assert (found.is_absolute, found.is_relative) == (False, True)
         assert found.mean().actions[0].columns == ("turn_deg",)
-    other = RewardSums.of(0, [make_record("jdm", 1).decisions[0]])
+    other = RewardSums.from_decisions(0, [make_record("jdm", 1).decisions[0]])
     with pytest.raises(InputError, match="tables of one shape"):
-        RewardSums.added([whole, other]).mean()
-    bare = RewardSums.of(0, [make_record("random", 1).decisions[0]])
+        RewardSums.combine([whole, other]).mean()
+    bare = RewardSums.from_decisions(0, [make_record("random", 1).decisions[0]])
     with pytest.raises(InputError, match="with rewards at decision 0; got none"):
-        RewardSums.added([whole, bare]).mean()
+        RewardSums.combine([whole, bare]).mean()

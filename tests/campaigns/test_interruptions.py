@@ -206,7 +206,7 @@ def test_a_damaged_run_is_named_and_done_again_if_that_is_asked_for(tmp_path: Pa
     with pytest.raises(InputError, match=r"altered since: idm 1 \(have what is damaged redone"):
         run_campaign(small_campaign(runs=2), folder)
     told: list[str] = []
-    outcome = run_campaign(small_campaign(runs=2), folder, redo_damaged=True, watch=Notes(told))
+    outcome = run_campaign(small_campaign(runs=2), folder, redo_damaged=True, progress=Notes(told))
     assert (outcome.num_completed, told) == (1, ["damaged, and done again: idm 1"])
     assert contents(folder) == before
 
@@ -239,7 +239,7 @@ def test_runs_that_were_lost_are_done_again_and_that_is_said(tmp_path: Path, lef
     (folder / "campaign.sqlite").unlink()
     if left is not None:
         (folder / "campaign.sqlite").write_bytes(left)
-    assert run_campaign(small_campaign(runs=1), folder, watch=Notes(told)).num_completed == 2
+    assert run_campaign(small_campaign(runs=1), folder, progress=Notes(told)).num_completed == 2
     assert any("was not there, or empty: every run is done again" in text for text in told)
 
 

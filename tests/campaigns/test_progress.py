@@ -19,8 +19,8 @@ def lines_of(place: Path, monkeypatch: pytest.MonkeyPatch, **options: Any) -> li
     monkeypatch.setattr(engine, "perform", stub_perform)
     out = io.StringIO()
     campaign = stub_campaign(4)
-    with Progress(campaign, Console(file=out, width=200, **options)) as watch:
-        run_campaign(campaign, place / "results", watch=watch)
+    with Progress(campaign, Console(file=out, width=200, **options)) as progress:
+        run_campaign(campaign, place / "results", progress=progress)
     return out.getvalue().splitlines()
 
 

@@ -24,8 +24,8 @@ from vedette.campaigns.rows import row_of
 from vedette.campaigns.store import Store
 from vedette.cli import app
 from vedette.errors import InputError
-from vedette.evaluation.comparison import scored
-from vedette.evaluation.ensembles import ensemble_of
+from vedette.evaluation.comparison import compare_scored_scans
+from vedette.evaluation.ensembles import build_ensemble
 from vedette.simulation.serialization import encode_timings
 
 
@@ -92,8 +92,10 @@ def test_strategies_are_compared_over_the_runs_that_all_have(whole, campaign):
     assert group.labels == group.comparison.strategies == ("jdm", "random")
     assert [cell.name for cell in group.cells] == ["jdm-rate-5.0", "random-rate-5.0"]
     runs = {planner: [make_run(planner, run) for run in range(2)] for planner in ("jdm", "random")}
-    ensembles = {name: ensemble_of((record.summary(), metrics) for record, metrics in of) for name, of in runs.items()}
-    assert_same(group.comparison, scored(campaign.cells[0].scenario, ensembles))
+    ensembles = {
+        name: build_ensemble((record.summary(), metrics) for record, metrics in of) for name, of in runs.items()
+    }
+    assert_same(group.comparison, compare_scored_scans(campaign.cells[0].scenario, ensembles))
 
 
 def test_another_axis_than_the_planner_is_compared(tmp_path):

@@ -78,7 +78,7 @@ def test_an_interrupted_one_leaves_nothing(runs: Path, tmp_path: Path) -> None:
 
     record, scenario = saved_run(runs / "run")
     with pytest.raises(KeyboardInterrupt):
-        write_video(record, scenario, tmp_path / "run.gif", size=200, watch=interrupt)
+        write_video(record, scenario, tmp_path / "run.gif", size=200, progress=interrupt)
     assert list(tmp_path.iterdir()) == []
 
 

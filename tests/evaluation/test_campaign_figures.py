@@ -147,7 +147,7 @@ def test_the_title_over_equal_axes_lies_within_the_figure(shift: float) -> None:
     assert figure.axes[0].title.get_window_extent().y1 < figure.bbox.height
 
 
-def test_estimates_whose_labels_never_recur_are_not_told_apart_by_colour() -> None:
+def test_estimates_whose_labels_never_recur_have_one_colour() -> None:
     record = make_record()
     anew = tuple(
         replace(estimate, labels=np.c_[np.full(estimate.num_targets, scan), np.arange(estimate.num_targets)])

@@ -12,7 +12,7 @@ from scripts import load
 from vedette.errors import InputError
 from vedette.evaluation import Comparison, compare, decision_rows, holm, strategy_csv, strategy_markdown, strategy_rows
 from vedette.evaluation.tables import header, significance, strategy_latex
-from vedette.evaluation.tails import Tail, tail, tails
+from vedette.evaluation.tail_summary import TailSummary, summarise_tail, tail_sentence
 from vedette.simulation.records import RunRecord
 
 NUM_RUNS = 6
@@ -37,7 +37,7 @@ def test_means_are_taken_after_the_first_decision(comparison: Comparison, runs: 
     np.testing.assert_allclose(comparison.run_means("idm", "localisation"), expected)
 
 
-def test_another_time_to_count_from(runs: dict[str, list[RunRecord]]) -> None:
+def test_the_start_of_the_time_window_can_be_set(runs: dict[str, list[RunRecord]]) -> None:
     np.testing.assert_allclose(
         compare(runs, since=30.0).run_means("jdm"), [record.ospa[30:, 0].mean() for record in runs["jdm"]]
     )
@@ -53,7 +53,7 @@ def test_differences_are_to_the_first_strategy_unless_named(comparison: Comparis
         float(comparison.summary("random").mean - comparison.summary("jdm").mean)
     )
     assert float(comparison.difference("random", "random").summary.mean) == 0.0
-    assert comparison.difference("random").share_won == 1.0
+    assert comparison.difference("random").win_rate == 1.0
 
 
 def of_these(comparison: Comparison, *places: int) -> Comparison:
@@ -114,7 +114,7 @@ def test_no_runs_are_refused(empty: dict[str, list[RunRecord]]) -> None:
         compare(empty)
 
 
-def test_nothing_to_count_is_refused(runs: dict[str, list[RunRecord]]) -> None:
+def test_an_empty_time_window_is_rejected(runs: dict[str, list[RunRecord]]) -> None:
     with pytest.raises(InputError, match=r"scans after it and up to until, of 1\.0 to 40\.0 s; got 40\.0"):
         compare(runs, since=40.0)
 
@@ -143,7 +143,7 @@ def test_whole_states_have_no_unit_in_the_table(runs: dict[str, list[RunRecord]]
 def test_table_of_a_single_run_claims_no_error(runs: dict[str, list[RunRecord]]) -> None:
     rows = strategy_rows(compare({name: runs[name][:1] for name in STRATEGIES}))
     assert "±" not in "".join(rows[1])
-    assert tails(compare({name: runs[name][:1] for name in STRATEGIES})) == ""
+    assert tail_sentence(compare({name: runs[name][:1] for name in STRATEGIES})) == ""
     assert rows[1][5] == "unknown"
 
 
@@ -153,16 +153,18 @@ def test_markdown_is_a_table_with_a_caption(comparison: Comparison) -> None:
     assert len(table) == 2 + len(STRATEGIES)
     assert len({line.count("|") for line in table}) == 1
     assert "6 paired runs, mean OSPA over t = 11 to 40 s" in lines[-2]
-    assert lines[-1] == tails(comparison)
+    assert lines[-1] == tail_sentence(comparison)
 
 
-def test_tails_stand_beside_means(comparison: Comparison) -> None:
+def test_tails_are_shown_next_to_means(comparison: Comparison) -> None:
     means = comparison.run_means("jdm")
-    assert tails(comparison).startswith(f"Median and worst run (m): jdm {np.median(means):.2f}, {means.max():.2f}; idm")
+    assert tail_sentence(comparison).startswith(
+        f"Median and worst run (m): jdm {np.median(means):.2f}, {means.max():.2f}; idm"
+    )
     lost = np.zeros((6, len(comparison.times)))
     lost[2, -1] = lost[3, 0] = lost[4, -1] = 2.0
     ensembles = tuple(replace(own, measures={"num_missed": lost}) for own in comparison.ensembles)
-    told = tails(replace(comparison, ensembles=ensembles))
+    told = tail_sentence(replace(comparison, ensembles=ensembles))
     assert told.startswith("Median and worst run (m), share of runs that end with a lost target: jdm ")
     assert told.count(", 33 %") == len(STRATEGIES)
     numbers = next(csv.DictReader(io.StringIO(strategy_csv(replace(comparison, ensembles=ensembles)))))
@@ -170,13 +172,13 @@ def test_tails_stand_beside_means(comparison: Comparison) -> None:
     assert float(numbers["share_lost"]) == 2 / 6
 
 
-def test_tail_is_of_the_runs_that_are_known() -> None:
-    assert tail([3.0, np.nan, 1.0, 8.0], [1.0, 0.0, 0.0, 1.0]) == Tail(3.0, 8.0, 0.5)
-    assert tail([3.0, 1.0]).cells() == ("2.00", "3.00", "")
-    assert tail([np.nan]).cells() == ("", "", "")
+def test_tail_summary_ignores_unknown_runs() -> None:
+    assert summarise_tail([3.0, np.nan, 1.0, 8.0], [1.0, 0.0, 0.0, 1.0]) == TailSummary(3.0, 8.0, 0.5)
+    assert summarise_tail([3.0, 1.0]).cells() == ("2.00", "3.00", "")
+    assert summarise_tail([np.nan]).cells() == ("", "", "")
 
 
-def test_benchmarks_have_tails_beside_means() -> None:
+def test_benchmarks_show_tails_next_to_means() -> None:
     deciding, defaults, lookahead = (load(f"benchmarks/{name}.py") for name in ("deciding", "defaults", "lookahead"))
     ospa, ends_lost = [2.0, 3.0, 9.0, 4.0], [0.0, 0.0, 1.0, 0.0]
     scores = {run: deciding.Score(own, 0.0, 1.0, np.nan, ends_lost[run]) for run, own in enumerate(ospa)}
@@ -197,10 +199,10 @@ def test_benchmarks_have_tails_beside_means() -> None:
 def test_csv_holds_the_unrounded_numbers(comparison: Comparison) -> None:
     rows = list(csv.DictReader(io.StringIO(strategy_csv(comparison))))
     assert float(rows[1]["total_mean_m"]) == float(comparison.summary("idm").mean)
-    assert float(rows[3]["share_won"]) == comparison.difference("fixed").share_won
+    assert float(rows[3]["share_won"]) == comparison.difference("fixed").win_rate
 
 
-def test_csv_has_no_name_that_a_spreadsheet_runs(runs: dict[str, list[RunRecord]]) -> None:
+def test_csv_has_no_name_that_a_spreadsheet_takes_for_a_formula(runs: dict[str, list[RunRecord]]) -> None:
     compared = compare({"=1+1": runs["jdm"], "idm": runs["idm"]})
     rows = list(csv.DictReader(io.StringIO(strategy_csv({"@group": compared}))))
     assert [(row["group"], row["strategy"]) for row in rows] == [("'@group", "'=1+1"), ("'@group", "idm")]

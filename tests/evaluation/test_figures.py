@@ -134,7 +134,7 @@ def test_heat_map_of_any_pair_of_three_sensors() -> None:
         assert upper.get_xlabel() == f"Heading of sensor {pair[0] + 1} (deg)"
 
 
-def test_what_a_search_did_not_evaluate_is_left_blank() -> None:
+def test_entries_that_a_search_did_not_evaluate_are_blank() -> None:
     decision = plan("jdm", 3)
     gaps = np.ones(decision.tables[0].mean.shape, bool)
     gaps[decision.chosen[0], :, decision.chosen[2]] = False
@@ -153,7 +153,7 @@ def test_what_a_search_did_not_evaluate_is_left_blank() -> None:
 
 
 @pytest.mark.parametrize("pair", [(0, 0), (0, 2), (-1, 0)])
-def test_heat_map_refuses_what_is_no_pair(pair: tuple[int, int]) -> None:
+def test_heat_map_rejects_an_invalid_pair(pair: tuple[int, int]) -> None:
     with pytest.raises(InputError, match="pair: expected two of the sensors"):
         reward_figure(plan("jdm"), pair=pair)
 
@@ -193,7 +193,7 @@ def test_differences_are_drawn_from_the_first_decision_on_with_their_intervals(
         differences_figure(compare({name: [make_record(name)] for name in comparison.strategies}))
 
 
-def test_the_style_is_there_for_figures_of_ones_own() -> None:
+def test_the_style_is_available_for_custom_figures() -> None:
     with matplotlib.style.context("vedette.paper"):
         assert matplotlib.rcParams["font.size"] == 8.0
         colours = matplotlib.rcParams["axes.prop_cycle"].by_key()["color"]
@@ -250,7 +250,7 @@ def test_any_name_can_be_drawn_without_a_warning(
     assert "w" * 30 not in text
 
 
-def test_curves_that_are_one_share_a_line_with_dashes_of_each_colour(comparison: Comparison) -> None:
+def test_equal_curves_share_a_line_with_dashes_of_each_colour(comparison: Comparison) -> None:
     first, second, *others = comparison.ensembles
     ospa = second.ospa.copy()
     ospa[:, :20] = first.ospa[:, :20]
@@ -277,7 +277,7 @@ def test_few_values_have_no_tails() -> None:
 
 
 @pytest.mark.parametrize("times", [(3e-4, 6e-4), (3e-4,), (1e-6, 2e-3), (1e-4, 3e-3)])
-def test_labels_of_times_do_not_meet(times: tuple[float, ...]) -> None:
+def test_labels_of_times_do_not_overlap(times: tuple[float, ...]) -> None:
     figure = cost_figure({"jdm": {f"stage {i}": np.array([time]) for i, time in enumerate(times)}})
     canvas = FigureCanvasAgg(figure)
     canvas.draw()

@@ -13,8 +13,8 @@ from vedette import models
 from vedette.densities import Estimate, track_histories
 from vedette.errors import InputError
 from vedette.evaluation.gaps import gap_log_ratios
-from vedette.evaluation.joining import joins_of, track_names
-from vedette.evaluation.watch import Watch, births_found
+from vedette.evaluation.joining import find_joins, track_names
+from vedette.evaluation.observation_history import ObservationHistory, birth_count_ratio
 
 DT, SURVIVAL, DETECTION, SIGMA, NOISE = 2.0, 0.97, 0.8, 0.6, 3.0
 LAST, BEGINS, ENDS = 2, 6, 9  # scans, from 1
@@ -50,7 +50,7 @@ def gone(existence: float, hidden: float) -> float:
     return float(total)
 
 
-def watch_of(hidden: float, **changed: Any) -> Watch:
+def make_observations(hidden: float, **changed: Any) -> ObservationHistory:
     region = models.Region(-1e3, 1e3, -1e3, 1e3)
     mean, cov, existence = SITE
     birth = models.BirthModel(np.array([existence]), mean[None], cov[None], frozenset({BEGINS}))
@@ -67,7 +67,7 @@ def watch_of(hidden: float, **changed: Any) -> Watch:
         "prob_hidden": hidden,
     }
     given |= {"targets": targets, "sensors": (sensor,), "times": DT * np.arange(float(ENDS))}
-    return Watch(**{**given, **changed})
+    return ObservationHistory(**{**given, **changed})
 
 
 def estimates_of(rows: dict[int, list[tuple[tuple[int, int], Any, Any, float]]]) -> list[Estimate]:
@@ -103,7 +103,7 @@ def scene() -> tuple[list[Estimate], float, tuple[Any, Any], list[Any]]:
 @pytest.mark.parametrize("hidden", [0.0, 0.3, 1.0])
 def test_the_ratio_of_a_gap_is_that_of_enumeration(hidden: float) -> None:
     estimates, log_born, (mean, cov), zs = scene()
-    watch = watch_of(hidden)
+    observations = make_observations(hidden)
     log_same = np.log(0.8) + (BEGINS - LAST) * np.log(SURVIVAL)
     log_same += np.log(hidden / (BEGINS - LAST) + (1.0 - hidden) * (1.0 - DETECTION) ** (BEGINS - LAST - 1))
     for _ in range(LAST, BEGINS):
@@ -115,10 +115,10 @@ def test_the_ratio_of_a_gap_is_that_of_enumeration(hidden: float) -> None:
         log_same += log
     # One label of three estimates; .01 births are expected.
     expected = log_same - np.log(1.5 / 0.51 + 0.1 / 0.9) - np.log(gone(0.8, hidden)) - np.log(SITE[2]) - log_born
-    ratios = gap_log_ratios(track_histories(estimates, watch.times), watch)
+    ratios = gap_log_ratios(track_histories(estimates, observations.times), observations)
     assert ratios[0, 1] == pytest.approx(expected, abs=1e-7)
     assert (ratios[[0, 1, 1], [0, 0, 1]] == -np.inf).all()
-    joins = joins_of(estimates, watch, threshold=0.0)
+    joins = find_joins(estimates, observations, threshold=0.0)
     if expected > 0.0:
         assert [(join.ended, join.began) for join in joins] == [((1, 0), (BEGINS, 0))]
         assert joins[0].probability == pytest.approx(1.0 / (1.0 + np.exp(-expected)))
@@ -128,23 +128,23 @@ def test_scans_that_did_not_take_place_miss_nothing() -> None:
     estimates, *_ = scene()
     scanned = np.ones((ENDS, 1), np.bool_)
     scanned[LAST : BEGINS - 1] = False
-    histories, missed = track_histories(estimates, watch_of(0.0).times), watch_of(0.0)
-    blind, unseen = watch_of(0.0, scanned=scanned), watch_of(1.0)
-    ratio, least, most = (gap_log_ratios(histories, watch)[0, 1] for watch in (blind, missed, unseen))
+    histories, missed = track_histories(estimates, make_observations(0.0).times), make_observations(0.0)
+    blind, unseen = make_observations(0.0, scanned=scanned), make_observations(1.0)
+    ratio, least, most = (gap_log_ratios(histories, observations)[0, 1] for observations in (blind, missed, unseen))
     assert least < ratio
     log_seen = np.log(gone(0.8, 1.0))
     assert ratio > most + log_seen  # of no scan the hypothesis that the target died is no more probable
 
 
-def test_one_of_two_ended_labels_goes_on() -> None:
+def test_one_of_two_ended_labels_continues() -> None:
     estimates, *_ = scene()
     first = estimates[LAST - 1]
     both = [np.concatenate([part, part]) for part in (first.means, first.covs, first.existence)]
     estimates[LAST - 1] = Estimate(np.array([[1, 0], [1, 1]]), *both)
-    watch = watch_of(1.0)
-    (join,) = joins_of(estimates, watch, threshold=0.0)
+    observations = make_observations(1.0)
+    (join,) = find_joins(estimates, observations, threshold=0.0)
     assert join.probability == pytest.approx(0.5, abs=0.02)
-    assert joins_of(estimates, watch, threshold=0.6) == ()
+    assert find_joins(estimates, observations, threshold=0.6) == ()
 
 
 def test_tracks_are_named_by_their_first_label() -> None:
@@ -161,9 +161,9 @@ def test_tracks_are_named_by_their_first_label() -> None:
         ({"hidden": 0.5, "poses": np.zeros((2, 1, 3))}, "poses, scanned: expected entries for each scan and sensor"),
     ],
 )
-def test_what_a_watch_refuses(changed: dict[str, Any], message: str) -> None:
+def test_invalid_observation_histories_are_rejected(changed: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
-        watch_of(changed.pop("hidden"), **changed)
+        make_observations(changed.pop("hidden"), **changed)
 
 
 def targets_of(region: models.Region | None, expected: Any, period: float | None = None) -> models.TargetModel:
@@ -179,12 +179,12 @@ def targets_of(region: models.Region | None, expected: Any, period: float | None
 def test_births_are_counted_by_labels_that_last(expected: Any, period: float | None, births: float) -> None:
     estimates, *_ = scene()
     region = models.Region(-1e3, 1e3, -1e3, 1e3)
-    watch = watch_of(0.5, targets=targets_of(region, expected, period))
-    histories = track_histories(estimates, watch.times)
-    assert births_found(histories, watch) == pytest.approx(births)
-    assert np.isfinite(gap_log_ratios(histories, watch)[0, 1])
+    observations = make_observations(0.5, targets=targets_of(region, expected, period))
+    histories = track_histories(estimates, observations.times)
+    assert birth_count_ratio(histories, observations) == pytest.approx(births)
+    assert np.isfinite(gap_log_ratios(histories, observations)[0, 1])
 
 
 def test_births_need_a_region() -> None:
     with pytest.raises(InputError, match="expected births in a region; got none"):
-        watch_of(0.5, targets=targets_of(None, 0.5))
+        make_observations(0.5, targets=targets_of(None, 0.5))

@@ -7,8 +7,8 @@ import pytest
 
 from vedette.errors import InputError
 from vedette.evaluation import track_table
-from vedette.evaluation.comparison import scored, typical_run
-from vedette.evaluation.ensembles import ensemble_of
+from vedette.evaluation.comparison import compare_scored_scans, typical_run
+from vedette.evaluation.ensembles import build_ensemble
 from vedette.evaluation.runs import run_scenario
 from vedette.scenarios import Scenario, list_builtin, load_scenario
 from vedette.scenarios.build import build_planner
@@ -57,17 +57,17 @@ def test_threads_change_no_byte(scenario, runs):
 
 
 def ensembles_of(runs):
-    return {name: ensemble_of((record.summary(), None) for record in of) for name, of in runs.items()}
+    return {name: build_ensemble((record.summary(), None) for record in of) for name, of in runs.items()}
 
 
 def test_the_scans_that_count_are_the_scenarios(scenario, runs):
-    comparison = scored(scenario, ensembles_of(runs))
+    comparison = compare_scored_scans(scenario, ensembles_of(runs))
     assert comparison.counted.nonzero()[0].tolist() == [8, 9, 10, 11]
     np.testing.assert_allclose(comparison.run_means("jdm"), [r.ospa[8:12, 0].mean() for r in runs["jdm"]])
 
 
 def test_the_typical_run_is_in_the_middle(scenario, runs):
-    comparison = scored(scenario, ensembles_of(runs))
+    comparison = compare_scored_scans(scenario, ensembles_of(runs))
     means = comparison.run_means("still")
     assert typical_run(comparison, "still") == int(np.argmin(means))
 

@@ -46,12 +46,12 @@ def test_paired_difference_is_sharper_than_the_difference_of_means() -> None:
     paired = paired_difference(first, second)
     assert float(paired.summary.mean) == pytest.approx(1.0, abs=0.1)
     assert float(paired.summary.standard_error) < 0.05 < float(summarise(first).standard_error)
-    assert paired.share_won == 1.0
+    assert paired.win_rate == 1.0
 
 
-def test_wins_and_ties_are_counted_apart() -> None:
+def test_wins_and_ties_are_counted_separately() -> None:
     paired = paired_difference([2.0, 1.0, 1.0, 5.0], [1.0, 1.0, 3.0, 4.0])
-    assert (paired.share_won, paired.share_tied) == (0.5, 0.25)
+    assert (paired.win_rate, paired.tie_rate) == (0.5, 0.25)
 
 
 @pytest.mark.parametrize(

@@ -20,16 +20,16 @@ from vedette.control.plan import Plan, RewardTable
 from vedette.errors import InputError
 from vedette.evaluation import compare
 from vedette.evaluation.figures import (
+    build_scene,
     mean_rewards_figure,
     overview_figure,
     reward_figure,
     roses_figure,
     save_figure,
-    scene_of,
     tracks_figure,
 )
 from vedette.evaluation.figures.scene import draw_zones
-from vedette.evaluation.figures.style import COLOURS, colour, sensor_looks
+from vedette.evaluation.figures.style import COLOURS, colour, sensor_styles
 from vedette.evaluation.runs import run_scenario
 from vedette.platforms import Actions
 from vedette.recorded import Origin
@@ -65,11 +65,11 @@ def texts(figure: Figure) -> set[str]:
 def test_rewards_are_of_the_sensors_that_have_a_choice(
     scenario: Scenario, records: dict[str, list[RunRecord]], tmp_path: Path
 ) -> None:
-    joint = mean_rewards_figure(means_of(records["jdm"]), scene_of(scenario, "jdm"))
+    joint = mean_rewards_figure(means_of(records["jdm"]), build_scene(scenario, "jdm"))
     maps = [axes for axes in joint.axes if axes.get_title().endswith(" s")]
     assert [np.asarray(axes.collections[0].get_array()).size for axes in maps] == [13 * 13] * 2
     assert {"Heading of Boat Anna (deg)", "Heading of Boat Bertha (deg)"} <= texts(joint)
-    alone = mean_rewards_figure(means_of(records["idm"]), scene_of(scenario, "idm"))
+    alone = mean_rewards_figure(means_of(records["idm"]), build_scene(scenario, "idm"))
     assert {*NAMES[1:]} <= texts(alone)
     assert not {NAMES[0], "sensor 1"} & texts(alone)
     assert [axes.get_xlabel() for axes in alone.axes] == ["Heading (deg)"] * 2
@@ -77,22 +77,22 @@ def test_rewards_are_of_the_sensors_that_have_a_choice(
         save_figure(figure, tmp_path / str(number))
 
 
-def test_rewards_say_what_they_are(scenario: Scenario, records: dict[str, list[RunRecord]]) -> None:
-    upper, lower, bar = reward_figure(records["jdm"][0].decisions[0].plan, scene=scene_of(scenario, "jdm")).axes
+def test_rewards_have_their_name_in_the_title(scenario: Scenario, records: dict[str, list[RunRecord]]) -> None:
+    upper, lower, bar = reward_figure(records["jdm"][0].decisions[0].plan, scene=build_scene(scenario, "jdm")).axes
     assert upper.get_xlabel() == "Heading of Boat Anna (deg)"
     assert lower.get_ylabel() == "Largest joint reward\n(minus expected loss)"
     assert bar.get_ylabel() == "Joint reward\n(minus expected loss)"
-    assert scene_of(load_scenario("paper-a"), "jdm").reward == "CS divergence"
+    assert build_scene(load_scenario("paper-a"), "jdm").reward == "CS divergence"
     plain = reward_figure(make_plan("idm", np.random.default_rng(1)))
     assert plain.axes[0].get_ylabel() == "Reward"
 
 
-def test_a_strategy_with_a_reward_of_its_own_says_that_one(scenario: Scenario) -> None:
+def test_a_strategy_with_a_custom_reward_shows_its_name(scenario: Scenario) -> None:
     named = {
         "planners": {"by-gospa": {"kind": "joint", "reward": {"kind": "expected_gospa"}}, "as-is": {"kind": "joint"}}
     }
     own = with_fields(scenario, named)
-    rewards = {name: scene_of(own, name).reward for name in ("by-gospa", "as-is", "jdm")}
+    rewards = {name: build_scene(own, name).reward for name in ("by-gospa", "as-is", "jdm")}
     assert rewards == {
         "by-gospa": "minus squared GOSPA, m²",
         "as-is": "minus expected loss",
@@ -100,13 +100,13 @@ def test_a_strategy_with_a_reward_of_its_own_says_that_one(scenario: Scenario) -
     }
 
 
-def test_roses_leave_out_who_can_but_stand(scenario: Scenario, records: dict[str, list[RunRecord]]) -> None:
-    figure = roses_figure(compare(records), scene_of(scenario, "jdm"))
+def test_roses_leave_out_sensors_that_cannot_move(scenario: Scenario, records: dict[str, list[RunRecord]]) -> None:
+    figure = roses_figure(compare(records), build_scene(scenario, "jdm"))
     assert {axes.name for axes in figure.axes} == {"polar"}
     assert [text.get_text() for text in figure.legends[0].get_texts()] == list(NAMES[1:])
 
 
-def test_nobody_with_a_choice_is_told() -> None:
+def test_decisions_without_a_choice_are_rejected() -> None:
     plan = replace(make_plan("idm", np.random.default_rng(1)), actions=(STILL, STILL), chosen=(0, 0))
     plan = replace(plan, tables=tuple(RewardTable((sensor,), np.zeros(1), np.zeros(1)) for sensor in (0, 1)))
     record = make_record("idm")
@@ -120,7 +120,7 @@ def test_nobody_with_a_choice_is_told() -> None:
             draw()
 
 
-def test_a_lone_mover_of_a_joint_decision_has_a_curve() -> None:
+def test_a_single_sensor_with_a_choice_has_a_curve() -> None:
     plan = make_plan("jdm", np.random.default_rng(1))
     table = RewardTable((0, 1), plan.tables[0].mean[:1], plan.tables[0].standard_error[:1])
     plan = replace(plan, actions=(STILL, ACTIONS), chosen=(0, plan.chosen[1]), tables=(table,))
@@ -129,7 +129,7 @@ def test_a_lone_mover_of_a_joint_decision_has_a_curve() -> None:
 
 
 def test_zones_and_names_are_drawn(scenario: Scenario, records: dict[str, list[RunRecord]]) -> None:
-    tracks = tracks_figure(records["jdm"][0], scene=scene_of(scenario, "jdm"))
+    tracks = tracks_figure(records["jdm"][0], scene=build_scene(scenario, "jdm"))
     picture = scenario_figure(scenario, truth_of(scenario))
     for figure in (tracks, picture):
         (axes,) = figure.axes
@@ -161,7 +161,7 @@ def test_fields_and_degrees_are_drawn() -> None:
     changes = {"origin": {"lon": -1.2, "lat": 50.7}, "sensors.*.detection": SECTOR}
     scene = with_fields(load_scenario("paper-a"), changes)
     record = run_scenario(scene, "still", seed=0)
-    figure = tracks_figure(record, scene=scene_of(scene, "still"))
+    figure = tracks_figure(record, scene=build_scene(scene, "still"))
     (axes,) = figure.axes
     wedges = [patch for patch in axes.patches if isinstance(patch, Wedge)]
     assert [wedge.r for wedge in wedges] == [700.0, 700.0]
@@ -179,9 +179,9 @@ def test_fields_and_degrees_are_drawn() -> None:
     assert (east.get_xlabel(), north.get_ylabel()) == ("longitude (\N{DEGREE SIGN})", "latitude (\N{DEGREE SIGN})")
 
 
-def test_one_colour_has_one_meaning_beside_the_errors(scenario: Scenario, records: dict[str, list[RunRecord]]) -> None:
+def test_a_colour_has_one_meaning_in_the_error_figure(scenario: Scenario, records: dict[str, list[RunRecord]]) -> None:
     comparison = compare(records)
-    figure = overview_figure(records["idm"][0], comparison, strategy="idm", scene=scene_of(scenario, "idm"))
+    figure = overview_figure(records["idm"][0], comparison, strategy="idm", scene=build_scene(scenario, "idm"))
     left, right, *_ = figure.axes
     of_strategies = {str(line.get_label()): line.get_color() for line in right.lines}
     assert (of_strategies["JDM"], of_strategies["IDM"]) == (colour(0), colour(1))
@@ -193,11 +193,11 @@ def test_one_colour_has_one_meaning_beside_the_errors(scenario: Scenario, record
 
 
 def test_sensors_have_other_colours_than_strategies() -> None:
-    assert not {shade for shade, _, _ in sensor_looks(range(6)).values()} & {colour(place) for place in range(6)}
-    of_sensors = {shade for shade, _, _ in sensor_looks([0, 1, 2]).values()}
+    assert not {shade for shade, _, _ in sensor_styles(range(6)).values()} & {colour(place) for place in range(6)}
+    of_sensors = {shade for shade, _, _ in sensor_styles([0, 1, 2]).values()}
     assert not of_sensors & {colour(0), colour(1), colour(2)}
-    assert sensor_looks([1, 2])[1] == sensor_looks([0, 1, 2])[1]
-    assert len({shade for shade, _, _ in sensor_looks([3, 9, 15, 21, 27, 33]).values()}) == 6
+    assert sensor_styles([1, 2])[1] == sensor_styles([0, 1, 2])[1]
+    assert len({shade for shade, _, _ in sensor_styles([3, 9, 15, 21, 27, 33]).values()}) == 6
 
 
 def many_sensors(planner: str, number: int = 40) -> RunRecord:
@@ -226,7 +226,7 @@ def within(figure: Figure) -> bool:
     )
 
 
-def test_of_many_sensors_those_with_the_most_at_stake_are_drawn_and_legends_fit() -> None:
+def test_sensors_with_the_largest_reward_range_are_drawn_and_legends_fit() -> None:
     record = many_sensors("idm")
     rewards = mean_rewards_figure(means_of([record]))
     assert [text.get_text() for text in rewards.legends[0].get_texts()] == [f"sensor {n}" for n in range(35, 41)]
@@ -244,7 +244,7 @@ def test_of_many_sensors_those_with_the_most_at_stake_are_drawn_and_legends_fit(
 @pytest.mark.parametrize("letters", ["sensor", "W" * 20, "WWW"])
 def test_legends_of_six_names_fit(letters: str) -> None:
     record = many_sensors("idm", 6)
-    scene = replace(scene_of(load_scenario("paper-a"), "idm"), names=tuple(f"{letters}{n}" for n in range(6)))
+    scene = replace(build_scene(load_scenario("paper-a"), "idm"), names=tuple(f"{letters}{n}" for n in range(6)))
     comparison = compare({"idm": [record], "W" * 30: [record], "M" * 30: [record]})
     for figure in (
         mean_rewards_figure(means_of([record]), scene),

@@ -15,7 +15,7 @@ from fuzz.combinations import STRATEGIES, combination, lay_beside
 from fuzz.outcomes import bounded, check_message
 from vedette.cli import app
 from vedette.errors import InputError, ScenarioError, SlowRewardWarning
-from vedette.evaluation.runs import measure_run, own_metrics, run_scenario
+from vedette.evaluation.runs import custom_metrics, measure_run, run_scenario
 from vedette.scenarios import Scenario, load_scenario
 from vedette.scenarios.build import build_planner
 from vedette.scenarios.dumping import dump_scenario
@@ -77,7 +77,7 @@ def run(scenario: Scenario) -> int:
     for name in names:
         try:
             record = run_scenario(scenario, name, seed=0, num_threads=1)
-            measure_run(record, scenario, own_metrics(scenario))
+            measure_run(record, scenario, custom_metrics(scenario))
             check_limit(scenario, name, record)
         except Exception as error:
             error.add_note(f"{name}: {dump_scenario(scenario.model)}")

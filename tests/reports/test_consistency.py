@@ -10,7 +10,7 @@ import pytest
 
 from reports.examples import campaign_of, results_of
 from vedette.evaluation import RunMetrics
-from vedette.evaluation.ensembles import ensemble_of
+from vedette.evaluation.ensembles import build_ensemble
 from vedette.evaluation.runs import measure_run
 from vedette.reports.groups import Group, Strategy, comparison_groups
 from vedette.reports.health import failed_checks, strategy_diagnostics
@@ -39,7 +39,7 @@ def off_once(record: RunRecord, step: int) -> RunRecord:
 
 def with_runs(group: Group, label: str, runs: Iterable[tuple[RunRecord, RunMetrics]]) -> Group:
     """The group with other runs of a strategy."""
-    ensemble = ensemble_of((record.summary(), metrics) for record, metrics in runs)
+    ensemble = build_ensemble((record.summary(), metrics) for record, metrics in runs)
     others = [replace(each, ensemble=ensemble) if each.label == label else each for each in group.strategies]
     return replace(group, strategies=tuple(others))
 

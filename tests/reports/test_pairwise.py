@@ -7,7 +7,7 @@ import pytest
 
 from evaluation.synthetic import make_record
 from vedette.evaluation import Comparison
-from vedette.evaluation.ensembles import ensemble_of
+from vedette.evaluation.ensembles import build_ensemble
 from vedette.evaluation.health import percent
 from vedette.reports.pairwise import all_pairs, compare_pair, compare_with_first
 
@@ -17,7 +17,7 @@ def comparison_of(*errors: list[float]) -> Comparison:
     names = tuple("abcde"[: len(errors)])
     scan = make_record("fixed", num_scans=1).summary()
     ensembles = [
-        ensemble_of(
+        build_ensemble(
             (replace(scan, run=run, ospa=np.array([[total, total, 0.0]])), None) for run, total in enumerate(of)
         )
         for of in errors
@@ -32,7 +32,7 @@ def test_a_clear_difference_is_claimed_with_its_interval_and_share() -> None:
         "A has a smaller mean OSPA than b, by 1.00 m (95 % interval 0.87 to 1.13 m, 4 paired runs). "
         "It is smaller in 100 % of the runs."
     )
-    assert (found.difference, found.share_won) == ("+1.00 (+0.87 to +1.13)", "100 %")
+    assert (found.difference, found.win_rate) == ("+1.00 (+0.87 to +1.13)", "100 %")
 
 
 def test_whole_states_have_no_unit() -> None:

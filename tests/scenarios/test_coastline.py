@@ -18,7 +18,7 @@ from vedette.cli import app
 from vedette.cli.picture import scenario_figure
 from vedette.cli.show import truth_of
 from vedette.errors import ScenarioError
-from vedette.evaluation.figures import scene_of, tracks_figure
+from vedette.evaluation.figures import build_scene, tracks_figure
 from vedette.evaluation.runs import run_scenario
 from vedette.scenarios import Scenario, load_scenario
 from vedette.scenarios.cautions import cautions
@@ -153,7 +153,7 @@ def test_pictures_and_replays_have_it_and_limits_are_as_without(tmp_path: Path) 
     assert figure.axes[0].get_xlim() == without.axes[0].get_xlim()
     assert "coastline" in [text.get_text() for legend in figure.legends for text in legend.get_texts()]
     record = run_scenario(scenario, "still", seed=0)
-    figure = tracks_figure(record, scene=scene_of(scenario, "still"))
+    figure = tracks_figure(record, scene=build_scene(scenario, "still"))
     np.testing.assert_allclose(drawn(figure)[0], EDGE, atol=1e-6)
     (line,) = [corners for kind, corners in data_of(record, scenario)["zones"] if kind == COAST]
     np.testing.assert_allclose(line, EDGE, atol=0.5)

@@ -15,7 +15,7 @@ import pytest
 
 from reference.geodesy import inverse
 from vedette.errors import InputError, ScenarioError
-from vedette.evaluation.actions import action_axis, angle_of, rounded, row_words
+from vedette.evaluation.actions import action_axis, describe_action, drawn_angle, rounded
 from vedette.evaluation.rewards import mean_rewards
 from vedette.evaluation.runs import run_scenario
 from vedette.evaluation.track_table import table_of_run
@@ -249,7 +249,7 @@ def test_tables_and_words_of_a_run_have_courses() -> None:
     means = mean_rewards([record], 0)
     assert action_axis(means.actions[0]).title() == "Course (deg)"
     first = plan.actions[0]
-    assert row_words(rounded(first.columns, first.values[0])) == "course 270°, speed 50 m/s"
+    assert describe_action(rounded(first.columns, first.values[0])) == "course 270°, speed 50 m/s"
 
 
 def test_without_origin_or_compass_nothing_changes() -> None:
@@ -320,10 +320,10 @@ def test_a_program_gets_the_scene_by_compass(tmp_path: Path) -> None:
 
 
 def test_figures_draw_courses_from_north() -> None:
-    assert angle_of({"course_deg": 30.0}) == 60.0
-    assert angle_of({"heading_deg": 30.0}) == 30.0
-    assert angle_of({"azimuth_deg": 270.0}, "pointing_deg", "azimuth_deg") == -180.0
-    assert angle_of({"dx": 1.0}) is None
+    assert drawn_angle({"course_deg": 30.0}) == 60.0
+    assert drawn_angle({"heading_deg": 30.0}) == 30.0
+    assert drawn_angle({"azimuth_deg": 270.0}, "pointing_deg", "azimuth_deg") == -180.0
+    assert drawn_angle({"dx": 1.0}) is None
     several = Actions(("course_deg", "speed_mps"), np.array([[0.0, 8.0], [90.0, 0.0]]))
     assert action_axis(several).labels == ("course 0°, speed 8 m/s", "course 90°, speed 0 m/s")
     assert rounded(("course_deg", "heading_deg"), np.array([359.7, 359.7])) == (

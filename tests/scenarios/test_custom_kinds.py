@@ -166,14 +166,14 @@ def test_code_that_others_may_have_written_is_said_and_not_imported(folder: Path
 
 
 def test_a_measure_that_is_no_number_a_scan(folder: Path) -> None:
-    from vedette.evaluation import measure_run, own_metrics
+    from vedette.evaluation import custom_metrics, measure_run
 
     file = folder / "scene.yaml"
     file.write_text(file.read_text().replace("count', arguments: {factor: 2.0}", "short_count', arguments: {}"))
     loaded = load_scenario(file)
     record = run_scenario(loaded, "still", seed=1)
     with pytest.raises(InputError, match="metric found: expected"):
-        measure_run(record, loaded, own_metrics(loaded))
+        measure_run(record, loaded, custom_metrics(loaded))
 
 
 def test_files_import_those_beside_them_each_its_own(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vedette.evaluation import measure_run, own_metrics, run_scenario
+from vedette.evaluation import custom_metrics, measure_run, run_scenario
 from vedette.scenarios import Scenario, parse_scenario, with_fields
 from vedette.scenarios.build import build_targets
 from vedette.scenarios.cautions import cautions
@@ -106,5 +106,5 @@ def test_a_scene_runs_and_its_truth_is_drawn_anew_in_each_run(view: str) -> None
     for run in (0, 1):
         np.testing.assert_array_equal(runs["jdm", run].truth.states, runs["random", run].truth.states)
     assert not np.allclose(runs["jdm", 0].truth.states, runs["jdm", 1].truth.states)
-    share = measure_run(runs["jdm", 0], short, own_metrics(short)).columns()["tracked_of_all"]
+    share = measure_run(runs["jdm", 0], short, custom_metrics(short)).columns()["tracked_of_all"]
     assert ((share >= 0.0) & (share <= 1.0)).all()

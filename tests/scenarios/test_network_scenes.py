@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vedette.evaluation import measure_run, own_metrics, run_scenario, seen_targets
+from vedette.evaluation import custom_metrics, measure_run, run_scenario, targets_in_view
 from vedette.kernels.base.types import Floats
 from vedette.scenarios import load_scenario, with_fields
 from vedette.scenarios.build import build_experiment, build_targets
@@ -49,7 +49,7 @@ def seen_by(scenario: Scenario, truth: Truth) -> Floats:
     sensors, columns = experiment.tracker.sensors, []
     for s, sensor in enumerate(sensors):
         poses = np.tile(experiment.poses[s], (truth.num_scans, 1, 1))
-        columns.append(seen_targets(truth, poses, [sensor], min_detection=0.4))
+        columns.append(targets_in_view(truth, poses, [sensor], min_detection=0.4))
     return np.stack(columns, axis=1)
 
 
@@ -126,7 +126,7 @@ def beginning(name: str) -> Scenario:
 def test_their_beginning_runs_and_what_is_seen_is_tracked(name: str) -> None:
     scenario = beginning(name)
     record = run_scenario(scenario, "still", seed=1, num_threads=1)
-    share = measure_run(record, scenario, own_metrics(scenario)).columns()["tracked_share"]
+    share = measure_run(record, scenario, custom_metrics(scenario)).columns()["tracked_share"]
     assert (record.ospa[:, 0] <= scenario.model.ospa.cutoff).all()
     assert share[-1] >= 0.8
     scans = build_experiment(scenario).scans_at

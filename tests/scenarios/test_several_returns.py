@@ -11,7 +11,7 @@ import pytest
 
 from vedette.errors import ScenarioError
 from vedette.evaluation.runs import run_scenario
-from vedette.evaluation.unexplained import unexplained
+from vedette.evaluation.unexplained_courses import unexplained_course_warnings
 from vedette.recorded import RecordedScans, Site
 from vedette.recorded.merging import merged
 from vedette.scenarios.cautions import cautions
@@ -96,7 +96,7 @@ MIXED = np.array([[2000.0, 3000.0, 2.0, -1.0], [-4000.0, 1000.0, 0.0, 3.0], [900
 
 def test_measurements_of_fast_targets_that_no_track_explains_are_told_of(tmp_path: Path) -> None:
     found = recorded(tmp_path, 1.0, targets=MIXED)
-    (line,) = unexplained(run_scenario(found.scenario, "still", seed=0), found.scenario)
+    (line,) = unexplained_course_warnings(run_scenario(found.scenario, "still", seed=0), found.scenario)
     speed = math.hypot(200.0, 100.0)
     low, high = (float(word) for word in line.split("courses at ")[1].split(" m/s")[0].split(" to "))
     assert low == pytest.approx(speed, rel=0.03)
@@ -105,7 +105,7 @@ def test_measurements_of_fast_targets_that_no_track_explains_are_told_of(tmp_pat
     assert re.match(rf"R: \d+ measurements that no track explains {where}", line)
     assert "new tracks are expected at about 10 m/s: give `--max-target-speed 250`" in line
     fast = scenario_of_recording(tmp_path / "radar.yaml", tmp_path / "scans.csv", speed=300.0)
-    assert unexplained(run_scenario(fast.scenario, "still", seed=0), fast.scenario) == ()
+    assert unexplained_course_warnings(run_scenario(fast.scenario, "still", seed=0), fast.scenario) == ()
 
 
 def test_clutter_alone_makes_no_courses(tmp_path: Path) -> None:
@@ -116,4 +116,4 @@ def test_clutter_alone_makes_no_courses(tmp_path: Path) -> None:
     (tmp_path / "scans.csv").write_text("\n".join([*rows, ""]), "utf-8")
     (tmp_path / "radar.yaml").write_text(SENSORS % "", "utf-8")
     found = scenario_of_recording(tmp_path / "radar.yaml", tmp_path / "scans.csv")
-    assert unexplained(run_scenario(found.scenario, "still", seed=0), found.scenario) == ()
+    assert unexplained_course_warnings(run_scenario(found.scenario, "still", seed=0), found.scenario) == ()

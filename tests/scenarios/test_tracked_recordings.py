@@ -20,7 +20,7 @@ from recordings import write_recording
 from vedette.cli import app
 from vedette.errors import InputError
 from vedette.evaluation import run_scenario, track_recording
-from vedette.evaluation.runs import score_of
+from vedette.evaluation.runs import build_score
 from vedette.scenarios import load_scenario
 from vedette.scenarios.build import build_experiment, build_tracking
 from vedette.scenarios.code_checks import code_faults
@@ -82,7 +82,7 @@ def test_the_loop_is_steps_of_the_tracker_and_estimates(made: OfRecording) -> No
     assert record.planner == "recorded"
     assert not record.decisions
     assert not record.off.any()
-    score = score_of(made.scenario)
+    score = build_score(made.scenario)
     assert score is not None
     np.testing.assert_array_equal(record.ospa, score(parts.truth, record.estimates))
 
@@ -171,18 +171,18 @@ def test_a_run_that_stops_says_where_and_keeps_the_scans_before(
 ) -> None:
     parts = build_tracking(made.scenario, made.recording)
     with pytest.raises(stop) as caught:
-        replace(parts, estimate=Stopping(error, parts.estimate)).run(score_of(made.scenario))
+        replace(parts, estimate=Stopping(error, parts.estimate)).run(build_score(made.scenario))
     place = f"stopped at step 4 of {len(made.recording.times)} ({made.recording.times[3]:g} s), in the estimate: "
     assert str(caught.value).startswith(f"scans, scans.csv: {place}{cause}")
     record = caught.value.record  # type: ignore[attr-defined]
     assert (record.num_scans, record.stopped) == (3, str(caught.value))
-    whole = parts.run(score_of(made.scenario))
+    whole = parts.run(build_score(made.scenario))
     assert record.ospa.tobytes() == whole.ospa[:3].tobytes()
 
 
 def test_every_scan_is_watched(made: OfRecording) -> None:
     steps = list[int]()
-    track_recording(made.scenario, made.recording, watch=steps.append)
+    track_recording(made.scenario, made.recording, progress=steps.append)
     assert steps == [*range(1, len(made.recording.times) + 1)]
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from scenarios.minimal import changed
-from vedette.evaluation import choices_of, mean_rewards
-from vedette.evaluation.actions import choice_words
+from vedette.evaluation import decided_actions, mean_rewards
+from vedette.evaluation.actions import describe_choice
 from vedette.evaluation.comparison import compare
 from vedette.evaluation.figures import mean_rewards_figure, reward_figure, roses_figure, tracks_figure
 from vedette.evaluation.runs import run_scenario
@@ -64,8 +64,8 @@ def test_poses_are_those_of_the_platforms(records: dict[str, RunRecord]) -> None
 
 
 def test_without_a_decision_a_platform_keeps_to_its_course(records: dict[str, RunRecord]) -> None:
-    (row, *_) = choices_of(records["fixed"])
-    assert choice_words(row) == "heading 0°, speed 1, pointing -90°; dx 0, dy 0"
+    (row, *_) = decided_actions(records["fixed"])
+    assert describe_choice(row) == "heading 0°, speed 1, pointing -90°; dx 0, dy 0"
 
 
 def test_runs_are_kept_and_drawn(records: dict[str, RunRecord], tmp_path: Path) -> None:

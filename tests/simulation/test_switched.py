@@ -15,8 +15,8 @@ from simulation.test_storage import assert_same
 from vedette.cli import app
 from vedette.control import FixedPlanner
 from vedette.errors import InputError
-from vedette.evaluation.actions import choice_words
-from vedette.evaluation.ensembles import choice_of
+from vedette.evaluation.actions import describe_choice
+from vedette.evaluation.ensembles import rounded_choice
 from vedette.evaluation.runs import run_scenario
 from vedette.platforms import Actions
 from vedette.scenarios import Scenario
@@ -94,7 +94,7 @@ def test_every_planner_switches_off_what_costs_too_much(planner: str) -> None:
         plan = decision.plan
         texts = [own.text(index) for own, index in zip(plan.actions, plan.chosen, strict=True)]
         assert all(text.endswith(", off") for text in texts)
-        assert choice_words(choice_of(plan)).count("°, off") == 2
+        assert describe_choice(rounded_choice(plan)).count("°, off") == 2
 
 
 MOST_ONE = (PLANS[0], PLANS[1][:-1] + ", constraints: [{kind: max_active, sensors: 1}]}")

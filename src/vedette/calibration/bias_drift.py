@@ -32,14 +32,14 @@ class CalibrationWindow(NamedTuple):
 
 
 def calibrate_windows(
-    problem: Problem, seconds: float, watch: Callable[[], None] = lambda: None
+    problem: Problem, seconds: float, progress: Callable[[], None] = lambda: None
 ) -> Iterator[CalibrationWindow]:
     """Calibrate the parts of a recording separately, in order of time.
 
     Args:
         problem: the recording and the parameters.
         seconds: approximate duration of a part, s; all parts have the same; inf: the whole recording.
-        watch: see `calibrate`.
+        progress: see `calibrate`.
 
     Raises:
         InputError: seconds that are not a number above 0.
@@ -52,7 +52,7 @@ def calibrate_windows(
     for begin, end in pairwise(bounds):
         own = problem.recording.between(begin, end)
         if own.scans:
-            yield CalibrationWindow(begin, end, calibrate(replace(problem, recording=own), watch))
+            yield CalibrationWindow(begin, end, calibrate(replace(problem, recording=own), progress))
 
 
 def warm_started(problem: Problem, calibration: Calibration) -> Problem:

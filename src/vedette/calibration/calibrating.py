@@ -64,13 +64,13 @@ class Calibration(NamedTuple):
 
 
 def calibrate(
-    problem: Problem, watch: Callable[[], None] = lambda: None, only: Sequence[Parameter] | None = None
+    problem: Problem, progress: Callable[[], None] = lambda: None, only: Sequence[Parameter] | None = None
 ) -> Calibration:
     """Return the parameters that maximise the likelihood of a recording.
 
     Args:
         problem: the recording and the parameters.
-        watch: called after each tracking of the recording.
+        progress: called after each tracking of the recording.
         only: the parameters to estimate, with the others fixed at their start values; None: all.
 
     Raises:
@@ -81,13 +81,13 @@ def calibrate(
     asked = [i for i, each in enumerate(problem.parameters) if only is None or each in only]
 
     def terms(free: Floats, own: Sequence[int]) -> Floats:
-        watch()
+        progress()
         whole = said.copy()
         whole[own] = free
         return problem.log_likelihoods(whole)
 
     before = float(terms(said[asked], asked).sum())
-    guessed, pairs = _guess(problem, said, asked, watch)
+    guessed, pairs = _guess(problem, said, asked, progress)
     start = guessed if float(terms(guessed[asked], asked).sum()) > before else said.copy()
     together = sensors_with_common_targets(pairs, len(problem.sites))
     apart = np.flatnonzero(~together | (together.sum() == 1)).tolist()  # without linked sensors the first is apart, too
@@ -141,7 +141,7 @@ def _blocks(parameters: tuple[Parameter, ...]) -> list[list[int]]:
 
 
 def _guess(
-    problem: Problem, said: Floats, own: Sequence[int], watch: Callable[[], None]
+    problem: Problem, said: Floats, own: Sequence[int], progress: Callable[[], None]
 ) -> tuple[Floats, MatchedMeasurements]:
     """Return an initial guess, for the biases among `own`, and the matched measurements that it is based on.
 
@@ -160,7 +160,7 @@ def _guess(
     stds = far
     for _ in range(3):
         recording = problem.without_biases(values)
-        watch()
+        progress()
         pairs = match_measurements(problem.tracker(_with_noise(problem, values, stds, wide))[0], recording, sites, stds)
         found = register(pairs, sites, asked, unknown, stds, _period(problem))
         for i, at in places.items():

@@ -10,14 +10,14 @@ from multiprocessing import active_children, current_process
 from typing import TYPE_CHECKING
 
 from vedette.errors import VedetteError
-from vedette.evaluation.ensembles import TOGETHER, Ensemble, ensemble_of, joined
+from vedette.evaluation.ensembles import MAX_BATCH_RUNS, Ensemble, build_ensemble, concatenate_ensembles
 from vedette.internal.processes import as_children, context, end_with_parent, let_go_of_results, load_ahead
 from vedette.internal.threads import processors
 
 if TYPE_CHECKING:
     from vedette.campaigns.results import CampaignResults
 
-_A_PART = 4 * TOGETHER  # runs per part; fewer are read faster than another process starts
+_A_PART = 4 * MAX_BATCH_RUNS  # runs per part; fewer are read faster than another process starts
 
 
 def read_ensemble(results: CampaignResults, cell: str, runs: Sequence[int], num_workers: int) -> Ensemble:
@@ -30,8 +30,8 @@ def read_ensemble(results: CampaignResults, cell: str, runs: Sequence[int], num_
     parts = [runs[start : start + _A_PART] for start in range(0, len(runs), _A_PART)]
     number = min(num_workers or processors(), len(parts))
     if number <= 1:
-        return joined([_part(results, cell, part) for part in parts])
-    return joined(list(_by_processes(results, cell, parts, number)))
+        return concatenate_ensembles([_part(results, cell, part) for part in parts])
+    return concatenate_ensembles(list(_by_processes(results, cell, parts, number)))
 
 
 def _by_processes(
@@ -61,7 +61,7 @@ def _by_processes(
 
 
 def _part(results: CampaignResults, cell: str, runs: Sequence[int]) -> Ensemble:
-    return ensemble_of(results.summaries(cell, runs))
+    return build_ensemble(results.summaries(cell, runs))
 
 
 _own_source: list[tuple[CampaignResults, str]] = []  # results and cell of this process, if it is a reader

@@ -14,9 +14,9 @@ import numpy as np
 from vedette.campaigns.benchmark import OWN, Scene
 from vedette.campaigns.results import CampaignResults, open_results
 from vedette.evaluation import Summary, paired_difference, summarise
-from vedette.evaluation.comparison import scored
+from vedette.evaluation.comparison import compare_scored_scans
 from vedette.evaluation.ensembles import Ensemble
-from vedette.evaluation.tails import Tail, lost_at_end, tail, tail_header
+from vedette.evaluation.tail_summary import TailSummary, lost_at_end, summarise_tail, tail_header
 from vedette.internal.text import markdown_table, named_in, with_minus
 from vedette.kernels.base.types import Floats
 from vedette.scenarios.dumping import dump_scenario
@@ -53,7 +53,7 @@ class LeaderboardRow:
     num_runs: int
     num_lost: int
     ospa: Summary
-    tail: Tail
+    tail: TailSummary
     difference: Summary | None
     cardinality_error: float
     nees: Summary | None
@@ -109,7 +109,7 @@ def _tried(scene: Scene, results: CampaignResults) -> Iterator[tuple[Leaderboard
         cardinality = nees = seconds = np.empty(0)
         lost_targets = np.ones(len(lost))
         if ensemble is not None:
-            comparison = scored(cell.scenario, {label: ensemble})
+            comparison = compare_scored_scans(cell.scenario, {label: ensemble})
             ospa |= dict(zip(ensemble.runs.tolist(), comparison.run_means(label).tolist(), strict=True))
             lost_targets = np.append(lost_targets, lost_at_end(comparison, label))
             cardinality = comparison.run_means(label, "cardinality_error")
@@ -123,7 +123,7 @@ def _tried(scene: Scene, results: CampaignResults) -> Iterator[tuple[Leaderboard
             len(ospa),
             len(lost),
             summarise([ospa[run] for run in sorted(ospa)]),
-            tail(list(ospa.values()), lost_targets),
+            summarise_tail(list(ospa.values()), lost_targets),
             None,
             _mean(cardinality),
             summarise(nees) if len(nees) and nees.mean() > _SAYS_NOTHING else None,

@@ -22,8 +22,8 @@ _ROOM_FOR_BAR = 90
 class Progress(ProgressObserver):
     """Progress display: finished runs, rate, remaining time, and running mean error of the compared strategies.
 
-    A context manager to pass to `run_campaign` as its `watch`. In a notebook the line is updated in place if ipywidgets
-    is installed; otherwise one is printed every 15 s.
+    A context manager to pass to `run_campaign` as its `progress`. In a notebook the line is updated in place if
+    ipywidgets is installed; otherwise one is printed every 15 s.
     """
 
     def __init__(self, campaign: Campaign, console: Console | None = None) -> None:

@@ -14,10 +14,10 @@ from vedette.campaigns.results import CampaignResults
 from vedette.campaigns.scores import StrategyScore, score_markdown, score_strategies
 from vedette.campaigns.spec import CampaignSpec, load_spec
 from vedette.evaluation import Comparison
-from vedette.evaluation.actions import choice_words
+from vedette.evaluation.actions import describe_choice
 from vedette.evaluation.health import percent
 from vedette.evaluation.statistics import CONFIDENCE
-from vedette.evaluation.tails import tails
+from vedette.evaluation.tail_summary import tail_sentence
 from vedette.internal.text import with_minus, with_unit
 
 _PUBLISHED = Path(__file__).with_name("published.toml")
@@ -32,7 +32,7 @@ class PublishedOrder(NamedTuple):
 
 
 class PublishedDecision(NamedTuple):
-    """Published actions of a planner at a time, s, in the words of `choice_words`."""
+    """Published actions of a planner at a time, s, in the words of `describe_choice`."""
 
     planner: str
     time: float
@@ -119,7 +119,7 @@ def _checked_decisions(reference: PublishedComparison, comparison: Comparison) -
         if planner not in comparison.strategies or time not in times:
             continue
         shares = comparison.decision_shares(planner, times.index(time))
-        words = {choice_words(choice): share for choice, share in shares.items()}
+        words = {describe_choice(choice): share for choice, share in shares.items()}
         first = next(iter(words))
         evidence = f"chosen in {percent(words.get(actions, 0.0))} of the runs"
         if first != actions:
@@ -154,7 +154,7 @@ def published_markdown(results: CampaignResults, reference: PublishedComparison)
         title = results.title(group)
         scores = (*score_strategies(group), *reference.published)
         table = score_markdown(scores, group.comparison.unit, group.labels[0])
-        lines += [*([f"## {title}", ""] if title else []), table, tails(group.comparison), ""]
+        lines += [*([f"## {title}", ""] if title else []), table, tail_sentence(group.comparison), ""]
     return "\n".join([*lines, "\n\n".join(provenance(reference)), ""])
 
 

@@ -19,7 +19,7 @@ from vedette.campaigns.manifest import campaign_of, contents_checksum, read_mani
 from vedette.campaigns.rows import Entry
 from vedette.campaigns.tables import FinishedRun, concatenated_tables, tables_of_runs
 from vedette.errors import InputError
-from vedette.evaluation.comparison import Comparison, scored
+from vedette.evaluation.comparison import Comparison, compare_scored_scans
 from vedette.evaluation.ensembles import Ensemble
 from vedette.evaluation.metrics import Metric, RunMetrics, decode_metrics
 from vedette.evaluation.runs import measure_run
@@ -188,7 +188,7 @@ class CampaignResults(SummaryRepr):
         labels = tuple(str(cell.settings[axis]) for cell in cells)
         ensembles = {label: self.ensemble(cell.name, common) for label, cell in zip(labels, cells, strict=True)}
         settings = {name: value for name, value in cells[0].settings.items() if name != axis}
-        return GroupComparison(settings, cells, labels, scored(cells[0].scenario, ensembles))
+        return GroupComparison(settings, cells, labels, compare_scored_scans(cells[0].scenario, ensembles))
 
     def _summarised(self, entry: Entry) -> tuple[RunSummary, RunMetrics]:
         if entry.metrics and not self._own:
@@ -205,10 +205,12 @@ class CampaignResults(SummaryRepr):
         with self._placed(entry):
             record = decode(entry.payload, entry.timings)
             self._check(entry, record.run, record.num_sensors)
-            metrics, own = decode_metrics(entry.metrics, record.num_scans) if entry.metrics else (None, {})
+            metrics, custom = decode_metrics(entry.metrics, record.num_scans) if entry.metrics else (None, {})
             if metrics is None:
-                metrics = replace(measure_run(record, self.campaign.cell(entry.cell).scenario), own=own)
-            return FinishedRun(entry.cell, record, metrics.with_own(record, self._own), entry.session, entry.checksum)
+                metrics = replace(measure_run(record, self.campaign.cell(entry.cell).scenario), custom=custom)
+            return FinishedRun(
+                entry.cell, record, metrics.with_custom(record, self._own), entry.session, entry.checksum
+            )
 
     def _check(self, entry: Entry, run: int, num_sensors: int) -> None:
         """Raise `InputError` if a run does not belong to that entry."""

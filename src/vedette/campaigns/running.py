@@ -21,7 +21,7 @@ from vedette.campaigns.tasks import CompletedRun, FailedRun, TaskQueue
 from vedette.campaigns.tasks import TaskOutcome as Done
 from vedette.errors import InputError, VedetteError
 from vedette.evaluation.metrics import encode_metrics
-from vedette.evaluation.runs import own_metrics
+from vedette.evaluation.runs import custom_metrics
 from vedette.internal.extras import require_packages
 from vedette.internal.text import pluralise
 
@@ -74,7 +74,7 @@ def run_campaign(
     num_workers: int = 1,
     scheduler: str | None = None,
     redo_damaged: bool = False,
-    watch: ProgressObserver | None = None,
+    progress: ProgressObserver | None = None,
 ) -> CampaignOutcome:
     """Execute the runs that are missing in the folder, and write the tables when all are done.
 
@@ -91,7 +91,7 @@ def run_campaign(
             (`--scheduler-file`); each worker has this version installed.
         redo_damaged: repeat runs that were altered in the folder after they were stored, instead of refusing to
             continue.
-        watch: observer of the progress.
+        progress: observer of the progress.
 
     Raises:
         InputError: the folder holds something else, another campaign, or damaged results; no scheduler answers at the
@@ -104,38 +104,38 @@ def run_campaign(
         )
     if scheduler is not None:
         require_packages("a campaign on a cluster", "distributed")
-    watch = watch or NullObserver()
+    progress = progress or NullObserver()
     failed, num_completed = [], 0
     database = Path(folder) / DATABASE
     lost = (Path(folder) / MANIFEST).is_file() and (not database.exists() or database.stat().st_size == 0)
     with Store.open(Path(folder), campaign) as store:
         if lost:
-            watch.note(f"{database} was not there, or empty: every run is done again")
-        _check_undamaged(store, redo_damaged, watch)
-        _add_missing_metrics(store, campaign, watch)
+            progress.note(f"{database} was not there, or empty: every run is done again")
+        _check_undamaged(store, redo_damaged, progress)
+        _add_missing_metrics(store, campaign, progress)
         queue = TaskQueue(campaign, store.finished())
         num_existing = campaign.total - len(queue)
-        watch.begin(num_existing, campaign.total)
+        progress.begin(num_existing, campaign.total)
         for change in store.version_changes:
-            watch.note(f"{change}; runs of both may differ in their last digits")
-        with closing(_results(queue, num_workers, scheduler, watch)) as results:
+            progress.note(f"{change}; runs of both may differ in their last digits")
+        with closing(_results(queue, num_workers, scheduler, progress)) as results:
             for batch in results:
                 store.add(*(result.row for result in batch if isinstance(result, CompletedRun)))
                 for result in batch:
                     if isinstance(result, CompletedRun):
                         num_completed += 1
-                        watch.completed(result)
+                        progress.completed(result)
                     else:
                         failed.append(result)
                         store.note_failure(result.cell, result.run, result.message)
-                        watch.failed(result)
+                        progress.failed(result)
     if campaign.shard.count == 1:  # tables of shards are written when they are merged
         # Always, to repair tables that an interrupted call left or that were altered.
         export_tables(open_results(folder, campaign=campaign), Path(folder) / TABLES)
     return CampaignOutcome(num_completed, num_existing, tuple(failed))
 
 
-def _check_undamaged(store: Store, redo: bool, watch: ProgressObserver) -> None:
+def _check_undamaged(store: Store, redo: bool, progress: ProgressObserver) -> None:
     """Raise `InputError` if a finished run was altered; with `redo` discard it instead, so that it is repeated."""
     damaged = store.damaged()
     names = ", ".join(f"{cell} {run}" for cell, run in damaged)
@@ -147,29 +147,29 @@ def _check_undamaged(store: Store, redo: bool, watch: ProgressObserver) -> None:
     for cell, run in damaged:
         store.discard(cell, run)
     if damaged:
-        watch.note(f"damaged, and done again: {names}")
+        progress.note(f"damaged, and done again: {names}")
 
 
-def _add_missing_metrics(store: Store, campaign: Campaign, watch: ProgressObserver) -> None:
+def _add_missing_metrics(store: Store, campaign: Campaign, progress: ProgressObserver) -> None:
     """Compute metrics that the program or the scenarios have gained since runs were stored, from their records."""
-    own = {cell.name: own_metrics(cell.scenario) for cell in campaign.cells}
+    own = {cell.name: custom_metrics(cell.scenario) for cell in campaign.cells}
     lacking = store.unmeasured({cell: [metric.name for metric in of_cell] for cell, of_cell in own.items()})
     if lacking:
         results = open_results(store.folder, campaign=campaign)
         for cell, run in lacking:
             there = results.run(cell, run)
-            store.put_metrics(cell, run, encode_metrics(there.metrics.with_own(there.record, own[cell])))
-        watch.note(f"measured anew: {pluralise(len(lacking), 'run')}")
+            store.put_metrics(cell, run, encode_metrics(there.metrics.with_custom(there.record, own[cell])))
+        progress.note(f"measured anew: {pluralise(len(lacking), 'run')}")
 
 
-def _results(queue: TaskQueue, num_workers: int, scheduler: str | None, watch: ProgressObserver) -> Generator[Done]:
+def _results(queue: TaskQueue, num_workers: int, scheduler: str | None, progress: ProgressObserver) -> Generator[Done]:
     if scheduler is not None:
         from vedette.campaigns.cluster import remote_workers  # imported here, as only this branch needs asyncio
 
-        with remote_workers(scheduler, watch.note, num_workers) as workers:
+        with remote_workers(scheduler, progress.note, num_workers) as workers:
             yield from on_workers(workers, queue)
     elif num_workers > 1 and len(queue) > 1:
-        with local_workers(min(num_workers, len(queue)), watch.note) as workers:
+        with local_workers(min(num_workers, len(queue)), progress.note) as workers:
             yield from on_workers(workers, queue)
     else:
         yield from in_process(queue)

@@ -15,7 +15,7 @@ from vedette.campaigns.codec import encode
 from vedette.campaigns.rows import Row, row_of
 from vedette.errors import VedetteError
 from vedette.evaluation.metrics import encode_metrics
-from vedette.evaluation.runs import measure_run, own_metrics, run_scenario
+from vedette.evaluation.runs import custom_metrics, measure_run, run_scenario
 from vedette.scenarios.sections.planners import STRATEGIES
 from vedette.simulation.serialization import encode_timings
 from vedette.simulation.storage import versions
@@ -106,7 +106,7 @@ def _one(cell: Cell, seed: int, run: int) -> CompletedRun | FailedRun:
     start = time.perf_counter()
     try:
         record = run_scenario(cell.scenario, cell.planner, seed=seed, run=run, num_threads=1)
-        metrics = encode_metrics(measure_run(record, cell.scenario, own_metrics(cell.scenario)))
+        metrics = encode_metrics(measure_run(record, cell.scenario, custom_metrics(cell.scenario)))
         row = row_of(cell.name, run, encode(record), encode_timings(record), metrics)
     except VedetteError as error:
         return FailedRun(cell.name, run, str(error))

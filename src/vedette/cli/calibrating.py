@@ -60,8 +60,8 @@ def calibrate(
     scenario, recording, assumed = read
     with interruptible("nothing was written"):
         problem = problem_of(scenario, position=position)
-        with compiling(), _counting() as watch:
-            windows = list(calibrate_windows(problem, window or math.inf, watch))
+        with compiling(), _counting() as progress:
+            windows = list(calibrate_windows(problem, window or math.inf, progress))
         if out is not None:
             text = calibrated_text(scenario, sensors, windows[-1].calibration, out.parent)
             write_file(out, lambda file: file.write(text.encode("utf-8")), make_folder=True)

@@ -150,7 +150,7 @@ def carry_out(
                 num_workers=workers or (1 if scheduler else processors()),
                 scheduler=scheduler,
                 redo_damaged=redo_damaged,
-                watch=progress,
+                progress=progress,
             )
 
 

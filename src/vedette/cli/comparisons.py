@@ -39,7 +39,7 @@ def print_comparison(comparison: Comparison, words: Sequence[str] = ()) -> None:
     """
     from vedette.evaluation import strategy_rows
     from vedette.evaluation.tables import heading, legend, significance
-    from vedette.evaluation.tails import tails
+    from vedette.evaluation.tail_summary import tail_sentence
 
     console = new_console()
     console.print(heading(comparison), style="bold")
@@ -51,7 +51,7 @@ def print_comparison(comparison: Comparison, words: Sequence[str] = ()) -> None:
     if words:
         print_names(dict(zip(comparison.strategies, words, strict=True)))
     if is_verbose():
-        console.print(tails(comparison), style="dim")
+        console.print(tail_sentence(comparison), style="dim")
         _print_decisions(console, comparison)
 
 
@@ -70,19 +70,19 @@ def _print_decisions(console: Console, comparison: Comparison) -> None:
 def print_scores(scores: Sequence[StrategyScore], comparison: Comparison) -> None:
     """Print the errors and costs of strategies next to the published ones."""
     from vedette.campaigns.scores import score_row
-    from vedette.evaluation.tails import tails
+    from vedette.evaluation.tail_summary import tail_sentence
 
     rows = [score_row(score)[1:] for score in scores]
     names = (named_in("OSPA", comparison.unit), *_SHORT_SCORES)
     _print_rows(new_console(), [score.label for score in scores], names, rows)
-    if told := tails(comparison):
+    if told := tail_sentence(comparison):
         new_console().print(told, style="dim")
 
 
 def print_standings(table: SceneTable) -> None:
     """Print the ranking of entrants on a scene with the columns that fit a terminal; the page has all of them."""
     from vedette.campaigns.leaderboard import header, row
-    from vedette.evaluation.tails import tail_header, tails_in_words
+    from vedette.evaluation.tail_summary import tail_header, tail_text
 
     names, rows = header(table), [row(table, own) for own in table.standings]
     left_out = (*_LEFT_OUT, *tail_header(table.unit))
@@ -90,7 +90,7 @@ def print_standings(table: SceneTable) -> None:
     new_console().print(f"{table.scene.name}: {table.scene.about}")
     numbers = [tuple(each[place] for place in shown) for each in rows]
     _print_rows(new_console(), [each[0] for each in rows], (names[1], *_SHORT_STANDINGS), numbers)
-    told = tails_in_words({own.label: own.tail for own in table.standings}, table.unit)
+    told = tail_text({own.label: own.tail for own in table.standings}, table.unit)
     new_console().print(told, style="dim")
     for own in table.standings:
         if own.reason:

@@ -17,7 +17,7 @@ def run_document(record: RunRecord, scenario: Scenario | None) -> dict[str, Any]
 
     Without the scenario, OSPA has no unit and sensors have numbers.
     """
-    from vedette.evaluation.comparison import choices_of, counted_scans
+    from vedette.evaluation.comparison import counted_scans, decided_actions
     from vedette.evaluation.diagnostics import run_diagnostics
     from vedette.evaluation.ensembles import PARTS
 
@@ -30,7 +30,7 @@ def run_document(record: RunRecord, scenario: Scenario | None) -> dict[str, Any]
             ],
             "notes": decision.plan.notes,
         }
-        for decision, choice in zip(record.decisions, choices_of(record), strict=True)
+        for decision, choice in zip(record.decisions, decided_actions(record), strict=True)
     ]
     counted = counted_scans(record, scenario)
     window = record.times[counted]

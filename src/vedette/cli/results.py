@@ -86,14 +86,14 @@ def _report_campaign(
 
 
 def _report_run(folder: Path, page: Path, figures: Path | None, trust: bool) -> Reported:
-    from vedette.evaluation.scans import code_of_sensors
+    from vedette.evaluation.scans import measurement_code
     from vedette.reports import write_run_figures, write_run_report
     from vedette.simulation.storage import read_manifest
 
     record, scenario = saved_run(folder)
     with named_options({"path": "--out"}):
         write_run_report(record, scenario, page, manifest=read_manifest(folder), trust=trust)
-    unmeasured = () if trust else code_of_sensors(scenario)
+    unmeasured = () if trust else measurement_code(scenario)
     _tell_page(page, unmeasured)
     return _figures(figures, lambda path: write_run_figures(record, scenario, path)), unmeasured
 

@@ -48,17 +48,17 @@ def _title(record: RunRecord, scenario: Scenario | None) -> str:
 def _print_decisions(console: Console, record: RunRecord) -> None:
     from rich.table import Table
 
-    from vedette.evaluation.actions import choice_words
+    from vedette.evaluation.actions import describe_choice
     from vedette.evaluation.certainty import lead_words, optimality_words
-    from vedette.evaluation.comparison import choices_of
+    from vedette.evaluation.comparison import decided_actions
 
-    rows = list(zip(record.decisions, choices_of(record), strict=True))
+    rows = list(zip(record.decisions, decided_actions(record), strict=True))
     left_out = 0 if is_verbose() else max(0, len(rows) - _FEW_DECISIONS)
     table = Table(box=None, pad_edge=False)
     for heading in ("time", "actions", "expected reward", "lead over runner-up", "optimal"):
         table.add_column(heading)
     for decision, choice in [*rows[: _FEW_DECISIONS - 1], rows[-1]] if left_out else rows:
-        actions = choice_words(choice)
+        actions = describe_choice(choice)
         rewards = dict.fromkeys(f"{mean:.3f} ± {error:.3f}" for mean, error in decision.plan.expected_rewards)
         table.add_row(
             f"{decision.time:g} s",

@@ -165,19 +165,19 @@ def warn_of_recording(record: RunRecord, scenario: Scenario) -> tuple[str, ...]:
     """Print and return warnings on a recording: sensors that share no target, and targets too fast for its tracks."""
     if scenario.model.recording is None:
         return ()
-    from vedette.evaluation.agreement import disagreements
-    from vedette.evaluation.unexplained import unexplained
+    from vedette.evaluation.sensor_agreement import disagreement_warnings
+    from vedette.evaluation.unexplained_courses import unexplained_course_warnings
 
-    found = (*disagreements(record, scenario), *unexplained(record, scenario))
+    found = (*disagreement_warnings(record, scenario), *unexplained_course_warnings(record, scenario))
     for line in found:
         note(f"warning: {line}")
     return found
 
 
 def _draw_run(record: RunRecord, scenario: Scenario, folder: Path) -> None:
-    from vedette.evaluation.figures import reward_figure, save_figure, scene_of, tracks_figure
+    from vedette.evaluation.figures import build_scene, reward_figure, save_figure, tracks_figure
 
-    scene = scene_of(scenario, record.planner)
+    scene = build_scene(scenario, record.planner)
     save_figure(tracks_figure(record, scene=scene), folder / "tracks")
     for decision in record.decisions:
         if decision.plan.tables and any(len(actions) > 1 for actions in decision.plan.actions):

@@ -129,8 +129,8 @@ def _tracked(scenario: Scenario, recording: RecordedScans) -> RunRecord:
     from vedette.simulation.journal import RunInterrupted, RunStopped
 
     try:
-        with compiling(), bar("scans", len(recording.times)) as watch:
-            return track_recording(scenario, recording, watch=watch)
+        with compiling(), bar("scans", len(recording.times)) as progress:
+            return track_recording(scenario, recording, progress=progress)
     except (RunStopped, RunInterrupted) as error:
         end_stopped(error, "nothing was written")
 
@@ -200,6 +200,6 @@ def _tracks(record: RunRecord) -> str:
 
 
 def _draw(record: RunRecord, scenario: Scenario, out: Path) -> None:
-    from vedette.evaluation.figures import save_figure, scene_of, tracks_figure
+    from vedette.evaluation.figures import build_scene, save_figure, tracks_figure
 
-    save_figure(tracks_figure(record, scene=scene_of(scenario, record.planner)), out / "figures" / "tracks")
+    save_figure(tracks_figure(record, scene=build_scene(scenario, record.planner)), out / "figures" / "tracks")

@@ -43,15 +43,17 @@ def video(
         raise usage_error("expected one of --speed and --seconds; got both", "--speed")
     require_packages("vedette video", "matplotlib", "pyarrow")
     from vedette.evaluation.figures import write_video
-    from vedette.evaluation.scans import code_of_sensors
+    from vedette.evaluation.scans import measurement_code
 
     with interruptible("nothing was written"):
         record, scenario = saved_run(folder)
         if speed is not None:
             seconds = float(record.times[-1] - record.times[0]) / speed
-        with bar("frames") as watch, named_options({"path": "--out", "seconds": "--seconds"}):
-            number = write_video(record, scenario, out, fps=fps, seconds=seconds, size=size, trust=trust, watch=watch)
-    unmeasured = () if trust else code_of_sensors(scenario)
+        with bar("frames") as progress, named_options({"path": "--out", "seconds": "--seconds"}):
+            number = write_video(
+                record, scenario, out, fps=fps, seconds=seconds, size=size, trust=trust, progress=progress
+            )
+    unmeasured = () if trust else measurement_code(scenario)
     if unmeasured:
         note(f"without measurements, as drawing them runs {', '.join(unmeasured)}: --trust allows it")
     say(f"wrote {out}: {pluralise(number, 'frame')}, {number / fps:.1f} s")

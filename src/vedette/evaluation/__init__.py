@@ -3,7 +3,7 @@
 Figures are in `vedette.evaluation.figures`.
 """
 
-from vedette.evaluation.comparison import Comparison, choices_of, compare
+from vedette.evaluation.comparison import Comparison, compare, decided_actions
 from vedette.evaluation.ensembles import Ensemble
 from vedette.evaluation.metrics import (
     AverageNees,
@@ -15,7 +15,7 @@ from vedette.evaluation.metrics import (
     OspaResult,
     RunMetrics,
     TimeToTrack,
-    TrackedShare,
+    TrackedFraction,
     TrackSet,
     average_nees,
     continuity,
@@ -31,10 +31,10 @@ from vedette.evaluation.metrics import (
     ospa2,
     ospa2_of_run,
     ospa_of_run,
-    seen_targets,
+    targets_in_view,
 )
 from vedette.evaluation.rewards import MeanRewards, mean_rewards
-from vedette.evaluation.runs import measure_run, own_metrics, run_scenario, track_recording
+from vedette.evaluation.runs import custom_metrics, measure_run, run_scenario, track_recording
 from vedette.evaluation.statistics import PairedDifference, Summary, holm, paired_difference, summarise
 from vedette.evaluation.tables import decision_rows, strategy_csv, strategy_markdown, strategy_rows
 
@@ -54,12 +54,13 @@ __all__ = [
     "Summary",
     "TimeToTrack",
     "TrackSet",
-    "TrackedShare",
+    "TrackedFraction",
     "average_nees",
-    "choices_of",
     "compare",
     "continuity",
     "continuity_of_run",
+    "custom_metrics",
+    "decided_actions",
     "decision_rows",
     "gospa",
     "gospa_distance",
@@ -75,13 +76,12 @@ __all__ = [
     "ospa2",
     "ospa2_of_run",
     "ospa_of_run",
-    "own_metrics",
     "paired_difference",
     "run_scenario",
-    "seen_targets",
     "strategy_csv",
     "strategy_markdown",
     "strategy_rows",
     "summarise",
+    "targets_in_view",
     "track_recording",
 ]

@@ -37,8 +37,8 @@ class ActionAxis(NamedTuple):
 
     def title(self, sensor: str = "") -> str:
         """Return the title `Heading (deg)`, or for a named sensor `Heading of sensor 1 (deg)`."""
-        of = f" of {sensor}" if sensor else ""
-        return self.name[:1].upper() + self.name[1:] + of + (f" ({self.unit})" if self.unit else "")
+        suffix = f" of {sensor}" if sensor else ""
+        return self.name[:1].upper() + self.name[1:] + suffix + (f" ({self.unit})" if self.unit else "")
 
     def counted(self) -> ActionAxis:
         """Return the axis with the actions side by side, regardless of their numbers."""
@@ -53,14 +53,16 @@ def action_axis(actions: Actions) -> ActionAxis:
     actions = _without_speed(actions)
     rows = [rounded(actions.columns, row) for row in actions.values]
     ticks = tuple(with_minus(", ".join([f"{value:g}" for _, value in row])) for row in rows)
-    labels = tuple(map(row_words, rows))
-    names, units = [[_parts(column)[i] for column in actions.columns] for i in (0, 1)]
+    labels = tuple(map(describe_action, rows))
+    names, units = [[_split_column(column)[i] for column in actions.columns] for i in (0, 1)]
     if len(names) == 1:
         return ActionAxis(names[0], units[0], actions.values[:, 0], ticks, labels, True)
-    same = len(set(units)) == 1
-    each = names if same else [f"{name} ({unit})" if unit else name for name, unit in zip(names, units, strict=True)]
+    one_unit = len(set(units)) == 1
+    titles = (
+        names if one_unit else [f"{name} ({unit})" if unit else name for name, unit in zip(names, units, strict=True)]
+    )
     places = np.arange(1.0, len(actions) + 1)
-    return ActionAxis(", ".join(each) or "action", units[0] if same else "", places, ticks, labels, False)
+    return ActionAxis(", ".join(titles) or "action", units[0] if one_unit else "", places, ticks, labels, False)
 
 
 def _without_speed(actions: Actions) -> Actions:
@@ -69,23 +71,23 @@ def _without_speed(actions: Actions) -> Actions:
     place = actions.columns.index("speed_mps")
     if np.ptp(actions.values[:, place]) > 0.0:
         return actions
-    kept = [i for i in range(len(actions.columns)) if i != place]
-    return Actions(tuple(actions.columns[i] for i in kept), actions.values[:, kept])
+    columns = [i for i in range(len(actions.columns)) if i != place]
+    return Actions(tuple(actions.columns[i] for i in columns), actions.values[:, columns])
 
 
 def rounded(columns: Sequence[str], row: Floats) -> Row:
     """Return a row with angles rounded to whole degrees and all else to four digits."""
-    found = []
+    cells = []
     for name, number in zip(columns, row.tolist(), strict=True):
         if not name.endswith("_deg"):
             number = float(f"{number:.4g}")
         else:
             number = round(number) % 360 if name in _AZIMUTHS else round(number)
-        found.append((name, number + 0.0))
-    return tuple(found)
+        cells.append((name, number + 0.0))
+    return tuple(cells)
 
 
-def angle_of(row: Mapping[str, float], heading: str = "heading_deg", azimuth: str = "course_deg") -> float | None:
+def drawn_angle(row: Mapping[str, float], heading: str = "heading_deg", azimuth: str = "course_deg") -> float | None:
     """Return the direction of an action for a drawing, deg counter-clockwise from east; None if it has none.
 
     True north is drawn upwards, wherever the sensor is.
@@ -95,24 +97,24 @@ def angle_of(row: Mapping[str, float], heading: str = "heading_deg", azimuth: st
     return row.get(heading)
 
 
-def row_words(row: Row) -> str:
+def describe_action(row: Row) -> str:
     """Return a row in words: `-30°` for a lone heading or course, else `heading -30°, speed 5, off`, or `still`."""
     if len(row) == 1 and row[0][0] in ("heading_deg", "course_deg"):
         return f"{row[0][1]:g}°"
-    return ", ".join([switch_words(column, x) or _number_words(column, x) for column, x in row]) or "still"
+    return ", ".join([switch_words(column, x) or _describe_number(column, x) for column, x in row]) or "still"
 
 
-def _number_words(column: str, number: float) -> str:
-    name, _, sign = _parts(column)
+def _describe_number(column: str, number: float) -> str:
+    name, _, sign = _split_column(column)
     return f"{name} {number:g}{sign}"
 
 
-def choice_words(rows: Sequence[Row]) -> str:
+def describe_choice(rows: Sequence[Row]) -> str:
     """Return the actions of all sensors in words: `-30°, 60°`."""
-    return ("; " if any(len(row) > 1 for row in rows) else ", ").join(map(row_words, rows))
+    return ("; " if any(len(row) > 1 for row in rows) else ", ").join(map(describe_action, rows))
 
 
-def _parts(column: str) -> tuple[str, str, str]:
+def _split_column(column: str) -> tuple[str, str, str]:
     """Return name in words, unit, and sign after a number: `heading_deg` gives `heading`, `deg`, `°`."""
     end = next(filter(column.endswith, _UNITS), "")
     name = column.removesuffix(end).replace("_", " ")

@@ -9,13 +9,13 @@ from vedette.control.plan import Plan
 
 def lead_words(plan: Plan) -> str:
     """Return the lead in mean reward over the runner-up, `0.071 (3.3 std. errors)`; empty if it is not recorded."""
-    second = None if plan.explanation is None else plan.explanation.runner_up
-    if second is None:
+    runner_up = None if plan.explanation is None else plan.explanation.runner_up
+    if runner_up is None:
         return ""
-    ratio = second.in_standard_errors
+    ratio = runner_up.in_standard_errors
     if ratio is None or not math.isfinite(ratio):
-        return f"{second.margin:.3g}"
-    return f"{second.margin:.3g} ({ratio:.2g} std. errors)"
+        return f"{runner_up.margin:.3g}"
+    return f"{runner_up.margin:.3g} ({ratio:.2g} std. errors)"
 
 
 def optimality_words(plan: Plan) -> str:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.evaluation.ensembles import PARTS, Choice, Ensemble, choice_of, ensemble_of
+from vedette.evaluation.ensembles import PARTS, Choice, Ensemble, build_ensemble, rounded_choice
 from vedette.evaluation.metrics import RunMetrics
 from vedette.evaluation.statistics import PairedDifference, Summary, holm, paired_difference, summarise
 from vedette.internal.representation import SummaryRepr
@@ -18,7 +18,7 @@ from vedette.kernels.base.types import Bools, Floats
 from vedette.scenarios import Scenario
 from vedette.simulation.records import RunRecord
 
-_MOST_TOLD = 4
+_MAX_LISTED = 4
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -44,9 +44,9 @@ class Comparison(SummaryRepr):
         return f"of {pluralise(self.num_runs, 'run')} on {elided(self.scenario)}"
 
     def _detail(self) -> str:
-        means = [f"{elided(name)} {float(self.summary(name).mean):.4g}" for name in self.strategies[:_MOST_TOLD]]
-        more = len(self.strategies) - len(means)
-        return "mean OSPA: " + "; ".join(means + ([f"{more} more"] if more else []))
+        means = [f"{elided(name)} {float(self.summary(name).mean):.4g}" for name in self.strategies[:_MAX_LISTED]]
+        num_others = len(self.strategies) - len(means)
+        return "mean OSPA: " + "; ".join(means + ([f"{num_others} more"] if num_others else []))
 
     @property
     def scenario(self) -> str:
@@ -100,8 +100,8 @@ class Comparison(SummaryRepr):
 
         NaN for the first strategy, and for single runs.
         """
-        alone = [self.difference(strategy).p_value for strategy in self.strategies[1:]]
-        return np.concatenate([[np.nan], holm(np.array(alone, np.float64))])
+        uncorrected = [self.difference(strategy).p_value for strategy in self.strategies[1:]]
+        return np.concatenate([[np.nan], holm(np.array(uncorrected, np.float64))])
 
     def decision_shares(self, strategy: str, decision: int) -> dict[Choice, float]:
         """Return the share of the runs in which each combination of actions was chosen; the most frequent first."""
@@ -142,10 +142,12 @@ def compare(
     """
     if not runs or not all(runs.values()):
         raise InputError("runs: expected at least one run of each of one or more strategies")
-    measured = {name: [None] * len(of) for name, of in runs.items()} if metrics is None else metrics
+    measured = {name: [None] * len(records) for name, records in runs.items()} if metrics is None else metrics
     ensembles = {
-        name: ensemble_of((record.summary(), own) for record, own in zip(of, measured[name], strict=True))
-        for name, of in runs.items()
+        name: build_ensemble(
+            (record.summary(), metrics_of_run) for record, metrics_of_run in zip(records, measured[name], strict=True)
+        )
+        for name, records in runs.items()
     }
     return compare_ensembles(ensembles, since=since, until=until, unit=unit)
 
@@ -167,7 +169,7 @@ def compare_ensembles(
     return compared
 
 
-def scored(scenario: Scenario, ensembles: Mapping[str, Ensemble]) -> Comparison:
+def compare_scored_scans(scenario: Scenario, ensembles: Mapping[str, Ensemble]) -> Comparison:
     """Return the comparison over the scans that the scenario counts."""
     window, times = scenario.model.ospa, next(iter(ensembles.values())).times
     since, until = None, np.inf
@@ -181,12 +183,12 @@ def scored(scenario: Scenario, ensembles: Mapping[str, Ensemble]) -> Comparison:
 def counted_scans(record: RunRecord, scenario: Scenario | None) -> Bools:
     """Return whether each scan of a run counts in its mean error, (num_scans,).
 
-    The scans are those that `scored` counts; without a scenario, those after the first decision. All count if the run
-    stopped before the first of them.
+    The scans are those that `compare_scored_scans` counts; without a scenario, those after the first decision. All
+    count if the run stopped before the first of them.
     """
-    runs = {record.planner: ensemble_of([(record.summary(), None)])}
+    runs = {record.planner: build_ensemble([(record.summary(), None)])}
     try:
-        return (compare_ensembles(runs) if scenario is None else scored(scenario, runs)).counted
+        return (compare_ensembles(runs) if scenario is None else compare_scored_scans(scenario, runs)).counted
     except InputError:
         return np.ones(record.num_scans, bool)
 
@@ -206,9 +208,9 @@ def typical_run(comparison: Comparison, strategy: str) -> int:
     return int(np.argsort(means, kind="stable")[(len(means) - 1) // 2])
 
 
-def choices_of(record: RunRecord) -> tuple[Choice, ...]:
+def decided_actions(record: RunRecord) -> tuple[Choice, ...]:
     """Return the choices of all decisions of a run, rounded."""
-    return tuple(choice_of(decision.plan) for decision in record.decisions)
+    return tuple(rounded_choice(decision.plan) for decision in record.decisions)
 
 
 def _check_paired(name: str, ensemble: Ensemble, other: str, reference: Ensemble) -> None:
@@ -216,11 +218,11 @@ def _check_paired(name: str, ensemble: Ensemble, other: str, reference: Ensemble
         raise InputError(
             f"runs[{name!r}]: expected {reference.num_runs} runs, as of {other!r}; got {ensemble.num_runs}"
         )
-    apart = (ensemble.seeds != reference.seeds) | (ensemble.runs != reference.runs)
-    if ensemble.scenario != reference.scenario or apart.any():
-        place = int(apart.argmax())
+    differs = (ensemble.seeds != reference.seeds) | (ensemble.runs != reference.runs)
+    if ensemble.scenario != reference.scenario or differs.any():
+        index = int(differs.argmax())
         expected, got = (
-            (each.scenario, int(each.seeds[place]), int(each.runs[place])) for each in (reference, ensemble)
+            (each.scenario, int(each.seeds[index]), int(each.runs[index])) for each in (reference, ensemble)
         )
         raise InputError(f"runs[{name!r}]: expected scenario, seed and run {expected}; got {got}")
     if not np.array_equal(ensemble.times, reference.times):

@@ -15,7 +15,7 @@ from vedette.kernels.labelled.set_fusion import LOST, SURE
 from vedette.simulation.health import Health
 
 Level = Literal["ok", "note", "check"]
-_MUCH = 0.01  # share or number above which a truncation should be checked
+_CHECK_ABOVE = 0.01  # share or number above which a truncation should be checked
 
 
 class Diagnostic(NamedTuple):
@@ -39,20 +39,20 @@ def run_diagnostics(health: Health, sensors: Sequence[str] = ()) -> tuple[Diagno
     return diagnostics(summarise_health(health_sums([health]), sensors))
 
 
-def diagnostics_line(found: Sequence[Diagnostic]) -> str:
+def diagnostics_line(results: Sequence[Diagnostic]) -> str:
     """Return the diagnostics that are not `ok` in one line; `no limit reached, nothing truncated` if all are."""
-    shown = [f"{each.name[0].lower()}{each.name[1:]}: {each.text}" for each in found if each.level != "ok"]
+    shown = [f"{each.name[0].lower()}{each.name[1:]}: {each.text}" for each in results if each.level != "ok"]
     return "; ".join(shown) or "no limit reached, nothing truncated"
 
 
 def diagnostics(health: HealthSummary) -> tuple[Diagnostic, ...]:
     """Return every diagnostic of some runs, those of the fusion first."""
-    return (*_of_fusion(health), *_of_filters(health), *_of_measurements(health))
+    return (*_fusion_diagnostics(health), *_filter_diagnostics(health), *_measurement_diagnostics(health))
 
 
-def _level(value: float, much: float = 0.0) -> Level:
-    """Return `check` above `much`, `note` above 0; with infinite `much` never `check`."""
-    return "check" if value > much else "note" if value > 0.0 else "ok"
+def _level(value: float, check_above: float = 0.0) -> Level:
+    """Return `check` above `check_above`, `note` above 0; with infinite `check_above` never `check`."""
+    return "check" if value > check_above else "note" if value > 0.0 else "ok"
 
 
 def _scans(share: float) -> str:
@@ -69,14 +69,14 @@ def _worst(shares: Floats, names: Sequence[str]) -> str:
     return f"{percent(float(shares[worst]))} at {names[worst]}" if shares[worst] else "0 %"
 
 
-def _of_fusion(health: HealthSummary) -> Iterator[Diagnostic]:
-    most = f", up to {pluralise(health.worst_lost, 'target')}" if health.lost else ""
+def _fusion_diagnostics(health: HealthSummary) -> Iterator[Diagnostic]:
+    max_lost = f", up to {pluralise(health.worst_lost, 'target')}" if health.lost else ""
     yield Diagnostic(
         "Targets lost by fusion",
         f"A label with an existence probability of {SURE:g} or more at one sensor has less than {LOST:g} after fusion, "
         "because another sensor lacks it or does not see there.",
-        f"{_scans(health.lost)}{most}",
-        _level(health.lost, _MUCH),
+        f"{_scans(health.lost)}{max_lost}",
+        _level(health.lost, _CHECK_ABOVE),
     )
     yield Diagnostic(
         "No common label set",
@@ -88,7 +88,7 @@ def _of_fusion(health: HealthSummary) -> Iterator[Diagnostic]:
         "Fused weight truncated",
         "Share of the fused weight beyond max_hypotheses, at the worst scan.",
         percent(health.worst_fusion_discarded),
-        _level(health.worst_fusion_discarded, _MUCH),
+        _level(health.worst_fusion_discarded, _CHECK_ABOVE),
     )
     yield Diagnostic(
         "Label sets missing at a sensor",
@@ -104,7 +104,7 @@ def _of_fusion(health: HealthSummary) -> Iterator[Diagnostic]:
     )
 
 
-def _of_filters(health: HealthSummary) -> Iterator[Diagnostic]:
+def _filter_diagnostics(health: HealthSummary) -> Iterator[Diagnostic]:
     yield Diagnostic(
         "Posterior truncated",
         "The filter reached its limits, or left out improbable hypotheses. The weight is an upper bound, and "
@@ -130,13 +130,13 @@ def _of_filters(health: HealthSummary) -> Iterator[Diagnostic]:
         "Independence error",
         "Upper bound on the share of the weight that a filter moves when it treats labels as independent, per scan.",
         (f"{_bound(worst)} (mean {_bound(mean)})" if worst else "none") if known else "not known",
-        ("check" if mean > 5.0 * _MUCH else _level(worst, math.inf)) if known else "note",
+        ("check" if mean > 5.0 * _CHECK_ABOVE else _level(worst, math.inf)) if known else "note",
     )
     yield Diagnostic(
         "Targets dropped",
         "Expected number of targets in the labels that a filter dropped, at the worst scan.",
         f"up to {health.worst_dropped:.2g} per scan" if health.worst_dropped else "none",
-        _level(health.worst_dropped, _MUCH),
+        _level(health.worst_dropped, _CHECK_ABOVE),
     )
 
 
@@ -152,11 +152,11 @@ def _truncation(health: HealthSummary) -> str:
 
 def _truncation_level(health: HealthSummary) -> Level:
     if health.worst_discarded > 0.0:  # neither zero nor unknown
-        return _level(health.worst_discarded, _MUCH)
+        return _level(health.worst_discarded, _CHECK_ABOVE)
     return "check" if health.cap_met else "note" if math.isnan(health.worst_discarded) else "ok"
 
 
-def _of_measurements(health: HealthSummary) -> Iterator[Diagnostic]:
+def _measurement_diagnostics(health: HealthSummary) -> Iterator[Diagnostic]:
     yield Diagnostic(
         "Repeated measurements",
         "Measurements that repeat another one and were left out.",

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from vedette.control import Plan
 from vedette.errors import InputError
 from vedette.evaluation.actions import Row, rounded
-from vedette.evaluation.health import HealthSums, added, health_sums
+from vedette.evaluation.health import HealthSums, add_health_sums, health_sums
 from vedette.evaluation.metrics import RunMetrics
 from vedette.evaluation.rewards import RewardSums
 from vedette.internal.representation import SummaryRepr
@@ -27,7 +27,7 @@ Choice: TypeAlias = tuple[Row, ...]
 Measured: TypeAlias = tuple[RunSummary, RunMetrics | None]
 
 # Largest numbers of runs, and of entries of their reward tables, that are in memory at once.
-TOGETHER, _MOST_REWARDS = 256, 2**22
+MAX_BATCH_RUNS, _MAX_BATCH_REWARDS = 256, 2**22
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -89,18 +89,18 @@ class Ensemble(SummaryRepr):
         return np.asarray(self.num_targets.astype(np.int64) - self.measures["num_missed"])
 
 
-def ensemble_of(runs: Iterable[Measured]) -> Ensemble:
+def build_ensemble(runs: Iterable[Measured]) -> Ensemble:
     """Return the ensemble of some runs, with their measures if they have any.
 
     Runs may come from a stream: at most a few hundred are in memory at a time.
 
     Raises `InputError` for no run, and for runs of other scenarios or scan times than the first.
     """
-    return joined([_of_few(few) for few in _batches(runs)])
+    return concatenate_ensembles([_build_batch(batch) for batch in _batches(runs)])
 
 
-def joined(parts: Sequence[Ensemble]) -> Ensemble:
-    """Return the runs of several ensembles, one after the other; raises like `ensemble_of`."""
+def concatenate_ensembles(parts: Sequence[Ensemble]) -> Ensemble:
+    """Return the runs of several ensembles, one after the other; raises like `build_ensemble`."""
     if not parts:
         raise InputError("runs: expected at least one run of each of one or more strategies")
     if len(parts) == 1:
@@ -109,7 +109,7 @@ def joined(parts: Sequence[Ensemble]) -> Ensemble:
     for part in parts[1:]:
         _check_alike(first.scenario, first.times, part.scenario, part.times, int(part.runs[0]))
     names = [name for name in first.measures if all(name in part.measures for part in parts)]
-    known: dict[Choice, Choice] = {}
+    unique: dict[Choice, Choice] = {}
     return Ensemble(
         scenario=first.scenario,
         seeds=np.concatenate([part.seeds for part in parts]),
@@ -118,53 +118,60 @@ def joined(parts: Sequence[Ensemble]) -> Ensemble:
         ospa=np.concatenate([part.ospa for part in parts]),
         num_targets=np.concatenate([part.num_targets for part in parts]),
         measures={name: np.concatenate([part.measures[name] for part in parts]) for name in names},
-        choices=tuple(tuple(known.setdefault(one, one) for one in run) for part in parts for run in part.choices),
+        choices=tuple(
+            tuple(unique.setdefault(choice, choice) for choice in run) for part in parts for run in part.choices
+        ),
         decision_times=np.unique(np.concatenate([part.decision_times for part in parts])),
-        health=added([part.health for part in parts]),
-        rewards=tuple(map(RewardSums.added, _columns([part.rewards for part in parts]))),
-        seconds=_by_name([part.seconds for part in parts]),
-        counts=_by_name([part.counts for part in parts]),
+        health=add_health_sums([part.health for part in parts]),
+        rewards=tuple(map(RewardSums.combine, _columns([part.rewards for part in parts]))),
+        seconds=_concatenate_by_name([part.seconds for part in parts]),
+        counts=_concatenate_by_name([part.counts for part in parts]),
     )
 
 
-def choice_of(plan: Plan) -> Choice:
+def rounded_choice(plan: Plan) -> Choice:
     """Return the choice of a plan, rounded."""
-    return tuple(rounded(own.columns, row) for own, row in zip(plan.actions, plan.chosen_actions, strict=True))
+    return tuple(rounded(actions.columns, row) for actions, row in zip(plan.actions, plan.chosen_actions, strict=True))
 
 
 def _batches(runs: Iterable[Measured]) -> Iterator[list[Measured]]:
-    few, room = list[Measured](), _MOST_REWARDS
+    batch, room = list[Measured](), _MAX_BATCH_REWARDS
     for run in runs:
-        few.append(run)
+        batch.append(run)
         room -= sum(table.mean.size for decision in run[0].decisions for table in decision.plan.tables)
-        if len(few) == TOGETHER or room <= 0:
-            yield few
-            few, room = [], _MOST_REWARDS
-    if few:
-        yield few
+        if len(batch) == MAX_BATCH_RUNS or room <= 0:
+            yield batch
+            batch, room = [], _MAX_BATCH_REWARDS
+    if batch:
+        yield batch
 
 
-def _of_few(runs: Sequence[Measured]) -> Ensemble:
+def _build_batch(runs: Sequence[Measured]) -> Ensemble:
     summaries, first = [run for run, _ in runs], runs[0][0]
-    for each in summaries[1:]:
-        _check_alike(first.scenario, first.times, each.scenario, each.times, each.run)
+    for summary in summaries[1:]:
+        _check_alike(first.scenario, first.times, summary.scenario, summary.times, summary.run)
     columns = [{} if metrics is None else metrics.columns() for _, metrics in runs]
-    names = [name for name in columns[0] if all(name in of_run for of_run in columns)]
-    decided = _columns([each.decisions for each in summaries])
+    names = [name for name in columns[0] if all(name in run_columns for run_columns in columns)]
+    decisions_by_index = _columns([summary.decisions for summary in summaries])
     return Ensemble(
         scenario=first.scenario,
-        seeds=np.array([each.seed for each in summaries], np.int64),
-        runs=np.array([each.run for each in summaries], np.int64),
+        seeds=np.array([summary.seed for summary in summaries], np.int64),
+        runs=np.array([summary.run for summary in summaries], np.int64),
         times=first.times,
-        ospa=np.array([each.ospa for each in summaries]),
-        num_targets=_in_few_bytes(np.array([each.num_targets for each in summaries])),
-        measures={name: _in_few_bytes(np.array([of_run[name] for of_run in columns])) for name in names},
-        choices=tuple(tuple(choice_of(decision.plan) for decision in each.decisions) for each in summaries),
-        decision_times=np.unique([decision.time for each in summaries for decision in each.decisions]),
-        health=health_sums([each.health for each in summaries]),
-        rewards=tuple(RewardSums.of(number, made) for number, made in enumerate(decided)),
-        seconds={stage: of.astype(np.float32) for stage, of in _by_name(list(map(_seconds, summaries))).items()},
-        counts={name: _in_few_bytes(np.array(of, np.int64)) for name, of in _counts(summaries).items()},
+        ospa=np.array([summary.ospa for summary in summaries]),
+        num_targets=_smallest_ints(np.array([summary.num_targets for summary in summaries])),
+        measures={name: _smallest_ints(np.array([run_columns[name] for run_columns in columns])) for name in names},
+        choices=tuple(tuple(rounded_choice(decision.plan) for decision in summary.decisions) for summary in summaries),
+        decision_times=np.unique([decision.time for summary in summaries for decision in summary.decisions]),
+        health=health_sums([summary.health for summary in summaries]),
+        rewards=tuple(
+            RewardSums.from_decisions(number, decisions) for number, decisions in enumerate(decisions_by_index)
+        ),
+        seconds={
+            stage: values.astype(np.float32)
+            for stage, values in _concatenate_by_name(list(map(_seconds, summaries))).items()
+        },
+        counts={name: _smallest_ints(np.array(values, np.int64)) for name, values in _counts(summaries).items()},
     )
 
 
@@ -180,27 +187,27 @@ def _check_alike(scenario: str, times: Floats, other: str, other_times: Floats, 
         raise InputError(f"runs: expected the same scan times in every run; run {run} has others")
 
 
-def _in_few_bytes(values: NDArray[Any]) -> NDArray[Any]:
+def _smallest_ints(values: NDArray[Any]) -> NDArray[Any]:
     """Return whole numbers in the smallest signed type that holds them; other arrays unchanged."""
     if values.dtype != np.int64:
         return values
     return values.astype(np.min_scalar_type(-1 - int(np.abs(values).max(initial=0))))
 
 
-def _by_name(parts: Sequence[Mapping[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
+def _concatenate_by_name(parts: Sequence[Mapping[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
     """Return the arrays of each name, concatenated."""
     names = dict.fromkeys(name for part in parts for name in part)
     return {name: np.concatenate([part[name] for part in parts if name in part]) for name in names}
 
 
 def _seconds(summary: RunSummary) -> dict[str, Floats]:
-    decided = np.array([decision.step - 1 for decision in summary.decisions], np.int64)
-    return {stage: of[decided] if stage == "planning" else of for stage, of in summary.timings.items()}
+    indices = np.array([decision.step - 1 for decision in summary.decisions], np.int64)
+    return {stage: seconds[indices] if stage == "planning" else seconds for stage, seconds in summary.timings.items()}
 
 
 def _counts(summaries: Sequence[RunSummary]) -> dict[str, list[int]]:
-    found: dict[str, list[int]] = {}
+    counts: dict[str, list[int]] = {}
     for decision in (decision for each in summaries for decision in each.decisions):
         for name, number in decision.plan.counts.items():
-            found.setdefault(name, []).append(number)
-    return found
+            counts.setdefault(name, []).append(number)
+    return counts

@@ -10,7 +10,12 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.densities import TrackHistory
-from vedette.evaluation.watch import Watch, births_at, births_found, undetected_before
+from vedette.evaluation.observation_history import (
+    ObservationHistory,
+    birth_count_ratio,
+    birth_intensity,
+    undetected_priors,
+)
 from vedette.kernels.base.types import Floats, Ints, Mixture
 from vedette.kernels.gaussian.components import components_of, joined_components, taken_components
 
@@ -33,7 +38,7 @@ class _Information(NamedTuple):
 
 
 @dataclass(slots=True)
-class _Lost:
+class _EndedLabels:
     """The labels that have ended so far: densities of their targets if alive, and the evidence of the scans since.
 
     Log weights are of the probability that the target existed at the last estimate and has survived until now.
@@ -62,36 +67,38 @@ class _Lost:
         self.num_scans = self.num_scans[places]
         self.log_missed, self.detected = self.log_missed[places], self.detected[places]
 
-    def thin(self, watch: Watch, scan: int) -> None:
+    def update_missed(self, observations: ObservationHistory, scan: int) -> None:
         """Update by a scan that detected none of them."""
         log_missed = np.zeros(len(self.tracks))
         with np.errstate(divide="ignore"):
-            for s in np.flatnonzero(watch.scanned[scan]).tolist():
-                seen = watch.sensors[s].mean_detection(self.mixture.means, self.mixture.covs, watch.poses[scan, s])
-                log_missed += np.log1p(-seen)
+            for s in np.flatnonzero(observations.scanned[scan]).tolist():
+                prob_detection = observations.sensors[s].mean_detection(
+                    self.mixture.means, self.mixture.covs, observations.poses[scan, s]
+                )
+                log_missed += np.log1p(-prob_detection)
         self.detected -= np.exp(self.mixture.log_weights + self.log_missed) * np.expm1(log_missed)
         self.log_missed = self.log_missed + log_missed
 
-    def log_unseen(self, prob_hidden: float) -> Floats:
+    def log_undetected(self, prob_hidden: float) -> Floats:
         """Return the log probability of no detection until now and a possible one at this scan, if alive, (num,)."""
         with np.errstate(divide="ignore"):
             hidden = np.log(prob_hidden / self.num_scans)
             return np.asarray(np.logaddexp(hidden, np.log1p(-prob_hidden) + self.log_missed))
 
-    def log_gone(self, prob_hidden: float) -> Floats:
+    def log_never_detected(self, prob_hidden: float) -> Floats:
         """Return the log probability that no scan since has detected the target, alive or not, shape (num,)."""
         return np.asarray(np.log1p(-(1.0 - prob_hidden) * np.minimum(self.detected, _MOST_CERTAIN)))
 
 
-def gap_log_ratios(histories: Sequence[TrackHistory], watch: Watch) -> Floats:
+def gap_log_ratios(histories: Sequence[TrackHistory], observations: ObservationHistory) -> Floats:
     """Return, for each pair of labels, the log likelihood ratio of one target with a gap against all alternatives.
 
     Label i ended with existence r and density N(m, P) at its last estimate; the first of label j is n scans later. With
     P_S(n) the probability of surviving until then, U = h / n + (1 - h) * product of 1 - P_D over the scans between (h
     is `prob_hidden`), p_i the density N(m, P) predicted to that time, L_j the likelihood of the first scans of j, D the
     intensity of undetected targets there, G the probability that target i, which may have died, is detected by no scan
-    until the last of these, b the number of births in the record divided by the expected number (`births_found`), and e
-    the existence of j at that scan, as j may be clutter:
+    until the last of these, b the number of births in the record divided by the expected number (`birth_count_ratio`),
+    and e the existence of j at that scan, as j may be clutter:
 
         ratio(i, j) = r P_S(n) U * integral p_i(x) L_j(x) dx / (G * (b + (1 - e) / e) * integral D(x) L_j(x) dx).
 
@@ -102,60 +109,67 @@ def gap_log_ratios(histories: Sequence[TrackHistory], watch: Watch) -> Floats:
 
     Args:
         histories: of all labels, see `track_histories`.
-        watch: models, times and poses.
+        observations: models, times and poses.
 
     Returns:
         (num_labels, num_labels) log ratio of the row's label continuing as the column's; -inf if it cannot.
     """
-    num, dim = len(histories), watch.targets.state_dim
+    num, dim = len(histories), observations.targets.state_dim
     ratios = np.full((num, num), -np.inf)
-    begins, births = [int(history.steps[0]) - 1 for history in histories], births_found(histories, watch)
+    first_scans, birth_ratio = (
+        [int(history.steps[0]) - 1 for history in histories],
+        birth_count_ratio(histories, observations),
+    )
     compared = [history.steps[:_FIRST_ESTIMATES] - 1 for history in histories]
-    nothing = components_of(np.empty(0), np.empty((0, dim)), np.empty((0, dim, dim)))
-    lost = _Lost([], np.empty(0), nothing, np.empty(0), np.empty(0))
+    empty = components_of(np.empty(0), np.empty((0, dim)), np.empty((0, dim, dim)))
+    ended = _EndedLabels([], np.empty(0), empty, np.empty(0), np.empty(0))
     pending: dict[int, dict[int, float]] = {}  # log ratios without G, by the columns' and rows' labels
-    for scan, undetected in enumerate(undetected_before(watch, begins)):
-        if lost.tracks:
-            lost.mixture = watch.moved(lost.mixture, scan - 1, scan)
-            lost.num_scans += 1.0
-        for j in [j for j, begin in enumerate(begins) if begin == scan and lost.tracks]:
-            prior = births_at(undetected, histories[j], watch)
+    for scan, undetected in enumerate(undetected_priors(observations, first_scans)):
+        if ended.tracks:
+            ended.mixture = observations.predict(ended.mixture, scan - 1, scan)
+            ended.num_scans += 1.0
+        for j in [j for j, first_scan in enumerate(first_scans) if first_scan == scan and ended.tracks]:
+            prior = birth_intensity(undetected, histories[j], observations)
             if not (prior.log_weights > -np.inf).any():
                 continue  # the models exclude births then and do not explain how the label began
-            told = list(_told(histories[j], prior, watch))
-            same = lost.mixture._replace(log_weights=lost.mixture.log_weights + lost.log_unseen(watch.prob_hidden))
-            fits, born = (_log_fits(mixture, scan, told, watch) for mixture in (same, prior))
-            others = births - 1.0 + 1.0 / histories[j].existence[:_FIRST_ESTIMATES][-1]
-            log_ratios = fits - np.logaddexp.reduce(born) - np.log(others)
-            pending[j] = dict(zip(lost.tracks, log_ratios, strict=True))
-        if lost.tracks:
-            lost.thin(watch, scan)
-        log_gone = dict(zip(lost.tracks, lost.log_gone(watch.prob_hidden), strict=True))
+            information = list(_estimate_information(histories[j], prior, observations))
+            continuing = ended.mixture._replace(
+                log_weights=ended.mixture.log_weights + ended.log_undetected(observations.prob_hidden)
+            )
+            continued, born = (_log_fits(mixture, scan, information, observations) for mixture in (continuing, prior))
+            alternatives = birth_ratio - 1.0 + 1.0 / histories[j].existence[:_FIRST_ESTIMATES][-1]
+            log_ratios = continued - np.logaddexp.reduce(born) - np.log(alternatives)
+            pending[j] = dict(zip(ended.tracks, log_ratios, strict=True))
+        if ended.tracks:
+            ended.update_missed(observations, scan)
+        log_undetected = dict(zip(ended.tracks, ended.log_never_detected(observations.prob_hidden), strict=True))
         for j in [j for j in pending if compared[j][-1] == scan]:
             for i, log_ratio in pending.pop(j).items():
-                ratios[i, j] = log_ratio - log_gone[i] if i in log_gone else -np.inf
-        lost.keep(np.flatnonzero([scan - histories[i].steps[-1] < _LONGEST_GAP for i in lost.tracks]))
+                ratios[i, j] = log_ratio - log_undetected[i] if i in log_undetected else -np.inf
+        ended.keep(np.flatnonzero([scan - histories[i].steps[-1] < _LONGEST_GAP for i in ended.tracks]))
         for i in [i for i, history in enumerate(histories) if history.steps[-1] - 1 == scan]:
-            lost.add(i, histories[i])
+            ended.add(i, histories[i])
     return ratios
 
 
-def _told(history: TrackHistory, prior: Mixture, watch: Watch) -> Iterator[_Information]:
+def _estimate_information(
+    history: TrackHistory, prior: Mixture, observations: ObservationHistory
+) -> Iterator[_Information]:
     """Yield the information in the scans of each of the first estimates; prior: of births, before the first."""
     scans = (history.steps[:_FIRST_ESTIMATES] - 1).tolist()
     fits = prior.log_weights + _log_densities(prior, history.means[0], history.covs[0])
     before = taken_components(prior, np.array([int(np.argmax(fits))]))
     yield _information(scans[0], before, history.means[0], history.covs[0])
     for k, (last, now) in enumerate(pairwise(scans)):
-        own = components_of(np.zeros(1), history.means[k : k + 1].copy(), history.covs[k : k + 1].copy())
-        yield _information(now, watch.moved(own, last, now), history.means[k + 1], history.covs[k + 1])
+        posterior = components_of(np.zeros(1), history.means[k : k + 1].copy(), history.covs[k : k + 1].copy())
+        yield _information(now, observations.predict(posterior, last, now), history.means[k + 1], history.covs[k + 1])
 
 
 def _log_densities(mixture: Mixture, mean: Floats, cov: Floats) -> Floats:
     """Return the log integrals of N(x; mean, cov) times each unweighted component, (num,), up to a constant."""
-    spread, apart = mixture.covs + cov, mixture.means - mean
-    squared = (apart * np.linalg.solve(spread, apart[..., np.newaxis])[..., 0]).sum(axis=-1)
-    return np.asarray(-0.5 * (squared + np.linalg.slogdet(spread)[1]))
+    covariances, offsets = mixture.covs + cov, mixture.means - mean
+    squared = (offsets * np.linalg.solve(covariances, offsets[..., np.newaxis])[..., 0]).sum(axis=-1)
+    return np.asarray(-0.5 * (squared + np.linalg.slogdet(covariances)[1]))
 
 
 def _information(scan: int, before: Mixture, mean: Floats, cov: Floats) -> _Information:
@@ -166,27 +180,29 @@ def _information(scan: int, before: Mixture, mean: Floats, cov: Floats) -> _Info
     """
     root, precision = np.linalg.cholesky(cov), np.linalg.inv(before.covs[0])
     values, axes = np.linalg.eigh(np.eye(len(mean)) - root.T @ precision @ root)
-    is_told = values > _LEAST_INFORMATION
+    is_informative = values > _LEAST_INFORMATION
     whitened = axes.T @ root.T @ precision @ (mean - before.means[0])
     back = axes.T @ np.linalg.inv(root)
-    return _Information(scan, mean, back.T @ (is_told * whitened), (back.T * (is_told * values)) @ back)
+    return _Information(scan, mean, back.T @ (is_informative * whitened), (back.T * (is_informative * values)) @ back)
 
 
-def _log_fits(mixture: Mixture, scan: int, told: Sequence[_Information], watch: Watch) -> Floats:
+def _log_fits(
+    mixture: Mixture, scan: int, informations: Sequence[_Information], observations: ObservationHistory
+) -> Floats:
     """Return the log of weight times likelihood of the information, (num,), for each component of a mixture at `scan`.
 
     The integral of N(x; m, P) exp(y'u - u'Yu / 2) with u = x - c, d = m - c, g = y - Y d is
     |1 + P Y|^(-1/2) exp(y'd - d'Yd / 2 + g'(1 + P Y)^-1 P g / 2).
     """
-    for information in told:
-        mixture = watch.moved(mixture, scan, information.scan)
-        scan, apart = information.scan, mixture.means - information.reference
-        grown = np.eye(mixture.means.shape[1]) + mixture.covs @ information.matrix
-        solved = np.linalg.solve(grown, mixture.covs)
+    for information in informations:
+        mixture = observations.predict(mixture, scan, information.scan)
+        scan, offset = information.scan, mixture.means - information.reference
+        scale = np.eye(mixture.means.shape[1]) + mixture.covs @ information.matrix
+        solved = np.linalg.solve(scale, mixture.covs)
         covs = np.ascontiguousarray(0.5 * (solved + solved.transpose(0, 2, 1)), np.float64)
-        slope = information.linear - apart @ information.matrix
+        slope = information.linear - offset @ information.matrix
         shift = (covs @ slope[..., np.newaxis])[..., 0]
-        exponents = apart @ information.linear - 0.5 * ((apart @ information.matrix) * apart).sum(axis=-1)
-        logs = exponents + 0.5 * (slope * shift).sum(axis=-1) - 0.5 * np.linalg.slogdet(grown)[1]
+        exponents = offset @ information.linear - 0.5 * ((offset @ information.matrix) * offset).sum(axis=-1)
+        logs = exponents + 0.5 * (slope * shift).sum(axis=-1) - 0.5 * np.linalg.slogdet(scale)[1]
         mixture = components_of(mixture.log_weights + logs, mixture.means + shift, covs)
     return mixture.log_weights

@@ -80,12 +80,14 @@ def _sum_and_worst(values: Floats) -> tuple[float, int, float]:
     return float(known.sum()), len(known), float(known.max(initial=-np.inf))
 
 
-def added(parts: Sequence[HealthSums]) -> HealthSums:
+def add_health_sums(parts: Sequence[HealthSums]) -> HealthSums:
     """Return the sums over all runs of several sums; raises like `health_sums`."""
     if len({part.unknown_labels.shape for part in parts}) != 1:
         raise InputError("records: expected one run or more, of equally many sensors")
     columns = dict(zip(HealthSums._fields, zip(*parts, strict=True), strict=True))
-    return HealthSums(**{name: max(of) if name.startswith("worst_") else sum(of) for name, of in columns.items()})
+    return HealthSums(
+        **{name: max(values) if name.startswith("worst_") else sum(values) for name, values in columns.items()}
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,8 +10,8 @@ import numpy as np
 
 from vedette.densities import Estimate, track_histories
 from vedette.evaluation.gaps import gap_log_ratios
+from vedette.evaluation.observation_history import ObservationHistory
 from vedette.evaluation.scans import scans_of_record
-from vedette.evaluation.watch import Watch
 from vedette.filters import common_target_model, has_labels
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import probability
@@ -39,36 +39,40 @@ def joins_of_run(
 
     There are none for filters whose targets have no labels.
 
-    prob_hidden: see `Watch`. threshold: the lowest probability of a join. Raises `InputError` for numbers that are not
-    probabilities, and `VedetteError` for models or a recording that cannot be built.
+    prob_hidden: see `ObservationHistory`. threshold: the lowest probability of a join. Raises `InputError` for numbers
+    that are not probabilities, and `VedetteError` for models or a recording that cannot be built.
     """
     filters = tuple(sensor.filter for sensor in build_sensors(scenario))
     if not all(map(has_labels, filters)):
         return ()
     scanned = np.array([[scan is not None for scan in scans] for scans in scans_of_record(record, scenario)])
     sensors = tuple(local.sensor for local in filters)
-    watch = Watch(common_target_model(filters), sensors, record.times, record.poses, scanned, prob_hidden)
-    return joins_of(record.estimates, watch, threshold=threshold)
+    observations = ObservationHistory(
+        common_target_model(filters), sensors, record.times, record.poses, scanned, prob_hidden
+    )
+    return find_joins(record.estimates, observations, threshold=threshold)
 
 
-def joins_of(estimates: Sequence[Estimate], watch: Watch, *, threshold: float = THRESHOLD) -> tuple[Join, ...]:
+def find_joins(
+    estimates: Sequence[Estimate], observations: ObservationHistory, *, threshold: float = THRESHOLD
+) -> tuple[Join, ...]:
     """Return the joins like `joins_of_run`, for estimates of successive scans.
 
     Raises `InputError` for another number of scans.
     """
     probability("threshold", threshold)
-    histories = track_histories(estimates, watch.times)
-    log_ratios = gap_log_ratios(histories, watch)
-    shares = _shares(log_ratios)
+    histories = track_histories(estimates, observations.times)
+    log_ratios = gap_log_ratios(histories, observations)
+    probabilities = _join_probabilities(log_ratios)
     joins = [
-        Join(histories[i].label, histories[j].label, float(shares[i, j]))
-        for i, j in zip(*_assigned(log_ratios), strict=True)
-        if shares[i, j] >= threshold and log_ratios[i, j] > -np.inf
+        Join(histories[i].label, histories[j].label, float(probabilities[i, j]))
+        for i, j in zip(*_best_joins(log_ratios), strict=True)
+        if probabilities[i, j] >= threshold and log_ratios[i, j] > -np.inf
     ]
     return tuple(sorted(joins, key=lambda join: join.began))
 
 
-def _shares(log_ratios: Floats) -> Floats:
+def _join_probabilities(log_ratios: Floats) -> Floats:
     """Return the probability of each join among those of either of its labels, and none, shape (num, num).
 
     Exact if one of the two has no other; else a little low, as a rival may itself be joined elsewhere.
@@ -76,11 +80,11 @@ def _shares(log_ratios: Floats) -> Floats:
     rows, columns = (np.logaddexp.reduce(log_ratios, axis=axis, initial=-np.inf) for axis in (1, 0))
     others = np.logaddexp(rows[:, np.newaxis], columns)
     with np.errstate(invalid="ignore"):
-        twice = np.where(log_ratios > -np.inf, np.exp(log_ratios - others), 0.0)
-    return np.asarray(np.exp(log_ratios - np.logaddexp(0.0, others + np.log1p(-np.minimum(twice, 0.5)))))
+        probabilities = np.where(log_ratios > -np.inf, np.exp(log_ratios - others), 0.0)
+    return np.asarray(np.exp(log_ratios - np.logaddexp(0.0, others + np.log1p(-np.minimum(probabilities, 0.5)))))
 
 
-def _assigned(log_ratios: Floats) -> tuple[list[int], list[int]]:
+def _best_joins(log_ratios: Floats) -> tuple[list[int], list[int]]:
     """Return rows and columns of the joins with the largest summed log ratio, each row and column at most once."""
     from scipy.optimize import linear_sum_assignment
 
@@ -101,11 +105,11 @@ def track_names(joins: Sequence[Join]) -> dict[Label, Label]:
 def with_joined_tracks(record: RunRecord, joins: Sequence[Join]) -> RunRecord:
     """Return the record with every label replaced by the first of its track, so that measures score whole tracks."""
     names = track_names(joins)
-    return replace(record, estimates=tuple(_renamed(estimate, names) for estimate in record.estimates))
+    return replace(record, estimates=tuple(_relabel(estimate, names) for estimate in record.estimates))
 
 
-def _renamed(estimate: Estimate, names: dict[Label, Label]) -> Estimate:
+def _relabel(estimate: Estimate, names: dict[Label, Label]) -> Estimate:
     labels = [names.get((step, index), (step, index)) for step, index in estimate.labels.tolist()]
     order = sorted(range(len(labels)), key=labels.__getitem__)
-    own = np.array(labels, np.int64).reshape(-1, 2)[order]
-    return Estimate(own, estimate.means[order], estimate.covs[order], estimate.existence[order])
+    relabelled = np.array(labels, np.int64).reshape(-1, 2)[order]
+    return Estimate(relabelled, estimate.means[order], estimate.covs[order], estimate.existence[order])

@@ -21,7 +21,7 @@ from vedette.simulation.loop import run_stream
 from vedette.tracking import State
 
 # Settings of a decision that is made only to compile the planner.
-_QUICK: dict[str, Any] = {"num_samples": 2, "horizon_steps": 1, "num_threads": 1, "confidence": None}
+_QUICK_SETTINGS: dict[str, Any] = {"num_samples": 2, "horizon_steps": 1, "num_threads": 1, "confidence": None}
 
 
 def precompile(scenario: Scenario, planners: Sequence[str] = ("jdm",)) -> None:
@@ -36,21 +36,21 @@ def precompile(scenario: Scenario, planners: Sequence[str] = ("jdm",)) -> None:
         planners: names of strategies; those without joint decisions are left out.
     """
     experiment = build_experiment(scenario)
-    labelled = isinstance(experiment.tracker.initial().fused, LabelledDensity)
-    if not (labelled and experiment.tracker.targets.birth.num_sites):
+    has_labels = isinstance(experiment.tracker.initial().fused, LabelledDensity)
+    if not (has_labels and experiment.tracker.targets.birth.num_sites):
         _compile_tracker(experiment)  # no fusion nor planning without labels; no example without birth sites
         return
-    *here, there = [name for name in planners if _joint_planner(scenario, name)] or ["jdm"]
-    other = get_context("spawn").Process(target=_compile_elsewhere, args=(scenario, there), daemon=True)
+    *local_planners, remote_planner = [name for name in planners if _joint_planner(scenario, name)] or ["jdm"]
+    process = get_context("spawn").Process(target=_compile_elsewhere, args=(scenario, remote_planner), daemon=True)
     try:
         with as_children():
-            other.start()
+            process.start()
     except OSError:
         return
     _compile_tracker(experiment)
-    for name in here:
+    for name in local_planners:
         _compile_planning(scenario, name)
-    other.join()
+    process.join()
 
 
 def _joint_planner(scenario: Scenario, name: str) -> JointPlanner | None:
@@ -80,9 +80,9 @@ def _compile_planning(scenario: Scenario, name: str) -> None:
     beliefs = (_belief(experiment, num_sites), *(_belief(experiment, max(num_sites - 1, 1)),) * num_others)
     fused = beliefs[0] if requires_common_prior(planner.fusion) else planner.fusion.fuse(beliefs)[0]
     experiment.estimate(fused, 1)
-    quick = replace(planner, settings=replace(planner.settings, **_QUICK))
+    quick_planner = replace(planner, settings=replace(planner.settings, **_QUICK_SETTINGS))
     state = State(beliefs, fused, undetected=experiment.tracker.initial().undetected)
-    quick.plan(state, experiment.poses, rng=run_stream(0, 0))
+    quick_planner.plan(state, experiment.poses, rng=run_stream(0, 0))
 
 
 def _belief(experiment: Experiment, num_targets: int) -> LabelledDensity:

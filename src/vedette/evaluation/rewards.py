@@ -15,7 +15,7 @@ from vedette.models.measurement import wrap_angles
 from vedette.platforms import Actions
 from vedette.simulation.records import Decision, RunRecord
 
-_ALIKE = 1e-4  # degrees, or any other unit
+_TOLERANCE = 1e-4  # degrees, or any other unit
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,30 +58,34 @@ class RewardSums(NamedTuple):
     num_runs: int
 
     @classmethod
-    def of(cls, decision: int, made: Sequence[Decision]) -> RewardSums:
+    def from_decisions(cls, decision: int, decisions: Sequence[Decision]) -> RewardSums:
         """Return the sums of runs that made the decision of that index."""
-        first, tables = made[0], [each.plan.tables for each in made]
-        shapes = [tuple(table.mean.shape for table in of_run) for of_run in tables]
+        first, tables = decisions[0], [each.plan.tables for each in decisions]
+        shapes = [tuple(table.mean.shape for table in run_tables) for run_tables in tables]
         faults = []
         if not all(tables):
             faults.append(f"records: expected runs with rewards at decision {decision}; got none")
         elif len(set(shapes)) > 1:
             faults.append("records: expected tables of one shape; got several")
-        summed = [] if faults else [_summed(place, made) for place in range(len(tables[0]))]
+        summed = [] if faults else [_summed(place, decisions) for place in range(len(tables[0]))]
         counts, means, squares, chosen = zip(*summed, strict=True) if summed else ((), (), (), ())
-        alike = _all_alike([each.plan.actions for each in made])
-        turned = _all_alike([_turns(each) for each in made]) if not alike else _head_alike(made)
-        return cls(first, tuple(faults), counts, means, squares, chosen, alike, turned, len(made))
+        is_absolute = _have_equal_actions([each.plan.actions for each in decisions])
+        is_relative = (
+            _have_equal_actions([_turn_actions(each) for each in decisions])
+            if not is_absolute
+            else _have_equal_headings(decisions)
+        )
+        return cls(first, tuple(faults), counts, means, squares, chosen, is_absolute, is_relative, len(decisions))
 
     @staticmethod
-    def added(parts: Sequence[RewardSums]) -> RewardSums:
+    def combine(parts: Sequence[RewardSums]) -> RewardSums:
         """Return the sums over all runs of several sums."""
         total = parts[0]
         for part in parts[1:]:
-            total = total._with(part)
+            total = total._add(part)
         return total
 
-    def _with(self, other: RewardSums) -> RewardSums:
+    def _add(self, other: RewardSums) -> RewardSums:
         """Add by T. Chan, G. Golub and R. LeVeque, "Updating formulae and a pairwise algorithm", 1979, eq. 2.1."""
         faults, num_runs = self.faults + other.faults, self.num_runs + other.num_runs
         if not faults and [each.shape for each in self.means] != [each.shape for each in other.means]:
@@ -89,20 +93,22 @@ class RewardSums(NamedTuple):
         if faults:
             return self._replace(faults=faults, num_runs=num_runs)
         counts, means, squares = [], [], []
-        for mine, theirs in zip(self._moments(), other._moments(), strict=True):
-            count, apart = mine[0] + theirs[0], theirs[1] - mine[1]
-            share = theirs[0] / np.maximum(count, 1.0)
+        for left, right in zip(self._moments(), other._moments(), strict=True):
+            count, difference = left[0] + right[0], right[1] - left[1]
+            share = right[0] / np.maximum(count, 1.0)
             counts.append(count)
-            means.append(mine[1] + share * apart)
-            squares.append(mine[2] + theirs[2] + mine[0] * share * apart**2)
+            means.append(left[1] + share * difference)
+            squares.append(left[2] + right[2] + left[0] * share * difference**2)
         pair = self.first, other.first
         return self._replace(
             counts=tuple(counts),
             means=tuple(means),
             squares=tuple(squares),
-            chosen=tuple(mine + theirs for mine, theirs in zip(self.chosen, other.chosen, strict=True)),
-            is_absolute=self.is_absolute and other.is_absolute and _all_alike([each.plan.actions for each in pair]),
-            is_relative=self.is_relative and other.is_relative and _all_alike(list(map(_turns, pair))),
+            chosen=tuple(left + right for left, right in zip(self.chosen, other.chosen, strict=True)),
+            is_absolute=self.is_absolute
+            and other.is_absolute
+            and _have_equal_actions([each.plan.actions for each in pair]),
+            is_relative=self.is_relative and other.is_relative and _have_equal_actions(list(map(_turn_actions, pair))),
             num_runs=num_runs,
         )
 
@@ -123,7 +129,7 @@ class RewardSums(NamedTuple):
             )
             for table, (count, mean, squares) in zip(self.first.plan.tables, self._moments(), strict=True)
         ]
-        actions = self.first.plan.actions if self.is_absolute else _turns(self.first)
+        actions = self.first.plan.actions if self.is_absolute else _turn_actions(self.first)
         shares = tuple(chosen / self.num_runs for chosen in self.chosen)
         return MeanRewards(self.first.time, actions, tuple(tables), shares, self.num_runs)
 
@@ -133,60 +139,62 @@ def mean_rewards(records: Sequence[RunRecord], decision: int) -> MeanRewards:
 
     Raises `InputError` if no run made it, the planner evaluates no actions, or runs had different actions.
     """
-    made = [record.decisions[decision] for record in records if decision < len(record.decisions)]
-    if not made:
+    decisions = [record.decisions[decision] for record in records if decision < len(record.decisions)]
+    if not decisions:
         raise InputError(f"records: expected runs with rewards at decision {decision}; got none")
-    return RewardSums.of(decision, made).mean()
+    return RewardSums.from_decisions(decision, decisions).mean()
 
 
-def _summed(place: int, made: Sequence[Decision]) -> tuple[Floats, Floats, Floats, Floats]:
+def _summed(place: int, decisions: Sequence[Decision]) -> tuple[Floats, Floats, Floats, Floats]:
     """Return for one table the number of runs with each entry, mean and squares about it, and number that chose it."""
-    values = np.array([each.plan.tables[place].mean for each in made])
+    values = np.array([each.plan.tables[place].mean for each in decisions])
     known = np.isfinite(values)
     count = known.sum(axis=0).astype(np.float64)
     mean = np.where(known, values, 0.0).sum(axis=0) / np.maximum(count, 1.0)
     squares = np.where(known, (values - mean) ** 2, 0.0).sum(axis=0)
     chosen = np.zeros(values.shape[1:])
-    for each in made:
+    for each in decisions:
         chosen[tuple(each.plan.chosen[sensor] for sensor in each.plan.tables[place].sensors)] += 1.0
     return count, mean, squares, chosen
 
 
-def _turns(decision: Decision) -> tuple[Actions, ...]:
-    return tuple(_as_turns(own, pose[2]) for own, pose in zip(decision.plan.actions, decision.poses, strict=True))
+def _turn_actions(decision: Decision) -> tuple[Actions, ...]:
+    return tuple(
+        _as_turns(actions, pose[2]) for actions, pose in zip(decision.plan.actions, decision.poses, strict=True)
+    )
 
 
 def _as_turns(actions: Actions, heading: float) -> Actions:
-    for name, turn, now in (
+    for name, turn, current in (
         ("heading_deg", "turn_deg", heading),
         ("course_deg", "turn_right_deg", np.pi / 2 - heading),
     ):
         if name in actions.columns:
             values, column = actions.values.copy(), actions.columns.index(name)
-            values[:, column] = np.degrees(wrap_angles(np.radians(values[:, column]) - now))
+            values[:, column] = np.degrees(wrap_angles(np.radians(values[:, column]) - current))
             return Actions(tuple(turn if each == name else each for each in actions.columns), values)
     return actions
 
 
-def _head_alike(made: Sequence[Decision]) -> bool:
+def _have_equal_headings(decisions: Sequence[Decision]) -> bool:
     """Return True if all sensors had the headings of the first run, up to rounding and full turns."""
-    headings = np.array([each.poses[:, 2] for each in made])
-    return bool(np.abs(wrap_angles(headings - headings[0])).max(initial=0.0) < np.radians(_ALIKE))
+    headings = np.array([each.poses[:, 2] for each in decisions])
+    return bool(np.abs(wrap_angles(headings - headings[0])).max(initial=0.0) < np.radians(_TOLERANCE))
 
 
-def _all_alike(actions: Sequence[tuple[Actions, ...]]) -> bool:
+def _have_equal_actions(actions: Sequence[tuple[Actions, ...]]) -> bool:
     """Return True if all runs had the same actions, up to rounding and full turns."""
     return all(
-        mine.columns == first.columns
-        and len(mine) == len(first)
-        and (np.array_equal(mine.values, first.values) or _off(mine, first) < _ALIKE)
+        own.columns == first.columns
+        and len(own) == len(first)
+        and (np.array_equal(own.values, first.values) or _largest_difference(own, first) < _TOLERANCE)
         for run in actions
-        for mine, first in zip(run, actions[0], strict=True)
+        for own, first in zip(run, actions[0], strict=True)
     )
 
 
-def _off(mine: Actions, first: Actions) -> float:
-    off = np.abs(mine.values - first.values)
-    angles = [name.endswith("_deg") for name in mine.columns]
-    off[:, angles] = np.abs(np.remainder(off[:, angles] + 180.0, 360.0) - 180.0)
-    return float(off.max(initial=0.0))
+def _largest_difference(own: Actions, first: Actions) -> float:
+    differences = np.abs(own.values - first.values)
+    angles = [name.endswith("_deg") for name in own.columns]
+    differences[:, angles] = np.abs(np.remainder(differences[:, angles] + 180.0, 360.0) - 180.0)
+    return float(differences.max(initial=0.0))

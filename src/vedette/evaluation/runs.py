@@ -29,7 +29,7 @@ def run_scenario(
     seed: int,
     run: int = 0,
     num_threads: int = 0,
-    watch: Callable[[int], None] | None = None,
+    progress: Callable[[int], None] | None = None,
 ) -> RunRecord:
     """Run a scenario once under a strategy and return the record.
 
@@ -40,7 +40,7 @@ def run_scenario(
             or one of the scenario's own planners; not used if the scans are recorded.
         seed, run: fix every random number; runs with equal seed and number are paired across strategies.
         num_threads: of a decision (0: one per processor); changes no result.
-        watch: called with the number of every finished scan.
+        progress: called with the number of every finished scan.
 
     Raises:
         VedetteError: the scenario's models, filters or planner do not support the request.
@@ -48,9 +48,11 @@ def run_scenario(
     if not isinstance(scenario, Scenario):
         scenario = load_scenario(scenario)
     if scenario.model.recording is not None:
-        return track_recording(scenario, seed=seed, run=run, watch=watch)
-    decides = build_planner(scenario, planner, num_threads)
-    return simulate(build_experiment(scenario), decides, seed=seed, run=run, score=score_of(scenario), watch=watch)
+        return track_recording(scenario, seed=seed, run=run, progress=progress)
+    strategy = build_planner(scenario, planner, num_threads)
+    return simulate(
+        build_experiment(scenario), strategy, seed=seed, run=run, score=build_score(scenario), progress=progress
+    )
 
 
 def track_recording(
@@ -59,22 +61,22 @@ def track_recording(
     *,
     seed: int = 0,
     run: int = 0,
-    watch: Callable[[int], None] | None = None,
+    progress: Callable[[int], None] | None = None,
 ) -> RunRecord:
     """Track the recorded scans of a scenario.
 
     Args:
         scenario: such as that of `vedette.scenarios.of_recording.scenario_of_recording`.
         recording: its scans; None: read from the file.
-        seed, run, watch: see `vedette.recorded.Tracking.run`.
+        seed, run, progress: see `vedette.recorded.Tracking.run`.
 
     Raises:
         VedetteError: scans that are not recorded, or models and filters that do not support the request.
     """
-    return build_tracking(scenario, recording).run(score_of(scenario), seed=seed, run=run, watch=watch)
+    return build_tracking(scenario, recording).run(build_score(scenario), seed=seed, run=run, progress=progress)
 
 
-def score_of(scenario: Scenario) -> Score | None:
+def build_score(scenario: Scenario) -> Score | None:
     """Return the OSPA of estimates at each scan as a function, as the scenario defines it; None: unknown targets."""
     ospa = scenario.model.ospa
     if scenario.model.targets.kind == "unknown":
@@ -82,19 +84,19 @@ def score_of(scenario: Scenario) -> Score | None:
     return partial(ospa_of_run, cutoff=ospa.cutoff, order=ospa.order, components=ospa.components)
 
 
-def own_metrics(scenario: Scenario) -> tuple[Metric, ...]:
+def custom_metrics(scenario: Scenario) -> tuple[Metric, ...]:
     """Return the metrics that a scenario adds to the built-in ones; raises `InputError` if one cannot be loaded."""
-    return tuple(Metric(name, _measure_of(scenario, section)) for name, section in scenario.model.metrics.items())
+    return tuple(Metric(name, _build_metric(scenario, section)) for name, section in scenario.model.metrics.items())
 
 
-def _measure_of(scenario: Scenario, section: AnyMetric) -> Measure:
-    known, ospa = tuple(sensor.filter.sensor for sensor in build_sensors(scenario)), scenario.model.ospa
-    sensors = tuple(true.model for true in build_true_sensors(scenario, known))
-    made: Measure = section.build(scenario.folder, sensors=sensors, cutoff=ospa.cutoff, order=ospa.order)
-    return made
+def _build_metric(scenario: Scenario, section: AnyMetric) -> Measure:
+    assumed, ospa = tuple(sensor.filter.sensor for sensor in build_sensors(scenario)), scenario.model.ospa
+    sensors = tuple(true.model for true in build_true_sensors(scenario, assumed))
+    metric: Measure = section.build(scenario.folder, sensors=sensors, cutoff=ospa.cutoff, order=ospa.order)
+    return metric
 
 
-def measure_run(record: RunRecord, scenario: Scenario, own: Sequence[Metric] = ()) -> RunMetrics:
+def measure_run(record: RunRecord, scenario: Scenario, custom: Sequence[Metric] = ()) -> RunMetrics:
     """Return all measures of a run by its scenario's cutoff, order and window; raises like `measure`."""
     ospa = scenario.model.ospa
-    return measure(record, cutoff=ospa.cutoff, order=ospa.order, window=ospa.window, own=own)
+    return measure(record, cutoff=ospa.cutoff, order=ospa.order, window=ospa.window, custom=custom)

@@ -29,7 +29,7 @@ from vedette.simulation.true_sensors import sensors_at_step
 
 UNKNOWN = -2  # origin of a measurement that was recorded
 # Shape of the measurements of a kind in the plane; other kinds have none.
-LIE: dict[str, str] = {
+PLANE_SHAPES: dict[str, str] = {
     "bearing_range": "point",
     "bearing_range_rate": "point",
     "bearing_slant_range": "point",
@@ -43,7 +43,7 @@ LIE: dict[str, str] = {
 Scans: TypeAlias = tuple[tuple[Scan | None, ...], ...]
 
 
-def code_of_sensors(scenario: Scenario) -> tuple[str, ...]:
+def measurement_code(scenario: Scenario) -> tuple[str, ...]:
     """Return the code that drawing the measurements of a scenario would run."""
     if scenario.model.recording is not None:
         return ()
@@ -105,18 +105,18 @@ def scan_table(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
     for site in sites:
         if site.kind not in COMPONENTS:
             raise reject(f"sensor {site.name}", f"measurements of kind {', '.join(COMPONENTS)}", site.kind)
-    told = [site for site in sites if "bearing" in COMPONENTS[site.kind]]
-    compass = bool(told) and all(site.compass for site in told)
+    bearing_sites = [site for site in sites if "bearing" in COMPONENTS[site.kind]]
+    compass = bool(bearing_sites) and all(site.compass for site in bearing_sites)
     unit = "deg" if compass else "rad"
     names = {name: si_column(name) for name in QUANTITIES} | {
         name: f"{name}_{unit}" for name in ("bearing", "elevation")
     }
-    wanted = dict.fromkeys(names[name] for site in sites for name in COMPONENTS[site.kind])
-    own = ["own_x_m", "own_y_m", f"own_heading_{unit}"]
+    quantities = dict.fromkeys(names[name] for site in sites for name in COMPONENTS[site.kind])
+    pose_columns = ["own_x_m", "own_y_m", f"own_heading_{unit}"]
     if any(is_doppler(site.kind) for site in sites):
-        own += [f"{name}_mps" for name in OWN_SPEEDS]
+        pose_columns += [f"{name}_mps" for name in OWN_SPEEDS]
     own_heights = ["own_height_m"] if any(site.kind in HEIGHT_DEPENDENT for site in sites) else []
-    table: dict[str, list[Any]] = {name: [] for name in ("time", "sensor", *wanted, *own, *own_heights)}
+    table: dict[str, list[Any]] = {name: [] for name in ("time", "sensor", *quantities, *pose_columns, *own_heights)}
     for time, scans, poses in zip(record.times.tolist(), scans_of_record(record, scenario), record.poses, strict=True):
         for site, scan, pose in zip(sites, scans, poses, strict=True):
             if scan is None:
@@ -125,14 +125,14 @@ def scan_table(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
             columns = [names[name] for name in COMPONENTS[site.kind]]
             rows = (site.told(scan.measurements, pose) if compass else scan.measurements).tolist() or [()]
             bearings = bearings_of(scan.measurements, pose, site.kind)
-            after = lags(bearings, pose).tolist() if is_turn(pose) and len(bearings) else [0.0] * len(rows)
-            for row, lag in zip(rows, after, strict=True):
+            beam_lags = lags(bearings, pose).tolist() if is_turn(pose) and len(bearings) else [0.0] * len(rows)
+            for row, lag in zip(rows, beam_lags, strict=True):
                 place = pose[:2] + lag * pose[OWN_VELOCITY:BEAM] if lag else pose[:2]
-                placed = zip(own, (*place, heading, *pose[OWN_VELOCITY:]), strict=False)
+                pose_cells = zip(pose_columns, (*place, heading, *pose[OWN_VELOCITY:]), strict=False)
                 cells = {
                     "time": time + lag,
                     "sensor": site.name,
-                    **dict(placed),
+                    **dict(pose_cells),
                     "own_height_m": float(pose[OWN_HEIGHT]) if len(pose) > OWN_HEIGHT else 0.0,
                     **dict(zip(columns, row, strict=False)),
                 }
@@ -141,6 +141,9 @@ def scan_table(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
     return table
 
 
-def in_plane(measurements: Floats, kind: str, pose: Floats) -> Floats:
-    """Return places of measurements of a kind of `LIE`, (n, 2) m; for rays bearings, (n, 1) rad, for circles radii."""
+def plane_coordinates(measurements: Floats, kind: str, pose: Floats) -> Floats:
+    """Return places of measurements of a kind of `PLANE_SHAPES`, (n, 2) m.
+
+    For rays bearings, (n, 1) rad; for circles radii, (n, 1) m.
+    """
     return places_of(measurements, pose, kind) if kind in PLACED else measurements[:, :1]

@@ -15,8 +15,8 @@ from vedette.models.arguments import as_array
 CONFIDENCE = 0.95
 _RESAMPLES, _BLOCK = 9999, 10_000_000  # samples of the bootstrap; numbers drawn at once
 # Largest error of a tail of Student's interval, to first order in the skewness of the values.
-_MOST_MISPLACED = 0.01
-_FEWEST = 8  # runs, below which the skewness cannot be estimated
+_MAX_TAIL_ERROR = 0.01
+_MIN_RUNS = 8  # runs, below which the skewness cannot be estimated
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,15 +44,15 @@ class PairedDifference:
     Attributes:
         summary: of the differences, first minus second; positive if the second is better. Its interval is from a
             bootstrap if `is_skewed`.
-        share_won: share of the runs in which the second is better (strictly lower).
-        share_tied: share of the runs in which both are equal.
+        win_rate: share of the runs in which the second is better (strictly lower).
+        tie_rate: share of the runs in which both are equal.
         p_value: two-sided, of a mean difference of 0, by the same method as the interval; NaN for a single run.
         is_skewed: True if the differences are too skewed, for their number, for Student's t.
     """
 
     summary: Summary
-    share_won: float
-    share_tied: float
+    win_rate: float
+    tie_rate: float
     p_value: float
     is_skewed: bool
 
@@ -78,8 +78,8 @@ def summarise(values: ArrayLike) -> Summary:
         unknown = np.full(mean.shape, np.nan)
         return Summary(mean, unknown, unknown, unknown, 1)
     error = np.asarray(runs.std(axis=0, ddof=1) / np.sqrt(num_runs))
-    reach = stdtrit(num_runs - 1, 0.5 + CONFIDENCE / 2.0) * error
-    return Summary(mean, error, np.asarray(mean - reach), np.asarray(mean + reach), num_runs)
+    half_width = stdtrit(num_runs - 1, 0.5 + CONFIDENCE / 2.0) * error
+    return Summary(mean, error, np.asarray(mean - half_width), np.asarray(mean + half_width), num_runs)
 
 
 def paired_difference(first: ArrayLike, second: ArrayLike) -> PairedDifference:
@@ -95,7 +95,7 @@ def paired_difference(first: ArrayLike, second: ArrayLike) -> PairedDifference:
     )
     if a.ndim != 1 or a.shape != b.shape:
         raise InputError(f"first, second: expected equally many numbers, one a run; got shapes {a.shape} and {b.shape}")
-    summary, p_value, is_skewed = _tested(a - b)
+    summary, p_value, is_skewed = _test_mean(a - b)
     return PairedDifference(summary, float((b < a).mean()), float((b == a).mean()), p_value, is_skewed)
 
 
@@ -107,17 +107,17 @@ def holm(p_values: ArrayLike) -> Floats:
 
     Raises `InputError` for values that are not probabilities.
     """
-    given = as_array("p_values", p_values, "fiu", "numbers, one a test").astype(np.float64)
-    known = ~np.isnan(given)
-    if given.ndim != 1 or not ((given[known] >= 0.0) & (given[known] <= 1.0)).all():
+    values = as_array("p_values", p_values, "fiu", "numbers, one a test").astype(np.float64)
+    is_test = ~np.isnan(values)
+    if values.ndim != 1 or not ((values[is_test] >= 0.0) & (values[is_test] <= 1.0)).all():
         raise InputError(f"p_values: expected probabilities, one a test; got {p_values!r}")
-    corrected = np.full(len(given), np.nan)
-    order = np.flatnonzero(known)[np.argsort(given[known], kind="stable")]
-    corrected[order] = np.minimum(np.maximum.accumulate(given[order] * np.arange(len(order), 0, -1)), 1.0)
+    corrected = np.full(len(values), np.nan)
+    order = np.flatnonzero(is_test)[np.argsort(values[is_test], kind="stable")]
+    corrected[order] = np.minimum(np.maximum.accumulate(values[order] * np.arange(len(order), 0, -1)), 1.0)
     return corrected
 
 
-def _tested(differences: Floats) -> tuple[Summary, float, bool]:
+def _test_mean(differences: Floats) -> tuple[Summary, float, bool]:
     """Return mean with its interval, the p-value of a mean of 0, and True if both are from a bootstrap."""
     from scipy.special import stdtr
 
@@ -127,18 +127,18 @@ def _tested(differences: Floats) -> tuple[Summary, float, bool]:
         return summary, np.nan, False
     if error == 0.0:
         return summary, float(mean == 0.0), False
-    if summary.num_runs >= _FEWEST and _misplaced(differences) > _MOST_MISPLACED:
-        drawn = _studentised(tuple(differences.tolist()))
+    if summary.num_runs >= _MIN_RUNS and _tail_error(differences) > _MAX_TAIL_ERROR:
+        statistics = _bootstrap_statistics(tuple(differences.tolist()))
         with np.errstate(invalid="ignore"):  # samples of one value only are infinite: then use Student's t
-            low, high = np.quantile(drawn, ((1.0 + CONFIDENCE) / 2.0, (1.0 - CONFIDENCE) / 2.0))
+            low, high = np.quantile(statistics, ((1.0 + CONFIDENCE) / 2.0, (1.0 - CONFIDENCE) / 2.0))
         if np.isfinite(low) and np.isfinite(high):
-            tail = min((drawn >= mean / error).sum(), (drawn <= mean / error).sum())
+            tail = min((statistics >= mean / error).sum(), (statistics <= mean / error).sum())
             skewed = replace(summary, low=np.asarray(mean - low * error), high=np.asarray(mean - high * error))
             return skewed, min(1.0, 2.0 * (float(tail) + 1.0) / (_RESAMPLES + 1.0)), True
     return summary, float(2.0 * stdtr(summary.num_runs - 1, -abs(mean) / error)), False
 
 
-def _misplaced(values: Floats) -> float:
+def _tail_error(values: Floats) -> float:
     """Return the error of a tail of Student's interval due to skewness: the first term of Edgeworth's expansion.
 
     P(T <= z) = Phi(z) + (2 z^2 + 1) phi(z) skewness / (6 sqrt(n)) (P. Hall, The Bootstrap and Edgeworth Expansion,
@@ -152,19 +152,19 @@ def _misplaced(values: Floats) -> float:
 
 
 @lru_cache(maxsize=32)  # each table, claim and caption of a comparison uses the same result
-def _studentised(differences: tuple[float, ...]) -> Floats:
+def _bootstrap_statistics(differences: tuple[float, ...]) -> Floats:
     """Return (mean* - mean) / error* of samples drawn from the values, shape (resamples,).
 
     Infinite if a sample is of one value. The same number of values has the same draws, so that tables are reproducible.
     """
     values = np.array(differences)
     rng, number = np.random.default_rng(0), len(values)
-    found = np.empty(_RESAMPLES)
+    statistics = np.empty(_RESAMPLES)
     block = max(1, _BLOCK // number)
     for start in range(0, _RESAMPLES, block):
         sample = values[rng.integers(number, size=(min(block, _RESAMPLES - start), number))]
-        away = sample.mean(axis=1) - values.mean()
+        deviation = sample.mean(axis=1) - values.mean()
         error = sample.std(axis=1, ddof=1) / np.sqrt(number)
         with np.errstate(divide="ignore", invalid="ignore"):
-            found[start : start + block] = np.where(away == 0.0, 0.0, away / error)
-    return found
+            statistics[start : start + block] = np.where(deviation == 0.0, 0.0, deviation / error)
+    return statistics

@@ -10,11 +10,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from vedette.evaluation.actions import choice_words
+from vedette.evaluation.actions import describe_choice
 from vedette.evaluation.comparison import Comparison
 from vedette.evaluation.ensembles import PARTS
 from vedette.evaluation.statistics import CONFIDENCE, PairedDifference, Summary, summarise
-from vedette.evaluation.tails import tail_of, tails
+from vedette.evaluation.tail_summary import strategy_tail, tail_sentence
 from vedette.internal.text import markdown_table, named_in, spreadsheet_text, with_error
 
 _ESCAPED = str.maketrans(
@@ -52,24 +52,24 @@ def decision_rows(comparison: Comparison, strategy: str, *, at_most: int = 3) ->
         shares = list(comparison.decision_shares(strategy, decision).items())[:at_most]
         if not shares:
             continue
-        rows.append((f"{time:g} s", ", ".join(f"({choice_words(choice)}) {share:.0%}" for choice, share in shares)))
+        rows.append((f"{time:g} s", ", ".join(f"({describe_choice(choice)}) {share:.0%}" for choice, share in shares)))
     return rows
 
 
 def strategy_markdown(comparison: Comparison) -> str:
     """Return the table as Markdown, with its caption below."""
     table = markdown_table(header(comparison), strategy_rows(comparison))
-    return "\n".join([table, *filter(None, (caption(comparison), tails(comparison))), ""])
+    return "\n".join([table, *filter(None, (caption(comparison), tail_sentence(comparison))), ""])
 
 
 def strategy_latex(comparison: Comparison) -> str:
     """Return the table as LaTeX (package booktabs) with its caption, in an environment `table`."""
     rows = [tuple(map(_latex, row)) for row in (header(comparison), *strategy_rows(comparison))]
     lines = [f"{' & '.join(row)} \\\\" for row in rows]
-    told = " ".join(filter(None, (caption(comparison), tails(comparison))))
+    caption_text = " ".join(filter(None, (caption(comparison), tail_sentence(comparison))))
     body = "\n".join(["\\toprule", lines[0], "\\midrule", *lines[1:], "\\bottomrule"])
     return (
-        f"\\begin{{table}}\n\\centering\n\\caption{{{_latex(told)}}}\n"
+        f"\\begin{{table}}\n\\centering\n\\caption{{{_latex(caption_text)}}}\n"
         f"\\begin{{tabular}}{{l{'r' * (len(rows[0]) - 1)}}}\n{body}\n\\end{{tabular}}\n\\end{{table}}\n"
     )
 
@@ -84,15 +84,15 @@ def significance(comparison: Comparison) -> str:
     others = list(zip(comparison.strategies, comparison.p_values(), strict=True))[1:]
     if not others or comparison.num_runs < 2:
         return ""
-    known = [name for name, p_value in others if p_value <= 1.0 - CONFIDENCE]
-    unknown = [name for name, _ in others if name not in known]
+    significant = [name for name, p_value in others if p_value <= 1.0 - CONFIDENCE]
+    insignificant = [name for name, _ in others if name not in significant]
     corrected = " (Holm correction)" if len(others) > 1 else ""
-    if not unknown:
-        what = "The difference is" if len(others) == 1 else f"All {len(others)} differences are"
-        return f"{what} significant at 5 %{corrected}."
-    if not known:
+    if not insignificant:
+        subject = "The difference is" if len(others) == 1 else f"All {len(others)} differences are"
+        return f"{subject} significant at 5 %{corrected}."
+    if not significant:
         return f"No difference is significant at 5 %{corrected}."
-    return f"Significant at 5 %{corrected}: {', '.join(known)}; not significant: {', '.join(unknown)}."
+    return f"Significant at 5 %{corrected}: {', '.join(significant)}; not significant: {', '.join(insignificant)}."
 
 
 def decisions_markdown(comparison: Comparison) -> str:
@@ -130,7 +130,7 @@ def strategy_numbers(comparison: Comparison, strategy: str) -> dict[str, str | f
     paired = difference.summary
     parts = [_means(comparison, strategy, part, f"{part}_mean_m", f"{part}_se_m") for part in PARTS]
     measures = [_means(comparison, strategy, name, f"{name}_mean", f"{name}_se") for name in comparison.measures]
-    tail = tail_of(comparison, strategy)
+    tail = strategy_tail(comparison, strategy)
     return {
         "strategy": spreadsheet_text(strategy),
         "runs": comparison.num_runs,
@@ -145,7 +145,7 @@ def strategy_numbers(comparison: Comparison, strategy: str) -> dict[str, str | f
         "interval": "bootstrap" if difference.is_skewed else "t",
         "p_value": difference.p_value,
         "p_holm": float(comparison.p_values()[comparison.strategies.index(strategy)]),
-        "share_won": difference.share_won,
+        "share_won": difference.win_rate,
         **dict(itertools.chain(*measures)),
     }
 
@@ -187,27 +187,27 @@ def legend(comparison: Comparison) -> str:
 
 
 def _row(comparison: Comparison, strategy: str) -> tuple[str, ...]:
-    total = _told(comparison.summary(strategy))
+    total = _mean_with_error(comparison.summary(strategy))
     parts = [f"{float(comparison.summary(strategy, part).mean):.2f}" for part in ("localisation", "cardinality")]
     if strategy == comparison.strategies[0]:
         return (strategy, total, *parts, "", "", "")
     difference = comparison.difference(strategy)
     interval = f"{difference.summary.low:+.2f} to {difference.summary.high:+.2f}"
-    known = comparison.num_runs > 1
+    has_interval = comparison.num_runs > 1
     return (
         strategy,
         total,
         *parts,
-        _told(difference.summary, sign="+"),
-        interval if known else "unknown",
-        _won(difference) if known else "unknown",
+        _mean_with_error(difference.summary, sign="+"),
+        interval if has_interval else "unknown",
+        _win_text(difference) if has_interval else "unknown",
     )
 
 
-def _won(difference: PairedDifference) -> str:
-    tied = f", {difference.share_tied:.0%} tied" if difference.share_tied > 0.0 else ""
-    return f"{difference.share_won:.0%}{tied}"
+def _win_text(difference: PairedDifference) -> str:
+    tied = f", {difference.tie_rate:.0%} tied" if difference.tie_rate > 0.0 else ""
+    return f"{difference.win_rate:.0%}{tied}"
 
 
-def _told(summary: Summary, sign: str = "") -> str:
+def _mean_with_error(summary: Summary, sign: str = "") -> str:
     return with_error(float(summary.mean), float(summary.standard_error), sign)

@@ -48,12 +48,12 @@ def geojson(table: Table) -> bytes:
             places = [[*place, round(table["z_m"][row], 1)] for place, row in zip(places, rows, strict=True)]
         line = {"type": "LineString", "coordinates": places}
         geometry = line if len(places) > 1 else {"type": "Point", "coordinates": places[0]}
-        told: dict[str, Any] = {"label": track, "target": _most_common([table["target"][row] for row in rows])}
-        told["labels"] = list(dict.fromkeys(table["label"][row] for row in rows))
+        properties: dict[str, Any] = {"label": track, "target": _most_common([table["target"][row] for row in rows])}
+        properties["labels"] = list(dict.fromkeys(table["label"][row] for row in rows))
         for name in ("time_s", "utc", "existence"):
             if name in table:
-                told[name] = [table[name][row] for row in rows]
-        features.append({"type": "Feature", "geometry": geometry, "properties": told})
+                properties[name] = [table[name][row] for row in rows]
+        features.append({"type": "Feature", "geometry": geometry, "properties": properties})
     return json.dumps({"type": "FeatureCollection", "features": features}).encode()
 
 
@@ -140,5 +140,5 @@ def utc_text(time: float) -> str:
 
 
 def _most_common(names: Sequence[str | None]) -> str | None:
-    found = [name for name in names if name is not None]
-    return max(sorted(set(found)), key=found.count) if found else None
+    known = [name for name in names if name is not None]
+    return max(sorted(set(known)), key=known.count) if known else None

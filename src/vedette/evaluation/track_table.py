@@ -14,7 +14,7 @@ from vedette.densities.inspection import state_columns
 from vedette.errors import InputError
 from vedette.evaluation.joining import Join, track_names
 from vedette.evaluation.metrics.matching import match_run
-from vedette.evaluation.told import told_by
+from vedette.evaluation.recording_metadata import recording_metadata
 from vedette.evaluation.track_formats import czml, geojson, mcap, utc_text
 from vedette.internal.extras import require_packages
 from vedette.internal.files import write_file
@@ -49,7 +49,7 @@ def track_table(
     names: of the true targets, by their ids; else `id + 1`. joins: see `vedette.evaluation.joining`.
     """
     matching = match_run(record.truth, record.estimates, cutoff=cutoff, order=1.0)
-    partners = dict(
+    matched_targets = dict(
         zip(
             zip(matching.scans.tolist(), map(tuple, matching.labels.tolist()), strict=True),
             record.truth.ids[matching.truth_rows].tolist(),
@@ -80,7 +80,7 @@ def track_table(
         courses = courses_of(compass, means.reshape(-1, dim))
         table["course_deg"], table["speed_mps"] = courses[:, 0].tolist(), courses[:, 1].tolist()
     table["existence"] = [row[4] for row in rows]
-    table["target"] = [_name(partners.get((row[0], row[1])), names) for row in rows]
+    table["target"] = [_name(matched_targets.get((row[0], row[1])), names) for row in rows]
     return table
 
 
@@ -88,7 +88,7 @@ def table_of_run(record: RunRecord, scenario: Scenario, joins: Sequence[Join] = 
     """Return the `track_table` of a run, with origin, times and names of targets from its scenario."""
     model = scenario.model
     origin = None if model.origin is None else model.origin.build()
-    start, is_utc, names = told_by(record, scenario)
+    start, is_utc, names = recording_metadata(record, scenario)
     return track_table(
         record,
         cutoff=model.ospa.cutoff,
@@ -113,7 +113,7 @@ def write_tracks(path: Path, table: Mapping[str, Sequence[Any]]) -> None:
         MissingPackageError: the package that writes the format is not installed.
     """
     check_format(path)
-    content = _MAKERS[path.suffix.lower()](table)
+    content = _ENCODERS[path.suffix.lower()](table)
     write_file(path, lambda file: file.write(content), make_folder=True)
 
 
@@ -143,11 +143,11 @@ def _csv(table: Mapping[str, Sequence[Any]]) -> bytes:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(table)
-    writer.writerows(map(_harmless, cells) for cells in zip(*table.values(), strict=True))
+    writer.writerows(map(_spreadsheet_cell, cells) for cells in zip(*table.values(), strict=True))
     return text.getvalue().encode()
 
 
-def _harmless(cell: Any) -> Any:
+def _spreadsheet_cell(cell: Any) -> Any:
     return spreadsheet_text(cell) if isinstance(cell, str) else cell
 
 
@@ -162,6 +162,6 @@ def _parquet(table: Mapping[str, Sequence[Any]]) -> bytes:
     return content.getvalue()
 
 
-_MAKERS = {".csv": _csv, ".parquet": _parquet, ".geojson": geojson, ".czml": czml, ".mcap": mcap}
-ENDINGS = tuple(_MAKERS)
+_ENCODERS = {".csv": _csv, ".parquet": _parquet, ".geojson": geojson, ".czml": czml, ".mcap": mcap}
+ENDINGS = tuple(_ENCODERS)
 _PACKAGES = {".parquet": "pyarrow", ".mcap": "mcap"}

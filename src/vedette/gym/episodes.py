@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from vedette.control import Plan
 from vedette.densities import LabelledDensity
 from vedette.errors import InputError
-from vedette.evaluation.runs import score_of
+from vedette.evaluation.runs import build_score
 from vedette.gym.observing import DecisionContext, ObservationEncoder, deciding_sensors
 from vedette.gym.windows import Window
 from vedette.internal.extras import require_packages
@@ -47,7 +47,7 @@ class BuiltScenario:
             )
         parts = build_parts(self.scenario, build_sensors(self.scenario), Strategy())
         self.encoder = ObservationEncoder.of(parts._asdict(), num_labels)
-        score = score_of(self.scenario)
+        score = build_score(self.scenario)
         assert score is not None  # only the targets of recordings are unknown
         self.score = score
 

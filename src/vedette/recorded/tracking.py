@@ -50,14 +50,14 @@ class Tracking:
         return replace(self, recording=self.recording.between(0.0, later), truth=self.truth.first(num))
 
     def run(
-        self, score: Score | None, *, seed: int = 0, run: int = 0, watch: Callable[[int], None] | None = None
+        self, score: Score | None, *, seed: int = 0, run: int = 0, progress: Callable[[int], None] | None = None
     ) -> RunRecord:
         """Track the targets; raises `RunStopped` and `RunInterrupted` like `vedette.simulation.simulate`.
 
         Args:
             score: (num_scans, 3) OSPA of the estimates against the truth; None: NaN.
             seed, run: fix the random numbers of filters that draw.
-            watch: called with the number of each instant after it.
+            progress: called with the number of each instant after it.
         """
         recording, num = self.recording, len(self.tracker.sensors)
         journal = Journal(self.name, "recorded", seed, run, self.truth, num, recording.file)
@@ -68,7 +68,7 @@ class Tracking:
             for step, (time, scans, poses) in enumerate(instants, start=1):
                 _, info, estimate = running.step(step, scans, poses, time, journal.begin(step))
                 journal.note(poses, np.zeros(num, np.bool_), info, estimate)
-                if watch is not None:
-                    watch(step)
+                if progress is not None:
+                    progress(step)
 
         return journal.run_of(go, score)

@@ -10,7 +10,7 @@ import numpy as np
 
 from vedette.control.explanation import Explanation, RunnerUp, TargetGains, number_text, with_error
 from vedette.control.plan import Plan
-from vedette.evaluation.actions import rounded, row_words
+from vedette.evaluation.actions import describe_action, rounded
 from vedette.internal.text import pluralise
 
 _MOST_TARGETS = 10
@@ -62,7 +62,7 @@ def _margin(runner_up: RunnerUp, reward: float) -> str:
 
 def _others(plan: Plan, runner_up: RunnerUp, names: Sequence[str]) -> str:
     words = (
-        f"{names[s]} to {row_words(rounded(own.columns, own.values[other]))}"
+        f"{names[s]} to {describe_action(rounded(own.columns, own.values[other]))}"
         for s, (own, chosen, other) in enumerate(zip(plan.actions, plan.chosen, runner_up.actions, strict=True))
         if other != chosen
     )
@@ -86,7 +86,7 @@ def _sensors(plan: Plan, why: Explanation) -> list[tuple[int, str, float, float]
     if why.of_sensors is None or why.without is None:
         return []
     return [
-        (s, row_words(rounded(own.columns, own.values[chosen])), _number(share), _number(without))
+        (s, describe_action(rounded(own.columns, own.values[chosen])), _number(share), _number(without))
         for s, (own, chosen, share, without) in enumerate(
             zip(plan.actions, plan.chosen, why.of_sensors.tolist(), why.without.tolist(), strict=True)
         )

@@ -25,7 +25,7 @@ from vedette.evaluation.figures import (
     tracks_figure,
 )
 from vedette.evaluation.figures.cost import MIN_FOR_TAILS
-from vedette.evaluation.figures.distributions import MOST_DOTS
+from vedette.evaluation.figures.distributions import MAX_DOTS
 from vedette.evaluation.figures.style import shown_decisions, strategy_label
 from vedette.internal.text import elided, pluralise
 from vedette.kernels.base.types import Floats
@@ -113,7 +113,7 @@ def error_drawings(group: Group) -> Iterator[Drawing]:
         )
     elif len(comparison.strategies) > 1:
         differences = " Below: the differences, which one run gives no confidence interval."
-    first = f" (of the first {MOST_DOTS})" if comparison.num_runs > MOST_DOTS else ""
+    first = f" (of the first {MAX_DOTS})" if comparison.num_runs > MAX_DOTS else ""
     yield Drawing(
         "distributions",
         "Run by run",

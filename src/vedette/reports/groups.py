@@ -15,9 +15,9 @@ from vedette.campaigns.cells import Campaign, Cell
 from vedette.campaigns.results import CampaignResults
 from vedette.errors import InputError
 from vedette.evaluation import Comparison
-from vedette.evaluation.comparison import scored
-from vedette.evaluation.ensembles import Ensemble, ensemble_of
-from vedette.evaluation.figures.scene import Scene, scene_of
+from vedette.evaluation.comparison import compare_scored_scans
+from vedette.evaluation.ensembles import Ensemble, build_ensemble
+from vedette.evaluation.figures.scene import Scene, build_scene
 from vedette.evaluation.figures.style import strategy_label
 from vedette.evaluation.runs import measure_run
 from vedette.internal.text import unique_name
@@ -60,7 +60,7 @@ class Strategy:
     @property
     def scene(self) -> Scene:
         """Scenario data for figures of its runs."""
-        return scene_of(self.cell.scenario, self.cell.planner)
+        return build_scene(self.cell.scenario, self.cell.planner)
 
     @property
     def has_labels(self) -> bool:
@@ -110,7 +110,7 @@ def _group(results: CampaignResults, cells: tuple[Cell, ...], name: str, title: 
     comparison, reason = None, "no run number is finished for every one of them yet"
     if common:
         try:
-            comparison, reason = scored(cells[0].scenario, ensembles), ""
+            comparison, reason = compare_scored_scans(cells[0].scenario, ensembles), ""
         except InputError as error:  # for example different scan times
             reason = str(error)
     strategies = []
@@ -136,11 +136,11 @@ def group_of_run(record: RunRecord, scenario: Scenario) -> Group:
     settings = {"scenario": record.scenario, "planner": record.planner}
     cell = Cell(_file_part(record.planner) or "run", settings, scenario, record.planner)
     is_known = scenario.model.targets.kind != "unknown"
-    ensemble = ensemble_of([(record.summary(), measure_run(record, scenario) if is_known else None)])
+    ensemble = build_ensemble([(record.summary(), measure_run(record, scenario) if is_known else None)])
     comparison, reason = None, "nobody knows the targets"
     if is_known:
         try:
-            comparison = scored(scenario, {record.planner: ensemble})
+            comparison = compare_scored_scans(scenario, {record.planner: ensemble})
         except InputError as error:  # for example a run that stopped before the counted scans
             reason = str(error)
     strategy = Strategy(cell, record.planner, 1, ensemble, _counted(ensemble, comparison), lambda _: record)

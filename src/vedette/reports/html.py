@@ -20,7 +20,7 @@ from vedette.campaigns.published import CheckedClaim, checked_claims, published_
 from vedette.campaigns.results import CampaignResults
 from vedette.errors import InputError
 from vedette.evaluation.figures.labels import elided_names
-from vedette.evaluation.scans import code_of_sensors
+from vedette.evaluation.scans import measurement_code
 from vedette.internal.files import write_whole
 from vedette.internal.text import named_in
 from vedette.kernels.base.types import Floats
@@ -164,7 +164,7 @@ def write_demo(results: CampaignResults, path: str | Path, *, trust: bool = Fals
 
 def replay_code(results: CampaignResults) -> tuple[str, ...]:
     """Return the names of custom sensor models that a trusted report would run to draw its replays."""
-    return tuple(dict.fromkeys(name for cell in results.campaign.cells for name in code_of_sensors(cell.scenario)))
+    return tuple(dict.fromkeys(name for cell in results.campaign.cells for name in measurement_code(cell.scenario)))
 
 
 def _check_replays(results: CampaignResults, replays: Sequence[tuple[str, int]]) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 
 from vedette.control import Plan, Planner
 from vedette.evaluation.diagnostics import diagnostics_line, run_diagnostics
-from vedette.evaluation.figures.scene import scene_of
+from vedette.evaluation.figures.scene import build_scene
 from vedette.evaluation.scans import UNKNOWN
 from vedette.kernels.base.types import Floats
 from vedette.live import Answer, Live, LiveState
@@ -80,7 +80,7 @@ class LiveScreen:
         model = scenario.model
         self._names, self._sections = model.sensor_names, model.sensors
         strategy = "" if live.planner is None else live.planner.name
-        scene = scene_of(scenario, strategy)
+        scene = build_scene(scenario, strategy)
         run = {
             "live": True,
             "strategy": strategy or "no decisions",

@@ -78,7 +78,7 @@ def _comparison(
         told = "< 0.001" if p_value < 0.001 else f"= {p_value:.2g}"
         sentence = f"{sentence[:-1]} (p {told} among {number} comparisons)."
     mean, low, high = (float(each) for each in (paired.summary.mean, paired.summary.low, paired.summary.high))
-    share = "unknown" if verdict == "unknown" else percent(paired.share_won)
+    share = "unknown" if verdict == "unknown" else percent(paired.win_rate)
     interval = "" if verdict == "unknown" else f" ({low:+.2f} to {high:+.2f})"
     return PairwiseComparison(verdict, *names, sentence, mean, low, high, with_minus(f"{mean:+.2f}{interval}"), share)
 
@@ -135,5 +135,5 @@ def _runs(paired: PairedDifference) -> str:
 
 
 def _share(paired: PairedDifference) -> str:
-    tied = f", equal in {percent(paired.share_tied)}" if paired.share_tied > 0.0 else ""
-    return f"{percent(paired.share_won)} of the runs{tied}"
+    tied = f", equal in {percent(paired.tie_rate)}" if paired.tie_rate > 0.0 else ""
+    return f"{percent(paired.win_rate)} of the runs{tied}"

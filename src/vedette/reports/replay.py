@@ -12,11 +12,11 @@ from vedette.control.plan import Plan
 from vedette.densities import Estimate, UndetectedIntensity
 from vedette.errors import VedetteError
 from vedette.evaluation import match_run
-from vedette.evaluation.actions import action_axis, choice_words
-from vedette.evaluation.ensembles import choice_of
+from vedette.evaluation.actions import action_axis, describe_choice
+from vedette.evaluation.ensembles import rounded_choice
 from vedette.evaluation.figures.rewards import best_over_others, best_over_pair, first_pair
-from vedette.evaluation.scans import LIE, code_of_sensors, in_plane, scans_of_record
-from vedette.evaluation.told import told_by
+from vedette.evaluation.recording_metadata import recording_metadata
+from vedette.evaluation.scans import PLANE_SHAPES, measurement_code, plane_coordinates, scans_of_record
 from vedette.kernels.base.types import HEIGHT, Floats
 from vedette.reports.decision_explanations import explanation_data
 from vedette.reports.groups import Strategy
@@ -47,7 +47,7 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
     sensors = [sensor_data(name, section) for name, section in zip(names, sections, strict=True)]
     has_velocity = scenario.model.motion.kind != "custom"
     is_known, origin = scenario.model.targets.kind != "unknown", scenario.model.origin
-    told = told_by(record, scenario)
+    told = recording_metadata(record, scenario)
     axes = dict[str, dict[str, Any]]()
     decisions = [decision_data(each, axes, names) for each in record.decisions]
     return {
@@ -122,7 +122,7 @@ def sensor_data(name: str, section: SensorSection) -> dict[str, Any]:
 
     `unturned` is the heading (rad) of a stationary sensor with a uniform view, which has no meaning.
     """
-    found: dict[str, Any] = {"name": name, "kind": LIE.get(section.measurement.kind, "none")}
+    found: dict[str, Any] = {"name": name, "kind": PLANE_SHAPES.get(section.measurement.kind, "none")}
     if section.platform.kind == "still" and section.detection.kind in ("constant", "gaussian", "limited_range"):
         found["unturned"] = round(math.radians(section.heading_deg), 4)
     if section.detection.kind in ("limited_range", "limited_sector", "soft_sector"):
@@ -213,7 +213,7 @@ def _scans(record: RunRecord, scenario: Scenario, places: int, trust: bool) -> l
     Empty if the models of the scenario, or its recording, are not available.
     """
     kinds = [sensor.measurement.kind for sensor in scenario.model.sensors]
-    if not LIE.keys() & set(kinds) or (code_of_sensors(scenario) and not trust):
+    if not PLANE_SHAPES.keys() & set(kinds) or (measurement_code(scenario) and not trust):
         return []
     try:
         scans = scans_of_record(record, scenario)
@@ -227,10 +227,10 @@ def _scans(record: RunRecord, scenario: Scenario, places: int, trust: bool) -> l
 
 def measurement_data(scan: Scan | None, kind: str, pose: Floats, places: int) -> list[list[float]]:
     """Return for each measurement of a scan its target (0: clutter, -1: unknown), and its position in the plane."""
-    if scan is None or kind not in LIE:
+    if scan is None or kind not in PLANE_SHAPES:
         return []
-    digits = _ANGLE_DIGITS if LIE[kind] == "ray" else places
-    lie = in_plane(scan.measurements, kind, pose)
+    digits = _ANGLE_DIGITS if PLANE_SHAPES[kind] == "ray" else places
+    lie = plane_coordinates(scan.measurements, kind, pose)
     return [
         [origin + 1, *rounded_list(place, digits)] for origin, place in zip(scan.origins.tolist(), lie, strict=True)
     ]
@@ -241,7 +241,7 @@ def decision_data(decision: Decision, axes: dict[str, dict[str, Any]], names: Se
     plan = decision.plan
     return {
         "scan": decision.step - 1,
-        "actions": choice_words(choice_of(plan)),
+        "actions": describe_choice(rounded_choice(plan)),
         "notes": plan.notes,
         "curves": _curves(plan, axes),
         "map": _map(plan),

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from vedette.evaluation.scans import code_of_sensors
+from vedette.evaluation.scans import measurement_code
 from vedette.reports.groups import group_of_run
 from vedette.reports.html import prepare_folder, render, section_of, write_page
 from vedette.reports.provenance import citation
@@ -48,7 +48,7 @@ def write_run_report(
         record=record,
         strategy=strategy.name,
         section=section_of(group, "g0"),
-        untrusted=() if trust else code_of_sensors(scenario),
+        untrusted=() if trust else measurement_code(scenario),
         described=scenario.model.description,
         versions=None if manifest is None else _versions(manifest),
         citation="" if manifest is None else citation(manifest["versions"]["vedette"]),

@@ -16,7 +16,7 @@ from vedette.evaluation.figures.style import strategy_label
 from vedette.evaluation.health import percent
 from vedette.evaluation.metrics.run import COLUMNS
 from vedette.evaluation.tables import decision_rows, header, strategy_rows
-from vedette.evaluation.tails import tail_header, tail_of
+from vedette.evaluation.tail_summary import strategy_tail, tail_header
 from vedette.internal.text import elided_apart, with_error, with_minus
 from vedette.kernels.base.types import Bools, Floats
 from vedette.reports.groups import Group, Strategy
@@ -122,7 +122,7 @@ def error_table(group: Group) -> Table | None:
         (
             strategy_label(name),
             *(with_minus(cell) for cell in cells),
-            *(tail_of(group.comparison, name).cells() if several else ()),
+            *(strategy_tail(group.comparison, name).cells() if several else ()),
         )
         for name, *cells in strategy_rows(group.comparison)
     )

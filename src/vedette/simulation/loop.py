@@ -164,18 +164,18 @@ def truth_of_run(experiment: Experiment, seed: int, run: int) -> Truth:
     return experiment.targets.truth(experiment.times, rng=run_stream(seed, run, TRUTH))
 
 
-def advance(world: SimulationRun, journal: Journal, watch: Callable[[int], None] | None = None) -> list[ScanOutcome]:
+def advance(world: SimulationRun, journal: Journal, progress: Callable[[int], None] | None = None) -> list[ScanOutcome]:
     """Simulate the scans up to the next decision or the end, note each in the journal, and return their outcomes.
 
-    watch: called with the number of every finished scan. Raises as `SimulationRun.step`.
+    progress: called with the number of every finished scan. Raises as `SimulationRun.step`.
     """
     first, steps = 1 if world.outcome is None else world.outcome.step + 1, world.experiment.decision_steps
     moments: list[ScanOutcome] = []
     for step in range(first, len(world.experiment.times) + 1):
         moments.append(world.step(stages=journal.begin(step)))
         journal.note(moments[-1].poses, moments[-1].off, moments[-1].info, moments[-1].estimate)
-        if watch is not None:
-            watch(step)
+        if progress is not None:
+            progress(step)
         if step in steps:
             break
     return moments
@@ -188,7 +188,7 @@ def simulate(
     seed: int,
     run: int,
     score: Score | None,
-    watch: Callable[[int], None] | None = None,
+    progress: Callable[[int], None] | None = None,
 ) -> RunRecord:
     """Return the record of one run of a strategy.
 
@@ -197,7 +197,7 @@ def simulate(
         planner: decides at the experiment's decision steps; None: the sensors never move, and no decision is made.
         seed, run: determine every random number; runs with equal seed and number are paired across planners.
         score: (num_scans, 3) OSPA of the estimates against the truth, see `vedette.evaluation.ospa_of_run`; None: NaN.
-        watch: called with the number of every finished scan.
+        progress: called with the number of every finished scan.
 
     Raises:
         VedetteError: the true targets cannot be drawn.
@@ -207,7 +207,7 @@ def simulate(
     truth = truth_of_run(experiment, seed, run)
     journal = Journal(experiment.name, name, seed, run, truth, experiment.num_sensors)
     with suppress_unit_warnings():  # no warnings of implausible numbers in simulated scans
-        return journal.run_of(partial(_run_scans, experiment, planner, journal, watch), score)
+        return journal.run_of(partial(_run_scans, experiment, planner, journal, progress), score)
 
 
 def _with_truth(planner: Any, truth: Truth) -> Planner | None:
@@ -217,7 +217,7 @@ def _with_truth(planner: Any, truth: Truth) -> Planner | None:
 
 
 def _run_scans(
-    experiment: Experiment, planner: Planner | None, journal: Journal, watch: Callable[[int], None] | None
+    experiment: Experiment, planner: Planner | None, journal: Journal, progress: Callable[[int], None] | None
 ) -> None:
     """Simulate every scan of a run, one after the other, and note each in the journal."""
     planner = _with_truth(planner, journal.truth)
@@ -227,7 +227,7 @@ def _run_scans(
         experiment, seed=journal.seed, run=journal.run, moving=planner is not None, truth=journal.truth
     )
     while not world.is_over:
-        moment = advance(world, journal, watch)[-1]
+        moment = advance(world, journal, progress)[-1]
         if planner is not None and moment.step in experiment.decision_steps:
             with journal.timing("planning"):
                 plan = planner.plan(moment.state, moment.poses, rng=planner_rng)

@@ -15,7 +15,7 @@ from vedette.evaluation.figures.mean_rewards import mean_rewards_figure
 from vedette.evaluation.figures.ospa import differences_figure, ospa_figure
 from vedette.evaluation.figures.rewards import reward_figure
 from vedette.evaluation.figures.roses import roses_figure
-from vedette.evaluation.figures.scene import Scene, scene_of
+from vedette.evaluation.figures.scene import Scene, build_scene
 from vedette.evaluation.figures.style import png_bytes, save_figure, svg_text
 from vedette.evaluation.figures.sweep import SweepCurve, sweep_figure
 from vedette.evaluation.figures.tracks import overview_figure, tracks_figure
@@ -24,6 +24,7 @@ from vedette.evaluation.figures.video import scan_image, write_video
 __all__ = [
     "Scene",
     "SweepCurve",
+    "build_scene",
     "consistency_figure",
     "cost_figure",
     "differences_figure",
@@ -36,7 +37,6 @@ __all__ = [
     "roses_figure",
     "save_figure",
     "scan_image",
-    "scene_of",
     "svg_text",
     "sweep_figure",
     "tracks_figure",

@@ -29,7 +29,7 @@ def cost_figure(seconds: Mapping[str, Mapping[str, NDArray[np.floating]]]) -> Fi
 
     Raises `InputError` if nothing was timed.
     """
-    stages = list(dict.fromkeys(stage for spent in seconds.values() for stage in spent))
+    stages = list(dict.fromkeys(stage for stage_seconds in seconds.values() for stage in stage_seconds))
     if not stages:
         raise InputError("seconds: expected the time of at least one stage; got none")
     labels = short_labels(list(seconds))
@@ -37,17 +37,17 @@ def cost_figure(seconds: Mapping[str, Mapping[str, NDArray[np.floating]]]) -> Fi
     lines = -(-len(labels) // columns)
     figure = new_figure(0.6 + 0.15 * lines + (0.11 * len(seconds) + 0.08) * len(stages))
     axes = figure.subplots()
-    for index, (label, spent) in enumerate(zip(labels, seconds.values(), strict=True)):
+    for index, (label, stage_seconds) in enumerate(zip(labels, seconds.values(), strict=True)):
         shade, marker = colour(index), MARKERS[index % len(MARKERS)]
         offset = (index - (len(seconds) - 1) / 2.0) * 0.7 / max(len(seconds), 1)
-        rows = [row for row, stage in enumerate(stages) if len(spent.get(stage, ()))]
-        low, middle, high = np.array([_quantiles(spent[stages[row]]) for row in rows]).T * 1e3
+        rows = [row for row, stage in enumerate(stages) if len(stage_seconds.get(stage, ()))]
+        low, middle, high = np.array([_quantiles(stage_seconds[stages[row]]) for row in rows]).T * 1e3
         places = np.array(rows) + offset
         axes.hlines(places, low, high, color=shade, linewidth=1.2)
         axes.plot(middle, places, linestyle="", marker=marker, markersize=4, color=shade, label=label)
     axes.set_xscale("log")
     _label_times(axes)
-    counts = [max(len(spent.get(stage, ())) for spent in seconds.values()) for stage in stages]
+    counts = [max(len(stage_seconds.get(stage, ())) for stage_seconds in seconds.values()) for stage in stages]
     axes.set_yticks(range(len(stages)), [f"{stage}\nn = {count}" for stage, count in zip(stages, counts, strict=True)])
     axes.set_ylim(len(stages) - 0.5, -0.5)
     axes.grid(False, axis="y")

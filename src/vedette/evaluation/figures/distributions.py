@@ -14,7 +14,7 @@ from vedette.evaluation.statistics import Summary, paired_difference
 from vedette.internal.text import named_in
 from vedette.kernels.base.types import Floats
 
-MOST_DOTS = 2000  # in a row: more would merge into one blot
+MAX_DOTS = 2000  # in a row: more would merge into one blot
 _ROW = 0.36  # inches
 _SHORT, _ONE_LINE = 8, 20  # letters
 _GOLDEN = 0.6180339887498949
@@ -24,7 +24,7 @@ _GOLDEN = 0.6180339887498949
 def distributions_figure(comparison: Comparison) -> Figure:
     """Return a figure of the mean OSPA of every run, and below it of every paired difference from the first strategy.
 
-    Each dot is a run; of more than `MOST_DOTS` runs, the first are drawn. The box contains the middle half of the runs
+    Each dot is a run; of more than `MAX_DOTS` runs, the first are drawn. The box contains the middle half of the runs
     and its line is their median. The diamond is the mean, in the lower panel with its 95 % confidence interval; if the
     interval contains 0, the difference is not significant.
     """
@@ -62,13 +62,13 @@ def _draw_differences(axes: Axes, comparison: Comparison) -> None:
 
 def _minus(name: str, reference: str) -> str:
     """Return the name of a difference, on two lines if one would leave little room to draw."""
-    between = "\n" if cell_len(name + reference) > _ONE_LINE else " "
-    return f"{name}{between}\N{MINUS SIGN} {reference}"
+    separator = "\n" if cell_len(name + reference) > _ONE_LINE else " "
+    return f"{name}{separator}\N{MINUS SIGN} {reference}"
 
 
 def _draw_runs(axes: Axes, values: Floats, row: int, shade: str) -> None:
     """Draw dots of the first runs, spread over half the height of the row, so that equal values are distinguishable."""
-    shown = values[:MOST_DOTS]
+    shown = values[:MAX_DOTS]
     spread = (np.arange(1, len(shown) + 1) * _GOLDEN) % 1.0 - 0.5
     axes.plot(
         shown, row + 0.55 * spread, linestyle="", marker="o", markersize=2.4, markeredgewidth=0, color=shade, alpha=0.6

@@ -8,14 +8,14 @@ from vedette.evaluation.figures.style import strategy_label
 from vedette.internal.text import elided, elided_apart
 
 
-def short_labels(names: Sequence[str], most: int = 24) -> tuple[str, ...]:
-    """Return a label for each strategy, ready to draw, each at most `most` letters wide and no two alike."""
-    return tuple(map(drawn_text, elided_apart([strategy_label(name) for name in names], most)))
+def short_labels(names: Sequence[str], max_width: int = 24) -> tuple[str, ...]:
+    """Return a label for each strategy, ready to draw, each at most `max_width` letters wide and no two alike."""
+    return tuple(map(drawn_text, elided_apart([strategy_label(name) for name in names], max_width)))
 
 
-def short_label(name: str, most: int = 24) -> str:
-    """Return the label of one strategy, at most `most` letters wide."""
-    return drawn_text(elided(strategy_label(name), most))
+def short_label(name: str, max_width: int = 24) -> str:
+    """Return the label of one strategy, at most `max_width` letters wide."""
+    return drawn_text(elided(strategy_label(name), max_width))
 
 
 def elided_names(names: Sequence[str]) -> dict[str, str]:

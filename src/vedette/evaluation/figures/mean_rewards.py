@@ -16,10 +16,10 @@ from vedette.evaluation.actions import ActionAxis, action_axis
 from vedette.evaluation.figures.rewards import (
     best_over_others,
     best_over_pair,
-    choosing,
     first_pair,
     map_ticks,
     mark_actions,
+    sensors_with_choice,
 )
 from vedette.evaluation.figures.scene import Scene
 from vedette.evaluation.figures.style import (
@@ -28,7 +28,7 @@ from vedette.evaluation.figures.style import (
     TEXT_WIDTH,
     legend_columns,
     new_figure,
-    sensor_looks,
+    sensor_styles,
     styled,
 )
 from vedette.evaluation.rewards import MeanRewards
@@ -59,19 +59,19 @@ def mean_rewards_figure(decisions: Sequence[MeanRewards], scene: Scene | None = 
     if not decisions:
         raise InputError("decisions: expected the rewards of one or more; got none")
     pair = first_pair(decisions[0].tables, decisions[0].actions)
-    drawn = choosing([(each.tables, each.actions) for each in decisions])
-    if not drawn:
+    sensors = sensors_with_choice([(each.tables, each.actions) for each in decisions])
+    if not sensors:
         raise InputError("decisions: expected a sensor with a choice; got one action each")
     columns = min(len(decisions), _COLUMNS)
     rows = -(-len(decisions) // columns)
     width = TEXT_WIDTH * (columns / _COLUMNS if columns < _COLUMNS else 1.0)
-    words = 0.0 if all(action_axis(decisions[0].actions[sensor]).is_numeric for sensor in drawn) else 0.4
-    height = (1.9 + words) * rows + 0.4 if pair is None else 2.35 * rows
+    label_height = 0.0 if all(action_axis(decisions[0].actions[sensor]).is_numeric for sensor in sensors) else 0.4
+    height = (1.9 + label_height) * rows + 0.4 if pair is None else 2.35 * rows
     figure = new_figure(height, width=width)
     panels = figure.subplots(rows, columns, sharey=pair is None, squeeze=False)
     for panel, rewards in zip(panels.ravel(), decisions, strict=False):
         if pair is None:
-            _draw_curves(panel, rewards, drawn, scene)
+            _draw_curves(panel, rewards, sensors, scene)
         else:
             _draw_joint(figure, panel, rewards, pair)
         panel.set_title(f"{rewards.time:g} s")
@@ -94,44 +94,50 @@ def _name_curves(figure: Figure, panels: Any, scene: Scene) -> None:
 
 
 def _name_maps(figure: Figure, panels: Any, pair: tuple[int, int], rewards: MeanRewards, scene: Scene) -> None:
-    across, up = (action_axis(rewards.actions[sensor]).title(scene.name(sensor)) for sensor in pair)
+    x_title, y_title = (action_axis(rewards.actions[sensor]).title(scene.name(sensor)) for sensor in pair)
     for panel in panels[-1]:
-        panel.set_xlabel(across)
+        panel.set_xlabel(x_title)
     for panel in panels[:, 0]:
-        panel.set_ylabel(up)
+        panel.set_ylabel(y_title)
     if scene.reward:
         figure.suptitle(scene.reward_title("Colour: mean reward"), fontsize=7)
 
 
-def _draw_curves(axes: Axes, rewards: MeanRewards, drawn: Sequence[int], scene: Scene) -> None:
-    along, looks = {sensor: action_axis(rewards.actions[sensor]) for sensor in drawn}, sensor_looks(drawn)
-    alike = len({each.title() if each.is_numeric else each.labels for each in along.values()}) == 1
+def _draw_curves(axes: Axes, rewards: MeanRewards, sensors: Sequence[int], scene: Scene) -> None:
+    axes_of_sensors, styles = (
+        {sensor: action_axis(rewards.actions[sensor]) for sensor in sensors},
+        sensor_styles(sensors),
+    )
+    one_axis = (
+        len({own_axis.title() if own_axis.is_numeric else own_axis.labels for own_axis in axes_of_sensors.values()})
+        == 1
+    )
     for table, share in zip(rewards.tables, rewards.shares, strict=True):
         for axis, sensor in enumerate(table.sensors):
-            if sensor not in along:
+            if sensor not in axes_of_sensors:
                 continue
             others = tuple(other for other in range(share.ndim) if other != axis)
             _draw_curve(
                 axes,
-                along[sensor] if alike else along[sensor].counted(),
+                axes_of_sensors[sensor] if one_axis else axes_of_sensors[sensor].counted(),
                 best_over_others(table, axis),
                 share.sum(axis=others),
                 scene.name(sensor),
-                looks[sensor],
+                styles[sensor],
             )
-    if alike:
-        mark_actions(axes, next(iter(along.values())), 90)
+    if one_axis:
+        mark_actions(axes, next(iter(axes_of_sensors.values())), 90)
     else:
         axes.set_xlabel("Number of the action")
 
 
 def _draw_curve(
-    axes: Axes, along: ActionAxis, curve: tuple[Floats, Floats], share: Floats, name: str, looks: Any
+    axes: Axes, along: ActionAxis, curve: tuple[Floats, Floats], share: Floats, name: str, style: Any
 ) -> None:
     order = np.argsort(along.places, kind="stable")
     places = along.places[order]
     mean, error, share = curve[0][order], curve[1][order], share[order]
-    shade, marker, dashes = looks
+    shade, marker, dashes = style
     if along.is_numeric:
         axes.fill_between(places, mean - error, mean + error, color=shade, alpha=0.2, linewidth=0)
     else:
@@ -151,8 +157,8 @@ def _draw_curve(
 
 
 def _draw_joint(figure: Figure, axes: Axes, rewards: MeanRewards, pair: tuple[int, int]) -> None:
-    place, table = next((i, table) for i, table in enumerate(rewards.tables) if len(table.sensors) > 1)
-    reward, share = best_over_pair(table, pair), _pair_share(table, rewards.shares[place], pair)
+    index, table = next((i, table) for i, table in enumerate(rewards.tables) if len(table.sensors) > 1)
+    reward, share = best_over_pair(table, pair), _pair_share(table, rewards.shares[index], pair)
     edges = [np.arange(length + 1) - 0.5 for length in reward.shape]
     image = axes.pcolormesh(
         *edges, reward.T, cmap=matplotlib.colormaps[HEAT_MAP].resampled(_LEVELS), edgecolors="face", linewidth=0.1

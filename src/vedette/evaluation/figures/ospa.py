@@ -28,7 +28,7 @@ from vedette.kernels.base.types import Bools, Floats
 
 
 @dataclass(frozen=True, slots=True)
-class Shared:
+class SharedInterval:
     """An interval over which several curves are equal.
 
     Attributes:
@@ -40,7 +40,7 @@ class Shared:
     shown: Bools
 
 
-def shared_stretches(curves: Floats) -> tuple[Shared, ...]:
+def shared_intervals(curves: Floats) -> tuple[SharedInterval, ...]:
     """Return every set of curves that are equal over one or more steps, with the points of those steps.
 
     Args:
@@ -48,30 +48,30 @@ def shared_stretches(curves: Floats) -> tuple[Shared, ...]:
     """
     same_point = curves[:, None, :] == curves[None, :, :]
     same_step = same_point[:, :, :-1] & same_point[:, :, 1:]
-    found: dict[tuple[int, ...], Bools] = {}
+    points_by_members: dict[tuple[int, ...], Bools] = {}
     for step in range(curves.shape[1] - 1):
         for curve in range(len(curves)):
             members = tuple(np.flatnonzero(same_step[curve, :, step]).tolist())
             if len(members) > 1 and members[0] == curve:
-                found.setdefault(members, np.zeros(curves.shape[1], bool))[step : step + 2] = True
-    return tuple(Shared(members, shown) for members, shown in found.items())
+                points_by_members.setdefault(members, np.zeros(curves.shape[1], bool))[step : step + 2] = True
+    return tuple(SharedInterval(members, shown) for members, shown in points_by_members.items())
 
 
-def own_points(curves: Floats) -> Bools:
+def distinct_points(curves: Floats) -> Bools:
     """Return True at ends of steps over which a curve equals no other, (num_curves, num_points); all for one."""
     num_curves, num_points = curves.shape
     if num_curves == 1:
         return np.ones((1, num_points), bool)
     same_point = curves[:, None, :] == curves[None, :, :]
-    alone = (same_point[:, :, :-1] & same_point[:, :, 1:]).sum(axis=1) == 1
-    own = np.zeros(curves.shape, bool)
-    own[:, :-1] |= alone
-    own[:, 1:] |= alone
-    return own
+    is_distinct = (same_point[:, :, :-1] & same_point[:, :, 1:]).sum(axis=1) == 1
+    distinct = np.zeros(curves.shape, bool)
+    distinct[:, :-1] |= is_distinct
+    distinct[:, 1:] |= is_distinct
+    return distinct
 
 
 _LABELS = {"total": "OSPA", "localisation": "Localisation", "cardinality": "Cardinality"}
-_FAR = 2.0  # times the second largest difference; a larger one leaves the axis
+_OUTLIER_FACTOR = 2.0  # times the second largest difference; a larger one leaves the axis
 _DASH = 4.5  # line widths, dashes of curves that coincide
 
 
@@ -118,7 +118,7 @@ def differences_figure(comparison: Comparison) -> Figure:
     figure = new_figure(4.05)
     above, below = figure.subplots(2, 1, sharex=True)
     draw_ospa(above, comparison, "total")
-    _close_up(above, comparison, since_first_decision(comparison))
+    _limit_height(above, comparison, since_first_decision(comparison))
     draw_differences(below, comparison)
     handles, labels = above.get_legend_handles_labels()
     figure.legend(
@@ -139,7 +139,7 @@ def draw_differences(axes: Axes, comparison: Comparison) -> None:
     A strategy that is much worse than all others leaves the axis at the top, so that the others are distinguishable.
     """
     shown = since_first_decision(comparison)
-    reaches: dict[str, float] = {}
+    largest: dict[str, float] = {}
     times = comparison.times[shown]
     axes.axhline(0.0, color=colour(0), linewidth=1.4, label=short_labels(comparison.strategies)[0])
     first = comparison.values(comparison.strategies[0])
@@ -149,31 +149,31 @@ def draw_differences(axes: Axes, comparison: Comparison) -> None:
         curve = summarise(comparison.values(strategy)[:, shown] - first[:, shown])
         axes.plot(times, curve.mean, color=colour(index), linestyle=line_style(index), label=label)
         _fill(axes, times, curve.low, curve.high, np.ones(len(times), bool), colour(index))
-        reaches[label] = float(np.abs([curve.low, curve.high]).max())
-    _leave_out_the_worst(axes, reaches)
+        largest[label] = float(np.abs([curve.low, curve.high]).max())
+    _cut_off_outlier(axes, largest)
     _mark_decisions(axes, comparison)
     span_times(axes, times)
     axes.set_xlabel("Time (s)")
     axes.set_ylabel(named_in(f"minus {short_labels(comparison.strategies)[0]}", comparison.unit))
 
 
-def _leave_out_the_worst(axes: Axes, reaches: dict[str, float]) -> None:
+def _cut_off_outlier(axes: Axes, largest: dict[str, float]) -> None:
     """End the axis above the second largest difference if the largest is far beyond it, with a note in the figure."""
-    *_, second, worst = [("", 0.0), *sorted(reaches.items(), key=lambda each: each[1])]
-    if worst[1] > _FAR * second[1] > 0.0:
+    *_, second, worst = [("", 0.0), *sorted(largest.items(), key=lambda each: each[1])]
+    if worst[1] > _OUTLIER_FACTOR * second[1] > 0.0:
         axes.set_ylim(axes.get_ylim()[0], 1.15 * second[1])
         axes.text(
             0.98, 0.02, f"{worst[0]} leaves the axis", transform=axes.transAxes, ha="right", color=GREY, fontsize=6
         )
 
 
-def _close_up(axes: Axes, comparison: Comparison, shown: Bools) -> None:
+def _limit_height(axes: Axes, comparison: Comparison, shown: Bools) -> None:
     """Limit the height of the axes to the curves with their bands at these scans."""
     curves = [comparison.curve(strategy) for strategy in comparison.strategies]
     low = min(float((curve.mean - curve.standard_error)[shown].min()) for curve in curves)
     high = max(float((curve.mean + curve.standard_error)[shown].max()) for curve in curves)
-    room = 0.06 * (high - low) or 1.0
-    axes.set_ylim(max(0.0, low - room), high + room)
+    margin = 0.06 * (high - low) or 1.0
+    axes.set_ylim(max(0.0, low - margin), high + margin)
 
 
 def draw_ospa(axes: Axes, comparison: Comparison, part: str) -> None:
@@ -181,20 +181,20 @@ def draw_ospa(axes: Axes, comparison: Comparison, part: str) -> None:
     times = comparison.times
     curves = [comparison.curve(strategy, part) for strategy in comparison.strategies]
     means = np.array([curve.mean for curve in curves])
-    own = own_points(means)
+    distinct = distinct_points(means)
     for index, (label, curve) in enumerate(zip(short_labels(comparison.strategies), curves, strict=True)):
         shade = colour(index)
-        mean = np.where(own[index], curve.mean, np.nan)
+        mean = np.where(distinct[index], curve.mean, np.nan)
         axes.plot(times, mean, color=shade, linestyle=line_style(index), label=label)
         if comparison.num_runs > 1:
-            _draw_band(axes, times, curve, own[index], shade)
-    for shared in shared_stretches(means):
-        mean = np.where(shared.shown, means[shared.members[0]], np.nan)
-        for place, index in enumerate(shared.members):
-            dashes = (-_DASH * place, (_DASH, _DASH * (len(shared.members) - 1)))
+            _draw_band(axes, times, curve, distinct[index], shade)
+    for interval in shared_intervals(means):
+        mean = np.where(interval.shown, means[interval.members[0]], np.nan)
+        for place, index in enumerate(interval.members):
+            dashes = (-_DASH * place, (_DASH, _DASH * (len(interval.members) - 1)))
             axes.plot(times, mean, color=colour(index), linestyle=dashes, dash_capstyle="butt", label="_")
         if comparison.num_runs > 1:
-            _draw_band(axes, times, curves[shared.members[0]], shared.shown, GREY)
+            _draw_band(axes, times, curves[interval.members[0]], interval.shown, GREY)
     _mark_decisions(axes, comparison)
     axes.set_ylim(bottom=0.0)
     span_times(axes, comparison.times)

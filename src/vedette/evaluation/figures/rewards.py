@@ -21,7 +21,7 @@ from vedette.evaluation.figures.style import (
     degrees_label,
     legend_columns,
     new_figure,
-    sensor_looks,
+    sensor_styles,
     styled,
 )
 from vedette.internal.text import with_minus
@@ -54,39 +54,41 @@ def reward_figure(plan: Plan, *, pair: tuple[int, int] | None = None, scene: Sce
     plan.validate()
     if not plan.tables:
         raise InputError(f"plan: expected reward tables; got none, as planner {plan.planner!r} weighs no actions")
-    drawn = choosing([(plan.tables, plan.actions)])
-    if not drawn:
+    sensors_shown = sensors_with_choice([(plan.tables, plan.actions)])
+    if not sensors_shown:
         raise InputError("plan: expected a sensor with a choice; got one action each")
     joint = [table for table in plan.tables if len(table.sensors) > 1]
     pair = pair or first_pair(plan.tables, plan.actions)
-    known = {*drawn, *(pair or ())} & {*range(len(plan.actions))}
-    along = {sensor: action_axis(plan.actions[sensor]) for sensor in known}
-    groups = alike(along, drawn)
+    sensors_with_axis = {*sensors_shown, *(pair or ())} & {*range(len(plan.actions))}
+    action_axes = {sensor: action_axis(plan.actions[sensor]) for sensor in sensors_with_axis}
+    groups = group_by_axis(action_axes, sensors_shown)
     if pair is None:
         joint = []
     heights = [1.55] * len(joint[:1]) + [1.0] * len(groups)
     figure = new_figure((COLUMN_WIDTH + 1.4 if joint else 2.3) + 1.9 * (len(groups) - 1))
     panels = figure.subplots(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
     if joint and pair is not None:
-        _draw_heat_map(figure, panels[0], plan, joint[0], pair, along, scene)
+        _draw_heat_map(figure, panels[0], plan, joint[0], pair, action_axes, scene)
     for axes, sensors in zip(panels[-len(groups) :], groups, strict=True):
-        _draw_curves(axes, plan, {sensor: along[sensor] for sensor in sensors}, scene, sensor_looks(drawn))
+        _draw_curves(
+            axes, plan, {sensor: action_axes[sensor] for sensor in sensors}, scene, sensor_styles(sensors_shown)
+        )
     return figure
 
 
-def choosing(decided: Sequence[tuple[Sequence[RewardTable], Sequence[Actions]]]) -> tuple[int, ...]:
+def sensors_with_choice(decisions: Sequence[tuple[Sequence[RewardTable], Sequence[Actions]]]) -> tuple[int, ...]:
     """Return the sensors with more than one action in any of the decisions, given by their tables and actions.
 
     Of more than six, the six whose choice makes the most difference to the reward.
     """
     spans: dict[int, float] = {}
-    for tables, actions in decided:
+    for tables, actions in decisions:
         for table in tables:
             for axis, sensor in enumerate(table.sensors):
                 if len(actions[sensor]) > 1:
                     curve = best_over_others(table, axis)[0]
-                    known = curve[np.isfinite(curve)]
-                    spans[sensor] = spans.get(sensor, 0.0) + float(np.ptp(known) if len(known) else 0.0)
+                    finite = curve[np.isfinite(curve)]
+                    spans[sensor] = spans.get(sensor, 0.0) + float(np.ptp(finite) if len(finite) else 0.0)
     return tuple(sorted(sorted(spans, key=lambda sensor: -spans[sensor])[: len(COLOURS)]))
 
 
@@ -97,37 +99,40 @@ def first_pair(tables: Sequence[RewardTable], actions: Sequence[Actions]) -> tup
     return (with_choice[0], with_choice[1]) if len(with_choice) > 1 else None
 
 
-def alike(along: Mapping[int, ActionAxis], sensors: Sequence[int]) -> list[list[int]]:
-    """Return groups of sensors whose actions can be drawn along one axis; along: the axis of each sensor's actions."""
+def group_by_axis(action_axes: Mapping[int, ActionAxis], sensors: Sequence[int]) -> list[list[int]]:
+    """Return groups of sensors whose actions can be drawn along one axis.
+
+    action_axes: the axis of each sensor's actions.
+    """
     groups: dict[Any, list[int]] = {}
     for sensor in sensors:
-        axis = along[sensor]
+        axis = action_axes[sensor]
         groups.setdefault(axis.title() if axis.is_numeric else axis.labels, []).append(sensor)
     return list(groups.values())
 
 
 def _draw_curves(
-    axes: Axes, plan: Plan, along: Mapping[int, ActionAxis], scene: Scene, looks: Mapping[int, Any]
+    axes: Axes, plan: Plan, action_axes: Mapping[int, ActionAxis], scene: Scene, styles: Mapping[int, Any]
 ) -> None:
     for table in plan.tables:
         for axis, sensor in enumerate(table.sensors):
-            if sensor in along:
+            if sensor in action_axes:
                 curve, chosen = best_over_others(table, axis), plan.chosen[sensor]
-                _draw_curve(axes, along[sensor], *curve, chosen, scene.name(sensor), looks[sensor])
+                _draw_curve(axes, action_axes[sensor], *curve, chosen, scene.name(sensor), styles[sensor])
     joint = any(len(table.sensors) > 1 for table in plan.tables)
-    mark_actions(axes, next(iter(along.values())))
+    mark_actions(axes, next(iter(action_axes.values())))
     axes.set_ylabel(scene.reward_title("Largest joint reward" if joint else "Reward").replace(" (", "\n("))
     # Above the panel: inside it, a legend would cover a curve.
     columns = legend_columns([str(each) for each in axes.get_legend_handles_labels()[1]], width=_PANEL_WIDTH)
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns, frameon=False, handlelength=1.8)
 
 
-def _draw_curve(axes: Axes, axis: ActionAxis, mean: Floats, error: Floats, choice: int, name: str, looks: Any) -> None:
+def _draw_curve(axes: Axes, axis: ActionAxis, mean: Floats, error: Floats, choice: int, name: str, style: Any) -> None:
     # Changes of heading have another order than the resulting headings.
     order = np.argsort(axis.places, kind="stable")
     places, mean, error = axis.places[order], mean[order], error[order]
     chosen = int(np.flatnonzero(order == choice)[0])
-    shade, marker, dashes = looks
+    shade, marker, dashes = style
     if axis.is_numeric:
         axes.fill_between(places, mean - error, mean + error, color=shade, alpha=0.2, linewidth=0)
     else:
@@ -156,11 +161,11 @@ def mark_actions(axes: Axes, along: ActionAxis, every: int = 60) -> None:
         axes.set_xticks(np.arange(-180, 181, every), [degrees_label(value) for value in range(-180, 181, every)])
 
 
-def map_ticks(axis: Any, along: ActionAxis, most: int) -> None:
-    """Set at most `most` ticks on one side of a map of joint actions."""
-    every = max(1, -(-len(along.places) // most))
+def map_ticks(axis: Any, along: ActionAxis, max_ticks: int) -> None:
+    """Set at most `max_ticks` ticks on one side of a map of joint actions."""
+    step = max(1, -(-len(along.places) // max_ticks))
     style = {} if along.is_numeric or axis.axis_name == "y" else {"rotation": 90}
-    axis.set_ticks(range(0, len(along.ticks), every), along.ticks[::every], **style)
+    axis.set_ticks(range(0, len(along.ticks), step), along.ticks[::step], **style)
 
 
 def best_over_others(table: RewardTable, axis: int) -> tuple[Floats, Floats]:

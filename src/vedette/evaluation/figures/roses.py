@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from vedette.errors import InputError
-from vedette.evaluation.actions import Row, row_words
+from vedette.evaluation.actions import Row, describe_action
 from vedette.evaluation.comparison import Comparison
 from vedette.evaluation.ensembles import Choice
 from vedette.evaluation.figures.labels import short_labels
@@ -22,7 +22,7 @@ from vedette.evaluation.figures.style import (
     TEXT_WIDTH,
     legend_columns,
     new_figure,
-    sensor_looks,
+    sensor_styles,
     shown_decisions,
     styled,
 )
@@ -30,7 +30,7 @@ from vedette.internal.text import with_minus
 from vedette.kernels.base.types import Floats, Ints
 
 _SIZE = 1.5  # inches of a rose
-_MOST_BARS = 4  # for each sensor
+_MAX_BARS = 4  # for each sensor
 _SECTORS = 24  # in which headings without a fixed grid are counted
 
 
@@ -51,15 +51,15 @@ def roses_figure(comparison: Comparison, scene: Scene | None = None) -> Figure:
     if not rows:
         raise InputError("comparison: expected decisions; got none")
     columns = shown_decisions(len(comparison.decision_times))
-    movers, names = _movers(comparison), short_labels(comparison.strategies, 20)
-    sensors = {sensor: (scene or Scene()).name(sensor) for sensor in movers}
-    if together := len(movers) > len(COLOURS):
-        sensors = {0: f"{len(movers)} sensors, taken together"}
-    shades = [shade for shade, _, _ in sensor_looks(list(sensors)).values()]
+    deciding, names = _deciding_sensors(comparison), short_labels(comparison.strategies, 20)
+    sensors = {sensor: (scene or Scene()).name(sensor) for sensor in deciding}
+    if is_combined := len(deciding) > len(COLOURS):
+        sensors = {0: f"{len(deciding)} sensors, taken together"}
+    shades = [shade for shade, _, _ in sensor_styles(list(sensors)).values()]
     size = min(TEXT_WIDTH / (len(columns) + 0.35), _SIZE)
     figure = new_figure(size * len(rows) + 0.5, width=size * (len(columns) + 0.35))
-    rows_of = [dict(choice[sensor]) for choice in _all_choices(comparison) for sensor in movers]
-    angle = next((name for name in ("heading_deg", "course_deg") if all(name in row for row in rows_of)), None)
+    chosen_actions = [dict(choice[sensor]) for choice in _all_choices(comparison) for sensor in deciding]
+    angle = next((name for name in ("heading_deg", "course_deg") if all(name in row for row in chosen_actions)), None)
     polar: dict[str, Any] = {"projection": "polar"} if angle else {}
     if angle == "course_deg":
         polar |= {"theta_offset": np.pi / 2.0, "theta_direction": -1}
@@ -68,8 +68,8 @@ def roses_figure(comparison: Comparison, scene: Scene | None = None) -> Figure:
         for column, decision in enumerate(columns):
             panel = panels[row, column]
             runs = [run[decision] for run in comparison.ensembles[index].choices if decision < len(run)]
-            chosen = [tuple(choice[sensor] for sensor in movers) for choice in runs]
-            if together:
+            chosen = [tuple(choice[sensor] for sensor in deciding) for choice in runs]
+            if is_combined:
                 chosen = [(each,) for choice in chosen for each in choice]
             if angle and chosen:
                 _draw_rose(panel, _headings(chosen, angle), shades)
@@ -79,18 +79,18 @@ def roses_figure(comparison: Comparison, scene: Scene | None = None) -> Figure:
                 panel.set_title(f"{comparison.decision_times[decision]:g} s", pad=9)
         panels[row, 0].set_ylabel(names[index], labelpad=22, fontsize=8)
     handles = [Patch(color=shade, label=name) for shade, name in zip(shades, sensors.values(), strict=True)]
-    side_by_side = legend_columns(list(sensors.values()), width=figure.get_figwidth())
-    figure.legend(handles=handles, loc="outside lower center", ncols=side_by_side)
+    num_columns = legend_columns(list(sensors.values()), width=figure.get_figwidth())
+    figure.legend(handles=handles, loc="outside lower center", ncols=num_columns)
     return figure
 
 
-def _movers(comparison: Comparison) -> list[int]:
+def _deciding_sensors(comparison: Comparison) -> list[int]:
     """Return the sensors that can do more than stand still."""
-    of_sensors: list[tuple[Row, ...]] = list(zip(*_all_choices(comparison), strict=True))
-    found = [sensor for sensor, chosen in enumerate(of_sensors) if any(chosen)]
-    if not found:
+    choices_by_sensor: list[tuple[Row, ...]] = list(zip(*_all_choices(comparison), strict=True))
+    sensors = [sensor for sensor, chosen in enumerate(choices_by_sensor) if any(chosen)]
+    if not sensors:
         raise InputError("comparison: expected a sensor with a choice; got none")
-    return found
+    return sensors
 
 
 def _all_choices(comparison: Comparison) -> list[Choice]:
@@ -107,9 +107,9 @@ def _draw_bars(axes: Any, chosen: list[Choice], shades: Sequence[str]) -> None:
     """Draw one bar for each sensor and chosen action, the most frequent of each sensor on top."""
     place, ticks = 0, []
     for shade, rows in zip(shades, zip(*chosen, strict=True), strict=False):
-        for row, count in Counter(rows).most_common(_MOST_BARS):
+        for row, count in Counter(rows).most_common(_MAX_BARS):
             axes.barh(place, count / len(chosen), color=shade, height=0.8)
-            ticks.append(with_minus(row_words(row)))
+            ticks.append(with_minus(describe_action(row)))
             place += 1
     axes.set_yticks(range(place), ticks, fontsize=5)
     axes.set_axisbelow(True)

@@ -73,31 +73,31 @@ class Scene:
         """Return the field of view of a sensor at a pose; None if it has no edge or is unknown."""
         return bounded_field(self.sensors[sensor], pose) if sensor < len(self.sensors) else None
 
-    def reward_title(self, of: str = "Reward") -> str:
+    def reward_title(self, title: str = "Reward") -> str:
         """Return the title `Reward (CS divergence)`."""
-        return f"{of} ({self.reward})" if self.reward else of
+        return f"{title} ({self.reward})" if self.reward else title
 
     @property
     def corners(self) -> Floats:
         """Corners of the no-go zones, (num, 2) m; corners beyond the region are moved to its edge."""
-        of_region = [zone.corners for zone in self.zones if zone.kind == REGION]
-        found = [np.array(zone.corners) for zone in self.zones if zone.kind == NO_GO]
-        if not found or not of_region:
+        region_corners = [zone.corners for zone in self.zones if zone.kind == REGION]
+        zone_corners = [np.array(zone.corners) for zone in self.zones if zone.kind == NO_GO]
+        if not zone_corners or not region_corners:
             return np.empty((0, 2))
-        low, high = np.min(of_region[0], axis=0), np.max(of_region[0], axis=0)
-        return np.asarray(np.clip(np.concatenate(found), low, high))
+        low, high = np.min(region_corners[0], axis=0), np.max(region_corners[0], axis=0)
+        return np.asarray(np.clip(np.concatenate(zone_corners), low, high))
 
 
-def scene_of(scenario: Scenario, planner: str) -> Scene:
+def build_scene(scenario: Scenario, planner: str) -> Scene:
     """Return the scene for figures of runs of a scenario under a strategy."""
     model = scenario.model
-    own, words = model.planners.get(planner), ""  # a custom planner may use any reward
-    if isinstance(own, NamedJoint | NamedIndependent | NamedLookahead):
-        words = (own.reward or model.control.reward).words
+    custom, reward = model.planners.get(planner), ""  # a custom planner may use any reward
+    if isinstance(custom, NamedJoint | NamedIndependent | NamedLookahead):
+        reward = (custom.reward or model.control.reward).words
     elif planner in STRATEGIES:
-        words = model.control.reward.words
+        reward = model.control.reward.words
     origin = None if model.origin is None else model.origin.build()
-    return Scene(model.sensor_names, words, zones(scenario), model.sensors, origin)
+    return Scene(model.sensor_names, reward, zones(scenario), model.sensors, origin)
 
 
 class NamePlace(NamedTuple):
@@ -118,27 +118,27 @@ def place_names(names: Sequence[str], places: Floats, bounds: Floats, marks: Flo
     """
     point = float((bounds[1] - bounds[0]).max()) / _POINTS_ACROSS
     corners = np.array([[x, y] for x in np.linspace(-1.0, 1.0, 9) for y in (-1.0, 0.0, 1.0)])
-    obstacles, taken = np.concatenate([marks, places]), np.empty((0, 2))
-    found = []
+    obstacles, covered_points = np.concatenate([marks, places]), np.empty((0, 2))
+    chosen = []
     for name, place in zip(names, places, strict=True):
         half = np.array([0.5 * _LETTER * len(name) + 2.0, 5.0]) * point
-        centres = [place + point * np.array(away) + half * np.sign(away) for away, _ in _SIDES]
+        centres = [place + point * np.array(offset) + half * np.sign(offset) for offset, _ in _SIDES]
         covered = [
             (
-                _inside(taken, centre, half),
+                _count_inside(covered_points, centre, half),
                 bool((centre - half < bounds[0]).any() or (centre + half > bounds[1]).any()),
-                _inside(obstacles, centre, half),
+                _count_inside(obstacles, centre, half),
             )
             for centre in centres
         ]
         side = min(range(len(_SIDES)), key=lambda each: covered[each])
-        away, alignment = _SIDES[side]
-        found.append(NamePlace({"xytext": away, **alignment}, covered[side][0] > 0))
-        taken = np.concatenate([taken, centres[side] + half * corners])
-    return found
+        offset, alignment = _SIDES[side]
+        chosen.append(NamePlace({"xytext": offset, **alignment}, covered[side][0] > 0))
+        covered_points = np.concatenate([covered_points, centres[side] + half * corners])
+    return chosen
 
 
-def _inside(points: Floats, centre: Floats, half: Floats) -> int:
+def _count_inside(points: Floats, centre: Floats, half: Floats) -> int:
     """Return the number of points in a box."""
     return int((np.abs(points - centre) < half).all(axis=1).sum())
 
@@ -152,7 +152,7 @@ def draw_zones(axes: Axes, drawn: Sequence[Zone], scale: float) -> None:
     for zone in drawn:
         if zone.kind == COAST:
             continue
-        ring = Path(scale * _turning(zone.corners, left=zone.kind != HOLE), closed=True)
+        ring = Path(scale * _oriented_ring(zone.corners, left=zone.kind != HOLE), closed=True)
         if zone.kind == HOLE:
             shown[-1][1].append(ring)
         else:
@@ -161,7 +161,7 @@ def draw_zones(axes: Axes, drawn: Sequence[Zone], scale: float) -> None:
         axes.add_patch(PathPatch(Path.make_compound_path(*rings), zorder=1.5, fill=False, **_ZONES[kind]))
 
 
-def _turning(corners: Sequence[tuple[float, float]], *, left: bool) -> Floats:
+def _oriented_ring(corners: Sequence[tuple[float, float]], *, left: bool) -> Floats:
     """Return a closed ring of corners, counter-clockwise (`left`) or clockwise: a hole turns against its zone."""
     ring = np.array([*corners, corners[0]])
     area = float((ring[:-1, 0] * ring[1:, 1] - ring[1:, 0] * ring[:-1, 1]).sum())
@@ -199,8 +199,8 @@ def label_axes(axes: Axes, scale: float, origin: Origin | None) -> None:
         degrees = origin.to_degrees(ends / scale)[:, k]
         if not degrees[0] < degrees[1]:  # over a pole, or where longitudes wrap around
             continue
-        there, back = _line(limits[k], degrees), _line(degrees, limits[k])
-        functions = (there, back)
+        to_degrees, to_metres = _line(limits[k], degrees), _line(degrees, limits[k])
+        functions = (to_degrees, to_metres)
         second = axes.secondary_yaxis("right", functions) if k else axes.secondary_xaxis("top", functions)
         axis = second.xaxis if k == 0 else second.yaxis
         axis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))

@@ -56,7 +56,7 @@ _OTHER_FONTS = (
     "Arial Unicode MS", "Segoe UI Symbol", "Noto Emoji", "Symbola",
 )  # fmt: skip
 # Warnings about layout, not results: letters without a font are drawn as boxes, crowded figures unchanged.
-_UNTOLD = ("Glyph .* missing from", "constrained_layout not applied", "Tight layout not applied")
+_LAYOUT_WARNINGS = ("Glyph .* missing from", "constrained_layout not applied", "Tight layout not applied")
 
 with resources.as_file(resources.files("vedette") / "paper.mplstyle") as _file:
     _SETTINGS: Any = dict(matplotlib.rc_params_from_file(_file, use_default_template=False))
@@ -65,8 +65,8 @@ for _name in ("axes.prop_cycle", "figure.figsize"):  # figures here set these th
 _FORMATS = ("pdf", "svg", "png")
 _DOTS_PER_INCH = 300
 _POINTS_PER_INCH = 72.0
-_AROUND_LABEL = 0.52  # inches, width of a legend handle and the gaps next to it
-_UNDATED: dict[str, dict[str, None]] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
+_LABEL_MARGIN = 0.52  # inches, width of a legend handle and the gaps next to it
+_WITHOUT_DATE: dict[str, dict[str, None]] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
 
 
 def styled(function: Callable[_P, _R]) -> Callable[_P, _R]:
@@ -82,15 +82,15 @@ def styled(function: Callable[_P, _R]) -> Callable[_P, _R]:
 
 @lru_cache(maxsize=1)
 def _other_fonts() -> tuple[str, ...]:
-    known = {font.name for font in font_manager.fontManager.ttflist if font.fname.lower().endswith(".ttf")}
-    return tuple(name for name in _OTHER_FONTS if name in known)
+    installed = {font.name for font in font_manager.fontManager.ttflist if font.fname.lower().endswith(".ttf")}
+    return tuple(name for name in _OTHER_FONTS if name in installed)
 
 
 @contextmanager
-def _untold() -> Iterator[None]:
+def _without_layout_warnings() -> Iterator[None]:
     """Draw without Matplotlib's warnings of missing letters and of crowded layouts."""
     with warnings.catch_warnings():
-        for message in _UNTOLD:
+        for message in _LAYOUT_WARNINGS:
             warnings.filterwarnings("ignore", message, UserWarning)
         yield
 
@@ -139,17 +139,17 @@ def degrees_label(value: float) -> str:
 def legend_columns(labels: Sequence[str], *, width: float = COLUMN_WIDTH) -> int:
     """Return the number of legend entries that fit next to each other in a width in inches: one to six."""
     font = FontProperties(size=_SETTINGS["legend.fontsize"])
-    with _untold():
+    with _without_layout_warnings():
         longest = max(
             (text_to_path.get_text_width_height_descent(label, font, False)[0] for label in labels), default=0
         )
-    return max(1, min(6, len(labels), int((width - 0.2) / (_AROUND_LABEL + longest / _POINTS_PER_INCH))))
+    return max(1, min(6, len(labels), int((width - 0.2) / (_LABEL_MARGIN + longest / _POINTS_PER_INCH))))
 
 
 def span_times(axes: Axes, times: Floats) -> None:
     """Limit the axis to the first and the last time; a single time gets one second to either side."""
-    room = 0.0 if times[-1] > times[0] else 1.0
-    axes.set_xlim(times[0] - room, times[-1] + room)
+    margin = 0.0 if times[-1] > times[0] else 1.0
+    axes.set_xlim(times[0] - margin, times[-1] + margin)
 
 
 def colour(index: int) -> str:
@@ -157,24 +157,24 @@ def colour(index: int) -> str:
     return COLOURS[index % len(COLOURS)]
 
 
-def sensor_looks(sensors: Sequence[int]) -> dict[int, tuple[str, str, Any]]:
+def sensor_styles(sensors: Sequence[int]) -> dict[int, tuple[str, str, Any]]:
     """Return colour, marker and dashes of each sensor of a figure; those of six sensors all differ.
 
     They are the same in every figure of at most six sensors, and no strategy has one of these colours.
     """
-    are_few = max(sensors, default=0) < len(SENSOR_COLOURS)
-    places = {sensor: sensor if are_few else place for place, sensor in enumerate(sensors)}
+    have_own = max(sensors, default=0) < len(SENSOR_COLOURS)
+    indices = {sensor: sensor if have_own else index for index, sensor in enumerate(sensors)}
     return {
-        sensor: (SENSOR_COLOURS[place % len(SENSOR_COLOURS)], MARKERS[place % len(MARKERS)], line_style(place))
-        for sensor, place in places.items()
+        sensor: (SENSOR_COLOURS[index % len(SENSOR_COLOURS)], MARKERS[index % len(MARKERS)], line_style(index))
+        for sensor, index in indices.items()
     }
 
 
-def shown_decisions(number: int, most: int = 6) -> tuple[int, ...]:
-    """Return indices of at most `most` of `number` decisions, evenly spread, with the first and the last."""
-    if number <= most:
+def shown_decisions(number: int, max_shown: int = 6) -> tuple[int, ...]:
+    """Return indices of at most `max_shown` of `number` decisions, evenly spread, with the first and the last."""
+    if number <= max_shown:
         return tuple(range(number))
-    return tuple(round(place * (number - 1) / (most - 1)) for place in range(most))
+    return tuple(round(place * (number - 1) / (max_shown - 1)) for place in range(max_shown))
 
 
 def line_style(index: int) -> Any:
@@ -199,7 +199,7 @@ def save_figure(figure: Figure, path: Path | str, *, formats: Sequence[str] = _F
     stem = Path(path)
     try:
         stem.parent.mkdir(parents=True, exist_ok=True)
-        with _as_it_is(figure):
+        with _restored(figure):
             return tuple(_save(figure, stem.with_name(f"{stem.name}.{name}"), name) for name in formats)
     except OSError as error:
         raise InputError(
@@ -211,7 +211,7 @@ def save_figure(figure: Figure, path: Path | str, *, formats: Sequence[str] = _F
 def svg_text(figure: Figure) -> str:
     """Return the figure as the text of an SVG file; the same figure gives the same text."""
     out = io.StringIO()
-    with _as_it_is(figure):
+    with _restored(figure):
         _print(figure, out, "svg")
     return out.getvalue()
 
@@ -220,18 +220,18 @@ def svg_text(figure: Figure) -> str:
 def png_bytes(figure: Figure, *, dots_per_inch: float) -> bytes:
     """Return the figure as the bytes of a PNG file, reproducibly; for figures with too many lines for `svg_text`."""
     out = io.BytesIO()
-    with _as_it_is(figure):
+    with _restored(figure):
         figure.dpi = dots_per_inch
         _print(figure, out, "png")
     return out.getvalue()
 
 
 @contextmanager
-def _as_it_is(figure: Figure) -> Iterator[None]:
+def _restored(figure: Figure) -> Iterator[None]:
     """Restore the figure's settings afterwards. Drawing the first format lays the figure out for all."""
     engine, dpi, canvas = figure.get_layout_engine(), figure.dpi, figure.canvas
     try:
-        with _untold():
+        with _without_layout_warnings():
             yield
     finally:
         figure.set_canvas(canvas)
@@ -257,4 +257,4 @@ def _print(figure: Figure, to: Any, name: str) -> None:
     if name == "png":
         canvas.print_png(to)
     else:
-        getattr(canvas, f"print_{name}")(to, metadata=_UNDATED[name])
+        getattr(canvas, f"print_{name}")(to, metadata=_WITHOUT_DATE[name])

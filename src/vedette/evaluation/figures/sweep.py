@@ -60,10 +60,10 @@ def sweep_figure(curves: Sequence[SweepCurve], label: str, unit: str = "m") -> F
         order = np.argsort(curve.values)
         mean = np.array([float(curve.errors[i].mean) for i in order])
         low, high = (np.array([float(getattr(curve.errors[i], end)) for i in order]) for end in ("low", "high"))
-        place = _beside(curve.values[order], index - (len(curves) - 1) / 2.0, values, logarithmic)
+        positions = _shift_sideways(curve.values[order], index - (len(curves) - 1) / 2.0, values, logarithmic)
         style = {"color": colour(index), "linestyle": line_style(index), "marker": MARKERS[index % len(MARKERS)]}
-        reach = np.nan_to_num(np.array([mean - low, high - mean]))
-        axes.errorbar(place, mean, yerr=reach, markersize=4, capsize=2, elinewidth=0.9, label=name, **style)
+        error_bars = np.nan_to_num(np.array([mean - low, high - mean]))
+        axes.errorbar(positions, mean, yerr=error_bars, markersize=4, capsize=2, elinewidth=0.9, label=name, **style)
     if logarithmic:
         axes.set_xscale("log")
     axes.set_xticks(values, [f"{value:g}" for value in values])
@@ -76,10 +76,10 @@ def sweep_figure(curves: Sequence[SweepCurve], label: str, unit: str = "m") -> F
     return figure
 
 
-def _beside(at: Floats, offset: float, values: Floats, logarithmic: bool) -> Floats:
+def _shift_sideways(positions: Floats, offset: float, values: Floats, logarithmic: bool) -> Floats:
     """Return values shifted a little sideways, so that the intervals of several curves at one value do not overlap."""
     if len(values) < 2:
-        return at
+        return positions
     if logarithmic:
-        return np.asarray(at * np.exp(0.04 * offset * float(np.diff(np.log(values)).min())))
-    return at + 0.04 * offset * float(np.diff(values).min())
+        return np.asarray(positions * np.exp(0.04 * offset * float(np.diff(np.log(values)).min())))
+    return positions + 0.04 * offset * float(np.diff(values).min())

@@ -14,7 +14,7 @@ from matplotlib.patches import Wedge
 from matplotlib.ticker import MaxNLocator
 
 from vedette.errors import InputError
-from vedette.evaluation.actions import angle_of
+from vedette.evaluation.actions import drawn_angle
 from vedette.evaluation.comparison import Comparison
 from vedette.evaluation.figures.labels import drawn_text, short_label
 from vedette.evaluation.figures.ospa import draw_differences, draw_ospa
@@ -45,7 +45,7 @@ LARGE = 5000.0  # m; axes of a larger extent are in kilometres
 _MANY_SCANS = 200  # with more scans, estimates are drawn smaller
 _TITLE_PAD = 14  # points, above the names of sensors at the upper edge
 SENSOR_MARKERS = "sDpP*X"
-_MOST_NAMED, _MOST_DECISIONS = 8, 12  # largest numbers of sensor names and of decisions that fit
+_MAX_NAMED, _MAX_DECISIONS = 8, 12  # largest numbers of sensor names and of decisions that fit
 
 
 @styled
@@ -72,7 +72,7 @@ def tracks_figure(*records: RunRecord, titles: Sequence[str] | None = None, scen
     figure = new_figure(width / len(records) + 0.4, width=width)
     figure.set_layout_engine("constrained", h_pad=0.08)  # equal axes are fitted last and would push titles off the top
     panels = figure.subplots(1, len(records), sharex=True, sharey=True, squeeze=False)[0]
-    scale = 1e-3 if reach_of(records) > LARGE else 1.0
+    scale = 1e-3 if plot_extent(records) > LARGE else 1.0
     for panel, record, name in zip(panels, records, names, strict=True):
         draw_tracks(panel, record, scale, scene)
         panel.set_title(drawn_text(name), pad=_TITLE_PAD)
@@ -102,19 +102,19 @@ def overview_figure(
     if strategy not in comparison.strategies:
         raise InputError(f"strategy: expected one of {', '.join(comparison.strategies)}; got {strategy!r}")
     figure = new_figure(TEXT_WIDTH / 2 + 0.1, width=TEXT_WIDTH)
-    several = comparison.num_runs > 1 and len(comparison.strategies) > 1
+    is_comparison = comparison.num_runs > 1 and len(comparison.strategies) > 1
     grid = figure.add_gridspec(2, 2, height_ratios=(1.0, 3.0))
-    left, right = figure.add_subplot(grid[:, 0]), figure.add_subplot(grid[1 if several else slice(None), 1])
-    scale = 1e-3 if reach_of([record]) > LARGE else 1.0
+    left, right = figure.add_subplot(grid[:, 0]), figure.add_subplot(grid[1 if is_comparison else slice(None), 1])
+    scale = 1e-3 if plot_extent([record]) > LARGE else 1.0
     shade = colour(comparison.strategies.index(strategy))
     draw_tracks(left, record, scale, scene, shade)
     frame_tracks(left, [record], scale, scene)
     left.set_title(f"{short_label(strategy)}, {record.source}", pad=_TITLE_PAD)
     above = right
-    if several:
-        _draw_gain(right, comparison)
+    if is_comparison:
+        _draw_differences(right, comparison)
         above = figure.add_subplot(grid[0, 1])
-        _draw_course(above, comparison)
+        _draw_error(above, comparison)
     else:
         draw_ospa(right, comparison, "total")
         right.set_xlabel("Time (s)")
@@ -125,14 +125,14 @@ def overview_figure(
     return figure
 
 
-def _draw_gain(axes: Axes, comparison: Comparison) -> None:
+def _draw_differences(axes: Axes, comparison: Comparison) -> None:
     """Draw the paired differences."""
     draw_differences(axes, comparison)
     minus = f"minus {short_label(comparison.strategies[0])}"
     axes.set_ylabel(f"{named_in('OSPA', comparison.unit)} {minus}")
 
 
-def _draw_course(axes: Axes, comparison: Comparison) -> None:
+def _draw_error(axes: Axes, comparison: Comparison) -> None:
     """Draw the error over the whole run, small."""
     draw_ospa(axes, comparison, "total")
     axes.set_ylabel(named_in("OSPA", comparison.unit), fontsize=6)
@@ -147,15 +147,15 @@ def draw_tracks(axes: Axes, record: RunRecord, scale: float, scene: Scene, shade
     _draw_estimates(axes, record, scale, shade)
     marks = np.concatenate([_positions(record), *(decision.poses[:, :2] for decision in record.decisions)])
     names = [scene.name(sensor) for sensor in range(record.num_sensors)]
-    stands = place_names(names, record.poses[0, :, :2], bounds_of([record], scene), marks)
+    name_places = place_names(names, record.poses[0, :, :2], plot_bounds([record], scene), marks)
     for sensor in range(record.num_sensors):
-        _draw_sensor(axes, record, sensor, scale, scene, stands[sensor].arguments)
+        _draw_sensor(axes, record, sensor, scale, scene, name_places[sensor].arguments)
     axes.set_aspect("equal")
 
 
 def frame_tracks(axes: Axes, records: Sequence[RunRecord], scale: float, scene: Scene) -> None:
-    """Set the limits from `bounds_of`, shared by all panels, and the labels of the axes."""
-    low, high = bounds_of(records, scene) * scale
+    """Set the limits from `plot_bounds`, shared by all panels, and the labels of the axes."""
+    low, high = plot_bounds(records, scene) * scale
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
     for axis in (axes.xaxis, axes.yaxis):
@@ -163,16 +163,16 @@ def frame_tracks(axes: Axes, records: Sequence[RunRecord], scale: float, scene: 
     label_axes(axes, scale, scene.origin if len(records) == 1 else None)
 
 
-def bounds_of(records: Sequence[RunRecord], scene: Scene) -> Floats:
+def plot_bounds(records: Sequence[RunRecord], scene: Scene) -> Floats:
     """Return the corners of a square around everything except stray estimates, (2, 2), m."""
     points = np.concatenate([scene.corners, *(_positions(record) for record in records)])
     low, high = points.min(axis=0), points.max(axis=0)
-    reach = 0.55 * max(float((high - low).max()), np.finfo(float).eps)
+    half_width = 0.55 * max(float((high - low).max()), np.finfo(float).eps)
     middle = (low + high) / 2.0
-    return np.array([middle - reach, middle + reach])
+    return np.array([middle - half_width, middle + half_width])
 
 
-def reach_of(records: Sequence[RunRecord]) -> float:
+def plot_extent(records: Sequence[RunRecord]) -> float:
     """Return the extent of the targets and sensors of runs, m."""
     return float(max(np.ptp(_positions(record), axis=0).max() for record in records))
 
@@ -195,20 +195,20 @@ def _draw_truth(axes: Axes, record: RunRecord, scale: float) -> None:
 def _draw_estimates(axes: Axes, record: RunRecord, scale: float, shade: str) -> None:
     labels = np.concatenate([estimate.labels for estimate in record.estimates])
     points = np.concatenate([estimate.means[:, :2] for estimate in record.estimates]) * scale
-    if not shade and recur(labels):
-        distinct, of_estimate = np.unique(labels, axis=0, return_inverse=True)
-        groups = [points[of_estimate.ravel() == index] for index in range(len(distinct))]
+    if not shade and labels_recur(labels):
+        distinct, group_of_estimate = np.unique(labels, axis=0, return_inverse=True)
+        groups = [points[group_of_estimate.ravel() == index] for index in range(len(distinct))]
     else:
         groups = [points]
     size = 3.2 * min(1.0, (_MANY_SCANS / record.num_scans) ** 0.5)
-    for index, mine in enumerate(groups):
+    for index, group in enumerate(groups):
         axes.plot(
-            mine[:, 0], mine[:, 1], linestyle="", marker=".", markersize=size, color=shade or colour(index), alpha=0.8,
-            zorder=3,
+            group[:, 0], group[:, 1], linestyle="", marker=".", markersize=size, color=shade or colour(index),
+            alpha=0.8, zorder=3,
         )  # fmt: skip
 
 
-def recur(labels: Ints) -> bool:
+def labels_recur(labels: Ints) -> bool:
     """Return True if a label occurs more than once; filters without labels give each estimate another one."""
     return len(np.unique(labels, axis=0)) < len(labels)
 
@@ -221,25 +221,25 @@ def _draw_sensor(
     if field is not None:
         draw_field(axes, _point(path[0]), field, scale)
     axes.plot(path[:, 0], path[:, 1], color=GREY, linewidth=1.6, linestyle=(0, (2.5, 1)), zorder=5)
-    if record.num_sensors > _MOST_NAMED:
+    if record.num_sensors > _MAX_NAMED:
         axes.plot(*path[0], marker="s", color=INK, markerfacecolor=GREY, markersize=4, markeredgewidth=0.5, zorder=6)
         return
     marker = SENSOR_MARKERS[sensor % len(SENSOR_MARKERS)]
     axes.plot(*path[0], marker=marker, color=INK, markerfacecolor=GREY, markersize=9, zorder=6)
-    paper = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
-    style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7, "zorder": 9, "bbox": paper}
+    background = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
+    style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7, "zorder": 9, "bbox": background}
     axes.annotate(scene.name(sensor), _point(path[0]), **name_place, **style)
-    if len(record.decisions) > _MOST_DECISIONS:
+    if len(record.decisions) > _MAX_DECISIONS:
         return
     for number, decision in enumerate(record.decisions, start=1):
         if len(decision.plan.actions[sensor]) == 1:
             continue
         place = _point(decision.poses[sensor, :2] * scale)
         arrow = {"arrowstyle": "<|-", "color": INK, "linewidth": 0.9, "shrinkA": 0, "shrinkB": 0}
-        ahead = 13.0 * _direction(decision, sensor)
-        if ahead.any():
-            axes.annotate("", place, xytext=_point(ahead), textcoords="offset points", arrowprops=arrow, zorder=7)
-        _draw_field(axes, decision, sensor, 0.12 * reach_of([record]), scale)
+        direction = 13.0 * _direction(decision, sensor)
+        if direction.any():
+            axes.annotate("", place, xytext=_point(direction), textcoords="offset points", arrowprops=arrow, zorder=7)
+        _draw_field(axes, decision, sensor, 0.12 * plot_extent([record]), scale)
         axes.plot(*place, marker="o", markersize=6.0, color=INK, markerfacecolor="white", markeredgewidth=0.7, zorder=8)
         axes.annotate(str(number), place, ha="center", va="center_baseline", fontsize=5, zorder=9)
 
@@ -248,7 +248,7 @@ def _draw_field(axes: Axes, decision: Decision, sensor: int, size: float, scale:
     """Draw a sector of a given size in the chosen pointing direction of the sensor."""
     plan, pose = decision.plan, decision.poses[sensor]
     row = dict(zip(plan.actions[sensor].columns, plan.chosen_actions[sensor].tolist(), strict=True))
-    middle = angle_of(row, "pointing_deg", "azimuth_deg")
+    middle = drawn_angle(row, "pointing_deg", "azimuth_deg")
     if middle is not None:
         half = row.get("half_width_deg", float(np.rad2deg(pose[4])) if len(pose) > 4 else 0.0)
         sides = middle - half, middle + half
@@ -259,7 +259,7 @@ def _direction(decision: Decision, sensor: int) -> Floats:
     """Return the unit vector of the sensor's chosen direction; 0 if its action is neither a heading nor a step."""
     plan = decision.plan
     row = dict(zip(plan.actions[sensor].columns, plan.chosen_actions[sensor].tolist(), strict=True))
-    heading = angle_of(row)
+    heading = drawn_angle(row)
     if heading is not None and row.get("distance_m") != 0.0:
         return np.array([np.cos(np.deg2rad(heading)), np.sin(np.deg2rad(heading))])
     step = np.array([row.get("dx", 0.0), row.get("dy", 0.0)])
@@ -277,30 +277,32 @@ def add_legend(figure: Figure, record: RunRecord, scene: Scene, shade: str = "",
     """
     open_marker: dict[str, Any] = {"color": INK, "markerfacecolor": "white", "markersize": 4.5, "linewidth": 0.9}
     labels = np.concatenate([estimate.labels for estimate in record.estimates])
-    by_label = not shade and recur(labels)
+    by_label = not shade and labels_recur(labels)
     shades = [colour(index) for index in range(3)] if by_label else [shade or colour(0)]
-    moved = bool((record.poses[:, :, :2] != record.poses[0, :, :2]).any())
-    path: Any = {"linestyle": (0, (2.5, 1)), "linewidth": 1.6} if moved else {"linestyle": ""}
-    shown: dict[str, Any] = {}
+    has_moved = bool((record.poses[:, :, :2] != record.poses[0, :, :2]).any())
+    path: Any = {"linestyle": (0, (2.5, 1)), "linewidth": 1.6} if has_moved else {"linestyle": ""}
+    entries: dict[str, Any] = {}
     if len(record.truth.ids) and is_video:
-        shown["target"] = Line2D([], [], marker="o", **open_marker)
+        entries["target"] = Line2D([], [], marker="o", **open_marker)
     elif len(record.truth.ids):
-        shown["target start"] = Line2D([], [], marker="o", **open_marker)
-        shown["target end"] = Line2D([], [], marker="^", **open_marker)
-    shown |= {
+        entries["target start"] = Line2D([], [], marker="o", **open_marker)
+        entries["target end"] = Line2D([], [], marker="^", **open_marker)
+    entries |= {
         "estimates, by label" if by_label else "estimates": tuple(
             Line2D([], [], linestyle="", marker=".", color=each) for each in shades
         ),
-        "sensor, path" if moved else "sensor": Line2D([], [], marker="s", color=GREY, markersize=4.5, **path),
+        "sensor, path" if has_moved else "sensor": Line2D([], [], marker="s", color=GREY, markersize=4.5, **path),
     }
     if is_video:
-        shown["measurement"] = Line2D([], [], linestyle="", marker="x", color=INK, markersize=4)
-    elif 0 < len(record.decisions) <= _MOST_DECISIONS and record.num_sensors <= _MOST_NAMED:
-        shown["decision"] = Line2D([], [], linestyle="", marker="$\\rightarrow$", color=INK, markersize=8)
-    shown |= {
+        entries["measurement"] = Line2D([], [], linestyle="", marker="x", color=INK, markersize=4)
+    elif 0 < len(record.decisions) <= _MAX_DECISIONS and record.num_sensors <= _MAX_NAMED:
+        entries["decision"] = Line2D([], [], linestyle="", marker="$\\rightarrow$", color=INK, markersize=8)
+    entries |= {
         str(patch.get_label()): patch for patch in field_handles(scene.sensors, "" if is_video else ", first scan")
     }
-    shown |= {str(patch.get_label()): patch for patch in zone_handles(scene.zones)}
-    columns = legend_columns(list(shown), width=figure.get_figwidth())
+    entries |= {str(patch.get_label()): patch for patch in zone_handles(scene.zones)}
+    columns = legend_columns(list(entries), width=figure.get_figwidth())
     by_parts = {tuple: HandlerTuple(ndivide=None, pad=0.0)}
-    figure.legend(list(shown.values()), list(shown), loc="outside lower center", ncols=columns, handler_map=by_parts)
+    figure.legend(
+        list(entries.values()), list(entries), loc="outside lower center", ncols=columns, handler_map=by_parts
+    )

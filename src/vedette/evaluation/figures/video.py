@@ -19,19 +19,19 @@ from numpy.typing import NDArray
 
 from vedette.errors import InputError, VedetteError
 from vedette.evaluation.figures.labels import drawn_text, short_label
-from vedette.evaluation.figures.scene import draw_field, draw_zones, place_names, scene_of
+from vedette.evaluation.figures.scene import build_scene, draw_field, draw_zones, place_names
 from vedette.evaluation.figures.style import COLUMN_WIDTH, GREY, INK, colour, new_figure, styled
 from vedette.evaluation.figures.tracks import (
     LARGE,
     SENSOR_MARKERS,
     add_legend,
-    bounds_of,
     frame_tracks,
-    reach_of,
-    recur,
+    labels_recur,
+    plot_bounds,
+    plot_extent,
 )
-from vedette.evaluation.scans import LIE, Scans, code_of_sensors, in_plane, scans_of_record
-from vedette.evaluation.told import told_by
+from vedette.evaluation.recording_metadata import recording_metadata
+from vedette.evaluation.scans import PLANE_SHAPES, Scans, measurement_code, plane_coordinates, scans_of_record
 from vedette.evaluation.track_formats import utc_text
 from vedette.internal.files import write_whole
 from vedette.internal.text import elided
@@ -47,9 +47,9 @@ if TYPE_CHECKING:
 ENDINGS = (".mp4", ".gif")
 SCANS_PER_SECOND = 5.0
 _SHORTEST, _LONGEST = 2.0, 60.0  # s, limits of the default length of a video
-_MOST_FRAMES = {".mp4": 20_000, ".gif": 1000}  # all frames of a GIF are in memory at once
+_MAX_FRAMES = {".mp4": 20_000, ".gif": 1000}  # all frames of a GIF are in memory at once
 _SIGMAS = 2.0
-_MOST_NAMED = 12  # largest number of estimates, targets or sensors with names
+_MAX_NAMED = 12  # largest number of estimates, targets or sensors with names
 
 
 @styled
@@ -62,7 +62,7 @@ def write_video(
     seconds: float | None = None,
     size: int = 800,
     trust: bool = False,
-    watch: Callable[[int, int], None] | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> int:
     """Write a run as a video, whole or not at all; return the number of its frames.
 
@@ -78,7 +78,7 @@ def write_video(
         seconds: length; None: a fifth of a second for each scan, from two seconds to a minute.
         size: width in pixels.
         trust: run the code that the scenario names, to draw measurements.
-        watch: called with the number of every frame drawn, and the number of all frames.
+        progress: called with the number of every frame drawn, and the number of all frames.
 
     Raises:
         InputError: another ending, too many frames, a file that cannot be written, or an ffmpeg that is missing or
@@ -88,33 +88,33 @@ def write_video(
     writer = _writer(ending, path, fps)
     if seconds is None:
         seconds = min(max(record.num_scans / SCANS_PER_SECOND, _SHORTEST), _LONGEST)
-    number = max(1, round(seconds * fps))
-    if number > _MOST_FRAMES[ending]:
-        raise InputError(f"seconds: expected at most {_MOST_FRAMES[ending]} frames of a {ending} file; got {number}")
-    times = np.linspace(record.times[0], record.times[-1], number) if number > 1 else record.times[:1]
+    num_frames = max(1, round(seconds * fps))
+    if num_frames > _MAX_FRAMES[ending]:
+        raise InputError(f"seconds: expected at most {_MAX_FRAMES[ending]} frames of a {ending} file; got {num_frames}")
+    times = np.linspace(record.times[0], record.times[-1], num_frames) if num_frames > 1 else record.times[:1]
     steps = np.searchsorted(record.times, times, side="right") - 1
     drawing = _Drawing(record, scenario, trust)
     with tempfile.TemporaryDirectory(prefix="vedette-video-", ignore_cleanup_errors=True) as folder:
-        made = Path(folder) / f"video{ending}"
+        partial = Path(folder) / f"video{ending}"
         try:
-            with writer.saving(drawing.figure, str(made), size / drawing.figure.get_figwidth()):
+            with writer.saving(drawing.figure, str(partial), size / drawing.figure.get_figwidth()):
                 for frame, step in enumerate(steps.tolist(), start=1):
                     drawing.show(step)
                     writer.grab_frame()
-                    if watch is not None:
-                        watch(frame, number)
+                    if progress is not None:
+                        progress(frame, num_frames)
         except (subprocess.CalledProcessError, BrokenPipeError) as error:
             if isinstance(error.__context__, KeyboardInterrupt):  # the signal went to ffmpeg, too
                 raise KeyboardInterrupt from None
-            told = str(getattr(error, "stderr", None) or error).strip().splitlines()[-1:]
-            raise InputError(f"{path}: expected ffmpeg to write it; it failed: {' '.join(told)}") from error
+            messages = str(getattr(error, "stderr", None) or error).strip().splitlines()[-1:]
+            raise InputError(f"{path}: expected ffmpeg to write it; it failed: {' '.join(messages)}") from error
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            with made.open("rb") as video:
+            with partial.open("rb") as video:
                 write_whole(path, lambda file: shutil.copyfileobj(video, file))
         except OSError as error:
             raise InputError(f"path: expected a place to write a video; got {path}: {error.strerror}") from error
-    return number
+    return num_frames
 
 
 @styled
@@ -145,9 +145,9 @@ class _Drawing:
 
     def __init__(self, record: RunRecord, scenario: Scenario, trust: bool) -> None:
         self._record, self._scenario = record, scenario
-        self._scans = _scans(record, scenario, trust)
-        self._scene, self._told = scene_of(scenario, record.planner), told_by(record, scenario)
-        self._scale = 1e-3 if reach_of([record]) > LARGE else 1.0
+        self._scans = _available_scans(record, scenario, trust)
+        self._scene, self._metadata = build_scene(scenario, record.planner), recording_metadata(record, scenario)
+        self._scale = 1e-3 if plot_extent([record]) > LARGE else 1.0
         self.figure = new_figure(COLUMN_WIDTH + 0.75)
         self.figure.set_layout_engine("constrained", h_pad=0.08)  # see `tracks_figure`
         self._axes: Axes = self.figure.subplots()
@@ -156,7 +156,7 @@ class _Drawing:
         frame_tracks(self._axes, [record], self._scale, self._scene)
         add_legend(self.figure, record, self._scene, is_video=True)
         labels = np.concatenate([estimate.labels for estimate in record.estimates])
-        self._places = _places(labels) if recur(labels) else {}
+        self._places = _colour_indices(labels) if labels_recur(labels) else {}
         self._shown: list[Artist] = []
         self._step = -1
         self.show(0)
@@ -173,8 +173,8 @@ class _Drawing:
         name = drawn_text(short_label(self._record.planner))
         time = float(self._record.times[step])
         clock = f"t = {time:.1f} s"
-        if self._told.is_utc:
-            utc = utc_text(time + self._told.start)
+        if self._metadata.is_utc:
+            utc = utc_text(time + self._metadata.start)
             clock = f"{utc[:10]} {utc[11:21]} UTC"
         self._axes.set_title(f"{name}, {drawn_text(self._record.source)}: {clock}")
         self._draw_sensors(step)
@@ -187,8 +187,8 @@ class _Drawing:
 
     def _draw_truth(self, step: int) -> None:
         truth = self._record.truth
-        until = int(truth.offsets[step + 1])
-        ids, places = truth.ids[:until], truth.states[:until, :2] * self._scale
+        end = int(truth.offsets[step + 1])
+        ids, places = truth.ids[:end], truth.states[:end, :2] * self._scale
         paths = [places[ids == target] for target in np.unique(ids)]
         self._add(self._axes.add_collection(LineCollection(paths, colors=INK, linewidths=0.9, zorder=2)))
         ids, states = truth.at(step)
@@ -203,39 +203,41 @@ class _Drawing:
             self._add(
                 self._axes.scatter(points[:, 0], points[:, 1], s=2.5, c=shades, alpha=0.5, linewidths=0, zorder=3)
             )
-        now = past[-1]
-        for label, mean, cov in zip(now.labels.tolist(), now.means, now.covs, strict=True):
+        current = past[-1]
+        for label, mean, cov in zip(current.labels.tolist(), current.means, current.covs, strict=True):
             shade, place = self._shade(label), (float(mean[0]) * self._scale, float(mean[1]) * self._scale)
-            variances, axes_of = np.linalg.eigh(cov[:2, :2])
+            variances, axes = np.linalg.eigh(cov[:2, :2])
             width, height = 2.0 * _SIGMAS * np.sqrt(np.maximum(variances, 0.0)) * self._scale
-            angle = float(np.degrees(np.arctan2(axes_of[1, 0], axes_of[0, 0])))
+            angle = float(np.degrees(np.arctan2(axes[1, 0], axes[0, 0])))
             ellipse = Ellipse(place, width, height, angle=angle, color=shade, fill=False, linewidth=0.8, zorder=5)
             self._add(self._axes.add_patch(ellipse))
             self._add(self._axes.plot(*place, marker=".", color=shade, markersize=5, zorder=6)[0])
 
     def _draw_names(self, step: int) -> None:
         """Draw names of sensors, targets and estimates, in this order; a name that would cover another is left out."""
-        record, now = self._record, self._record.estimates[step]
+        record, current = self._record, self._record.estimates[step]
         ids, states = record.truth.at(step)
         names = [(self._scene.name(s), pose[:2], INK) for s, pose in enumerate(record.poses[step])]
-        if record.num_sensors > _MOST_NAMED:
+        if record.num_sensors > _MAX_NAMED:
             names = []
-        if len(ids) <= _MOST_NAMED:
-            known = zip(ids.tolist(), states, strict=True)
+        if len(ids) <= _MAX_NAMED:
+            targets = zip(ids.tolist(), states, strict=True)
             names += [
-                (drawn_text(elided(self._told.names[target], 20)), state[:2], INK)
-                for target, state in known
-                if target < len(self._told.names)
+                (drawn_text(elided(self._metadata.names[target], 20)), state[:2], INK)
+                for target, state in targets
+                if target < len(self._metadata.names)
             ]
-        if self._places and len(now.labels) <= _MOST_NAMED:
-            of_estimates = zip(now.labels.tolist(), now.means, strict=True)
-            names += [(".".join(map(str, label)), mean[:2], self._shade(label)) for label, mean in of_estimates]
+        if self._places and len(current.labels) <= _MAX_NAMED:
+            estimates = zip(current.labels.tolist(), current.means, strict=True)
+            names += [(".".join(map(str, label)), mean[:2], self._shade(label)) for label, mean in estimates]
         if not names:
             return
-        marks = np.concatenate([states[:, :2], now.means[:, :2], record.poses[step, :, :2]])
+        marks = np.concatenate([states[:, :2], current.means[:, :2], record.poses[step, :, :2]])
         places = np.array([place for _, place, _ in names])
-        stands = place_names([name for name, *_ in names], places, bounds_of([record], self._scene), marks)
-        for (name, _, shade), place, (arguments, covers_name) in zip(names, places * self._scale, stands, strict=True):
+        name_places = place_names([name for name, *_ in names], places, plot_bounds([record], self._scene), marks)
+        for (name, _, shade), place, (arguments, covers_name) in zip(
+            names, places * self._scale, name_places, strict=True
+        ):
             style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 6, "color": shade, "zorder": 9}
             if not covers_name:
                 self._add(self._axes.annotate(name, (float(place[0]), float(place[1])), **arguments, **style))
@@ -256,34 +258,36 @@ class _Drawing:
             style: dict[str, Any] = {"marker": marker, "color": INK, "markerfacecolor": GREY, "markersize": 6}
             self._add(self._axes.plot(*place, zorder=8, **style)[0])
             scan = self._scans[step][s] if self._scans else None
-            if scan is not None and section.measurement.kind in LIE:
+            if scan is not None and section.measurement.kind in PLANE_SHAPES:
                 self._draw_scan(scan, section.measurement.kind, pose)
 
     def _draw_scan(self, scan: Scan, kind: str, pose: Floats) -> None:
         """Draw crosses, rays or circles; measurements of targets in dark ink, clutter in grey."""
-        lie = in_plane(scan.measurements, kind, pose) * (1.0 if LIE[kind] == "ray" else self._scale)
+        positions = plane_coordinates(scan.measurements, kind, pose) * (
+            1.0 if PLANE_SHAPES[kind] == "ray" else self._scale
+        )
         for is_clutter in (False, True):
-            mine = lie[(scan.origins == CLUTTER) == is_clutter]
+            shown = positions[(scan.origins == CLUTTER) == is_clutter]
             style: dict[str, Any] = {"color": GREY if is_clutter else INK, "alpha": 0.7, "zorder": 2.5}
             place = pose[:2] * self._scale
-            if LIE[kind] == "ray":
-                ends = place + 2.0 * reach_of([self._record]) * self._scale * np.column_stack(
-                    [np.cos(mine), np.sin(mine)]
+            if PLANE_SHAPES[kind] == "ray":
+                ends = place + 2.0 * plot_extent([self._record]) * self._scale * np.column_stack(
+                    [np.cos(shown), np.sin(shown)]
                 )
                 rays = [np.stack([place, end]) for end in ends]
                 self._add(self._axes.add_collection(LineCollection(rays, linewidths=0.5, **style), autolim=False))
-            elif LIE[kind] == "circle":
-                for radius in mine[:, 0].tolist():
+            elif PLANE_SHAPES[kind] == "circle":
+                for radius in shown[:, 0].tolist():
                     circle = Circle((float(place[0]), float(place[1])), max(radius, 0.0), fill=False, lw=0.5, **style)
                     self._add(self._axes.add_patch(circle))
             else:
                 size = 2.5 if is_clutter else 4.0
-                self._add(self._axes.plot(*mine.T, linestyle="", marker="x", markersize=size, mew=0.7, **style)[0])
+                self._add(self._axes.plot(*shown.T, linestyle="", marker="x", markersize=size, mew=0.7, **style)[0])
 
 
-def _scans(record: RunRecord, scenario: Scenario, trust: bool) -> Scans:
+def _available_scans(record: RunRecord, scenario: Scenario, trust: bool) -> Scans:
     """Return the scans of a run; empty if they are not available, or need custom code that is not trusted."""
-    if code_of_sensors(scenario) and not trust:
+    if measurement_code(scenario) and not trust:
         return ()
     try:
         return scans_of_record(record, scenario)
@@ -291,5 +295,5 @@ def _scans(record: RunRecord, scenario: Scenario, trust: bool) -> Scans:
         return ()
 
 
-def _places(labels: Ints) -> dict[tuple[int, ...], int]:
+def _colour_indices(labels: Ints) -> dict[tuple[int, ...], int]:
     return {tuple(label): place for place, label in enumerate(np.unique(labels, axis=0).tolist())}

@@ -1,14 +1,14 @@
 """Metrics of estimates against the truth: distances between sets of points and of tracks, breaks, consistency."""
 
 from vedette.evaluation.metrics.consistency import AverageNees, average_nees, nees, nees_interval
-from vedette.evaluation.metrics.kept import decode_metrics, encode_metrics, has_metrics
 from vedette.evaluation.metrics.matching import Matching, match_run
 from vedette.evaluation.metrics.point_gospa import GospaResult, GospaSeries, gospa, gospa_distance, gospa_of_run
 from vedette.evaluation.metrics.point_ospa import OspaResult, ospa, ospa_of_run
 from vedette.evaluation.metrics.run import Metric, RunMetrics, measure
+from vedette.evaluation.metrics.serialization import decode_metrics, encode_metrics, has_metrics
 from vedette.evaluation.metrics.time_to_track import TimeToTrack
 from vedette.evaluation.metrics.track_ospa import TrackSet, ospa2, ospa2_of_run
-from vedette.evaluation.metrics.tracked_share import TrackedShare, seen_targets
+from vedette.evaluation.metrics.tracked_fraction import TrackedFraction, targets_in_view
 from vedette.evaluation.metrics.trajectories import Continuity, continuity, continuity_of_run
 
 __all__ = [
@@ -22,7 +22,7 @@ __all__ = [
     "RunMetrics",
     "TimeToTrack",
     "TrackSet",
-    "TrackedShare",
+    "TrackedFraction",
     "average_nees",
     "continuity",
     "continuity_of_run",
@@ -40,5 +40,5 @@ __all__ = [
     "ospa2",
     "ospa2_of_run",
     "ospa_of_run",
-    "seen_targets",
+    "targets_in_view",
 ]

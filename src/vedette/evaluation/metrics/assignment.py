@@ -13,7 +13,7 @@ from vedette.models.arguments import as_array
 
 _HIGH_ORDER = 30.0
 # Largest number of distances that are stored in full; of more, only those below the cutoff are stored.
-_MOST_DISTANCES = 1_000_000
+_MAX_FULL_DISTANCES = 1_000_000
 
 
 def check_parameters(cutoff: float, order: float, *, finite: bool = False) -> None:
@@ -53,8 +53,8 @@ def cut_distances(first: Floats, second: Floats, cutoff: float) -> Floats:
     """Return min(Euclidean distance, cutoff), (len(first), len(second)). Either set may be empty."""
     if not (len(first) and len(second)):
         return np.empty((len(first), len(second)))
-    apart = np.sqrt(((first[:, None, :] - second[None, :, :]) ** 2).sum(axis=2))
-    return np.asarray(np.minimum(apart, cutoff))
+    distances = np.sqrt(((first[:, None, :] - second[None, :, :]) ** 2).sum(axis=2))
+    return np.asarray(np.minimum(distances, cutoff))
 
 
 def assign(distances: Floats, order: float) -> tuple[Ints, Ints]:
@@ -87,10 +87,10 @@ def assign_points(first: Floats, second: Floats, cutoff: float, order: float) ->
     within groups of points that share neighbours, so that time and memory grow with the number of points and not with
     its square.
     """
-    if len(first) * len(second) <= _MOST_DISTANCES or math.isinf(cutoff) or math.isinf(order):
-        apart = cut_distances(first, second, cutoff)
-        rows, columns = assign(apart, order)
-        return rows, columns, apart[rows, columns]
+    if len(first) * len(second) <= _MAX_FULL_DISTANCES or math.isinf(cutoff) or math.isinf(order):
+        costs = cut_distances(first, second, cutoff)
+        rows, columns = assign(costs, order)
+        return rows, columns, costs[rows, columns]
     # Imported here, because large sets are rare and these imports take as long as the rest of the module.
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -107,16 +107,16 @@ def assign_points(first: Floats, second: Floats, cutoff: float, order: float) ->
     for group in np.split(members, np.flatnonzero(np.diff(groups[members])) + 1):
         split = int(np.searchsorted(group, len(first)))
         if 0 < split < len(group):
-            own, other = group[:split], group[split:] - len(first)
-            apart = cut_distances(first[own], second[other], cutoff)
-            rows, columns = assign(apart, order)
-            pairs.append((own[rows], other[columns], apart[rows, columns]))
+            in_first, in_second = group[:split], group[split:] - len(first)
+            costs = cut_distances(first[in_first], second[in_second], cutoff)
+            rows, columns = assign(costs, order)
+            pairs.append((in_first[rows], in_second[columns], costs[rows, columns]))
     if not pairs:
         return np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0)
     rows, columns, distances = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
-    order_of = np.argsort(rows, kind="stable")
-    order_of = order_of[distances[order_of] < cutoff]
-    return rows[order_of], columns[order_of], distances[order_of]
+    by_row = np.argsort(rows, kind="stable")
+    by_row = by_row[distances[by_row] < cutoff]
+    return rows[by_row], columns[by_row], distances[by_row]
 
 
 def power_mean(values: Floats, number: float, order: float) -> float:

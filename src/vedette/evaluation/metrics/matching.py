@@ -96,41 +96,41 @@ def match_run(truth: Truth, estimates: Sequence[Estimate], *, cutoff: float, ord
     check_scans(truth, estimates)
     num_estimates = np.array([estimate.num_targets for estimate in estimates], np.int64)
     labels, means, covs = _stacked(estimates)
-    found, true = point_set(means[:, :2], "estimates"), point_set(truth.states[:, :2], "truth")
+    estimated, true = point_set(means[:, :2], "estimates"), point_set(truth.states[:, :2], "truth")
     starts = np.concatenate([[0], np.cumsum(num_estimates)]).tolist()
     offsets = truth.offsets.tolist()
     scans, rows, truth_rows, distances = [], [], [], []
     for scan in range(truth.num_scans):
         start, offset = starts[scan], offsets[scan]
-        first, second, apart = assign_points(
-            found[start : starts[scan + 1]], true[offset : offsets[scan + 1]], cutoff, order
+        first, second, pair_distances = assign_points(
+            estimated[start : starts[scan + 1]], true[offset : offsets[scan + 1]], cutoff, order
         )
         scans.append(np.full(len(first), scan))
         rows.append(first + start)
         truth_rows.append(second + offset)
-        distances.append(apart)
-    near = np.concatenate(distances) < cutoff
-    row = np.concatenate(rows)[near]
+        distances.append(pair_distances)
+    in_cutoff = np.concatenate(distances) < cutoff
+    estimate_rows = np.concatenate(rows)[in_cutoff]
     return Matching(
         num_targets=np.diff(truth.offsets),
         num_estimates=num_estimates,
-        scans=np.concatenate(scans)[near],
-        truth_rows=np.concatenate(truth_rows)[near],
-        distances=np.concatenate(distances)[near],
-        labels=labels[row],
-        means=means[row],
-        covs=covs[row],
+        scans=np.concatenate(scans)[in_cutoff],
+        truth_rows=np.concatenate(truth_rows)[in_cutoff],
+        distances=np.concatenate(distances)[in_cutoff],
+        labels=labels[estimate_rows],
+        means=means[estimate_rows],
+        covs=covs[estimate_rows],
     )
 
 
 def _stacked(estimates: Sequence[Estimate]) -> tuple[Ints, Floats, Floats]:
     """Return the labels, means and covariances of all scans; empty scans may have any state dimension."""
-    some = [estimate for estimate in estimates if estimate.num_targets] or [Estimate.empty(2)]
-    dims = {estimate.means.shape[1] for estimate in some}
+    non_empty = [estimate for estimate in estimates if estimate.num_targets] or [Estimate.empty(2)]
+    dims = {estimate.means.shape[1] for estimate in non_empty}
     if len(dims) > 1:
         raise InputError(f"estimates: expected states of one dimension; got {sorted(dims)}")
     return (
-        np.concatenate([estimate.labels for estimate in some]),
-        np.concatenate([estimate.means for estimate in some]),
-        np.concatenate([estimate.covs for estimate in some]),
+        np.concatenate([estimate.labels for estimate in non_empty]),
+        np.concatenate([estimate.means for estimate in non_empty]),
+        np.concatenate([estimate.covs for estimate in non_empty]),
     )

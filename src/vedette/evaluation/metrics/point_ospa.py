@@ -30,8 +30,8 @@ from vedette.models.arguments import reject
 from vedette.simulation.truth import Truth
 
 # Components of states in the distance.
-_COUNTED: dict[str, Any] = {"position": slice(2), "position_and_height": [0, 1, HEIGHT], "state": slice(None)}
-_ALIKE = "position, as true states have {} components and estimated ones {}"
+_COMPONENTS: dict[str, Any] = {"position": slice(2), "position_and_height": [0, 1, HEIGHT], "state": slice(None)}
+_DIMENSIONS_DIFFER = "position, as true states have {} components and estimated ones {}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,20 +89,20 @@ def ospa_of_run(
     """
     check_parameters(cutoff, order)
     check_scans(truth, estimates)
-    if components not in _COUNTED:
-        raise reject("components", join_alternatives(list(_COUNTED)), components)
-    counted = _COUNTED[components]
+    if components not in _COMPONENTS:
+        raise reject("components", join_alternatives(list(_COMPONENTS)), components)
+    counted = _COMPONENTS[components]
     parts = np.empty((len(estimates), 3))
     for scan, estimate in enumerate(estimates):
         _, states = truth.at(scan)
-        for given in (estimate.means, states):
-            if isinstance(counted, list) and given.shape[1] <= counted[-1]:
-                raise reject("components", f"position, as states have {given.shape[1]} components", components)
-        found, true = estimate.means[:, counted], states[:, counted]
-        if len(found) and len(true) and found.shape[1] != true.shape[1]:
-            raise reject("components", _ALIKE.format(true.shape[1], found.shape[1]), components)
+        for points in (estimate.means, states):
+            if isinstance(counted, list) and points.shape[1] <= counted[-1]:
+                raise reject("components", f"position, as states have {points.shape[1]} components", components)
+        estimated, true = estimate.means[:, counted], states[:, counted]
+        if len(estimated) and len(true) and estimated.shape[1] != true.shape[1]:
+            raise reject("components", _DIMENSIONS_DIFFER.format(true.shape[1], estimated.shape[1]), components)
         result = _ospa_of_points(
-            point_set(found, f"estimates[{scan}]"), point_set(true, f"truth at scan {scan}"), cutoff, order
+            point_set(estimated, f"estimates[{scan}]"), point_set(true, f"truth at scan {scan}"), cutoff, order
         )
         parts[scan] = result.total, result.localisation, result.cardinality
     return parts

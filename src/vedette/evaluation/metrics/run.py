@@ -43,19 +43,19 @@ class Metric:
         if self.name in RUN_COLUMNS or self.name in COLUMNS or LAYOUTS["scans"].kind(self.name) is not None:
             raise reject("metric.name", "a name that no column has", self.name)
 
-    def of(self, record: RunRecord) -> Floats:
+    def evaluate(self, record: RunRecord) -> Floats:
         """Return the metric of a run, (num_scans,).
 
         Raises `InputError`, with the name, unless the function returns one number per scan, and `VedetteError` if the
         function itself raises.
         """
         try:
-            answer = self.function(record)
+            result = self.function(record)
         except VedetteError:
             raise
         except Exception as error:
             raise VedetteError(f"metric {self.name}: {type(error).__name__}: {error}") from error
-        values = as_array(f"metric {self.name}", answer, "fiu", "numbers").astype(np.float64)
+        values = as_array(f"metric {self.name}", result, "fiu", "numbers").astype(np.float64)
         if values.shape != (record.num_scans,):
             raise reject(
                 f"metric {self.name}", f"a number for each of {record.num_scans} scans", f"shape {values.shape}"
@@ -87,7 +87,7 @@ class RunMetrics(SummaryRepr):
         position_nees_max: largest NEES of the position; NaN without pairs.
         label_switches: number of targets matched to another label than at their last match.
         fragmentations: number of targets matched again after a break.
-        own: custom metrics by name.
+        custom: custom metrics by name.
     """
 
     gospa_m: Floats
@@ -104,7 +104,7 @@ class RunMetrics(SummaryRepr):
     position_nees_max: Floats
     label_switches: Ints
     fragmentations: Ints
-    own: dict[str, Floats] = field(default_factory=dict)
+    custom: dict[str, Floats] = field(default_factory=dict)
 
     @property
     def num_scans(self) -> int:
@@ -113,14 +113,14 @@ class RunMetrics(SummaryRepr):
 
     def columns(self) -> dict[str, NDArray[np.float64] | NDArray[np.int64]]:
         """Return the arrays by name, in the order above: float64, or int64 for counts; custom metrics come last."""
-        return {**{name: getattr(self, name) for name in COLUMNS}, **self.own}
+        return {**{name: getattr(self, name) for name in COLUMNS}, **self.custom}
 
-    def with_own(self, record: RunRecord, own: Sequence[Metric]) -> RunMetrics:
+    def with_custom(self, record: RunRecord, added: Sequence[Metric]) -> RunMetrics:
         """Return the metrics with custom metrics of the run's record added; those with the same names are replaced.
 
-        Raises `InputError` or `VedetteError` as `Metric.of` does.
+        Raises `InputError` or `VedetteError` as `Metric.evaluate` does.
         """
-        return replace(self, own={**self.own, **{metric.name: metric.of(record) for metric in own}})
+        return replace(self, custom={**self.custom, **{metric.name: metric.evaluate(record) for metric in added}})
 
     @classmethod
     def from_columns(cls, columns: Mapping[str, NDArray[np.float64] | NDArray[np.int64]]) -> RunMetrics:
@@ -136,18 +136,20 @@ class RunMetrics(SummaryRepr):
             if column.dtype != dtype or column.shape != (num_scans,):
                 got = f"{column.dtype} in shape {column.shape}"
                 raise reject(f"columns.{name}", f"{dtype} in shape {(num_scans,)}", got)
-        own = {name: column for name, column in columns.items() if name not in COLUMNS}
-        return cls(**{name: columns[name] for name in COLUMNS}, own=own)  # type: ignore[arg-type] # checked above
+        custom = {name: column for name, column in columns.items() if name not in COLUMNS}
+        return cls(**{name: columns[name] for name in COLUMNS}, custom=custom)  # type: ignore[arg-type] # checked above
 
 
 COLUMNS = {
     each.name: np.dtype(np.float64 if each.type == "Floats" else np.int64)
     for each in fields(RunMetrics)
-    if each.name != "own"
+    if each.name != "custom"
 }
 
 
-def measure(record: RunRecord, *, cutoff: float, order: float, window: int, own: Sequence[Metric] = ()) -> RunMetrics:
+def measure(
+    record: RunRecord, *, cutoff: float, order: float, window: int, custom: Sequence[Metric] = ()
+) -> RunMetrics:
     """Return all metrics of a run, from one matching per scan and a matching of tracks for OSPA(2).
 
     Args:
@@ -155,7 +157,7 @@ def measure(record: RunRecord, *, cutoff: float, order: float, window: int, own:
         cutoff: c > 0, m, finite.
         order: p >= 1, finite.
         window: number of scans in the window of OSPA(2), at least 1.
-        own: custom metrics with different names.
+        custom: custom metrics with different names.
 
     Raises:
         InputError: an argument out of range, a number of estimates other than one per scan, a position that is not
@@ -185,4 +187,4 @@ def measure(record: RunRecord, *, cutoff: float, order: float, window: int, own:
         label_switches=breaks.label_switches,
         fragmentations=breaks.fragmentations,
     )
-    return metrics.with_own(record, own)
+    return metrics.with_custom(record, custom)

@@ -40,12 +40,15 @@ class TimeToTrack:
     def __call__(self, record: RunRecord) -> Floats:
         """Return the metric of a run, (num_scans,), s; raise `InputError` as `match_run` does."""
         truth = record.truth
-        _, first, of_row = np.unique(truth.ids, return_index=True, return_inverse=True)
-        until = len(truth.ids) - 1 - np.unique(truth.ids[::-1], return_index=True)[1]
+        _, first, target_of_row = np.unique(truth.ids, return_index=True, return_inverse=True)
+        last_rows = len(truth.ids) - 1 - np.unique(truth.ids[::-1], return_index=True)[1]
         tracked = np.sort(match_run(truth, record.estimates, cutoff=self.cutoff, order=self.order).truth_rows)[::-1]
-        until[of_row[tracked]] = tracked  # the first of a target's rows is assigned last, and remains
-        appears, waits = truth.scans[first], truth.times[truth.scans[until]] - truth.times[truth.scans[first]]
-        counts = appears + 1 >= self.from_step
-        number = np.bincount(appears[counts], minlength=truth.num_scans)
-        total = np.bincount(appears[counts], waits[counts], truth.num_scans)
+        last_rows[target_of_row[tracked]] = tracked  # the first of a target's rows is assigned last, and remains
+        first_scans, waiting_times = (
+            truth.scans[first],
+            truth.times[truth.scans[last_rows]] - truth.times[truth.scans[first]],
+        )
+        counts = first_scans + 1 >= self.from_step
+        number = np.bincount(first_scans[counts], minlength=truth.num_scans)
+        total = np.bincount(first_scans[counts], waiting_times[counts], truth.num_scans)
         return np.where(number > 0, total / np.maximum(number, 1), np.nan)

@@ -20,7 +20,7 @@ from vedette.models.arguments import dimension
 from vedette.simulation.truth import Truth
 
 # Largest product of pairs of tracks and scans of a window for which several windows share their distances.
-_MOST_AT_ONCE = 2**18
+_MAX_SHARED_DISTANCES = 2**18
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,8 +76,8 @@ class TrackSet:
 
     def within(self, start: int, stop: int) -> TrackSet:
         """Return the tracks that exist at any of the scans `start` to `stop - 1`, over these scans."""
-        there = self.alive[:, start:stop].any(axis=1)
-        return TrackSet(self.alive[there, start:stop], self.positions[there, start:stop])
+        present = self.alive[:, start:stop].any(axis=1)
+        return TrackSet(self.alive[present, start:stop], self.positions[present, start:stop])
 
 
 def ospa2(estimates: TrackSet, truths: TrackSet, *, cutoff: float, order: float, window: int) -> Floats:
@@ -105,16 +105,16 @@ def ospa2(estimates: TrackSet, truths: TrackSet, *, cutoff: float, order: float,
     if estimates.num_scans != truths.num_scans:
         raise InputError(f"estimates: expected {truths.num_scans} scans; got {estimates.num_scans}")
     parts = np.empty((truths.num_scans, 3))
-    few = len(estimates.alive) * len(truths.alive) * window <= _MOST_AT_ONCE
-    block = window if few else 1
+    is_small = len(estimates.alive) * len(truths.alive) * window <= _MAX_SHARED_DISTANCES
+    block = window if is_small else 1
     for first in range(0, truths.num_scans, block):
         start, stop = max(0, first + 1 - window), min(first + block, truths.num_scans)
-        mine, true = estimates.within(start, stop), truths.within(start, stop)
-        costs, either = _costs(mine, true, cutoff)
+        estimated, true = estimates.within(start, stop), truths.within(start, stop)
+        costs, either = _costs(estimated, true, cutoff)
         for scan in range(first, stop):
-            seen = slice(max(0, scan + 1 - window) - start, scan + 1 - start)
-            there = np.ix_(mine.alive[:, seen].any(axis=1), true.alive[:, seen].any(axis=1))
-            distances = _averages(costs[:, :, seen], either[:, :, seen])[there]
+            window_scans = slice(max(0, scan + 1 - window) - start, scan + 1 - start)
+            present = np.ix_(estimated.alive[:, window_scans].any(axis=1), true.alive[:, window_scans].any(axis=1))
+            distances = _averages(costs[:, :, window_scans], either[:, :, window_scans])[present]
             result = ospa_of_distances(distances, cutoff, order)
             parts[scan] = result.total, result.localisation, result.cardinality
     return parts
@@ -130,8 +130,8 @@ def _costs(first: TrackSet, second: TrackSet, cutoff: float) -> tuple[Floats, Bo
     """Return cut-off distances (0 if neither exists) and flags if either exists, (num_first, num_second, num_scans)."""
     either = first.alive[:, None] | second.alive[None]
     both = first.alive[:, None] & second.alive[None]
-    apart = np.sqrt(((first.positions[:, None] - second.positions[None]) ** 2).sum(axis=3))
-    return np.where(both, np.minimum(apart, cutoff), cutoff) * either, either
+    distances = np.sqrt(((first.positions[:, None] - second.positions[None]) ** 2).sum(axis=3))
+    return np.where(both, np.minimum(distances, cutoff), cutoff) * either, either
 
 
 def _averages(costs: Floats, either: Bools) -> Floats:

@@ -58,10 +58,10 @@ def continuity(truth: Truth, matching: Matching) -> Continuity:
     ids = truth.ids[matching.truth_rows]
     by_target = np.argsort(ids, kind="stable")  # pairs come in order of scans
     before, after = by_target[:-1], by_target[1:]
-    again = ids[before] == ids[after]
-    switched = again & (matching.labels[before] != matching.labels[after]).any(axis=1)
+    same_target = ids[before] == ids[after]
+    switched = same_target & (matching.labels[before] != matching.labels[after]).any(axis=1)
     age = _ages(truth)[matching.truth_rows]
-    broken = again & (age[after] - age[before] > 1)
+    broken = same_target & (age[after] - age[before] > 1)
     scans, num_scans = matching.scans[after], matching.num_scans
     return Continuity(
         np.bincount(scans[switched], minlength=num_scans), np.bincount(scans[broken], minlength=num_scans)

@@ -61,8 +61,8 @@ class MarginalEstimator(Section):
         return estimate
 
 
-@derived("vedette.evaluation.metrics.tracked_share:TrackedShare", without=("cutoff", "order"))
-class TrackedShare(Part):
+@derived("vedette.evaluation.metrics.tracked_fraction:TrackedFraction", without=("cutoff", "order"))
+class TrackedFraction(Part):
     """At each scan, the share of the targets seen by some sensor that have an estimate within the cutoff of `ospa`."""
 
     kind: Literal["tracked_share"] = Field(default="tracked_share", description="Kind of measure [-].")
@@ -83,7 +83,7 @@ else:
     _METRIC = "vedette.simulation.records:Measure, a function of a run's record that gives one number a scan"
     _OWN = (MapEstimator, LeastOspaEstimator, MarginalEstimator)
     AnyEstimator = one_of("estimator", "densities", _ESTIMATOR, own=_OWN)
-    AnyMetric = one_of("metric", "evaluation/metrics", _METRIC, own=(TrackedShare, TimeToTrack))
+    AnyMetric = one_of("metric", "evaluation/metrics", _METRIC, own=(TrackedFraction, TimeToTrack))
 
 
 class Ospa(Section):

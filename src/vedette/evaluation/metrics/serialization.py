@@ -20,14 +20,14 @@ _LAYOUT = Layout({}, {"": Kind.NUMBER})
 def encode_metrics(metrics: RunMetrics) -> bytes:
     """Return the metrics as bytes; equal metrics give equal bytes."""
     columns = {name: column.astype(np.float64) for name, column in metrics.columns().items()}
-    return write_table(columns, _LAYOUT, {"built_in": _SET, "own": " ".join(metrics.own)})  # type: ignore[arg-type] # arrays only
+    return write_table(columns, _LAYOUT, {"built_in": _SET, "own": " ".join(metrics.custom)})  # type: ignore[arg-type] # arrays only
 
 
-def has_metrics(content: bytes, own: Iterable[str]) -> bool:
+def has_metrics(content: bytes, custom: Iterable[str]) -> bool:
     """Return True if the bytes have all metrics of this version, and custom metrics with these names."""
     try:
-        there = read_metadata(content)
-        return there["built_in"] == _SET and set(own) <= set(there["own"].split())
+        metadata = read_metadata(content)
+        return metadata["built_in"] == _SET and set(custom) <= set(metadata["own"].split())
     except Exception:  # damaged bytes can raise almost any exception
         return False
 
@@ -50,11 +50,11 @@ def decode_metrics(content: bytes, num_scans: int) -> tuple[RunMetrics | None, d
     if any(len(column) != num_scans for column in columns.values()):
         got = len(next(iter(columns.values())))
         raise InputError(f"metrics: expected one entry for each of {num_scans} scans; got {got}")
-    own = {name: column for name, column in columns.items() if name not in built_in.split()}
+    custom = {name: column for name, column in columns.items() if name not in built_in.split()}
     if built_in != _SET:
-        return None, own
+        return None, custom
     for name, dtype in COLUMNS.items():
         if name not in columns or not (dtype == np.float64 or np.array_equal(np.rint(columns[name]), columns[name])):
             raise InputError(f"metrics, column {name}: expected {'' if dtype == np.float64 else 'whole '}numbers")
         columns[name] = columns[name].astype(dtype)
-    return RunMetrics.from_columns(columns), own
+    return RunMetrics.from_columns(columns), custom

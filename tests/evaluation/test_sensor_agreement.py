@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 from recordings import write_recording
-from vedette.evaluation.agreement import disagreements
 from vedette.evaluation.runs import run_scenario
+from vedette.evaluation.sensor_agreement import disagreement_warnings
 from vedette.scenarios import load_scenario
 from vedette.scenarios.cautions import cautions
 from vedette.scenarios.of_recording import scenario_of_recording
@@ -20,7 +20,7 @@ from vedette.scenarios.of_recording import scenario_of_recording
 
 def told(folder: Path) -> tuple[str, ...]:
     made = scenario_of_recording(folder / "radars.yaml", folder / "scans.csv")
-    return disagreements(run_scenario(made.scenario, "still", seed=0), made.scenario)
+    return disagreement_warnings(run_scenario(made.scenario, "still", seed=0), made.scenario)
 
 
 def rewritten(folder: Path, radar: str, change: Any) -> None:
@@ -48,15 +48,15 @@ def other_longitude(row: dict[str, str]) -> None:
     row["own_lon"] = str(-1.11 - (float(row["own_lon"]) + 1.11))
 
 
-def test_sensors_that_agree_are_not_told_of(tmp_path: Path) -> None:
+def test_sensors_that_agree_give_no_warning(tmp_path: Path) -> None:
     write_recording(tmp_path)
     assert told(tmp_path) == ()
     scenario = load_scenario("paper-a")
-    assert disagreements(run_scenario(scenario, "still", seed=0), scenario) == ()
+    assert disagreement_warnings(run_scenario(scenario, "still", seed=0), scenario) == ()
 
 
 @pytest.mark.parametrize("change", [from_east, in_kilometres, other_longitude], ids=lambda each: each.__name__)
-def test_gross_errors_are_told_of(tmp_path: Path, change: Any) -> None:
+def test_gross_errors_give_a_warning(tmp_path: Path, change: Any) -> None:
     write_recording(tmp_path)
     rewritten(tmp_path, "boat", change)
     first, *more = told(tmp_path)
@@ -80,7 +80,7 @@ def test_a_steady_offset_is_for_calibration(tmp_path: Path) -> None:
     assert lines[1].endswith("`vedette calibrate` finds biases of range, bearing, clock and place")
 
 
-def test_coverage_without_an_overlap_is_told_before_the_run(tmp_path: Path) -> None:
+def test_coverage_without_overlap_gives_a_warning_before_the_run(tmp_path: Path) -> None:
     write_recording(tmp_path)
     text = (tmp_path / "radars.yaml").read_text("utf-8")
     near = text.replace(

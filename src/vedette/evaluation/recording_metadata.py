@@ -10,7 +10,7 @@ from vedette.scenarios import Scenario
 from vedette.simulation.records import RunRecord
 
 
-class Told(NamedTuple):
+class RecordingMetadata(NamedTuple):
     """Clock and names.
 
     start: s, to be added to times of the run. is_utc: True if the sums are seconds since 1970 UTC. names: of the
@@ -22,7 +22,7 @@ class Told(NamedTuple):
     names: tuple[str, ...]
 
 
-def told_by(record: RunRecord, scenario: Scenario) -> Told:
+def recording_metadata(record: RunRecord, scenario: Scenario) -> RecordingMetadata:
     """Return clock and names from the recordings of a run's scenario; no clock if the scans are not those of the run.
 
     Raises `InputError` if they cannot be read.
@@ -35,4 +35,4 @@ def told_by(record: RunRecord, scenario: Scenario) -> Told:
             start, is_utc = recording.start, recording.is_utc
     if model.targets.kind == "recorded":
         names = tuple(str(track.name) for track in model.targets.source(model, scenario.folder).tracks)
-    return Told(start, is_utc, names)
+    return RecordingMetadata(start, is_utc, names)

@@ -1,4 +1,4 @@
-"""Measures of one's own: a column wherever there are measures, kept, computed later, compared and reported."""
+"""Custom metrics: a column in every table of measures, stored, computed later, compared and reported."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from vedette.campaigns.running import run_campaign
 from vedette.campaigns.spec import spec_from_data
 from vedette.campaigns.store import Store
 from vedette.errors import InputError, VedetteError
-from vedette.evaluation.metrics import Metric, decode_metrics, encode_metrics, kept, measure
+from vedette.evaluation.metrics import Metric, decode_metrics, encode_metrics, measure, serialization
 from vedette.reports import write_report
 from vedette.reports.groups import comparison_groups
 from vedette.reports.saving import write_summary
@@ -47,14 +47,14 @@ def since_third(record: RunRecord) -> Any:
 OWN = (Metric("farthest_m", farthest), Metric("estimates", since_third))
 
 
-def test_a_measure_of_ones_own_is_a_column_and_is_kept() -> None:
+def test_a_custom_metric_is_a_column_and_is_stored() -> None:
     record = make_record()
-    metrics = measure(record, **LIMITS, own=OWN)
+    metrics = measure(record, **LIMITS, custom=OWN)
     assert list(metrics.columns())[-2:] == ["farthest_m", "estimates"]
     np.testing.assert_array_equal(metrics.columns()["farthest_m"], farthest(record))
     again, own = decode_metrics(encode_metrics(metrics), 40)
     assert_same(again, metrics)
-    assert_same(own, metrics.own)
+    assert_same(own, metrics.custom)
 
 
 @pytest.mark.parametrize(
@@ -75,23 +75,23 @@ def test_names_that_no_column_can_have(name: str, got: str) -> None:
         (lambda record: record.nothing, "metric mine: AttributeError: 'RunRecord' object has no attribute 'nothing'"),
     ],
 )
-def test_what_is_not_one_number_a_scan_is_named(function: Any, message: str) -> None:
+def test_metrics_without_one_number_per_scan_are_rejected(function: Any, message: str) -> None:
     with pytest.raises(VedetteError, match=message):
         Metric("mine", function).of(make_record())
 
 
-def test_a_new_measure_is_computed_for_an_old_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_new_metric_is_computed_for_an_old_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of an earlier version, with fewer measures, and one that kept none: the same as this version keeps."""
     campaign = make_campaign(grid={}, runs=2)
     record, metrics = make_run("jdm", 0)
     with monkeypatch.context() as earlier:
-        earlier.setattr(kept, "_SET", "0 gospa_m")
+        earlier.setattr(serialization, "_SET", "0 gospa_m")
         fill(tmp_path / "results", campaign, leave_out=2)
     with Store.open(tmp_path / "results", campaign) as store:
         other = make_run("jdm", 1)[0]
         store.add(row_of("jdm", 1, encode(other), encode_timings(other)))
     results = open_results(tmp_path / "results")
-    assert_same(replace(results.metrics("jdm", 0), own={}), metrics)
+    assert_same(replace(results.metrics("jdm", 0), custom={}), metrics)
     assert_same(results.metrics("jdm", 1), make_run("jdm", 1)[1])
     assert_same(results.record("jdm", 0), record)
 
@@ -104,7 +104,7 @@ def farthest(record):
 """
 
 
-def test_a_measure_that_a_scenario_gains_is_of_the_same_campaign(tmp_path: Path) -> None:
+def test_a_new_metric_of_a_scenario_continues_the_campaign(tmp_path: Path) -> None:
     """The finished runs are measured again when the campaign goes on, and nothing else of the folder changes."""
     (tmp_path / "mine.py").write_text(MINE)
     text = dump_scenario(load_scenario("paper-a").model)
@@ -119,7 +119,7 @@ def test_a_measure_that_a_scenario_gains_is_of_the_same_campaign(tmp_path: Path)
     assert (outcome.num_existing, outcome.num_completed) == (2, 0)
     for run in open_results(folder).runs():
         assert run.checksum == before[run.record.run]
-        np.testing.assert_array_equal(run.metrics.own["farthest_m"], farthest(run.record))
+        np.testing.assert_array_equal(run.metrics.custom["farthest_m"], farthest(run.record))
     assert "farthest_m" in parquet.read_schema(folder / "tables" / "scans.parquet").names
 
 

@@ -17,7 +17,7 @@ from vedette.simulation.records import RunRecord
 from vedette.simulation.truth import Truth
 
 
-def seen_targets(truth: Truth, poses: Floats, sensors: Sequence[SensorModel], *, min_detection: float) -> Bools:
+def targets_in_view(truth: Truth, poses: Floats, sensors: Sequence[SensorModel], *, min_detection: float) -> Bools:
     """Return True for each row of `Truth.states` that some sensor detects with at least `min_detection`, (total,).
 
     Args:
@@ -31,16 +31,16 @@ def seen_targets(truth: Truth, poses: Floats, sensors: Sequence[SensorModel], *,
     probability("min_detection", min_detection)
     if poses.shape[:2] != (truth.num_scans, len(sensors)):
         raise reject("sensors", f"one for each of {poses.shape[1]} sensors", f"{len(sensors)}")
-    seen = np.zeros(len(truth.states), np.bool_)
+    in_view = np.zeros(len(truth.states), np.bool_)
     for scan in range(truth.num_scans):
         rows = slice(truth.offsets[scan], truth.offsets[scan + 1])
         for pose, sensor in zip(poses[scan], sensors, strict=True):
-            seen[rows] |= sensor.detection.prob(truth.states[rows], pose) >= min_detection
-    return seen
+            in_view[rows] |= sensor.detection.prob(truth.states[rows], pose) >= min_detection
+    return in_view
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TrackedShare:
+class TrackedFraction:
     """Metric: share of the targets visible to some sensor at a scan that have an estimate within c.
 
     Estimates are matched with all targets, each at most once, as for OSPA. NaN at scans without visible targets.
@@ -67,11 +67,11 @@ class TrackedShare:
     def __call__(self, record: RunRecord) -> Floats:
         """Return the share, (num_scans,); raise `InputError` as `match_run` does, and for another number of sensors."""
         truth = record.truth
-        seen = seen_targets(truth, record.poses, self.sensors, min_detection=self.min_detection)
+        in_view = targets_in_view(truth, record.poses, self.sensors, min_detection=self.min_detection)
         matching = match_run(truth, record.estimates, cutoff=self.cutoff, order=self.order)
-        tracked = np.zeros(len(seen), np.bool_)
+        tracked = np.zeros(len(in_view), np.bool_)
         tracked[matching.truth_rows] = True
         scans = truth.scans
-        number = np.bincount(scans[seen], minlength=truth.num_scans)
-        kept = np.bincount(scans[seen & tracked], minlength=truth.num_scans)
-        return np.where(number > 0, kept / np.maximum(number, 1), np.nan)
+        num_in_view = np.bincount(scans[in_view], minlength=truth.num_scans)
+        num_tracked = np.bincount(scans[in_view & tracked], minlength=truth.num_scans)
+        return np.where(num_in_view > 0, num_tracked / np.maximum(num_in_view, 1), np.nan)

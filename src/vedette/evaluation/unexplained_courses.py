@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.evaluation.agreement import measured_by, noise_stds
-from vedette.evaluation.scans import LIE, scans_of_record
+from vedette.evaluation.scans import PLANE_SHAPES, scans_of_record
+from vedette.evaluation.sensor_agreement import in_gate, noise_stds
 from vedette.internal.quantities import HEIGHT_DEPENDENT, PLACED
 from vedette.internal.text import pluralise
 from vedette.kernels.base.types import Bools, Floats
@@ -18,15 +18,15 @@ from vedette.scenarios import Scenario
 from vedette.simulation.records import RunRecord
 
 _GATE = 4.0  # standard deviations of the third measurement as predicted from two
-_FASTEST = 1500.0  # m/s
-_FASTER = 1.5  # times the speed that births assume; faster courses are reported
-_SHORTEST = 5  # measurements of a course
-_BY_CHANCE = 0.01  # expected number of courses by chance in a recording
-_MOST = 100  # unexplained measurements of a scan; with more there is no result
-_COURSES = 20
+_MAX_SPEED = 1500.0  # m/s
+_SPEED_FACTOR = 1.5  # times the speed that births assume; faster courses are reported
+_MIN_LENGTH = 5  # measurements of a course
+_MAX_CHANCE_COURSES = 0.01  # expected number of courses by chance in a recording
+_MAX_PER_SCAN = 100  # unexplained measurements of a scan; with more there is no result
+_MAX_COURSES = 20
 
 
-class _Left(NamedTuple):
+class _UnexplainedScan(NamedTuple):
     """Measurements of a scan that no track explains: time [s], (num, 2) positions and (num,) stds [m]."""
 
     time: float
@@ -44,7 +44,7 @@ class _Course(NamedTuple):
     speed: float
 
 
-def unexplained(record: RunRecord, scenario: Scenario) -> tuple[str, ...]:
+def unexplained_course_warnings(record: RunRecord, scenario: Scenario) -> tuple[str, ...]:
     """Return a warning for each sensor whose unexplained measurements follow each other on straight courses.
 
     A measurement is unexplained if no estimate of its scan lies within four standard deviations. Three measurements of
@@ -58,31 +58,31 @@ def unexplained(record: RunRecord, scenario: Scenario) -> tuple[str, ...]:
     placed = [s for s, kind in enumerate(kinds) if kind in PLACED and kind not in HEIGHT_DEPENDENT]
     if model.recording is None or births is None or not placed:
         return ()
-    assumed, warnings, left = max(births.std[2:4]), list[str](), _left(record, scenario, placed)
+    assumed, warnings, scans = max(births.std[2:4]), list[str](), _unexplained_scans(record, scenario, placed)
     box = model.region.build()
     for s in placed:
-        found = _courses(left[s], _FASTER * assumed, box.area)
-        if found:
-            warnings.append(_told(found, model.sensor_names[s], record.poses[0, s, :2], assumed))
+        courses = _courses(scans[s], _SPEED_FACTOR * assumed, box.area)
+        if courses:
+            warnings.append(_warning(courses, model.sensor_names[s], record.poses[0, s, :2], assumed))
     return tuple(warnings)
 
 
-def _told(found: list[_Course], name: str, place: Floats, assumed: float) -> str:
-    speeds, first = [each.speed for each in found], min(found, key=lambda each: each.begin)
-    away = float(np.hypot(*(first.first - place)))
-    where = f"from {first.begin:g} to {max(each.end for each in found):g} s, the first {away:.0f} m away"
-    number = pluralise(sum(each.number for each in found), "measurement")
-    fast = f"{min(speeds):.0f} to {max(speeds):.0f} m/s"
+def _warning(courses: list[_Course], name: str, place: Floats, assumed: float) -> str:
+    speeds, first = [each.speed for each in courses], min(courses, key=lambda each: each.begin)
+    distance = float(np.hypot(*(first.first - place)))
+    span = f"from {first.begin:g} to {max(each.end for each in courses):g} s, the first {distance:.0f} m away"
+    count = pluralise(sum(each.number for each in courses), "measurement")
+    speed_range = f"{min(speeds):.0f} to {max(speeds):.0f} m/s"
     step = 10.0 ** math.floor(math.log10(max(speeds)))
     advice = f"`--max-target-speed {0.5 * step * math.ceil(2.2 * max(speeds) / step):g}`, or `birth` and `motion`"
-    what = f"{number} that no track explains ({where}) lie on straight courses at {fast}"
-    return f"{name}: {what}, and new tracks are expected at about {assumed:g} m/s: give {advice} for such targets"
+    finding = f"{count} that no track explains ({span}) lie on straight courses at {speed_range}"
+    return f"{name}: {finding}, and new tracks are expected at about {assumed:g} m/s: give {advice} for such targets"
 
 
-def _left(record: RunRecord, scenario: Scenario, placed: list[int]) -> dict[int, list[_Left]]:
+def _unexplained_scans(record: RunRecord, scenario: Scenario, placed: list[int]) -> dict[int, list[_UnexplainedScan]]:
     """Return for each sensor its scans, with only the measurements that no estimate explains."""
     sensors, stds = scenario.model.sensors, noise_stds(scenario, placed)
-    left: dict[int, list[_Left]] = {s: [] for s in placed}
+    unexplained: dict[int, list[_UnexplainedScan]] = {s: [] for s in placed}
     for k, (scans, estimate) in enumerate(zip(scans_of_record(record, scenario), record.estimates, strict=True)):
         for s in placed:
             scan, pose, kind = scans[s], record.poses[k, s], sensors[s].measurement.kind
@@ -90,59 +90,61 @@ def _left(record: RunRecord, scenario: Scenario, placed: list[int]) -> dict[int,
                 continue
             explained = np.zeros(len(scan.measurements), np.bool_)
             for mean, cov in zip(estimate.means, estimate.covs, strict=True):
-                explained |= measured_by(scan.measurements, kind, stds[s], pose, mean[:2], cov[:2, :2])
-            own = scan.measurements[~explained]
-            along = np.full(len(own), stds[s].max())
-            if LIE[kind] == "point":
-                along = np.maximum(stds[s][1], stds[s][0] * own[:, 1])
-            left[s].append(_Left(float(record.times[k]), places_of(own, pose, kind), along))
-    return left
+                explained |= in_gate(scan.measurements, kind, stds[s], pose, mean[:2], cov[:2, :2])
+            measurements = scan.measurements[~explained]
+            place_stds = np.full(len(measurements), stds[s].max())
+            if PLANE_SHAPES[kind] == "point":
+                place_stds = np.maximum(stds[s][1], stds[s][0] * measurements[:, 1])
+            unexplained[s].append(
+                _UnexplainedScan(float(record.times[k]), places_of(measurements, pose, kind), place_stds)
+            )
+    return unexplained
 
 
-def _courses(scans: list[_Left], slowest: float, area: float) -> list[_Course]:
+def _courses(scans: list[_UnexplainedScan], slowest: float, area: float) -> list[_Course]:
     """Return the courses faster than `slowest`, the longest first, each without the measurements of those before it."""
     sizes = [len(scan.places) for scan in scans]
-    if len(scans) < _SHORTEST or max(sizes) > _MOST or not any(sizes):
+    if len(scans) < _MIN_LENGTH or max(sizes) > _MAX_PER_SCAN or not any(sizes):
         return []
     spread = float(np.quantile(np.concatenate([scan.stds for scan in scans]), 0.75))
     # Expected number of measurements in the next scan that continue a pair by chance.
-    goes_on = max(sizes) * 6.0 * math.pi * (_GATE * spread) ** 2 / area
-    if not 0.0 < goes_on < 0.5:
+    by_chance = max(sizes) * 6.0 * math.pi * (_GATE * spread) ** 2 / area
+    if not 0.0 < by_chance < 0.5:
         return []
     pairs = sum(a * b for a, b in pairwise(sizes))
-    enough = max(_SHORTEST, 2 + math.ceil(math.log(_BY_CHANCE / max(pairs, 1)) / math.log(goes_on)))
-    found, free = list[_Course](), [np.ones(size, np.bool_) for size in sizes]
-    while len(found) < _COURSES and (longest := _longest(scans, free, slowest)) and len(longest) >= enough:
+    min_length = max(_MIN_LENGTH, 2 + math.ceil(math.log(_MAX_CHANCE_COURSES / max(pairs, 1)) / math.log(by_chance)))
+    courses, free = list[_Course](), [np.ones(size, np.bool_) for size in sizes]
+    while len(courses) < _MAX_COURSES and (longest := _longest(scans, free, slowest)) and len(longest) >= min_length:
         for k, i in longest:
             free[k][i] = False
         points = np.array([scans[k].places[i] for k, i in longest])
         begin, end = scans[longest[0][0]].time, scans[longest[-1][0]].time
         speed = float(np.hypot(*(points[-1] - points[0]))) / (end - begin)
-        found.append(_Course(begin, end, points[0], len(longest), speed))
-    return found
+        courses.append(_Course(begin, end, points[0], len(longest), speed))
+    return courses
 
 
-def _longest(scans: list[_Left], free: list[Bools], slowest: float) -> list[tuple[int, int]]:
+def _longest(scans: list[_UnexplainedScan], free: list[Bools], slowest: float) -> list[tuple[int, int]]:
     """Return the longest course of free measurements as pairs (scan, measurement)."""
     best: list[tuple[int, int]] = []
     courses: dict[tuple[int, int], list[tuple[int, int]]] = {}  # by the last two measurements, of the scan before
     for k in range(1, len(scans)):
         now, before, step = scans[k], scans[k - 1], scans[k].time - scans[k - 1].time
-        going: dict[tuple[int, int], list[tuple[int, int]]] = {}
+        continued: dict[tuple[int, int], list[tuple[int, int]]] = {}
         if step > 0.0 and len(now.places) and len(before.places):
             moves = now.places[None] - before.places[:, None]
             speeds = np.hypot(moves[..., 0], moves[..., 1]) / step
-            usable = (speeds >= slowest) & (speeds <= _FASTEST) & free[k - 1][:, None] & free[k][None]
+            usable = (speeds >= slowest) & (speeds <= _MAX_SPEED) & free[k - 1][:, None] & free[k][None]
             for i, j in zip(*(each.tolist() for each in np.nonzero(usable)), strict=True):
-                going[i, j] = [(k - 1, i), (k, j)]
+                continued[i, j] = [(k - 1, i), (k, j)]
             for (h, i), course in courses.items():
                 ratio = step / (before.time - scans[k - 2].time)
-                ahead = before.places[i] + ratio * (before.places[i] - scans[k - 2].places[h])
-                off = np.hypot(*(now.places - ahead).T)
-                wide = _GATE * now.stds * math.sqrt(1.0 + (1.0 + ratio) ** 2 + ratio**2)
-                for j in np.flatnonzero((off <= wide) & usable[i]).tolist():
-                    if len(course) >= len(going[i, j]):
-                        going[i, j] = [*course, (k, j)]
-        courses = going
+                predicted = before.places[i] + ratio * (before.places[i] - scans[k - 2].places[h])
+                distances = np.hypot(*(now.places - predicted).T)
+                gates = _GATE * now.stds * math.sqrt(1.0 + (1.0 + ratio) ** 2 + ratio**2)
+                for j in np.flatnonzero((distances <= gates) & usable[i]).tolist():
+                    if len(course) >= len(continued[i, j]):
+                        continued[i, j] = [*course, (k, j)]
+        courses = continued
         best = max([best, *courses.values()], key=len)
     return best

@@ -14,7 +14,7 @@ from scenarios.minimal import changed
 from vedette import models
 from vedette.densities.estimates import Estimate
 from vedette.errors import InputError, ScenarioError
-from vedette.evaluation import TimeToTrack, TrackedShare, measure_run, own_metrics, run_scenario, seen_targets
+from vedette.evaluation import TimeToTrack, TrackedFraction, custom_metrics, measure_run, run_scenario, targets_in_view
 from vedette.models import SensorModel
 from vedette.scenarios import load_scenario
 from vedette.simulation.records import RunRecord
@@ -54,22 +54,22 @@ BOTH = (sensor(models.limited_range(0.9, 5.0)), sensor(models.limited_range(0.6,
 
 def test_by_hand() -> None:
     run = record_of(TRUTH, [[[-10.0, 3.0], [0.0, 0.5]], [[-10.0, 3.0], [10.0, 5.5]], [[0.0, 0.0]], []])
-    share = TrackedShare(BOTH, cutoff=2.0, order=1.0)(run)
+    share = TrackedFraction(BOTH, cutoff=2.0, order=1.0)(run)
     # Scan 1: of two seen the left one is tracked; scan 2: the right estimate is 2.5 m off; then none is seen.
     np.testing.assert_array_equal(share, [0.5, 0.5, math.nan, math.nan])
-    np.testing.assert_array_equal(TrackedShare(BOTH, cutoff=3.0, order=1.0)(run)[:2], [0.5, 1.0])
+    np.testing.assert_array_equal(TrackedFraction(BOTH, cutoff=3.0, order=1.0)(run)[:2], [0.5, 1.0])
 
 
 def test_a_sensor_that_hardly_detects_sees_nothing() -> None:
     run = record_of(TRUTH, [[[-10.0, 3.0]]] * 4)
-    np.testing.assert_array_equal(TrackedShare(BOTH, 2.0, 1.0, min_detection=0.7)(run)[:2], [1.0, 1.0])
-    seen = seen_targets(TRUTH, run.poses, BOTH, min_detection=0.7)
+    np.testing.assert_array_equal(TrackedFraction(BOTH, 2.0, 1.0, min_detection=0.7)(run)[:2], [1.0, 1.0])
+    seen = targets_in_view(TRUTH, run.poses, BOTH, min_detection=0.7)
     assert seen.tolist() == [True, False, False, True, False, False, False]
 
 
-def test_an_estimate_stands_for_one_target() -> None:
+def test_an_estimate_counts_for_one_target() -> None:
     close = replace(TRUTH, states=np.tile([-10.0, 0.0], (7, 1)))
-    share = TrackedShare(BOTH, cutoff=2.0, order=1.0)(record_of(close, [[[-10.0, 0.5]]] * 3 + [[]]))
+    share = TrackedFraction(BOTH, cutoff=2.0, order=1.0)(record_of(close, [[[-10.0, 0.5]]] * 3 + [[]]))
     assert share[:3] == pytest.approx([1 / 3, 1 / 3, 1.0])
 
 
@@ -83,7 +83,7 @@ def test_equals_plain_loops() -> None:
         seen = (apart <= [900.0, 700.0]).any(axis=1)
         near = [np.linalg.norm(estimate.means[:, :2] - state, axis=1).min(initial=99.0) < 30.0 for state in states]
         expected.append(np.mean(np.array(near)[seen]) if seen.any() else math.nan)
-    share = TrackedShare(sensors, cutoff=30.0, order=1.0)(record)
+    share = TrackedFraction(sensors, cutoff=30.0, order=1.0)(record)
     np.testing.assert_allclose(share, expected)
     assert 0.0 < np.nanmean(share) < 1.0
 
@@ -105,7 +105,7 @@ def test_time_to_track_by_hand() -> None:
 def test_a_run_of_other_sensors_is_refused() -> None:
     run = record_of(TRUTH, [[]] * 4)
     with pytest.raises(InputError, match="sensors: expected one for each of 2 sensors; got 1"):
-        TrackedShare(BOTH[:1], cutoff=2.0, order=1.0)(run)
+        TrackedFraction(BOTH[:1], cutoff=2.0, order=1.0)(run)
     assert len(SENSORS) == 2
 
 
@@ -120,7 +120,7 @@ def test_a_scenario_names_it(tmp_path: Path) -> None:
     file.write_text(text)
     scenario = load_scenario(file)
     record = run_scenario(scenario, "still", seed=1)
-    columns = measure_run(record, scenario, own_metrics(scenario)).columns()
+    columns = measure_run(record, scenario, custom_metrics(scenario)).columns()
     share = columns["share"]
     assert np.isnan(columns["wait_s"]).sum() == record.num_scans - 1  # one target, from the second scan on
     # Both sensors see everywhere, so the share is that of the targets which are not missed.
@@ -130,7 +130,7 @@ def test_a_scenario_names_it(tmp_path: Path) -> None:
     assert np.isnan(share[alive == 0]).all()
 
 
-def test_seen_is_what_the_true_sensors_see(tmp_path: Path) -> None:
+def test_targets_in_view_are_those_of_the_true_sensors(tmp_path: Path) -> None:
     text = changed(
         ("ospa: {cutoff: 50.0", "metrics: {share: {kind: tracked_share}}\nospa: {cutoff: 50.0"),
         (
@@ -143,7 +143,7 @@ def test_seen_is_what_the_true_sensors_see(tmp_path: Path) -> None:
     scenario = load_scenario(file)
     record = run_scenario(scenario, "still", seed=1)
     # The filters believe that they see everywhere; in truth no target comes within a metre.
-    assert np.isnan(measure_run(record, scenario, own_metrics(scenario)).columns()["share"]).all()
+    assert np.isnan(measure_run(record, scenario, custom_metrics(scenario)).columns()["share"]).all()
 
 
 def test_a_mistake_in_it_is_placed(tmp_path: Path) -> None:

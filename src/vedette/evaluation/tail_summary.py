@@ -13,7 +13,7 @@ from vedette.internal.text import named_in
 from vedette.kernels.base.types import Floats
 
 
-class Tail(NamedTuple):
+class TailSummary(NamedTuple):
     """Mean OSPA of the median and of the worst run, and the share of runs that end with a lost target.
 
     A target is lost at the end if it has no estimate within the cutoff at the last scan that counts. NaN: unknown.
@@ -30,24 +30,26 @@ class Tail(NamedTuple):
 
 
 def tail_header(unit: str) -> tuple[str, str, str]:
-    """Return the names of the columns of `Tail.cells`."""
+    """Return the names of the columns of `TailSummary.cells`."""
     return named_in("Median run", unit), named_in("Worst run", unit), "Runs that end with a lost target"
 
 
-def tail(means: ArrayLike, lost: ArrayLike = ()) -> Tail:
+def summarise_tail(means: ArrayLike, lost: ArrayLike = ()) -> TailSummary:
     """Return the tail of runs from the mean OSPA of each, and whether each ends with a lost target (1 or 0).
 
     NaN stands for an unknown mean; lost is empty if unknown.
     """
-    known, ended = np.asarray(means, np.float64), np.asarray(lost, np.float64)
-    known = known[~np.isnan(known)]
-    found = (float(np.median(known)), float(known.max())) if len(known) else (np.nan, np.nan)
-    return Tail(*found, float(ended.mean()) if len(ended) else np.nan)
+    known_means, ends_lost = np.asarray(means, np.float64), np.asarray(lost, np.float64)
+    known_means = known_means[~np.isnan(known_means)]
+    median_and_worst = (
+        (float(np.median(known_means)), float(known_means.max())) if len(known_means) else (np.nan, np.nan)
+    )
+    return TailSummary(*median_and_worst, float(ends_lost.mean()) if len(ends_lost) else np.nan)
 
 
-def tail_of(comparison: Comparison, strategy: str) -> Tail:
+def strategy_tail(comparison: Comparison, strategy: str) -> TailSummary:
     """Return the tail of the runs of a strategy."""
-    return tail(comparison.run_means(strategy), lost_at_end(comparison, strategy))
+    return summarise_tail(comparison.run_means(strategy), lost_at_end(comparison, strategy))
 
 
 def lost_at_end(comparison: Comparison, strategy: str) -> Floats:
@@ -58,16 +60,16 @@ def lost_at_end(comparison: Comparison, strategy: str) -> Floats:
     return np.asarray(comparison.values(strategy, "num_missed")[:, last] > 0.0, np.float64)
 
 
-def tails(comparison: Comparison) -> str:
+def tail_sentence(comparison: Comparison) -> str:
     """Return the tails of all strategies in a sentence; empty for a single run."""
     if comparison.num_runs == 1:
         return ""
-    return tails_in_words({name: tail_of(comparison, name) for name in comparison.strategies}, comparison.unit)
+    return tail_text({name: strategy_tail(comparison, name) for name in comparison.strategies}, comparison.unit)
 
 
-def tails_in_words(found: Mapping[str, Tail], unit: str) -> str:
+def tail_text(tails: Mapping[str, TailSummary], unit: str) -> str:
     """Return tails by strategy in a sentence. unit: of OSPA."""
-    told = [f"{name} {', '.join(filter(None, tail.cells()))}" for name, tail in found.items()]
-    known = any(not np.isnan(tail.lost) for tail in found.values())
-    lost = ", share of runs that end with a lost target" if known else ""
-    return f"{named_in('Median and worst run', unit)}{lost}: {'; '.join(told)}."
+    texts = [f"{name} {', '.join(filter(None, tail.cells()))}" for name, tail in tails.items()]
+    has_lost = any(not np.isnan(tail.lost) for tail in tails.values())
+    lost = ", share of runs that end with a lost target" if has_lost else ""
+    return f"{named_in('Median and worst run', unit)}{lost}: {'; '.join(texts)}."

@@ -19,11 +19,11 @@ from vedette.models.arguments import probability
 from vedette.models.motion import kernel_motion
 
 # Number of estimates at which a label counts as a birth, and the shape of the prior of the number of births.
-_LASTING, _SHAPE = 3, 0.5
+_MIN_ESTIMATES, _SHAPE = 3, 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Watch:
+class ObservationHistory:
     """Models of the targets, and the scans that observed them.
 
     Attributes:
@@ -58,64 +58,64 @@ class Watch:
         if measured is not None and measured.region is None and self.targets.birth.anywhere is None:
             raise InputError("targets.birth.from_measurements: expected births in a region; got none")
 
-    def step(self, scan: int) -> float:
+    def scan_interval(self, scan: int) -> float:
         """Return the seconds since the previous scan; 1 for the first."""
         return float(self.times[scan] - self.times[scan - 1]) if scan else 1.0
 
-    def moved(self, mixture: Mixture, first: int, last: int) -> Mixture:
+    def predict(self, mixture: Mixture, first: int, last: int) -> Mixture:
         """Return a mixture at scan `first`, after survival and motion to scan `last`."""
         motion = kernel_motion(self.targets.motion, self.targets.survival)
         for scan in range(first + 1, last + 1):
-            mixture = moved(mixture, motion, self.step(scan))
+            mixture = moved(mixture, motion, self.scan_interval(scan))
         return mixture
 
 
-def births_found(histories: Sequence[TrackHistory], watch: Watch) -> float:
+def birth_count_ratio(histories: Sequence[TrackHistory], observations: ObservationHistory) -> float:
     """Return the number of births that a record shows, divided by the number that the models expect.
 
     It is the posterior mean for a gamma prior of shape 1/2, as for a learnt birth rate: (1/2 + number of labels with
     three or more estimates) / (1/2 + expected number). It is 1 if the rate of births anywhere is learnt or given
     separately.
     """
-    birth = watch.targets.birth
+    birth = observations.targets.birth
     measured = birth.from_measurements
     if birth.anywhere is not None or (measured is not None and measured.is_learnt):
         return 1.0
     expected = 0.0
-    for scan in range(len(watch.times)):
-        own = float(birth.existence.sum()) if birth.is_active(scan + 1) else 0.0
-        own += 0.0 if measured is None else float(measured.expected)
-        expected += own if birth.period is None else own * watch.step(scan) / birth.period
-    number = sum(len(history.steps) >= _LASTING for history in histories)
+    for scan in range(len(observations.times)):
+        per_scan = float(birth.existence.sum()) if birth.is_active(scan + 1) else 0.0
+        per_scan += 0.0 if measured is None else float(measured.expected)
+        expected += per_scan if birth.period is None else per_scan * observations.scan_interval(scan) / birth.period
+    number = sum(len(history.steps) >= _MIN_ESTIMATES for history in histories)
     return (_SHAPE + number) / (_SHAPE + expected)
 
 
-def undetected_before(watch: Watch, begins: Sequence[int]) -> Iterator[FactoredGLMB]:
+def undetected_priors(observations: ObservationHistory, first_scans: Sequence[int]) -> Iterator[FactoredGLMB]:
     """Yield at each scan the prior of a filter without detections: its undetected targets are those of any filter.
 
-    begins: scan of each label's first estimate, from which a birth rate is learnt.
+    first_scans: scan of each label's first estimate, from which a birth rate is learnt.
     """
-    filters = [FactoredGlmbFilter(watch.targets, sensor) for sensor in watch.sensors]
+    filters = [FactoredGlmbFilter(observations.targets, sensor) for sensor in observations.sensors]
     belief, rng = filters[0].initial(), np.random.default_rng(0)
-    for scan in range(len(watch.times)):
+    for scan in range(len(observations.times)):
         undetected = belief.undetected
         if undetected is not None and undetected.birth_rate is not None:
-            number = float(sum(0 < begin < scan for begin in begins))
+            number = float(sum(0 < first_scan < scan for first_scan in first_scans))
             learnt = replace(undetected.birth_rate, past=number)
             belief = belief.with_fields(undetected=replace(undetected, birth_rate=learnt))
-        belief, _ = filters[0].predict(belief, watch.step(scan), scan + 1)
+        belief, _ = filters[0].predict(belief, observations.scan_interval(scan), scan + 1)
         yield belief
-        for s in np.flatnonzero(watch.scanned[scan]).tolist():
-            nothing = np.empty((0, watch.sensors[s].meas_dim))
-            belief, _ = filters[s].update(belief, nothing, watch.poses[scan, s], rng=rng)
+        for s in np.flatnonzero(observations.scanned[scan]).tolist():
+            no_measurements = np.empty((0, observations.sensors[s].meas_dim))
+            belief, _ = filters[s].update(belief, no_measurements, observations.poses[scan, s], rng=rng)
 
 
-def births_at(belief: FactoredGLMB, history: TrackHistory, watch: Watch) -> Mixture:
+def birth_intensity(belief: FactoredGLMB, history: TrackHistory, observations: ObservationHistory) -> Mixture:
     """Return the intensity of undetected targets where a label began; births anywhere are one wide Gaussian."""
-    undetected, labels, birth = belief.undetected, as_lmb(belief), watch.targets.birth
+    undetected, labels, birth = belief.undetected, as_lmb(belief), observations.targets.birth
     assert isinstance(undetected, UndetectedTargets)
     at_sites = labels.tracks.to_kernel().components._replace(log_weights=np.log(labels.existence))
-    found = [undetected.intensity.to_kernel(), at_sites]
+    parts = [undetected.intensity.to_kernel(), at_sites]
     if undetected.cells is not None and birth.from_measurements is not None:
         grid, in_plane = undetected.cells.grid, np.arange(birth.state_dim) < 2
         std = birth.from_measurements.std * np.where(in_plane, WIDE, 1.0)
@@ -124,5 +124,5 @@ def births_at(belief: FactoredGLMB, history: TrackHistory, watch: Watch) -> Mixt
         density = undetected.cells.expected[nearest] / np.prod(grid.cell_size)
         with np.errstate(divide="ignore"):
             weight = np.log(density * 2.0 * np.pi * std[0] * std[1])
-        found.append(components_of(np.array([weight]), place, np.diag(std**2)[np.newaxis]))
-    return joined_components(found)
+        parts.append(components_of(np.array([weight]), place, np.diag(std**2)[np.newaxis]))
+    return joined_components(parts)
