@@ -65,14 +65,14 @@ def perform(task):
     rows = (row_of(task.cell.name, run, payload + b"%d" % run, timings, metrics) for run in task.runs)
     return tuple(CompletedRun(row, 1.0, 0.2) for row in rows)
 
-def carry_out(*given):
+def run_with_progress(*given):
     from vedette.campaigns import engine
     engine.perform = perform
     return carried_out(*given)
 
 if stub:
     command = sys.modules["vedette.cli.campaign"]
-    carried_out, command.carry_out = command.carry_out, carry_out
+    carried_out, command.run_with_progress = command.run_with_progress, run_with_progress
 app()
 """
 

@@ -14,7 +14,7 @@ import pytest
 
 from test_processes import is_there
 from vedette.campaigns import CampaignSpec, open_results, resolve, run_campaign
-from vedette.cli.running import Approval
+from vedette.cli.running import CodeTrust
 from vedette.errors import InputError
 from vedette.evaluation.runs import run_scenario
 from vedette.evaluation.scans import scans_of_record
@@ -197,8 +197,8 @@ def test_programs_of_others_run_only_when_trusted(tmp_path: Path) -> None:
     scenario = planned("two-searchers", section(tmp_path, NEAREST))
     (tmp_path / "program.py").chmod(0o666)
     with pytest.raises(InputError, match="every user may write to"):
-        Approval(False)(scenario)
-    Approval(True)(scenario)
+        CodeTrust(False)(scenario)
+    CodeTrust(True)(scenario)
 
 
 # Trackers

@@ -185,7 +185,7 @@ def test_rewards_add_up_whatever_the_parts() -> None:
 def test_no_more_rewards_are_held_than_memory_has_room_for(monkeypatch: pytest.MonkeyPatch) -> None:
     summaries = [make_record("jdm", run).summary() for run in range(5)]
     whole = build_ensemble((each, None) for each in summaries)
-    monkeypatch.setattr(ensembles, "_MOST_REWARDS", 2 * 3 * 169)  # two runs of three decisions
+    monkeypatch.setattr(ensembles, "_MAX_BATCH_REWARDS", 2 * 3 * 169)  # two runs of three decisions
     held: list[int] = []
 
     def noted(parts: Sequence[Ensemble]) -> Ensemble:

@@ -25,7 +25,7 @@ def call(*words: str) -> Result:
     return CliRunner().invoke(app, list(words), env={"COLUMNS": "120"})
 
 
-def test_what_is_found_is_printed_and_its_file_is_tracked_with(place: Path) -> None:
+def test_estimates_are_printed_and_their_file_is_used_for_tracking(place: Path) -> None:
     result = call("calibrate", "scans.csv", "--sensors", "radars.yaml", "--out", "new/found.yaml")
     assert result.exit_code == 0, result.output
     assert "boat" in result.stdout
@@ -73,7 +73,7 @@ def test_a_search_that_did_not_converge_has_no_intervals(place: Path, monkeypatc
     assert {row["low"] for row in told["parameters"]} == {row["high"] for row in told["parameters"]} == {None}
 
 
-def test_what_is_there_is_not_overwritten_unasked(place: Path) -> None:
+def test_existing_files_are_not_overwritten_without_the_option(place: Path) -> None:
     result = call("calibrate", "scans.csv", "--sensors", "radars.yaml", "--out", "radars.yaml")
     assert (result.exit_code, result.stderr) == (1, "radars.yaml: already there; --overwrite replaces it\n")
 
@@ -86,7 +86,7 @@ def test_what_is_there_is_not_overwritten_unasked(place: Path) -> None:
         (("radars.yaml", "--sensors", "radars.yaml"), "expected a file that ends with .csv, .parquet"),
     ],
 )
-def test_files_that_are_not_there_are_told(place: Path, words: tuple[str, ...], message: str) -> None:
+def test_missing_files_are_reported(place: Path, words: tuple[str, ...], message: str) -> None:
     result = call("calibrate", *words)
     assert result.exit_code == 1
     assert message in result.stderr

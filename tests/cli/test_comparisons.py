@@ -39,7 +39,7 @@ def test_every_number_is_shown_at_any_width(
     assert max(map(len, table.splitlines())) <= width
 
 
-def test_one_run_claims_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+def test_one_run_has_no_significance(capsys: pytest.CaptureFixture[str]) -> None:
     print_comparison(comparison_of(1))
     printed = " ".join(capsys.readouterr().out.split())
     assert "synthetic: 1 run, mean OSPA over" in printed

@@ -44,7 +44,7 @@ def test_a_log_has_a_line_at_the_start_and_one_at_the_end(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("columns", [30, 120])
-def test_a_terminal_shows_what_is_compiled_and_how_far_it_is(tmp_path: Path, columns: int) -> None:
+def test_a_terminal_shows_the_progress_of_compilation(tmp_path: Path, columns: int) -> None:
     main, side = pty.openpty()
     with subprocess.Popen([sys.executable, "-c", PROGRAM], env=environment(tmp_path, columns), stderr=side) as process:
         os.close(side)

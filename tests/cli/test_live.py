@@ -83,6 +83,6 @@ def test_after_a_kill_it_goes_on_and_the_record_replays_to_the_same_bytes(place:
         (("--record", "no/came"), 1, "no/came: expected a file that can be written"),
     ],
 )
-def test_wrong_options_are_told(place: Path, words: tuple[str, ...], status: int, message: str) -> None:
+def test_wrong_options_are_reported(place: Path, words: tuple[str, ...], status: int, message: str) -> None:
     result = call(*words)
     assert (result.exit_code, message in result.output) == (status, True), result.output

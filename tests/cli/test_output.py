@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from cli.test_small_scenes import SCENE
 from vedette.cli import app
-from vedette.cli.output import folded
+from vedette.cli.output import wrap_line
 from vedette.scenarios import Scenario, load_scenario
 from vedette.scenarios.dumping import dump_scenario
 from vedette.scenarios.overrides import with_fields
@@ -91,10 +91,10 @@ def test_a_reader_that_goes_away_hears_nothing_more(command: tuple[str, ...]) ->
 def test_a_long_line_is_broken_between_words_on_a_terminal() -> None:
     text = "\ninterrupted: trial-results keeps every run that is finished; the same command goes on"
     broken = "\ninterrupted: trial-results keeps every\nrun that is finished; the same command\ngoes on"
-    assert folded(text, 40) == broken
-    assert folded(text, 100) == text
+    assert wrap_line(text, 40) == broken
+    assert wrap_line(text, 100) == text
     for kept in ("  vedette campaign SPEC --runs=2 --out trial-shards --shard 2/2", "a: 1\n" + 50 * "b", 50 * "x"):
-        assert folded(kept, 40) == kept
+        assert wrap_line(kept, 40) == kept
 
 
 @posix
@@ -113,7 +113,7 @@ def test_a_terminal_of_60_columns_breaks_no_word(tmp_path: Path) -> None:
 
 
 @posix
-def test_too_few_open_files_are_one_line(tmp_path: Path) -> None:
+def test_too_many_open_files_are_one_line(tmp_path: Path) -> None:
     import resource
 
     spec = tmp_path / "spec.toml"

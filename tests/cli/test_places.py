@@ -12,7 +12,7 @@ from typer.testing import CliRunner, Result
 from recordings import write_recording
 from vedette.campaigns.database import LOCK, lock_of
 from vedette.cli import app
-from vedette.cli.output import trouble_of_system
+from vedette.cli.output import system_error_message
 from vedette.errors import InputError
 from vedette.internal.files import unwritable, write_file, write_whole
 from vedette.simulation.storage import check_target
@@ -43,7 +43,7 @@ def call(text: str) -> Result:
         ("calibrate scans.csv --sensors radars.yaml --out scans.csv --overwrite", "yaml, yml"),
     ],
 )
-def test_an_output_replaces_no_file_of_another_kind(place: Path, words: str, endings: str) -> None:
+def test_output_does_not_replace_a_file_of_another_kind(place: Path, words: str, endings: str) -> None:
     before = {path: path.read_bytes() for path in place.iterdir()}
     result = call(words)
     assert result.exit_code == 2
@@ -51,7 +51,7 @@ def test_an_output_replaces_no_file_of_another_kind(place: Path, words: str, end
     assert {path: path.read_bytes() for path in place.iterdir()} == before
 
 
-def test_a_run_replaces_no_campaign(tmp_path: Path) -> None:
+def test_a_run_does_not_replace_a_campaign(tmp_path: Path) -> None:
     campaign = tmp_path / "results"
     campaign.mkdir()
     (campaign / "manifest.json").write_text('{"format": "vedette-campaign", "format_version": 6}')
@@ -83,7 +83,9 @@ def test_a_pipe_is_no_missing_scenario(place: Path) -> None:
     assert "it is no regular file" in call("check pipe").stdout
 
 
-def test_a_folder_that_cannot_be_written_is_told_before_the_work(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_that_cannot_be_written_is_reported_before_the_work(
+    place: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     result = call("calibrate scans.csv --sensors radars.yaml --out mine.yaml/found.yaml")
     expected = f"expected a file that can be written; {place / 'mine.yaml'} is no folder"
     assert (result.exit_code, result.stderr) == (1, f"mine.yaml/found.yaml: {expected}\n")
@@ -101,7 +103,7 @@ def test_a_folder_is_no_recording(place: Path) -> None:
     assert told == ".: expected a sensors file; got a folder\n"
 
 
-def test_a_sensors_file_of_something_else_is_told_in_words(place: Path) -> None:
+def test_another_yaml_file_as_sensors_file_is_reported(place: Path) -> None:
     (place / "empty.yaml").write_text("")
     told = call("track scans.csv --sensors empty.yaml").stderr
     assert told == "empty.yaml: expected a mapping with `sensors`; got nothing\n"
@@ -109,11 +111,11 @@ def test_a_sensors_file_of_something_else_is_told_in_words(place: Path) -> None:
 
 
 def test_a_file_that_the_system_refuses_is_a_line() -> None:
-    text = trouble_of_system(PermissionError(errno.EACCES, "Permission denied", "private/x"))
+    text = system_error_message(PermissionError(errno.EACCES, "Permission denied", "private/x"))
     assert text == "private/x: expected a file or folder that can be used; Permission denied"
     result = call(f"run {'x' * 300}.yaml --out {'y' * 300}")
     assert (result.exit_code, isinstance(result.exception, SystemExit)) == (1, True)
     result = call(f"track {'x' * 300}.csv --sensors radars.yaml")
     assert (result.exit_code, isinstance(result.exception, SystemExit)) == (1, True)
     with pytest.raises(OSError, match="odd"):
-        trouble_of_system(OSError(errno.EINVAL, "odd"))
+        system_error_message(OSError(errno.EINVAL, "odd"))

@@ -45,13 +45,13 @@ def test_a_time_in_milliseconds(place: Path) -> None:
     assert refused("radars.yaml", "Calshot", "Calshot").startswith(told)
 
 
-def test_a_quantity_that_there_is_none_of(place: Path) -> None:
+def test_an_unknown_quantity_is_reported(place: Path) -> None:
     told = refused("radars.yaml", "bearing: brg_deg", "bearings: brg_deg")
     assert told.startswith("radars.yaml: recording.columns: expected quantities among time, sensor, bearing, range, ")
     assert told.endswith("; got bearings")
 
 
-def test_targets_of_another_day(place: Path) -> None:
+def test_true_targets_of_another_day_are_reported(place: Path) -> None:
     told = refused("truth.csv", "2016-01-12", "2017-01-12")
     days = "2017-01-12T13:02:21+00:00 to 2017-01-12T13:02:41+00:00"
     assert told.startswith(
@@ -59,7 +59,7 @@ def test_targets_of_another_day(place: Path) -> None:
     )
 
 
-def test_targets_of_another_place(place: Path) -> None:
+def test_true_targets_of_another_place_are_reported(place: Path) -> None:
     told = refused("truth.csv", "longitude,latitude", "latitude,longitude")
     assert told == (
         f"{place / 'truth.csv'}: recorded targets: expected at least one track after cleaning; "

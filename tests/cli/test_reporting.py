@@ -52,9 +52,7 @@ def test_the_page_lies_in_the_folder_unless_said_otherwise_and_shows_the_chosen_
         ("gone:0", 1, "--runs: expected one of fixed, still; got 'gone'"),
     ],
 )
-def test_runs_that_cannot_be_meant_are_named(
-    folder: Path, tmp_path: Path, runs: str, status: int, message: str
-) -> None:
+def test_invalid_runs_are_named(folder: Path, tmp_path: Path, runs: str, status: int, message: str) -> None:
     result = report(folder, "--runs", runs, "--out", tmp_path / "page.html")
     assert result.exit_code == status
     assert message in " ".join(result.output.replace("\u2502", " ").split())
@@ -98,7 +96,7 @@ def test_the_folders_above_the_page_are_made(folder: Path, tmp_path: Path) -> No
     assert page.is_file()
 
 
-def test_an_interrupted_report_says_so_in_a_line(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupted_report_prints_one_line(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 

@@ -37,13 +37,13 @@ def call(*words: str, columns: int = 80) -> Result:
     return CliRunner().invoke(app, ["reproduce", *words, "--workers", "1"], env={"COLUMNS": str(columns)})
 
 
-def test_the_list_names_every_yardstick() -> None:
+def test_the_list_names_every_published_comparison() -> None:
     result = call("--list", columns=160)
     assert (result.exit_code, result.stderr) == (0, "")
     assert [line.split()[0] for line in result.stdout.splitlines()] == list(published.published_comparisons())
 
 
-def test_a_yardstick_is_run_and_printed_beside_what_is_published(short: PublishedComparison) -> None:
+def test_a_published_comparison_is_run_and_printed_next_to_published_numbers(short: PublishedComparison) -> None:
     result = call(NAME, "--planners", "random,fixed")
     assert result.exit_code == 0, result.output
     assert "published: FDCD     3.39 ± 0.15" in result.stdout
@@ -81,7 +81,7 @@ def test_every_number_is_shown_at_any_width(short: PublishedComparison, columns:
         assert number in table
 
 
-def test_ctrl_c_says_how_to_go_on(short: PublishedComparison, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_prints_how_to_continue(short: PublishedComparison, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 

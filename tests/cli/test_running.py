@@ -88,7 +88,7 @@ def test_a_run_that_stops_keeps_what_it_had(scenario_file, tmp_path, monkeypatch
     assert load_run(out).num_scans == 10
 
 
-def test_ctrl_c_while_the_figures_are_drawn_says_that_the_run_is_there(scenario_file, tmp_path, monkeypatch):
+def test_ctrl_c_during_figures_reports_that_the_run_is_saved(scenario_file, tmp_path, monkeypatch):
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 

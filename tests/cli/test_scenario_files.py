@@ -50,7 +50,7 @@ def test_help_imports_nothing_heavy() -> None:
 
 
 @pytest.mark.parametrize("words", [["check", "paper-a"], ["list"], ["schema"]])
-def test_what_only_reads_scenarios_imports_no_compiler_and_no_filters(words: list[str]) -> None:
+def test_commands_that_read_scenarios_import_no_compiler_and_no_filters(words: list[str]) -> None:
     code = (
         "import sys; from vedette.cli import app\n"
         f"try: app({words})\n"
@@ -114,7 +114,7 @@ def test_generate_names_the_file_after_the_scene(tmp_path: Path, monkeypatch: py
         (("--sensors", "0"), 2, "Invalid value for '--sensors'"),
     ],
 )
-def test_generate_says_what_cannot_be(words: tuple[str, ...], status: int, message: str, tmp_path: Path) -> None:
+def test_generate_rejects_invalid_options(words: tuple[str, ...], status: int, message: str, tmp_path: Path) -> None:
     result = vedette("generate", str(tmp_path / "new"), *words)
     assert result.exit_code == status
     assert message in " ".join(result.stderr.split())
@@ -144,7 +144,7 @@ def test_crowd_writes_a_commented_file_that_passes_check(tmp_path: Path, monkeyp
         (("--density", "0"), "Invalid value for '--density'"),
     ],
 )
-def test_crowd_says_what_cannot_be(words: tuple[str, ...], message: str, tmp_path: Path) -> None:
+def test_crowd_rejects_invalid_options(words: tuple[str, ...], message: str, tmp_path: Path) -> None:
     result = vedette("crowd", str(tmp_path / "new"), *words)
     assert result.exit_code == 2
     assert message in " ".join(result.stderr.split())
@@ -195,13 +195,13 @@ def test_init_never_overwrites_without_force(taken: str, tmp_path: Path) -> None
     assert load_scenario(tmp_path / "scenario.yaml").name == "solent"
 
 
-def test_init_from_what_is_not_there_is_wrong_use(tmp_path: Path) -> None:
+def test_init_from_an_unknown_scenario_is_a_usage_error(tmp_path: Path) -> None:
     result = vedette("init", str(tmp_path / "a.yaml"), "--from", "paper-z")
     assert result.exit_code == 2
     assert f"expected one of {', '.join(list_builtin())}; got paper-z" in result.stderr.replace("\n", " ")
 
 
-def test_check_tells_all_faults_of_all_files(tmp_path: Path) -> None:
+def test_check_reports_all_faults_of_all_files(tmp_path: Path) -> None:
     good, bad, absent = (tmp_path / name for name in ("good.yaml", "bad.yaml", "absent.yaml"))
     good.write_text(MINIMAL.replace("steps: [1, 5]", "steps: [1]"), encoding="utf-8")
     broken = MINIMAL.replace("num_steps: 20", "num_steps: x").replace("cutoff: 50.0", "cutof: 50.0")
@@ -217,7 +217,7 @@ def test_check_tells_all_faults_of_all_files(tmp_path: Path) -> None:
     assert fourth.startswith(f"{absent}: no such file; expected a YAML file or one of ")
 
 
-def test_check_knows_sensors_files(tmp_path: Path) -> None:
+def test_check_accepts_sensors_files(tmp_path: Path) -> None:
     file = tmp_path / "radars.yaml"
     file.write_text(SENSORS, encoding="utf-8")
     result = vedette("check", str(file))

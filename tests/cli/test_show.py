@@ -12,7 +12,7 @@ from typer.testing import CliRunner, Result
 from scenarios.minimal import changed
 from vedette.cli import app
 from vedette.cli.picture import scenario_figure
-from vedette.cli.show import truth_of
+from vedette.cli.show import sample_truth
 from vedette.scenarios import list_builtin, load_scenario, parse_scenario
 from vedette.scenarios.wording import scans_in_words
 
@@ -105,7 +105,7 @@ def test_a_picture_of_another_format_is_wrong_use(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", list_builtin())
 def test_the_picture_has_every_track_sensor_and_site(name: str) -> None:
     scenario = load_scenario(name)
-    truth = truth_of(scenario)
+    truth = sample_truth(scenario)
     (axes,) = scenario_figure(scenario, truth).axes
     markers = [line.get_marker() for line in axes.lines]
     num_targets = len(np.unique(truth.ids))
@@ -116,7 +116,7 @@ def test_the_picture_has_every_track_sensor_and_site(name: str) -> None:
     assert (axes.get_xlabel(), axes.get_ylabel()) == (f"x ({unit})", f"y ({unit})")
 
 
-def test_an_unknown_scenario_is_told_without_a_traceback() -> None:
+def test_an_unknown_scenario_is_reported_without_a_traceback() -> None:
     result = show("paper-b")
     assert (result.exit_code, result.stdout) == (1, "")
     assert result.stderr.startswith(
@@ -124,7 +124,7 @@ def test_an_unknown_scenario_is_told_without_a_traceback() -> None:
     )
 
 
-def test_a_faulty_scenario_is_told_without_a_traceback(tmp_path: Path) -> None:
+def test_a_faulty_scenario_is_reported_without_a_traceback(tmp_path: Path) -> None:
     file = tmp_path / "bad.yaml"
     file.write_text(changed(("sigma_v: 1.0", "sigma_v: quick")), encoding="utf-8")
     result = show(str(file))
@@ -132,7 +132,7 @@ def test_a_faulty_scenario_is_told_without_a_traceback(tmp_path: Path) -> None:
     assert result.stderr == f'{file}:4:44: motion.sigma_v: expected a number, got "quick"\n'
 
 
-def test_zones_biases_and_late_scans_are_told_in_a_few_words() -> None:
+def test_zones_biases_and_late_scans_are_described_briefly() -> None:
     lines = " ".join(show("solent-patrol").stdout.split())
     assert "constraint keep out, polygon of 21 corners" in lines
     assert "constraint stay inside, x -3000 to 3000 m, y -3000 to 3000 m" in lines

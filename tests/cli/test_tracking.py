@@ -57,7 +57,7 @@ def test_tracks_are_joined_across_gaps_unless_that_is_switched_off(place: Path) 
     assert len({row["track"] for row in joined}) == len({row["label"] for row in joined}) - 3
 
 
-def test_a_mistyped_file_is_named_itself(place: Path) -> None:
+def test_a_mistyped_file_name_is_in_the_message(place: Path) -> None:
     assert call("scnas.csv", "--sensors", "radars.yaml").stderr == (
         "scnas.csv: no such file; expected a file of scans\n"
     )
@@ -69,7 +69,7 @@ def test_a_mistyped_file_is_named_itself(place: Path) -> None:
     assert "bad.csv" in told
 
 
-def test_sensors_of_bearings_alone_are_told_what_to_write(place: Path) -> None:
+def test_bearing_only_sensors_get_advice(place: Path) -> None:
     sensor = "measurement: {kind: bearing_only}, noise: {kind: constant, std: [0.02]}, clutter: {kind: region, rate: 1}"
     head = "region: {x_min: -5000, x_max: 5000, y_min: -5000, y_max: 5000}\nsensors:\n"
     (place / "ears.yaml").write_text(f"{head}  - {{name: a, position: [0, 0], {sensor}, {SEES}}}\n")
@@ -82,7 +82,7 @@ def test_sensors_of_bearings_alone_are_told_what_to_write(place: Path) -> None:
 SEES = "detection: {kind: constant, probability: 0.9}"
 
 
-def test_the_folder_is_looked_at_before_the_run(place: Path) -> None:
+def test_the_folder_is_checked_before_the_run(place: Path) -> None:
     (place / "file").write_text("")
     result = call("scans.csv", "--sensors", "radars.yaml", "--out", "file/out")
     assert result.exit_code != 0
@@ -96,7 +96,7 @@ def test_the_folder_is_looked_at_before_the_run(place: Path) -> None:
      "run run/scenario.yaml"],
 )  # fmt: skip
 @pytest.mark.parametrize("name", ["scans.csv", "truth.csv"])
-def test_a_recording_that_is_gone_or_another_is_told_by_every_command(tracked: Path, words: str, name: str) -> None:
+def test_a_missing_or_changed_recording_is_reported_by_every_command(tracked: Path, words: str, name: str) -> None:
     file = tracked / name
     content = file.read_bytes()
     is_enough = words == "results run"  # what was found is in the folder
@@ -147,7 +147,7 @@ def test_a_format_of_places_on_the_earth_without_an_origin_leaves_no_folder(plac
     assert not (place / "out").exists()
 
 
-def test_numbers_that_an_option_cannot_have_are_told_as_they_came(place: Path) -> None:
+def test_invalid_numbers_of_options_are_reported_as_given(place: Path) -> None:
     words = ("scans.csv", "--sensors", "radars.yaml", "--max-target-speed")
     low, none = call(*words, "-3"), call(*words, "fast")
     assert (low.exit_code, none.exit_code) == (2, 2)
@@ -156,7 +156,7 @@ def test_numbers_that_an_option_cannot_have_are_told_as_they_came(place: Path) -
     assert "got 'fast'" in none.stderr
 
 
-def test_a_sensor_that_never_scanned_is_told(place: Path) -> None:
+def test_a_sensor_without_scans_is_reported(place: Path) -> None:
     rows = (place / "scans.csv").read_text("utf-8").splitlines()
     (place / "scans.csv").write_text("\n".join(row for row in rows if ",boat," not in row), "utf-8")
     result = call("scans.csv", "--sensors", "radars.yaml")
@@ -164,7 +164,7 @@ def test_a_sensor_that_never_scanned_is_told(place: Path) -> None:
     assert "boat 1 per scan (no scan in the recording)" in result.stderr
 
 
-def test_without_truth_no_error_is_told(place: Path) -> None:
+def test_without_truth_no_error_is_printed(place: Path) -> None:
     result = call("scans.csv", "--sensors", "radars.yaml")
     assert result.exit_code == 0, result.output
     assert "OSPA" not in result.stdout
@@ -194,14 +194,14 @@ def test_bad_rows_are_refused_or_skipped_by_name(place: Path) -> None:
         (("scans.csv", "--sensors", "scans.csv"), "expected a mapping with `sensors`"),
     ],
 )
-def test_files_that_are_not_there_are_told(place: Path, words: tuple[str, ...], message: str) -> None:
+def test_missing_files_are_reported(place: Path, words: tuple[str, ...], message: str) -> None:
     result = call(*words)
     assert result.exit_code == 1
     assert message in result.stderr
     assert {path.name for path in place.iterdir()} == {"scans.csv", "truth.csv", "radars.yaml"}
 
 
-def test_times_that_are_no_dates_are_told_where_a_format_has_dates(place: Path) -> None:
+def test_times_without_dates_are_reported_for_formats_with_dates(place: Path) -> None:
     rows = "".join(f"{600_000_000_000 + k},pier,{100 + k},200\n" for k in range(4))
     (place / "far.csv").write_text("time,sensor,x,y\n" + rows, "utf-8")
     (place / "plane.yaml").write_text(

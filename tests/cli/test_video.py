@@ -82,7 +82,7 @@ def test_an_interrupted_one_leaves_nothing(runs: Path, tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_ctrl_c_says_so_in_a_line(runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_prints_one_line(runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
@@ -93,7 +93,7 @@ def test_ctrl_c_says_so_in_a_line(runs: Path, tmp_path: Path, monkeypatch: pytes
 
 @pytest.mark.skipif(os.name == "nt", reason="programs are scripts of a shell")
 @pytest.mark.parametrize("is_there", [False, True])
-def test_an_ffmpeg_that_is_missing_or_fails_is_told(
+def test_a_missing_or_failing_ffmpeg_is_reported(
     runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_there: bool
 ) -> None:
     programs = tmp_path / "programs"
@@ -131,13 +131,13 @@ def test_an_mp4_is_one(runs: Path, tmp_path: Path) -> None:
         (("a.gif", "--size", 20), 2, "for '--size': expected greater than or equal to 200; got '20'"),
     ],
 )
-def test_what_cannot_be_is_said(runs: Path, words: tuple[object, ...], status: int, message: str) -> None:
+def test_invalid_options_are_reported(runs: Path, words: tuple[object, ...], status: int, message: str) -> None:
     result = call(runs / "run", "--out", *words)
     assert result.exit_code == status
     assert message in " ".join(result.output.replace("\u2502", " ").split())
 
 
-def test_a_folder_without_a_run_is_told(tmp_path: Path) -> None:
+def test_a_folder_without_a_run_is_reported(tmp_path: Path) -> None:
     result = call(tmp_path, "--out", tmp_path / "run.gif")
     assert result.exit_code == 1
     assert "no such file" in result.output

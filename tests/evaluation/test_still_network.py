@@ -15,7 +15,7 @@ from matplotlib.patches import PathPatch, Wedge
 from evaluation.still_network import NAMES, POLYGON, STILL_NETWORK
 from evaluation.synthetic import ACTIONS, make_plan, make_record, means_of
 from vedette.cli.picture import scenario_figure
-from vedette.cli.show import truth_of
+from vedette.cli.show import sample_truth
 from vedette.control.plan import Plan, RewardTable
 from vedette.errors import InputError
 from vedette.evaluation import compare
@@ -130,7 +130,7 @@ def test_a_single_sensor_with_a_choice_has_a_curve() -> None:
 
 def test_zones_and_names_are_drawn(scenario: Scenario, records: dict[str, list[RunRecord]]) -> None:
     tracks = tracks_figure(records["jdm"][0], scene=build_scene(scenario, "jdm"))
-    picture = scenario_figure(scenario, truth_of(scenario))
+    picture = scenario_figure(scenario, sample_truth(scenario))
     for figure in (tracks, picture):
         (axes,) = figure.axes
         drawn = [patch for patch in axes.patches if isinstance(patch, PathPatch)]

@@ -276,7 +276,7 @@ def test_many_scans_leave_no_more_behind_than_a_few(tmp_path: Path, num: int) ->
         ("recording: {units: {range: mile}}\nregion: 1\n", "units.range: expected one of m, km, nmi; got mile"),
     ],
 )
-def test_a_file_that_cannot_serve_is_told(tmp_path: Path, text: str, words: str) -> None:
+def test_an_unsuitable_file_is_reported(tmp_path: Path, text: str, words: str) -> None:
     with pytest.raises(InputError, match=words.replace("(", r"\(")):
         small(tmp_path, text)
 

@@ -66,7 +66,7 @@ def test_equal_strategies_do_not_differ() -> None:
     assert compare_pair(comparison_of([1.0, 2.0], [1.0, 2.0]), "a", "b").verdict == "unclear"
 
 
-def test_one_run_claims_nothing() -> None:
+def test_one_run_has_no_significance() -> None:
     found = compare_pair(comparison_of([1.0], [3.0]), "a", "b")
     assert found.verdict == "unknown"
     assert found.sentence.startswith("One run proves nothing. ")

@@ -16,7 +16,7 @@ from reports.test_single import data_of
 from scenarios.test_geojson import ORIGIN
 from vedette.cli import app
 from vedette.cli.picture import scenario_figure
-from vedette.cli.show import truth_of
+from vedette.cli.show import sample_truth
 from vedette.errors import ScenarioError
 from vedette.evaluation.figures import build_scene, tracks_figure
 from vedette.evaluation.runs import run_scenario
@@ -147,7 +147,7 @@ def drawn(figure: Any) -> list[Any]:
 
 def test_pictures_and_replays_have_it_and_limits_are_as_without(tmp_path: Path) -> None:
     scenario = load_scenario(scene(tmp_path, world(feature("LineString", degrees(EDGE)))))
-    truth = truth_of(scenario)
+    truth = sample_truth(scenario)
     figure, without = scenario_figure(scenario, truth), scenario_figure(load_scenario("paper-e"), truth)
     np.testing.assert_allclose(drawn(figure)[0], EDGE, atol=1e-6)
     assert figure.axes[0].get_xlim() == without.axes[0].get_xlim()

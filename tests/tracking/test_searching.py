@@ -168,7 +168,7 @@ def _no_probability(state, pose, params):
     return 1.2
 
 
-def test_a_detection_that_is_no_probability_is_told() -> None:
+def test_an_invalid_detection_probability_is_reported() -> None:
     bad = replace(SENSORS[0], detection=models.DetectionModel(_no_probability))
     searching = Searching(Central(SequentialLmbFilter(targets(()), (bad,))), undetected())
     with pytest.raises(ModelError, match=r"probability is not in \[0, 1\]"):

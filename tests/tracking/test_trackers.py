@@ -274,7 +274,7 @@ def test_an_exception_says_in_which_stage_it_was_raised(experiment: Experiment) 
     assert stage_of(ValueError("elsewhere")) is None
 
 
-def test_a_filter_that_reports_nothing_is_told_so(experiment: Experiment) -> None:
+def test_a_filter_without_a_report_is_named(experiment: Experiment) -> None:
     class Silent(Own):
         def step(self, *args: Any, **kwargs: Any) -> Any:
             return super().step(*args, **kwargs)[0], None

@@ -13,10 +13,10 @@ from vedette.cli.calibrating import calibrate
 from vedette.cli.campaign import campaign
 from vedette.cli.checking import check
 from vedette.cli.demo import demo
-from vedette.cli.errors import Commands
+from vedette.cli.errors import CommandGroup
 from vedette.cli.live import live
 from vedette.cli.merging import merge
-from vedette.cli.output import speaking
+from vedette.cli.output import with_output_options
 from vedette.cli.reproducing import reproduce
 from vedette.cli.results import report, results, upgrade
 from vedette.cli.running import run
@@ -26,7 +26,7 @@ from vedette.cli.tracking import track
 from vedette.cli.video import video
 
 app = typer.Typer(
-    cls=Commands,
+    cls=CommandGroup,
     no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
@@ -84,4 +84,4 @@ _COMMANDS: dict[str, list[tuple[Callable[..., None], str]]] = {
 for _group, _members in _COMMANDS.items():
     for _command, _summary in _members:
         _name = _command.__name__.rstrip("_")
-        app.command(_name, short_help=_summary, rich_help_panel=_group)(speaking(_command))
+        app.command(_name, short_help=_summary, rich_help_panel=_group)(with_output_options(_command))

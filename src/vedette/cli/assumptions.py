@@ -9,7 +9,7 @@ from pathlib import Path
 
 from vedette.cli.output import note
 
-_WIDEST = 120
+_MAX_WIDTH = 120
 
 
 def note_assumptions(assumed: Mapping[str, str], sensors: Path) -> None:
@@ -17,7 +17,7 @@ def note_assumptions(assumed: Mapping[str, str], sensors: Path) -> None:
     if not assumed:
         return
     note(f"Assumed, because {sensors} does not give it:")
-    width = min(shutil.get_terminal_size().columns, _WIDEST)
+    width = min(shutil.get_terminal_size().columns, _MAX_WIDTH)
     for section, text in assumed.items():
         first = f"  {section:<10}  "
         note(textwrap.fill(text, width, initial_indent=first, subsequent_indent=" " * len(first)))

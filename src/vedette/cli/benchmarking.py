@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from vedette.cli.campaign import carry_out, load_workers
+from vedette.cli.campaign import load_workers, run_with_progress
 from vedette.cli.comparisons import print_standings
-from vedette.cli.errors import named_options, usage_error
+from vedette.cli.errors import option_errors, usage_error
 from vedette.cli.options import Seed, Trust, Workers
-from vedette.cli.output import note, print_names, publish, say
-from vedette.cli.running import Approval, interruptible
+from vedette.cli.output import echo, emit_json, note, print_names
+from vedette.cli.running import CodeTrust, interruptible
 from vedette.cli.scenario_files import write_text
 from vedette.internal.extras import require_packages
 
@@ -22,12 +22,14 @@ if TYPE_CHECKING:
     from vedette.campaigns.leaderboard import SceneTable
 
 _RUNS, _QUICK_RUNS = 30, 2
-_WHAT = "NAME=COMMAND of a program that speaks JSON lines, NAME=file.py:attribute or NAME=package.module:attribute."
+_ENTRANT_FORM = (
+    "NAME=COMMAND of a program that speaks JSON lines, NAME=file.py:attribute or NAME=package.module:attribute."
+)
 
 
 def benchmark(
     planners: Annotated[
-        list[str] | None, typer.Option("--planner", metavar="NAME=WHAT", help=f"A planner: {_WHAT}")
+        list[str] | None, typer.Option("--planner", metavar="NAME=WHAT", help=f"A planner: {_ENTRANT_FORM}")
     ] = None,
     trackers: Annotated[
         list[str] | None, typer.Option("--tracker", metavar="NAME=WHAT", help="A tracker, in the same form.")
@@ -64,51 +66,54 @@ def benchmark(
 
     if list_:
         print_names({name: scene.about for name, scene in scenes().items()})
-        publish([{"name": name, "role": scene.role, "about": scene.about} for name, scene in scenes().items()])
+        emit_json([{"name": name, "role": scene.role, "about": scene.about} for name, scene in scenes().items()])
         return
-    with named_options({"planner": "--planner", "tracker": "--tracker"}):
-        entered = [entrant("planner", each, seconds=seconds, folder=Path()) for each in planners or ()]
-        entered += [entrant("tracker", each, seconds=seconds, folder=Path()) for each in trackers or ()]
-    approve, num_runs = Approval(trust), runs or (_QUICK_RUNS if quick else _RUNS)
-    chosen = _chosen(names, quick, entered)
-    for each in entered:  # before any result is saved
-        first = next((scene for scene in chosen if scene.role == each.role), None)
-        if first is None:
+    with option_errors({"planner": "--planner", "tracker": "--tracker"}):
+        entrants = [entrant("planner", each, seconds=seconds, folder=Path()) for each in planners or ()]
+        entrants += [entrant("tracker", each, seconds=seconds, folder=Path()) for each in trackers or ()]
+    trust_check, num_runs = CodeTrust(trust), runs or (_QUICK_RUNS if quick else _RUNS)
+    chosen = _selected_scenes(names, quick, entrants)
+    for each in entrants:  # before any result is saved
+        suitable = next((scene for scene in chosen if scene.role == each.role), None)
+        if suitable is None:
             got = ", ".join(scene.name for scene in chosen)
             raise usage_error(f"expected a scene of {each.role}s for {each.name}, see --list; got {got}", "--scenes")
-        check_entrant(each, campaign_of(first, each, num_runs, seed, out, approve=approve))
+        check_entrant(each, campaign_of(suitable, each, num_runs, seed, out, approve=trust_check))
     for scene in chosen:
-        for own in (*(each for each in entered if each.role == scene.role), None):  # entrants that may fail come first
-            folder = out / scene.name / (OWN if own is None else own.name)
+        for current in (
+            *(each for each in entrants if each.role == scene.role),
+            None,
+        ):  # entrants that may fail come first
+            folder = out / scene.name / (OWN if current is None else current.name)
             note(f"{scene.name}: {folder.name}")
-            campaign = campaign_of(scene, own, num_runs, seed, out, approve=approve)
+            campaign = campaign_of(scene, current, num_runs, seed, out, approve=trust_check)
             clear_stale_results(campaign, folder)
-            carry_out(campaign, folder, workers)
+            run_with_progress(campaign, folder, workers)
     tables = [table for scene in scenes().values() if (table := scene_table(scene, out)) is not None]
-    page = _write(tables, seed, out)
+    page = _write_tables(tables, seed, out)
     for table in tables:
         if table.scene in chosen:
             print_standings(table)
-            say()
-    say(f"wrote {out}; open {page}")
-    publish({"folder": out, "report": page, "scenes": [asdict(table) for table in tables if table.scene in chosen]})
+            echo()
+    echo(f"wrote {out}; open {page}")
+    emit_json({"folder": out, "report": page, "scenes": [asdict(table) for table in tables if table.scene in chosen]})
 
 
-def _chosen(names: str | None, quick: bool, entered: list[Entrant]) -> list[Scene]:
+def _selected_scenes(names: str | None, quick: bool, entrants: list[Entrant]) -> list[Scene]:
     from vedette.campaigns.benchmark import scenes
 
-    known = scenes()
+    all_scenes = scenes()
     if names is not None:
-        wanted = [name.strip() for name in names.split(",")]
-        for name in wanted:
-            if name not in known:
-                raise usage_error(f"expected some of {', '.join(known)}; got {name!r}", "--scenes")
-        return [known[name] for name in wanted]
-    roles = {each.role for each in entered} or {scene.role for scene in known.values()}
-    return [scene for scene in known.values() if scene.role in roles and (scene.quick or not quick)]
+        requested = [name.strip() for name in names.split(",")]
+        for name in requested:
+            if name not in all_scenes:
+                raise usage_error(f"expected some of {', '.join(all_scenes)}; got {name!r}", "--scenes")
+        return [all_scenes[name] for name in requested]
+    roles = {each.role for each in entrants} or {scene.role for scene in all_scenes.values()}
+    return [scene for scene in all_scenes.values() if scene.role in roles and (scene.quick or not quick)]
 
 
-def _write(tables: list[SceneTable], seed: int, out: Path) -> Path:
+def _write_tables(tables: list[SceneTable], seed: int, out: Path) -> Path:
     from vedette.campaigns.leaderboard import benchmark_csv, benchmark_markdown, benchmark_provenance
     from vedette.reports.benchmark import write_benchmark
 

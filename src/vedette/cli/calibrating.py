@@ -14,7 +14,7 @@ from vedette.cli.calibration_table import calibration_document, print_windows
 from vedette.cli.compiling import compiling
 from vedette.cli.errors import check_ending
 from vedette.cli.options import BadRows, Overwrite, SensorsFile, Speed, Trust
-from vedette.cli.output import console, publish, say
+from vedette.cli.output import console, echo, emit_json
 from vedette.cli.running import interruptible
 from vedette.cli.tracking import read_recording
 from vedette.errors import InputError
@@ -56,11 +56,11 @@ def calibrate(
         raise InputError(f"{out}: already there; --overwrite replaces it")
     if out is not None and (reason := unwritable(out)):
         raise InputError(f"{out}: expected a file that can be written; {reason}")
-    read, cautions = read_recording(sensors, scans, None, speed=speed, bad_rows=bad_rows, trust=trust)
-    scenario, recording, assumed = read
+    recorded, warnings = read_recording(sensors, scans, None, speed=speed, bad_rows=bad_rows, trust=trust)
+    scenario, recording, assumed = recorded
     with interruptible("nothing was written"):
         problem = problem_of(scenario, position=position)
-        with compiling(), _counting() as progress:
+        with compiling(), _pass_counter() as progress:
             windows = list(calibrate_windows(problem, window or math.inf, progress))
         if out is not None:
             text = calibrated_text(scenario, sensors, windows[-1].calibration, out.parent)
@@ -68,28 +68,28 @@ def calibrate(
     names = scenario.model.sensor_names
     print_windows(windows, names, position=position)
     if out is None:
-        say("Nothing was written. Add --out calibrated.yaml to save the estimates for `vedette track`.")
+        echo("Nothing was written. Add --out calibrated.yaml to save the estimates for `vedette track`.")
     else:
-        say(f"Wrote {out}. Use it with: vedette track {scans} --sensors {out}")
-    converged = all(each.calibration.converged for each in windows)
-    documents = [calibration_document(each.calibration, names) for each in windows]
+        echo(f"Wrote {out}. Use it with: vedette track {scans} --sensors {out}")
+    converged = all(part.calibration.converged for part in windows)
+    documents = [calibration_document(part.calibration, names) for part in windows]
     origin = {
         "assumptions": assumed,
         "skipped": recording.skipped,
-        "warnings": cautions,
+        "warnings": warnings,
         "written": [] if out is None else [out],
     }
     if window is None:
-        publish({**documents[0], **origin})
+        emit_json({**documents[0], **origin})
     else:
-        spans = [{"begin_s": each.begin, "end_s": each.end} for each in windows]
-        publish({"windows": [span | own for span, own in zip(spans, documents, strict=True)], **origin})
+        spans = [{"begin_s": part.begin, "end_s": part.end} for part in windows]
+        emit_json({"windows": [span | document for span, document in zip(spans, documents, strict=True)], **origin})
     if not converged:
         raise typer.Exit(NOT_CONVERGED)
 
 
 @contextmanager
-def _counting() -> Iterator[Callable[[], None]]:
+def _pass_counter() -> Iterator[Callable[[], None]]:
     """Show on a terminal how many times the filter has processed the recording."""
     from rich.progress import Progress, TextColumn, TimeElapsedColumn
 

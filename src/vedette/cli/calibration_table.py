@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from vedette.cli.output import console, note, say
+from vedette.cli.output import console, echo, note
 
 if TYPE_CHECKING:
     from vedette.calibration import Calibration, CalibrationWindow, ParameterEstimate
@@ -43,7 +43,7 @@ def print_windows(windows: list[CalibrationWindow], names: tuple[str, ...], *, p
     """Print the estimates of each window, their reference sensor, warnings and likelihoods."""
     _print_table(windows, names)
     if any(_is_outside(each) for window in windows for each in window.calibration.estimates):
-        say("* the assumed value lies outside the interval")
+        echo("* the assumed value lies outside the interval")
     reasons = [
         f"{each.parameter.label} of {names[each.parameter.sensor]}: {each.reason}"
         for window in windows
@@ -51,7 +51,7 @@ def print_windows(windows: list[CalibrationWindow], names: tuple[str, ...], *, p
         if each.reason
     ]
     for text in dict.fromkeys(reasons):
-        say(text)
+        echo(text)
     _print_references(windows[0].calibration.estimates, names, position)
     for window in windows:
         calibration = window.calibration
@@ -59,7 +59,7 @@ def print_windows(windows: list[CalibrationWindow], names: tuple[str, ...], *, p
         if not calibration.converged:
             note(f"Warning: {part[:1].lower()}{part[1:]}{_NOT_CONVERGED}")
         if any(each.reason for each in calibration.estimates):
-            say(
+            echo(
                 f"{part}The recording determines {calibration.rank} of "
                 f"{len(calibration.estimates)} parameter directions."
             )
@@ -67,7 +67,7 @@ def print_windows(windows: list[CalibrationWindow], names: tuple[str, ...], *, p
             f"{calibration.initial_log_likelihood:.1f} with the assumed values, "
             f"{calibration.log_likelihood:.1f} with the estimates"
         )
-        say(f"{part}Log-likelihood: {values}.")
+        echo(f"{part}Log-likelihood: {values}.")
 
 
 def _print_table(windows: list[CalibrationWindow], names: tuple[str, ...]) -> None:
@@ -76,34 +76,41 @@ def _print_table(windows: list[CalibrationWindow], names: tuple[str, ...]) -> No
 
     several = ["from (s)"] if len(windows) > 1 else []
     table = Table("sensor", "parameter", "unit", *several, "assumed", "estimate", "95 % interval", "", box=None)
-    ends = [_ends(each) for window in windows for each in window.calibration.estimates if not math.isnan(each.ci_low)]
-    low_width, high_width = (max(map(len, side)) for side in zip(*ends, strict=True)) if ends else (0, 0)
-    for same in zip(*(window.calibration.estimates for window in windows), strict=True):
-        for window, each in zip(windows, same, strict=True):
-            own, since = each.parameter, [f"{window.begin:.0f}"] if several else []
-            head = (names[own.sensor], own.label, own.unit, *since, f"{own.start:.4g}")
-            if each.reason:
+    interval_texts = [
+        _interval_ends(estimate)
+        for window in windows
+        for estimate in window.calibration.estimates
+        if not math.isnan(estimate.ci_low)
+    ]
+    low_width, high_width = (
+        (max(map(len, side)) for side in zip(*interval_texts, strict=True)) if interval_texts else (0, 0)
+    )
+    for estimates_of_parameter in zip(*(window.calibration.estimates for window in windows), strict=True):
+        for window, estimate in zip(windows, estimates_of_parameter, strict=True):
+            parameter, since = estimate.parameter, [f"{window.begin:.0f}"] if several else []
+            head = (names[parameter.sensor], parameter.label, parameter.unit, *since, f"{parameter.start:.4g}")
+            if estimate.reason:
                 table.add_row(*head, "not identifiable", "", "")
                 continue
             interval = ""
-            if not math.isnan(each.ci_low):
-                low, high = _ends(each)
+            if not math.isnan(estimate.ci_low):
+                low, high = _interval_ends(estimate)
                 interval = f"{low:>{low_width}} to {high:>{high_width}}"
-            table.add_row(*head, _number(each.value, each), interval, "*" if _is_outside(each) else "")
+            table.add_row(*head, _number(estimate.value, estimate), interval, "*" if _is_outside(estimate) else "")
     table.pad_edge = False
     console().print(table)
 
 
-def _print_references(found: tuple[ParameterEstimate, ...], names: tuple[str, ...], position: bool) -> None:
+def _print_references(estimates: tuple[ParameterEstimate, ...], names: tuple[str, ...], position: bool) -> None:
     """Print the estimates that are relative to those of the first sensor."""
-    first = {each.parameter.component for each in found if each.parameter.sensor == found[0].parameter.sensor}
-    others = {each.parameter.component for each in found if each.parameter.sensor != found[0].parameter.sensor}
-    name = names[found[0].parameter.sensor]
+    first = {each.parameter.component for each in estimates if each.parameter.sensor == estimates[0].parameter.sensor}
+    others = {each.parameter.component for each in estimates if each.parameter.sensor != estimates[0].parameter.sensor}
+    name = names[estimates[0].parameter.sensor]
     if "clock" in others:
-        say(f"Clock offsets are relative to {name}, the first sensor.")
+        echo(f"Clock offsets are relative to {name}, the first sensor.")
     if position or "x" in others - first:
-        what = "Positions and bearings" if position else "Positions"
-        say(f"{what} are relative to {name}, the first sensor{'' if others else ', and there is no other'}.")
+        subject = "Positions and bearings" if position else "Positions"
+        echo(f"{subject} are relative to {name}, the first sensor{'' if others else ', and there is no other'}.")
 
 
 def _is_outside(each: ParameterEstimate) -> bool:
@@ -111,7 +118,7 @@ def _is_outside(each: ParameterEstimate) -> bool:
     return each.parameter.start < each.ci_low or each.parameter.start > each.ci_high
 
 
-def _ends(each: ParameterEstimate) -> tuple[str, str]:
+def _interval_ends(each: ParameterEstimate) -> tuple[str, str]:
     """Return both ends of the interval as text."""
     return _number(each.ci_low, each), _number(each.ci_high, each)
 

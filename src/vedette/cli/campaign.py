@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vedette.cli import completing
-from vedette.cli.errors import named_options, usage_error
+from vedette.cli.errors import option_errors, usage_error
 from vedette.cli.options import Trust, Workers
-from vedette.cli.output import complain, console, note, publish, say
+from vedette.cli.output import console, echo, echo_error, emit_json, note
 from vedette.cli.results import print_failures
-from vedette.cli.running import Approval, compile_if_cold, interruptible
+from vedette.cli.running import CodeTrust, compile_if_cold, interruptible
 from vedette.internal.extras import require_packages
 from vedette.internal.processes import load_ahead
 from vedette.internal.text import pluralise
@@ -84,14 +84,14 @@ def campaign(
 
     gc.freeze()  # before a user's code: loaded objects are not searched for garbage, now or at the end of the process
     gc.enable()
-    resolved = resolve(load_spec(spec), spec.parent, approve=Approval(trust, spec))
+    resolved = resolve(load_spec(spec), spec.parent, approve=CodeTrust(trust, spec))
     if runs is not None:
         resolved = resolved.with_runs(runs)
     if shard is not None:
-        with named_options({"shard": "--shard"}):
+        with option_errors({"shard": "--shard"}):
             resolved = replace(resolved, shard=parse_shard(shard))
     if dry_run:
-        _describe(resolved)
+        _print_plan(resolved)
         return
     folder = out or Path(resolved.default_folder if (shard or slurm) is None else resolved.default_shards)
     if slurm is not None and time is not None:
@@ -100,12 +100,12 @@ def campaign(
         return
     if shard is not None:
         folder = folder / resolved.shard.folder
-    outcome = carry_out(resolved, folder, workers, scheduler, redo_damaged)
+    outcome = run_with_progress(resolved, folder, workers, scheduler, redo_damaged)
     finished = outcome.num_completed + outcome.num_existing
-    say(f"{folder}: {finished} of {resolved.total} runs")
+    echo(f"{folder}: {finished} of {resolved.total} runs")
     place = shlex.quote(str(folder if shard is None else folder.parent))
-    say(f"next: vedette {f'results {place}; vedette report' if shard is None else 'merge'} {place}")
-    publish(
+    echo(f"next: vedette {f'results {place}; vedette report' if shard is None else 'merge'} {place}")
+    emit_json(
         {
             "campaign": resolved.name,
             "folder": folder,
@@ -122,10 +122,10 @@ def _print_job(campaign: Campaign, count: int, time: str, command: list[str]) ->
     from vedette.campaigns.shards import slurm_script
 
     merge = shlex.join(["vedette", "merge", command[4], "--out", campaign.default_folder])
-    with named_options({"time": "--time", "shard": "--slurm"}):
+    with option_errors({"time": "--time", "shard": "--slurm"}):
         script = slurm_script(safe_name(campaign.name), count, time, shlex.join([*command, "--workers=1"]), merge)
-    say(script.rstrip("\n"))
-    publish({"script": script})
+    echo(script.rstrip("\n"))
+    emit_json({"script": script})
 
 
 def load_workers(workers: int) -> None:
@@ -134,7 +134,7 @@ def load_workers(workers: int) -> None:
         load_ahead("vedette.cli")
 
 
-def carry_out(
+def run_with_progress(
     campaign: Campaign, folder: Path, workers: int, scheduler: str | None = None, redo_damaged: bool = False
 ) -> CampaignOutcome:
     """Run a campaign and show its progress; after Ctrl-C, print how to continue."""
@@ -158,36 +158,36 @@ def report_failures(failed: tuple[FailedRun, ...]) -> None:
     """Print the runs that failed, and exit with status 1 if there are any."""
     if not failed:
         return
-    complain(f"failed: {pluralise(len(failed), 'run')}; the same command tries again:")
-    print_failures(failed, complain)
+    echo_error(f"failed: {pluralise(len(failed), 'run')}; the same command tries again:")
+    print_failures(failed, echo_error)
     raise typer.Exit(1)
 
 
-def _describe(campaign: Campaign) -> None:
+def _print_plan(campaign: Campaign) -> None:
     from vedette.scenarios.cautions import cautions
 
     share = f", shard {campaign.shard}" if campaign.shard.count > 1 else ""
-    say(
+    echo(
         f"{campaign.name}{share}: {campaign.total} runs, {campaign.num_runs} of each of {len(campaign.cells)} cells, "
         f"seed {campaign.seed}"
     )
     for field, value in campaign.spec["set"].items():
-        say(f"  set {field} = {value}")
+        echo(f"  set {field} = {value}")
     for variant in campaign.spec["variants"]:
         for field, value in variant["set"].items():
-            say(f"  variant {variant['name']}: {field} = {value}")
+            echo(f"  variant {variant['name']}: {field} = {value}")
     for axis, values in campaign.axes.items():
         compared = " (compared)" if axis == campaign.compare else ""
-        say(f"  {axis}: {', '.join(str(value) for value in values)}{compared}")
-    warned: dict[tuple[str, ...], str] = {}
+        echo(f"  {axis}: {', '.join(str(value) for value in values)}{compared}")
+    cell_of_warnings: dict[tuple[str, ...], str] = {}
     for cell in campaign.cells:
-        say(f"  - {cell.name}")
+        echo(f"  - {cell.name}")
         lines = cautions(cell.scenario)
-        if lines not in warned:  # once for all planners, filters and values with this warning
-            warned[lines] = cell.name
+        if lines not in cell_of_warnings:  # once for all planners, filters and values with this warning
+            cell_of_warnings[lines] = cell.name
             for line in lines:
                 note(f"cell {cell.name}: {line}")
-    publish(
+    emit_json(
         {
             "campaign": campaign.name,
             "seed": campaign.seed,
@@ -195,6 +195,6 @@ def _describe(campaign: Campaign) -> None:
             "runs_of_each_cell": campaign.num_runs,
             "cells": [{"name": cell.name, **cell.settings} for cell in campaign.cells],
             "compared": campaign.compare,
-            "warnings": [{"cell": cell, "lines": lines} for lines, cell in warned.items() if lines],
+            "warnings": [{"cell": cell, "lines": lines} for lines, cell in cell_of_warnings.items() if lines],
         }
     )

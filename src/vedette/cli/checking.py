@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from vedette.cli import completing
-from vedette.cli.output import note, publish, say
-from vedette.cli.scenario_files import warn
+from vedette.cli.output import echo, emit_json, note
+from vedette.cli.scenario_files import print_warnings
 from vedette.errors import InputError, ScenarioError
 
 if TYPE_CHECKING:
@@ -31,18 +31,18 @@ def check(
     """
     from vedette.scenarios.sensors_file import is_sensors_file
 
-    found: list[dict[str, Any]] = []
+    documents: list[dict[str, Any]] = []
     for file in files:
         faults = list[str]()
-        rest: dict[str, Any] = {"kind": "scenario", "summary": None, "warnings": []}
+        document: dict[str, Any] = {"kind": "scenario", "summary": None, "warnings": []}
         try:
-            rest = _check_sensors(file) if is_sensors_file(file) else _check_scenario(file)
+            document = _check_sensors(file) if is_sensors_file(file) else _check_scenario(file)
         except (ScenarioError, InputError) as error:
-            say(str(error), even_if_quiet=True)
+            echo(str(error), even_if_quiet=True)
             faults = error.faults if isinstance(error, ScenarioError) else [str(error)]
-        found.append({"file": file, "valid": not faults, "faults": faults, **rest})
-    publish({"files": found})
-    if not all(each["valid"] for each in found):
+        documents.append({"file": file, "valid": not faults, "faults": faults, **document})
+    emit_json({"files": documents})
+    if not all(each["valid"] for each in documents):
         raise typer.Exit(1)
 
 
@@ -53,11 +53,11 @@ def _check_scenario(file: Path) -> dict[str, Any]:
     from vedette.scenarios.summary import one_line
 
     scenario = load_scenario(file)
-    if lacking := code_faults(scenario):
-        raise ScenarioError(lacking)
+    if faults := code_faults(scenario):
+        raise ScenarioError(faults)
     summary = one_line(scenario)
-    say(f"{file}: valid ({summary})")
-    return {"kind": "scenario", "summary": summary, "warnings": warn(scenario, strategy_cautions(scenario))}
+    echo(f"{file}: valid ({summary})")
+    return {"kind": "scenario", "summary": summary, "warnings": print_warnings(scenario, strategy_cautions(scenario))}
 
 
 def _check_sensors(file: Path) -> dict[str, Any]:
@@ -65,10 +65,10 @@ def _check_sensors(file: Path) -> dict[str, Any]:
     from vedette.scenarios.sensors_file import check_sensors_file
 
     valid = check_sensors_file(file)
-    say(f"{file}: valid sensors file: {valid.summary}")
+    echo(f"{file}: valid sensors file: {valid.summary}")
     if valid.not_given:
-        say(f"  not given, will be assumed: {', '.join(valid.not_given)}")
-    say(f"  use it with: vedette track SCANS --sensors {file}")
+        echo(f"  not given, will be assumed: {', '.join(valid.not_given)}")
+    echo(f"  use it with: vedette track SCANS --sensors {file}")
     return {"kind": "sensors", "summary": valid.summary, "not_given": valid.not_given, "warnings": []}
 
 

@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 # Short form of `vedette.evaluation.tables.header` for a terminal of 80 columns; the caption of the table explains it.
 _SHORT_HEADER = ("loc.", "card.", "difference", "95 %", "won")
 _SHORT_SCORES = ("worst", "difference", "N error", "tracked", "s", "runs")  # of `vedette.campaigns.scores.score_header`
-_LEFT_OUT = ("NEES, 95 %", "Filter steps", "Fusions", "Rewards")  # columns of `vedette.campaigns.leaderboard.header`
+_OMITTED = ("NEES, 95 %", "Filter steps", "Fusions", "Rewards")  # columns of `vedette.campaigns.leaderboard.header`
 _SHORT_STANDINGS = ("more", "95 %", "N error", "NEES", "ms", "lost", "runs")  # short form of the other columns
 _LONGEST_LABEL, _SHORTEST_LABEL = 24, 8
-_MOST_DECISIONS = 6  # number of decision times printed; the tables and the report have all of them
+_MAX_DECISIONS = 6  # number of decision times printed; the tables and the report have all of them
 
 
 def print_comparison(comparison: Comparison, words: Sequence[str] = ()) -> None:
@@ -61,10 +61,10 @@ def _print_decisions(console: Console, comparison: Comparison) -> None:
     labels = elided_apart(comparison.strategies, _LONGEST_LABEL)
     for label, strategy in zip(labels, comparison.strategies, strict=True):
         decisions = decision_rows(comparison, strategy)
-        for when, shares in decisions[:_MOST_DECISIONS]:
+        for when, shares in decisions[:_MAX_DECISIONS]:
             console.print(f"{label} at {when}: {shares}")
-        if len(decisions) > _MOST_DECISIONS:
-            console.print(f"{label}: and at {pluralise(len(decisions) - _MOST_DECISIONS, 'other time')}")
+        if len(decisions) > _MAX_DECISIONS:
+            console.print(f"{label}: and at {pluralise(len(decisions) - _MAX_DECISIONS, 'other time')}")
 
 
 def print_scores(scores: Sequence[StrategyScore], comparison: Comparison) -> None:
@@ -75,8 +75,8 @@ def print_scores(scores: Sequence[StrategyScore], comparison: Comparison) -> Non
     rows = [score_row(score)[1:] for score in scores]
     names = (named_in("OSPA", comparison.unit), *_SHORT_SCORES)
     _print_rows(new_console(), [score.label for score in scores], names, rows)
-    if told := tail_sentence(comparison):
-        new_console().print(told, style="dim")
+    if tails := tail_sentence(comparison):
+        new_console().print(tails, style="dim")
 
 
 def print_standings(table: SceneTable) -> None:
@@ -84,17 +84,17 @@ def print_standings(table: SceneTable) -> None:
     from vedette.campaigns.leaderboard import header, row
     from vedette.evaluation.tail_summary import tail_header, tail_text
 
-    names, rows = header(table), [row(table, own) for own in table.standings]
-    left_out = (*_LEFT_OUT, *tail_header(table.unit))
-    shown = [place for place, name in enumerate(names) if place and name not in left_out]
+    names, rows = header(table), [row(table, standing) for standing in table.standings]
+    left_out = (*_OMITTED, *tail_header(table.unit))
+    columns = [column for column, name in enumerate(names) if column and name not in left_out]
     new_console().print(f"{table.scene.name}: {table.scene.about}")
-    numbers = [tuple(each[place] for place in shown) for each in rows]
+    numbers = [tuple(each[column] for column in columns) for each in rows]
     _print_rows(new_console(), [each[0] for each in rows], (names[1], *_SHORT_STANDINGS), numbers)
-    told = tail_text({own.label: own.tail for own in table.standings}, table.unit)
-    new_console().print(told, style="dim")
-    for own in table.standings:
-        if own.reason:
-            new_console().print(f"lost, {own.label}: {own.reason}", soft_wrap=True)
+    tails = tail_text({standing.label: standing.tail for standing in table.standings}, table.unit)
+    new_console().print(tails, style="dim")
+    for standing in table.standings:
+        if standing.reason:
+            new_console().print(f"lost, {standing.label}: {standing.reason}", soft_wrap=True)
 
 
 def _print_rows(
@@ -103,11 +103,11 @@ def _print_rows(
     labels = elided_apart(strategies, _LONGEST_LABEL)
     longest = max(map(cell_len, labels))
     gap = 2 if _width(names, numbers, 2) + longest <= console.width else 1
-    room = console.width - _width(names, numbers, gap)
-    if room < min(_SHORTEST_LABEL, longest):
+    label_width = console.width - _width(names, numbers, gap)
+    if label_width < min(_SHORTEST_LABEL, longest):
         _print_lines(console, labels, names, numbers)
     else:
-        _print_table(console, elided_apart(strategies, min(room, _LONGEST_LABEL)), names, numbers, gap)
+        _print_table(console, elided_apart(strategies, min(label_width, _LONGEST_LABEL)), names, numbers, gap)
 
 
 def _width(names: tuple[str, ...], numbers: list[tuple[str, ...]], gap: int) -> int:

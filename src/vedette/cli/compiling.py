@@ -19,25 +19,25 @@ def compiling() -> Iterator[None]:
     """Show the progress of compilation inside the context; show nothing if all kernels are compiled."""
     from vedette.kernels.base.compile_progress import watched
 
-    shown = _CompileProgress()
+    progress = _CompileProgress()
     try:
-        with watched(shown):
+        with watched(progress):
             yield
     finally:
-        shown.close()
+        progress.close()
 
 
 class _CompileProgress:
     """Progress display that is called for every compiled function and starts with the first."""
 
     def __init__(self) -> None:
-        self._began: float | None = None
+        self._started: float | None = None
         self._kernels = self._functions = 0
         self._now: CompileProgress | None = None
 
     def __call__(self, state: CompileProgress | None) -> None:
         """Update the display; see `vedette.kernels.base.compile_progress.watched`."""
-        if self._began is None:
+        if self._started is None:
             self._begin()
         if state is None:
             self._kernels += self._now is not None
@@ -47,10 +47,10 @@ class _CompileProgress:
 
     def close(self) -> None:
         """Replace the display by one line with the number of kernels and the time."""
-        if self._began is None:
+        if self._started is None:
             return
         self._line.stop()
-        seconds = time.monotonic() - self._began
+        seconds = time.monotonic() - self._started
         self._console.print(f"compiled {pluralise(self._kernels, 'kernel')} in {seconds:.0f} s", soft_wrap=True)
 
     def _begin(self) -> None:
@@ -58,7 +58,7 @@ class _CompileProgress:
 
         from vedette.kernels.base.cache_paths import cache_directory
 
-        self._began = time.monotonic()
+        self._started = time.monotonic()
         self._console = console(stderr=True)
         where = f"kept in {cache_directory()}"
         self._console.print(f"compiling kernels for this machine: once, a minute or two, {where}", soft_wrap=True)
@@ -76,5 +76,5 @@ class _CompileProgress:
         done = f"{pluralise(self._kernels, 'kernel')} done"
         if self._now is None:
             return done
-        far = f"{self._now.num_done} of {pluralise(self._now.num_functions, 'function')}"
-        return f"{done}, {self._now.name}: {far}"
+        progress = f"{self._now.num_done} of {pluralise(self._now.num_functions, 'function')}"
+        return f"{done}, {self._now.name}: {progress}"

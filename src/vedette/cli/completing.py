@@ -16,43 +16,43 @@ Completion = Callable[[str], list[str]]
 
 def scenarios(incomplete: str) -> list[str]:
     """Return matching built-in scenarios and scenario files."""
-    return _beginning(incomplete, _names("scenarios", "yaml")) + _files(incomplete, (".yaml", ".yml"))
+    return _matching(incomplete, _builtin_names("scenarios", "yaml")) + _files(incomplete, (".yaml", ".yml"))
 
 
 def built_in_scenarios(incomplete: str) -> list[str]:
     """Return matching built-in scenarios."""
-    return _beginning(incomplete, _names("scenarios", "yaml"))
+    return _matching(incomplete, _builtin_names("scenarios", "yaml"))
 
 
 def campaigns(incomplete: str) -> list[str]:
     """Return matching built-in campaigns and campaign files."""
-    return _beginning(incomplete, _names("campaigns", "toml")) + _files(incomplete, (".toml",))
+    return _matching(incomplete, _builtin_names("campaigns", "toml")) + _files(incomplete, (".toml",))
 
 
 def reproducible(incomplete: str) -> list[str]:
     """Return matching arguments of `vedette reproduce`."""
-    return _beginning(incomplete, _names("campaigns", "toml")) + scenarios(incomplete)
+    return _matching(incomplete, _builtin_names("campaigns", "toml")) + scenarios(incomplete)
 
 
 def strategies(context: typer.Context, incomplete: str) -> list[str]:
     """Return matching strategies, including those of the scenario or yardstick that the command line names."""
-    return _beginning(incomplete, _strategies(_first(context)))
+    return _matching(incomplete, _strategies(_first_argument(context)))
 
 
 def lists_of_strategies(context: typer.Context, incomplete: str) -> list[str]:
     """Return completions of the last strategy in a list separated by commas."""
     before, comma, last = incomplete.rpartition(",")
-    given = before.split(",")
-    names = (name for name in _strategies(_first(context)) if name not in given)
-    return [f"{before}{comma}{name}" for name in _beginning(last, names)]
+    chosen = before.split(",")
+    names = (name for name in _strategies(_first_argument(context)) if name not in chosen)
+    return [f"{before}{comma}{name}" for name in _matching(last, names)]
 
 
 def one_of(*names: str) -> Completion:
     """Return a function that completes these names."""
-    return lambda incomplete: _beginning(incomplete, names)
+    return lambda incomplete: _matching(incomplete, names)
 
 
-def _first(context: typer.Context) -> str | None:
+def _first_argument(context: typer.Context) -> str | None:
     """Return the first argument on the command line, which may be incomplete and not parsed yet; None without one."""
     return next((each for each in context.args if not each.startswith("-")), None)
 
@@ -68,11 +68,11 @@ def _strategies(scenario: str | None) -> tuple[str, ...]:
         return tuple(STRATEGIES)
 
 
-def _names(room: str, ending: str) -> list[str]:
-    return sorted(file.stem for file in (_PACKAGE / room / "builtin").glob(f"*.{ending}"))
+def _builtin_names(package: str, ending: str) -> list[str]:
+    return sorted(file.stem for file in (_PACKAGE / package / "builtin").glob(f"*.{ending}"))
 
 
-def _beginning(start: str, names: Iterable[str]) -> list[str]:
+def _matching(start: str, names: Iterable[str]) -> list[str]:
     return [name for name in names if name.startswith(start)]
 
 
@@ -80,10 +80,12 @@ def _files(start: str, endings: tuple[str, ...]) -> list[str]:
     """Return the folders, and files with these endings, whose paths begin with `start`."""
     folder, name = start[: start.rfind("/") + 1], start[start.rfind("/") + 1 :]
     try:
-        found = sorted(Path(folder or ".").iterdir())
+        paths = sorted(Path(folder or ".").iterdir())
     except (OSError, ValueError):
         return []
-    shown = [path for path in found if path.name.startswith(name) and (name or not path.name.startswith("."))]
+    matching = [path for path in paths if path.name.startswith(name) and (name or not path.name.startswith("."))]
     return [
-        f"{folder}{path.name}{'/' * path.is_dir()}" for path in shown if path.is_dir() or path.suffix.lower() in endings
+        f"{folder}{path.name}{'/' * path.is_dir()}"
+        for path in matching
+        if path.is_dir() or path.suffix.lower() in endings
     ]

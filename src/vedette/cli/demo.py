@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from vedette.cli.campaign import carry_out, load_workers, report_failures
+from vedette.cli.campaign import load_workers, report_failures, run_with_progress
 from vedette.cli.completing import lists_of_strategies, scenarios
 from vedette.cli.documents import results_document
 from vedette.cli.options import Seed, Trust, Workers
-from vedette.cli.output import console, publish, say
-from vedette.cli.reproducing import compared
-from vedette.cli.running import Approval, interruptible
+from vedette.cli.output import console, echo, emit_json
+from vedette.cli.reproducing import comparison_spec
+from vedette.cli.running import CodeTrust, interruptible
 from vedette.internal.extras import require_packages
 from vedette.internal.text import named_in, pluralise
 
@@ -50,8 +50,8 @@ def demo(
     from vedette.campaigns import open_results, resolve
     from vedette.reports import write_demo
 
-    campaign = resolve(compared(scenario, planners, 1, seed, "demo"), approve=Approval(trust))
-    outcome = carry_out(campaign, out, workers)
+    campaign = resolve(comparison_spec(scenario, planners, 1, seed, "demo"), approve=CodeTrust(trust))
+    outcome = run_with_progress(campaign, out, workers)
     opened = open_results(out)
     groups = opened.comparisons()
     for group in groups:
@@ -59,9 +59,9 @@ def demo(
     with interruptible(f"{out} keeps every run; the same command writes the page"):
         page = write_demo(opened, out / "demo.html", trust=True)  # the code that it names has just run
     is_open = open_ and _has_windows() and webbrowser.open(page.resolve().as_uri())
-    say(f"Wrote {page} and opened it in your browser." if is_open else f"Wrote {page}. Open it in a browser.")
-    say(f"One run proves nothing; compare 30 runs with: vedette reproduce {scenario}")
-    publish({**results_document(opened, groups), "page": page})
+    echo(f"Wrote {page} and opened it in your browser." if is_open else f"Wrote {page}. Open it in a browser.")
+    echo(f"One run proves nothing; compare 30 runs with: vedette reproduce {scenario}")
+    emit_json({**results_document(opened, groups), "page": page})
     report_failures(outcome.failed)
 
 

@@ -14,27 +14,27 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-from vedette.cli.output import accept_any_letter, complain, drop_output, trouble_of_system
+from vedette.cli.output import discard_output, echo_error, replace_unencodable, system_error_message
 from vedette.errors import InputError, VedetteError
 from vedette.internal.text import shown
 
 INTERRUPTED = 130
 
 
-class Commands(TyperGroup):
+class CommandGroup(TyperGroup):
     """Group of all commands; it prints the library's own errors instead of raising them."""
 
     def main(self, *args: Any, **options: Any) -> Any:
         """Run the program, with an output that can print every character."""
-        accept_any_letter()
+        replace_unencodable()
         return super().main(*args, **options)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write the summaries of the commands, group by group."""
         groups: dict[str | None, list[tuple[str, str]]] = {}
-        longest = max(map(len, self.commands))
+        width = max(map(len, self.commands))
         for name, command in self.commands.items():
-            row = name.ljust(longest), command.get_short_help_str(limit=formatter.width)
+            row = name.ljust(width), command.get_short_help_str(limit=formatter.width)
             groups.setdefault(getattr(command, "rich_help_panel", None), []).append(row)
         for title, rows in groups.items():
             with formatter.section(title):
@@ -47,28 +47,28 @@ class Commands(TyperGroup):
             sys.stdout.flush()  # here, where a fault can still be reported as a message
             return result
         except typer.BadParameter as error:
-            error.message = _with_value(error)
+            error.message = _message_with_value(error)
             raise
         except VedetteError as error:
-            complain(str(error))
+            echo_error(str(error))
             raise typer.Exit(1) from None
         except OSError as error:
-            text = trouble_of_system(error)
-            drop_output()
+            text = system_error_message(error)
+            discard_output()
             if text:
-                complain(text)
+                echo_error(text)
             raise typer.Exit(1) from None
         except KeyboardInterrupt:  # in a command that reports nothing about its partial results
             typer.echo("\ninterrupted", err=True)
             raise typer.Exit(INTERRUPTED) from None
 
 
-def _with_value(error: typer.BadParameter) -> str:
+def _message_with_value(error: typer.BadParameter) -> str:
     """Return the message of an error; the given value is added to a message of pydantic, which lacks it."""
-    said = getattr(error.__cause__, "errors", None)
-    if said is None:
+    pydantic_errors = getattr(error.__cause__, "errors", None)
+    if pydantic_errors is None:
         return error.message
-    first = said()[0]
+    first = pydantic_errors()[0]
     return f"{first['msg'].replace('Input should be', 'expected', 1)}; got {shown(first['input'])}"
 
 
@@ -84,7 +84,7 @@ def check_ending(path: Path | None, option: str, *endings: str) -> None:
 
 
 @contextmanager
-def named_options(options: Mapping[str, str]) -> Iterator[None]:
+def option_errors(options: Mapping[str, str]) -> Iterator[None]:
     """Replace the names of the library's arguments in errors by the options that set them."""
     try:
         yield

@@ -16,9 +16,9 @@ from vedette.cli.compiling import compiling
 from vedette.cli.completing import strategies
 from vedette.cli.errors import usage_error
 from vedette.cli.options import Seed, Speed, Trust
-from vedette.cli.output import note, publish, say
-from vedette.cli.running import Approval, check_planner, compile_if_cold, interruptible
-from vedette.cli.scenario_files import warn
+from vedette.cli.output import echo, emit_json, note
+from vedette.cli.running import CodeTrust, check_planner, compile_if_cold, interruptible
+from vedette.cli.scenario_files import print_warnings
 from vedette.internal.extras import require_packages
 
 if TYPE_CHECKING:
@@ -119,42 +119,42 @@ def live(
     from vedette.live.serving import check_address
     from vedette.scenarios.of_recording import scenario_of_sensors
 
-    places = [_place(each) for each in listen or ["stdin"]]
-    for place in places:
-        if place.kind != "stdin":
-            check_address(place.host, token)
-    if any(place.kind == "ws" for place in places):
+    sources = [_parse_source(address) for address in listen or ["stdin"]]
+    for source in sources:
+        if source.kind != "stdin":
+            check_address(source.host, token)
+    if any(source.kind == "ws" for source in sources):
         require_packages("vedette live --listen ws://", "websockets", "jinja2", "matplotlib", "pyarrow")
-    known = scenario_of_sensors(sensors, speed=speed, decide_every=decide_every, plan_within=planning_timeout)
-    check_planner(known.scenario, planner, "--planner")
-    Approval(trust)(known.scenario)
-    warn(known.scenario)
-    note_assumptions(known.assumed, sensors)
-    loop = live_of(known, planner, window=max_delay, ahead=max_lead, decide_every=decide_every, seed=seed)
+    live_scenario = scenario_of_sensors(sensors, speed=speed, decide_every=decide_every, plan_within=planning_timeout)
+    check_planner(live_scenario.scenario, planner, "--planner")
+    CodeTrust(trust)(live_scenario.scenario)
+    print_warnings(live_scenario.scenario)
+    note_assumptions(live_scenario.assumed, sensors)
+    loop = live_of(live_scenario, planner, window=max_delay, ahead=max_lead, decide_every=decide_every, seed=seed)
     screen = None
-    if any(place.kind == "ws" for place in places):
+    if any(source.kind == "ws" for source in sources):
         from vedette.reports.live import LiveScreen
 
-        screen = LiveScreen(known.scenario, loop, lambda: keeping.state)
+        screen = LiveScreen(live_scenario.scenario, loop, lambda: keeping.state)
         loop = screen.live
     options = (max_delay, max_lead, speed, planner if loop.planner else "", decide_every, planning_timeout, seed)
-    of = hashlib.sha256(repr(options).encode() + sensors.read_bytes()).hexdigest()
+    identity = hashlib.sha256(repr(options).encode() + sensors.read_bytes()).hexdigest()
     import asyncio
 
     with interruptible("what came is kept where --snapshot or --record say so"):
-        compile_if_cold(known.scenario)
-        keeping = Keeping(loop, of=of, snapshot=snapshot, every=snapshot_interval, record=record, tell=note)
+        compile_if_cold(live_scenario.scenario)
+        keeping = Keeping(loop, of=identity, snapshot=snapshot, every=snapshot_interval, record=record, tell=note)
         try:
             with compiling():
                 for answers in keeping.resume():
-                    _say(answers)
-                asyncio.run(_listen(keeping, screen, places, token))
+                    _print_answers(answers)
+                asyncio.run(_listen(keeping, screen, sources, token))
         finally:
             keeping.close()
-    publish(_document(keeping))
+    emit_json(_document(keeping))
 
 
-class _Place(NamedTuple):
+class _Source(NamedTuple):
     """A source of lines: stdin, tcp or ws, with its address."""
 
     kind: str
@@ -162,24 +162,24 @@ class _Place(NamedTuple):
     port: int = 0
 
 
-def _place(listen: str) -> _Place:
+def _parse_source(listen: str) -> _Source:
     if listen == "stdin":
-        return _Place(listen)
+        return _Source(listen)
     kind, _, address = listen.rpartition("://")
     host, _, port = address.rstrip("/").rpartition(":")
     if kind not in ("tcp", "ws") or not host or not port.isdecimal() or int(port) > 65535:
         raise usage_error(f"expected stdin, tcp://HOST:PORT or ws://HOST:PORT; got {listen!r}", "--listen")
-    return _Place(kind, host.strip("[]"), int(port))
+    return _Source(kind, host.strip("[]"), int(port))
 
 
-def _say(answers: Iterable[dict[str, Any]]) -> None:
+def _print_answers(answers: Iterable[dict[str, Any]]) -> None:
     from vedette.live import encoded
 
     for answer in answers:
-        say(encoded(answer).decode(), nl=False)
+        echo(encoded(answer).decode(), nl=False)
 
 
-async def _listen(keeping: Keeping, screen: LiveScreen | None, places: Sequence[_Place], token: str | None) -> None:
+async def _listen(keeping: Keeping, screen: LiveScreen | None, sources: Sequence[_Source], token: str | None) -> None:
     """Process lines until standard input ends, or until Ctrl-C if there are clients; do not wait for them."""
     import asyncio
 
@@ -187,30 +187,33 @@ async def _listen(keeping: Keeping, screen: LiveScreen | None, places: Sequence[
 
     def take(line: bytes) -> Iterable[dict[str, Any]]:
         answers = keeping.take(line)
-        _say(answers)
+        _print_answers(answers)
         if screen is not None:
             screen.note(answers)
         return answers
 
     exchange = Exchange(take, token, note)
     async with contextlib.AsyncExitStack() as servers:
-        for place in places:
-            if place.kind == "tcp":
-                server: Any = await TcpServer(exchange).listen(place.host, place.port)
-            elif screen is not None and place.kind == "ws":
+        for source in sources:
+            if source.kind == "tcp":
+                server: Any = await TcpServer(exchange).listen(source.host, source.port)
+            elif screen is not None and source.kind == "ws":
                 from vedette.live.web import WebServer
 
-                server = await WebServer(exchange, screen, place.host).listen(place.port)
+                server = await WebServer(exchange, screen, source.host).listen(source.port)
             else:
                 continue
             servers.callback(server.close)
             host, port = server.sockets[0].getsockname()[:2]
-            at = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
-            note(f"listens on {place.kind}://{at}" + (f"; the page is http://{at}/" if place.kind == "ws" else ""))
-        if any(place.kind == "stdin" for place in places):
+            address = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+            note(
+                f"listens on {source.kind}://{address}"
+                + (f"; the page is http://{address}/" if source.kind == "ws" else "")
+            )
+        if any(source.kind == "stdin" for source in sources):
             async for line in lines_of(sys.stdin.buffer):
                 await exchange.answer(line, None)
-        if any(place.kind != "stdin" for place in places):
+        if any(source.kind != "stdin" for source in sources):
             await asyncio.Event().wait()
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from vedette.cli.output import complain, publish, say
+from vedette.cli.output import echo, echo_error, emit_json
 from vedette.cli.running import interruptible
 from vedette.internal.extras import require_packages
 from vedette.internal.text import pluralise
@@ -16,7 +16,7 @@ from vedette.internal.text import pluralise
 if TYPE_CHECKING:
     from vedette.campaigns import MergeResult
 
-_SHOWN_COMMANDS = 3
+_MAX_SHOWN_COMMANDS = 3
 
 
 def merge(
@@ -40,9 +40,9 @@ def merge(
     results = merged.results
     campaign = results.campaign
     finished = campaign.total - merged.num_missing
-    say(f"{results.folder}: {finished} of {campaign.total} runs, {merged.num_added} of them new")
+    echo(f"{results.folder}: {finished} of {campaign.total} runs, {merged.num_added} of them new")
     commands = _commands(merged)
-    publish(
+    emit_json(
         {
             "campaign": campaign.name,
             "folder": results.folder,
@@ -54,13 +54,15 @@ def merge(
     )
     if not commands:
         place = shlex.quote(str(results.folder))
-        say(f"next: vedette results {place}; vedette report {place}")
+        echo(f"next: vedette results {place}; vedette report {place}")
         return
-    complain(f"missing: {pluralise(merged.num_missing, 'run')}, which these run (SPEC: the campaign's file):")
-    for command in commands[:_SHOWN_COMMANDS]:
-        complain(f"  {command}")
-    if len(commands) > _SHOWN_COMMANDS:
-        complain(f"  and so on, {len(commands)} shards; as a job array: sbatch --array={ranges(merged.missing)} SCRIPT")
+    echo_error(f"missing: {pluralise(merged.num_missing, 'run')}, which these run (SPEC: the campaign's file):")
+    for command in commands[:_MAX_SHOWN_COMMANDS]:
+        echo_error(f"  {command}")
+    if len(commands) > _MAX_SHOWN_COMMANDS:
+        echo_error(
+            f"  and so on, {len(commands)} shards; as a job array: sbatch --array={ranges(merged.missing)} SCRIPT"
+        )
     raise typer.Exit(1)
 
 

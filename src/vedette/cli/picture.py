@@ -78,9 +78,9 @@ def _draw_births(axes: Axes, scenario: Scenario, scale: float) -> None:
     """Draw a cross at each site and the ellipse of two standard deviations."""
     birth = scenario.model.birth.build(scenario.model.motion, scenario.model.region)
     for mean, cov in zip(birth.means[:, :2], birth.covs[:, :2, :2], strict=True):
-        variances, axes_of = np.linalg.eigh(cov)
+        variances, principal_axes = np.linalg.eigh(cov)
         width, height = 4.0 * np.sqrt(variances) * scale
-        angle = float(np.degrees(np.arctan2(axes_of[1, 0], axes_of[0, 0])))
+        angle = float(np.degrees(np.arctan2(principal_axes[1, 0], principal_axes[0, 0])))
         centre = (float(mean[0] * scale), float(mean[1] * scale))
         axes.add_patch(Ellipse(centre, width, height, angle=angle, facecolor=INK, alpha=0.15, linewidth=0, zorder=1))
         axes.plot(*centre, marker="+", color=INK, markersize=9, markeredgewidth=0.8, zorder=2)
@@ -98,8 +98,8 @@ def _draw_tracks(axes: Axes, truth: Truth, scale: float) -> None:
 def _draw_sensors(axes: Axes, scenario: Scenario, truth: Truth, bounds: Floats, scale: float) -> None:
     model = scenario.model
     places = np.array([sensor.position for sensor in model.sensors])
-    stands = place_names(model.sensor_names, places, bounds, truth.states[:, :2])
-    for name, sensor, stand in zip(model.sensor_names, model.sensors, stands, strict=True):
+    name_places = place_names(model.sensor_names, places, bounds, truth.states[:, :2])
+    for name, sensor, name_place in zip(model.sensor_names, model.sensors, name_places, strict=True):
         place = (sensor.position[0] * scale, sensor.position[1] * scale)
         if sensor.platform.top_speed > 0.0:
             _draw_heading(axes, place, np.radians(sensor.heading_deg))
@@ -107,15 +107,15 @@ def _draw_sensors(axes: Axes, scenario: Scenario, truth: Truth, bounds: Floats, 
         if field is not None:
             draw_field(axes, place, field, scale)
         axes.plot(*place, marker="s", markersize=6, color=INK, zorder=5)
-        paper = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
-        style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7, "zorder": 4.5, "bbox": paper}
-        axes.annotate(drawn_text(name), place, **stand.arguments, **style)
+        background = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
+        style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7, "zorder": 4.5, "bbox": background}
+        axes.annotate(drawn_text(name), place, **name_place.arguments, **style)
 
 
 def _draw_heading(axes: Axes, place: tuple[float, float], heading: float) -> None:
-    ahead = (14.0 * float(np.cos(heading)), 14.0 * float(np.sin(heading)))
+    arrow_start = (14.0 * float(np.cos(heading)), 14.0 * float(np.sin(heading)))
     arrow = {"arrowstyle": "<|-", "color": INK, "linewidth": 0.9, "shrinkA": 0, "shrinkB": 0}
-    axes.annotate("", place, xytext=ahead, textcoords="offset points", arrowprops=arrow, zorder=4)
+    axes.annotate("", place, xytext=arrow_start, textcoords="offset points", arrowprops=arrow, zorder=4)
 
 
 def _legend(scenario: Scenario) -> list[Line2D | Patch]:

@@ -14,6 +14,6 @@ def bar(what: str, total: int | None = None) -> Iterator[Callable[..., None]]:
     from rich.progress import Progress
 
     screen = console(stderr=True)
-    with Progress(console=screen, disable=not screen.is_terminal, transient=True) as shown:
-        task = shown.add_task(what, total=total)
-        yield lambda done, of=total: shown.update(task, completed=done, total=of)
+    with Progress(console=screen, disable=not screen.is_terminal, transient=True) as progress:
+        task = progress.add_task(what, total=total)
+        yield lambda done, new_total=total: progress.update(task, completed=done, total=new_total)

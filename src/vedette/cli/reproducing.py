@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from vedette.cli.campaign import carry_out, load_workers, report_failures
+from vedette.cli.campaign import load_workers, report_failures, run_with_progress
 from vedette.cli.comparisons import print_scores
 from vedette.cli.completing import lists_of_strategies, reproducible
 from vedette.cli.documents import results_document
 from vedette.cli.errors import usage_error
 from vedette.cli.options import Seed, Trust, Workers
-from vedette.cli.output import console, note, print_names, publish, say
+from vedette.cli.output import console, echo, emit_json, note, print_names
 from vedette.cli.results import print_progress, print_results
-from vedette.cli.running import Approval, check_planner, interruptible
+from vedette.cli.running import CodeTrust, check_planner, interruptible
 from vedette.cli.scenario_files import write_text
 from vedette.internal.extras import require_packages
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from vedette.campaigns.published import CheckedClaim, PublishedComparison
     from vedette.campaigns.results import GroupComparison
 
-YARDSTICK = "yardstick.md"
+PUBLISHED_PAGE = "yardstick.md"
 _RUNS = 30
 _STRATEGIES = ("jdm", "idm", "assigned", "random")
 _FOLDER = "reproduction"
@@ -71,39 +71,45 @@ def reproduce(
     from vedette.campaigns import open_results, resolve
     from vedette.campaigns.published import published_comparisons
 
-    known = published_comparisons()
+    comparisons = published_comparisons()
     if list_:
-        _list(known)
+        _print_list(comparisons)
         return
-    yardstick = known.get(name)
-    spec = compared(name, planners, runs, seed) if yardstick is None else _changed(yardstick.spec, planners, runs, seed)
-    campaign = resolve(spec, approve=Approval(trust))
-    folder = out or Path(_FOLDER if yardstick is None else campaign.default_folder)
-    outcome = carry_out(campaign, folder, workers)
+    published = comparisons.get(name)
+    spec = (
+        comparison_spec(name, planners, runs, seed)
+        if published is None
+        else _with_options(published.spec, planners, runs, seed)
+    )
+    campaign = resolve(spec, approve=CodeTrust(trust))
+    folder = out or Path(_FOLDER if published is None else campaign.default_folder)
+    outcome = run_with_progress(campaign, folder, workers)
     opened = open_results(folder)
     groups = opened.comparisons()
-    beside = yardstick if yardstick is not None and not yardstick.claims else None
-    if beside is None:
+    compared_with = published if published is not None and not published.claims else None
+    if compared_with is None:
         print_results(opened, groups)
     else:
-        _print_beside_published(opened, groups, beside)
-    claims = () if yardstick is None else _checked(yardstick, groups)
-    if yardstick is not None:
+        _print_with_published(opened, groups, compared_with)
+    claims = () if published is None else _check_claims(published, groups)
+    if published is not None:
         _print_claims(claims)
-        _print_provenance(yardstick)
-    if beside is not None:
+        _print_provenance(published)
+    if compared_with is not None:
         print_progress(opened)
-    page = _write(opened, beside, folder)
+    page = _write(opened, compared_with, folder)
     document = {
-        "published": [asdict(score) for score in (() if yardstick is None else yardstick.published)],
+        "published": [asdict(score) for score in (() if published is None else published.published)],
         "claims": [claim._asdict() for claim in claims],
         "report": page,
     }
-    publish({**results_document(opened, groups), **document})
+    emit_json({**results_document(opened, groups), **document})
     report_failures(outcome.failed)
 
 
-def compared(scenario: str, planners: str | None, runs: int | None, seed: int, name: str = _FOLDER) -> CampaignSpec:
+def comparison_spec(
+    scenario: str, planners: str | None, runs: int | None, seed: int, name: str = _FOLDER
+) -> CampaignSpec:
     """Return the campaign of strategies on one scenario from the command line; raise `VedetteError` without one."""
     from vedette.campaigns import CampaignSpec
     from vedette.campaigns.published import published_comparisons
@@ -116,10 +122,10 @@ def compared(scenario: str, planners: str | None, runs: int | None, seed: int, n
     for strategy in _names(planners) or ():
         check_planner(loaded, strategy, "--planners")
     spec = CampaignSpec(name=name, scenarios=(scenario,), planners=_STRATEGIES, runs=_RUNS, compare="planner")
-    return _changed(spec, planners, runs, seed)
+    return _with_options(spec, planners, runs, seed)
 
 
-def _changed(spec: CampaignSpec, planners: str | None, runs: int | None, seed: int) -> CampaignSpec:
+def _with_options(spec: CampaignSpec, planners: str | None, runs: int | None, seed: int) -> CampaignSpec:
     """Return the campaign with the values from the command line."""
     names = _names(planners)
     if names is not None and len(set(names)) != len(names):
@@ -131,57 +137,57 @@ def _names(planners: str | None) -> tuple[str, ...] | None:
     return None if planners is None else tuple(name.strip() for name in planners.split(","))
 
 
-def _list(known: dict[str, PublishedComparison]) -> None:
-    titles = {name: yardstick.title for name, yardstick in known.items()}
+def _print_list(comparisons: dict[str, PublishedComparison]) -> None:
+    titles = {name: published.title for name, published in comparisons.items()}
     print_names(titles)
-    publish([{"name": name, "title": title} for name, title in titles.items()])
+    emit_json([{"name": name, "title": title} for name, title in titles.items()])
 
 
-def _print_beside_published(
-    opened: CampaignResults, groups: Sequence[GroupComparison], yardstick: PublishedComparison
+def _print_with_published(
+    opened: CampaignResults, groups: Sequence[GroupComparison], published: PublishedComparison
 ) -> None:
     from vedette.campaigns.scores import score_strategies
 
     for group in groups:
         if title := opened.title(group):
-            say(f"{title}:")
-        print_scores((*score_strategies(group), *yardstick.published), group.comparison)
-        say("")
+            echo(f"{title}:")
+        print_scores((*score_strategies(group), *published.published), group.comparison)
+        echo("")
 
 
-def _print_provenance(yardstick: PublishedComparison) -> None:
+def _print_provenance(published: PublishedComparison) -> None:
     from vedette.campaigns.published import provenance
 
-    for line in provenance(yardstick):
+    for line in provenance(published):
         console().print(line, style="dim")
 
 
-def _checked(yardstick: PublishedComparison, groups: Sequence[GroupComparison]) -> tuple[CheckedClaim, ...]:
+def _check_claims(published: PublishedComparison, groups: Sequence[GroupComparison]) -> tuple[CheckedClaim, ...]:
     from vedette.campaigns.published import checked_claims
 
-    return tuple(claim for group in groups for claim in checked_claims(yardstick, group.comparison))
+    return tuple(claim for group in groups for claim in checked_claims(published, group.comparison))
 
 
 def _print_claims(claims: Sequence[CheckedClaim]) -> None:
     if claims:
-        say("")
-        say("Published claims:")
+        echo("")
+        echo("Published claims:")
     for claim in claims:
-        say(f"  {claim.outcome}: {claim.claim} ({claim.evidence})")
+        echo(f"  {claim.outcome}: {claim.claim} ({claim.evidence})")
 
 
-def _write(opened: CampaignResults, yardstick: PublishedComparison | None, folder: Path) -> Path:
+def _write(opened: CampaignResults, published: PublishedComparison | None, folder: Path) -> Path:
     """Write the report, and tables and figures next to it."""
     from vedette.campaigns.published import published_markdown
     from vedette.reports import write_figures, write_report, write_summary
 
     with interruptible(f"{folder} keeps every run; the same command writes the report"):
         note("drawing the report ...")
-        if yardstick is None:
+        if published is None:
             write_summary(opened, folder)
             write_figures(opened, folder / "figures")
         else:  # with a decision at every scan there would be hundreds of figures: `vedette report --figures`
-            write_text(folder / YARDSTICK, published_markdown(opened, yardstick))
+            write_text(folder / PUBLISHED_PAGE, published_markdown(opened, published))
         write_report(opened, page := folder / "report.html", trust=True)  # the code that it names has just run
-    say(f"Wrote {folder}. Open {page} in a browser.")
+    echo(f"Wrote {folder}. Open {page} in a browser.")
     return page

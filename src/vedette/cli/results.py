@@ -11,9 +11,9 @@ import typer
 from vedette.cli.comparisons import print_comparison
 from vedette.cli.completing import one_of
 from vedette.cli.documents import results_document, run_document
-from vedette.cli.errors import check_ending, named_options, usage_error
+from vedette.cli.errors import check_ending, option_errors, usage_error
 from vedette.cli.options import ResultsFolder
-from vedette.cli.output import note, publish, say
+from vedette.cli.output import echo, emit_json, note
 from vedette.cli.run_summary import print_run
 from vedette.cli.running import interruptible
 from vedette.errors import VedetteError
@@ -53,63 +53,63 @@ def report(
     require_packages("vedette report", "jinja2", "matplotlib", "pyarrow")
     from vedette.simulation.storage import holds_run
 
-    replays = None if runs is None else [_cell_and_run(text) for text in runs.split(",")]
+    replays = None if runs is None else [_parse_cell_and_run(text) for text in runs.split(",")]
     is_run = holds_run(folder)
     if is_run and runs is not None:
         raise usage_error(f"expected of a campaign; {folder} holds a single run", "--runs")
     page = out or folder / "report.html"
     with interruptible("what is not yet written is missing; the same command writes it all anew"):
-        written, unmeasured = (
+        written, untrusted_code = (
             _report_run(folder, page, figures, trust)
             if is_run
             else _report_campaign(folder, page, figures, replays, trust)
         )
-    publish({"page": page, "figures": written, "without_measurements_of": unmeasured})
+    emit_json({"page": page, "figures": written, "without_measurements_of": untrusted_code})
 
 
-Reported = tuple[Sequence[Path], Sequence[str]]
+WrittenReport = tuple[Sequence[Path], Sequence[str]]
 
 
 def _report_campaign(
     folder: Path, page: Path, figures: Path | None, replays: list[tuple[str, int]] | None, trust: bool
-) -> Reported:
+) -> WrittenReport:
     """Write the report and figures; return the figures that were written, and the code that was not run."""
     from vedette.campaigns.results import open_results
     from vedette.reports import replay_code, write_figures, write_report
 
     results = open_results(folder, num_workers=0)
-    with named_options({"path": "--out", "replays": "--runs", "cell": "--runs"}):
+    with option_errors({"path": "--out", "replays": "--runs", "cell": "--runs"}):
         write_report(results, page, replays=replays, trust=trust)
-    unmeasured = () if trust else replay_code(results)
-    _tell_page(page, unmeasured)
-    return _figures(figures, lambda path: write_figures(results, path)), unmeasured
+    untrusted_code = () if trust else replay_code(results)
+    _print_page(page, untrusted_code)
+    return _figures(figures, lambda path: write_figures(results, path)), untrusted_code
 
 
-def _report_run(folder: Path, page: Path, figures: Path | None, trust: bool) -> Reported:
+def _report_run(folder: Path, page: Path, figures: Path | None, trust: bool) -> WrittenReport:
     from vedette.evaluation.scans import measurement_code
     from vedette.reports import write_run_figures, write_run_report
     from vedette.simulation.storage import read_manifest
 
     record, scenario = saved_run(folder)
-    with named_options({"path": "--out"}):
+    with option_errors({"path": "--out"}):
         write_run_report(record, scenario, page, manifest=read_manifest(folder), trust=trust)
-    unmeasured = () if trust else measurement_code(scenario)
-    _tell_page(page, unmeasured)
-    return _figures(figures, lambda path: write_run_figures(record, scenario, path)), unmeasured
+    untrusted_code = () if trust else measurement_code(scenario)
+    _print_page(page, untrusted_code)
+    return _figures(figures, lambda path: write_run_figures(record, scenario, path)), untrusted_code
 
 
-def _tell_page(page: Path, unmeasured: Sequence[str]) -> None:
-    say(f"wrote {page}")
-    if unmeasured:
-        note(f"without measurements, as drawing them runs {', '.join(unmeasured)}: --trust allows it")
+def _print_page(page: Path, untrusted_code: Sequence[str]) -> None:
+    echo(f"wrote {page}")
+    if untrusted_code:
+        note(f"without measurements, as drawing them runs {', '.join(untrusted_code)}: --trust allows it")
 
 
 def _figures(folder: Path | None, write: Callable[[Path], Sequence[Path]]) -> Sequence[Path]:
     if folder is None:
         return ()
-    with named_options({"path": "--figures"}):
+    with option_errors({"path": "--figures"}):
         written = write(folder)
-    say(f"wrote {len(written)} files to {folder}")
+    echo(f"wrote {len(written)} files to {folder}")
     return written
 
 
@@ -121,7 +121,7 @@ def saved_run(folder: Path) -> tuple[RunRecord, Scenario]:
     return load_run(folder), load_scenario(folder / SCENARIO)
 
 
-def _cell_and_run(text: str) -> tuple[str, int]:
+def _parse_cell_and_run(text: str) -> tuple[str, int]:
     cell, colon, run = text.strip().rpartition(":")
     if not colon or not cell or not (run.isascii() and run.isdigit()):
         raise usage_error(f"expected CELL:RUN, such as jdm:0; got {text.strip()!r}", "--runs")
@@ -139,15 +139,15 @@ def upgrade(
 
         number = upgrade_results(folder)
         if number == FORMAT_VERSION:
-            say(f"{folder}: format {number}, which this version reads; nothing was changed")
+            echo(f"{folder}: format {number}, which this version reads; nothing was changed")
         else:
-            say(f"{folder}: format {number} is now {FORMAT_VERSION}")
+            echo(f"{folder}: format {number} is now {FORMAT_VERSION}")
             if (tables := folder / "tables").is_dir():
-                say(f"next: vedette results {folder} --export {tables}, to write its tables anew")
-        publish({"folder": folder, "format_was": number, "format": FORMAT_VERSION})
+                echo(f"next: vedette results {folder} --export {tables}, to write its tables anew")
+        emit_json({"folder": folder, "format_was": number, "format": FORMAT_VERSION})
 
 
-_SHOWN_FAILURES = 10
+_MAX_SHOWN_FAILURES = 10
 _FORMATS = ("parquet", "csv", "netcdf")
 
 
@@ -186,7 +186,7 @@ def results(
     written: list[Path] = []
     if holds_run(folder):
         opened = load_run(folder)
-        scenario = _scenario_of(folder)
+        scenario = _load_scenario(folder)
         if tex is not None:
             raise usage_error(f"expected of a campaign; {folder} holds a single run", "--tex")
         print_run(opened, scenario)
@@ -204,8 +204,8 @@ def results(
         for name in dict.fromkeys(formats or ("parquet",)):
             written += FORMATS[name](opened, export)
     for path in written:
-        say(f"wrote {path}")
-    publish({**document, "written": written})
+        echo(f"wrote {path}")
+    emit_json({**document, "written": written})
 
 
 def _write_tex(opened: CampaignResults, groups: Sequence[GroupComparison], path: Path) -> Path:
@@ -225,7 +225,7 @@ def _write_tex(opened: CampaignResults, groups: Sequence[GroupComparison], path:
     return path
 
 
-def _scenario_of(folder: Path) -> Scenario | None:
+def _load_scenario(folder: Path) -> Scenario | None:
     """Return the scenario of a saved run; print a note and return None if it is missing or cannot be read."""
     from vedette.scenarios import load_scenario
     from vedette.simulation.storage import SCENARIO
@@ -237,25 +237,25 @@ def _scenario_of(folder: Path) -> Scenario | None:
         return None
 
 
-def print_failures(failed: Sequence[FailedRun | Failure], tell: Callable[[str], None] = say) -> None:
+def print_failures(failed: Sequence[FailedRun | Failure], print_line: Callable[[str], None] = echo) -> None:
     """Print the first failed runs, each with its error."""
-    for result in failed[:_SHOWN_FAILURES]:
-        tell(f"  cell {result.cell}, run {result.run}: {result.message}")
-    if len(failed) > _SHOWN_FAILURES:
-        tell(f"  and {len(failed) - _SHOWN_FAILURES} more")
+    for result in failed[:_MAX_SHOWN_FAILURES]:
+        print_line(f"  cell {result.cell}, run {result.run}: {result.message}")
+    if len(failed) > _MAX_SHOWN_FAILURES:
+        print_line(f"  and {len(failed) - _MAX_SHOWN_FAILURES} more")
 
 
 def print_results(opened: CampaignResults, groups: Sequence[GroupComparison]) -> None:
     """Print the comparison of each group of settings, then the number of finished and missing runs."""
     for group in groups:
         if title := opened.title(group):
-            say(f"{title}:")
-        print_comparison(group.comparison, _words_of(opened, group))
-        say("")
+            echo(f"{title}:")
+        print_comparison(group.comparison, _strategy_descriptions(opened, group))
+        echo("")
     print_progress(opened)
 
 
-def _words_of(opened: CampaignResults, group: GroupComparison) -> tuple[str, ...]:
+def _strategy_descriptions(opened: CampaignResults, group: GroupComparison) -> tuple[str, ...]:
     """Return the description of each strategy of a group; empty if the campaign does not compare planners."""
     if opened.campaign.compare != "planner":
         return ()
@@ -270,11 +270,11 @@ def print_progress(opened: CampaignResults) -> None:
     finished = f"all {total}" if not any(missing.values()) else f"{total - sum(missing.values())} of {total}"
     tables = opened.folder / "tables"
     where = f"; tables in {tables}" if tables.is_dir() else ""
-    say(f"{campaign.name}, seed {campaign.seed}: {finished} runs are finished{where}")
+    echo(f"{campaign.name}, seed {campaign.seed}: {finished} runs are finished{where}")
     for cell, number in missing.items():
         if number:
-            say(f"missing: {pluralise(number, 'run')} of {cell}")
+            echo(f"missing: {pluralise(number, 'run')} of {cell}")
     failures = opened.failures()
     if failures:
-        say(f"failed: {pluralise(len(failures), 'run')}; the same command tries again:")
+        echo(f"failed: {pluralise(len(failures), 'run')}; the same command tries again:")
         print_failures(failures)

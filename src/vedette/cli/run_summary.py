@@ -53,11 +53,11 @@ def _print_decisions(console: Console, record: RunRecord) -> None:
     from vedette.evaluation.comparison import decided_actions
 
     rows = list(zip(record.decisions, decided_actions(record), strict=True))
-    left_out = 0 if is_verbose() else max(0, len(rows) - _FEW_DECISIONS)
+    num_omitted = 0 if is_verbose() else max(0, len(rows) - _FEW_DECISIONS)
     table = Table(box=None, pad_edge=False)
     for heading in ("time", "actions", "expected reward", "lead over runner-up", "optimal"):
         table.add_column(heading)
-    for decision, choice in [*rows[: _FEW_DECISIONS - 1], rows[-1]] if left_out else rows:
+    for decision, choice in [*rows[: _FEW_DECISIONS - 1], rows[-1]] if num_omitted else rows:
         actions = describe_choice(choice)
         rewards = dict.fromkeys(f"{mean:.3f} ± {error:.3f}" for mean, error in decision.plan.expected_rewards)
         table.add_row(
@@ -68,8 +68,8 @@ def _print_decisions(console: Console, record: RunRecord) -> None:
             optimality_words(decision.plan),
         )
     console.print(table)
-    if left_out:
-        console.print(f"{pluralise(left_out, 'more decision')} before the last: --verbose prints all", style="dim")
+    if num_omitted:
+        console.print(f"{pluralise(num_omitted, 'more decision')} before the last: --verbose prints all", style="dim")
     for note in dict.fromkeys(note for decision in record.decisions for note in decision.plan.notes):
         console.print(f"note: {note}", soft_wrap=True)
 
@@ -86,17 +86,21 @@ def _print_facts(console: Console, record: RunRecord, scenario: Scenario | None)
         parts = f"localisation {localisation:.2f}, cardinality {cardinality:.2f}"
         window = f"mean over t = {times[0]:g} to {times[-1]:g} s"
         console.print(f"mean OSPA   {with_unit(f'{total:.2f}', unit)} ({parts}; {window})", soft_wrap=True)
-    spent = {stage: float(seconds.sum()) for stage, seconds in record.timings.items()}
-    stages = ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in spent.items() if seconds >= _SHOWN_SECONDS)
-    console.print(f"run time    {sum(spent.values()):.2f} s{f' ({stages})' if stages else ''}", soft_wrap=True)
+    seconds_by_stage = {stage: float(seconds.sum()) for stage, seconds in record.timings.items()}
+    stages = ", ".join(
+        f"{stage} {seconds:.2f}" for stage, seconds in seconds_by_stage.items() if seconds >= _SHOWN_SECONDS
+    )
+    console.print(
+        f"run time    {sum(seconds_by_stage.values()):.2f} s{f' ({stages})' if stages else ''}", soft_wrap=True
+    )
 
 
 def _print_diagnostics(console: Console, record: RunRecord, scenario: Scenario | None) -> None:
     """Print the diagnostics that may reduce accuracy; with `--verbose` also notes."""
     from vedette.evaluation.diagnostics import run_diagnostics
 
-    found = run_diagnostics(record.health, scenario.model.sensor_names if scenario else ())
-    shown = [each for each in found if each.level == "check" or (is_verbose() and each.level == "note")]
+    diagnostics = run_diagnostics(record.health, scenario.model.sensor_names if scenario else ())
+    shown = [each for each in diagnostics if each.level == "check" or (is_verbose() and each.level == "note")]
     if not shown:
         console.print("diagnostics no problem found")
         return

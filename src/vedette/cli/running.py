@@ -12,11 +12,11 @@ import typer
 from vedette.cli.compiling import compiling
 from vedette.cli.completing import strategies
 from vedette.cli.documents import run_document
-from vedette.cli.errors import INTERRUPTED, named_options, usage_error
+from vedette.cli.errors import INTERRUPTED, option_errors, usage_error
 from vedette.cli.options import Overwrite, ScenarioName, Seed, Trust
-from vedette.cli.output import complain, note, publish, say
+from vedette.cli.output import echo, echo_error, emit_json, note
 from vedette.cli.run_summary import print_run
-from vedette.cli.scenario_files import warn
+from vedette.cli.scenario_files import print_warnings
 from vedette.errors import InputError
 from vedette.internal.extras import require_packages
 from vedette.internal.text import pluralise
@@ -44,12 +44,12 @@ def interruptible(advice: str) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        complain(f"\ninterrupted: {advice}")
+        echo_error(f"\ninterrupted: {advice}")
         raise typer.Exit(INTERRUPTED) from None
 
 
-class Approval:
-    """Approval of a scenario's code: reports it once before it runs, and refuses code of others unless trusted.
+class CodeTrust:
+    """Check of a scenario's code: reports it once before it runs, and rejects code of others unless trusted.
 
     Code counts as that of others if other users may have written it. With `spec`, the campaign's file must be the
     user's own too, because its fields can name code.
@@ -58,7 +58,7 @@ class Approval:
     def __init__(self, trust: bool, spec: Path | None = None) -> None:
         self._trust = trust
         self._spec = spec
-        self._said: set[str] = set()
+        self._reported: set[str] = set()
 
     def __call__(self, scenario: Scenario) -> None:
         from vedette.scenarios.trust import code_of, not_own, others_may_change
@@ -72,18 +72,18 @@ class Approval:
                 f"scenario {scenario.path or scenario.name}: expected code of your own; it runs {', '.join(code)}, and "
                 f"{reason}: read it, and have it run by --trust"
             )
-        if new := [name for name in code if name not in self._said]:
+        if new := [name for name in code if name not in self._reported]:
             note(f"runs code of {'theirs, as trusted' if reason else 'yours'}: {', '.join(new)}")
-            self._said.update(new)
+            self._reported.update(new)
 
 
 def check_planner(scenario: Scenario, name: str, option: str) -> None:
     """Raise a usage error unless the option names a strategy of the scenario."""
     from vedette.scenarios.sections.planners import STRATEGIES
 
-    known = (*STRATEGIES, *scenario.model.planners)
-    if name not in known:
-        raise usage_error(f"expected one of {', '.join(known)}; got {name!r}", option)
+    names = (*STRATEGIES, *scenario.model.planners)
+    if name not in names:
+        raise usage_error(f"expected one of {', '.join(names)}; got {name!r}", option)
 
 
 def run(
@@ -116,11 +116,11 @@ def run(
 
     loaded = load_scenario(scenario)
     check_planner(loaded, planner, "--planner")
-    Approval(trust)(loaded)
-    warn(loaded)
+    CodeTrust(trust)(loaded)
+    print_warnings(loaded)
     if out is not None:
         require_packages("vedette run --out", "matplotlib", "pyarrow")
-        with named_options({"directory": "--out"}):
+        with option_errors({"directory": "--out"}):
             check_target(out, overwrite)
     stop: RunStopped | RunInterrupted | None = None
     with interruptible("nothing was written"):
@@ -133,45 +133,45 @@ def run(
                 end_stopped(error, "nothing was written")
             record, stop = error.record, error
         print_run(record, loaded)
-        warn_of_recording(record, loaded)
-        kept = out if stop is None or not _holds_whole_run(out) else None
-        if kept is not None:
-            save_run(record, kept, scenario_text=dump_kept(loaded), overwrite=overwrite)
-    publish({**run_document(record, loaded), "folder": kept})
-    if stop is not None and kept is None:
+        print_recording_warnings(record, loaded)
+        saved_to = out if stop is None or not _has_complete_run(out) else None
+        if saved_to is not None:
+            save_run(record, saved_to, scenario_text=dump_kept(loaded), overwrite=overwrite)
+    emit_json({**run_document(record, loaded), "folder": saved_to})
+    if stop is not None and saved_to is None:
         end_stopped(stop, "nothing was written" if out is None else f"{out} keeps the whole run that was there")
     if out is not None:
         with interruptible(f"wrote {out}, but not all of its figures"):
             _draw_run(record, loaded, out / "figures")
         if stop is not None:
             end_stopped(stop, f"wrote {out}, with the {pluralise(record.num_scans, 'scan')} before")
-        say(f"wrote {out}")
+        echo(f"wrote {out}")
 
 
-def _holds_whole_run(folder: Path | None) -> bool:
+def _has_complete_run(folder: Path | None) -> bool:
     from vedette.simulation.storage import MANIFEST, read_manifest
 
     return folder is not None and (folder / MANIFEST).exists() and read_manifest(folder)["run"].get("stopped") is None
 
 
-def end_stopped(stop: RunStopped | RunInterrupted, left: str) -> NoReturn:
+def end_stopped(stop: RunStopped | RunInterrupted, consequence: str) -> NoReturn:
     """Print where a run stopped and what is left of it, and exit with a status for the reason."""
-    complain(str(stop))
-    complain(left)
+    echo_error(str(stop))
+    echo_error(consequence)
     raise typer.Exit(INTERRUPTED if isinstance(stop, KeyboardInterrupt) else 1) from None
 
 
-def warn_of_recording(record: RunRecord, scenario: Scenario) -> tuple[str, ...]:
+def print_recording_warnings(record: RunRecord, scenario: Scenario) -> tuple[str, ...]:
     """Print and return warnings on a recording: sensors that share no target, and targets too fast for its tracks."""
     if scenario.model.recording is None:
         return ()
     from vedette.evaluation.sensor_agreement import disagreement_warnings
     from vedette.evaluation.unexplained_courses import unexplained_course_warnings
 
-    found = (*disagreement_warnings(record, scenario), *unexplained_course_warnings(record, scenario))
-    for line in found:
+    warnings = (*disagreement_warnings(record, scenario), *unexplained_course_warnings(record, scenario))
+    for line in warnings:
         note(f"warning: {line}")
-    return found
+    return warnings
 
 
 def _draw_run(record: RunRecord, scenario: Scenario, folder: Path) -> None:

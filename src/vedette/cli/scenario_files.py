@@ -13,7 +13,7 @@ import typer
 from vedette.cli.completing import built_in_scenarios, one_of
 from vedette.cli.errors import check_ending, usage_error
 from vedette.cli.options import Overwrite, SceneFile
-from vedette.cli.output import note, print_json, print_names, publish, say
+from vedette.cli.output import echo, emit_json, note, print_json, print_names
 from vedette.errors import InputError
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def list_() -> None:
     files = list_builtin()
     described = {name: read_yaml(file.read_text("utf-8"), name).data["description"] for name, file in files.items()}
     print_names(described)
-    publish([{"name": name, "description": text} for name, text in described.items()])
+    emit_json([{"name": name, "description": text} for name, text in described.items()])
 
 
 def init(
@@ -133,8 +133,8 @@ def crowd(
 
     if measured not in MEASURED:
         raise usage_error(f"expected one of {', '.join(MEASURED)}; got {measured}", "--measured")
-    made = GeneratedCrowd(num_targets=targets, density=density, clutter=clutter, measured=measured, num_steps=steps)
-    _write_generated(path, made.name, crowd_text(made), overwrite)
+    scene = GeneratedCrowd(num_targets=targets, density=density, clutter=clutter, measured=measured, num_steps=steps)
+    _write_generated(path, scene.name, crowd_text(scene), overwrite)
 
 
 def _write_generated(path: Path | None, name: str, text: str, overwrite: bool) -> None:
@@ -146,14 +146,14 @@ def _write_generated(path: Path | None, name: str, text: str, overwrite: bool) -
 
 def _write_start(files: dict[Path, str], target: Path, overwrite: bool) -> None:
     """Write the files, and the schema next to `target`; raise `InputError` if one already exists."""
-    taken = [str(file) for file in files if file.exists()]
-    if taken and not overwrite:
-        raise InputError(f"{', '.join(taken)}: already there; --overwrite replaces it")
+    existing = [str(file) for file in files if file.exists()]
+    if existing and not overwrite:
+        raise InputError(f"{', '.join(existing)}: already there; --overwrite replaces it")
     files = {**files, target.parent / SCHEMA_FILE: _schema_text()}
     for file, content in files.items():
         write_text(file, content)
-        say(f"wrote {file}")
-    publish({"written": list(files)})
+        echo(f"wrote {file}")
+    emit_json({"written": list(files)})
 
 
 def _with_schema(text: str) -> str:
@@ -168,16 +168,16 @@ def _starting_files(scenario: Scenario, target: Path) -> dict[Path, str]:
     names = dict.fromkeys(re.findall(r"\.\./data/([\w.-]+)", text))
     files = {target.with_name(name): (scenario.folder / "../data" / name).read_text(encoding="utf-8") for name in names}
     if names:
-        about = (scenario.folder / "../data/README.md").read_text(encoding="utf-8")
-        files[target.with_name(f"{next(iter(names))}.README.md")] = about
+        origin_text = (scenario.folder / "../data/README.md").read_text(encoding="utf-8")
+        files[target.with_name(f"{next(iter(names))}.README.md")] = origin_text
     return {target: _with_schema(text.replace("../data/", "")), **files}
 
 
-def warn(scenario: Scenario, further: Iterable[tuple[Place, str]] = ()) -> list[str]:
+def print_warnings(scenario: Scenario, more: Iterable[tuple[Place, str]] = ()) -> list[str]:
     """Print the warnings of a scenario (`cautions`) to standard error, and return them."""
     from vedette.scenarios.cautions import cautions
 
-    lines = list(cautions(scenario, further))
+    lines = list(cautions(scenario, more))
     for line in lines:
         note(line)
     return lines
@@ -193,12 +193,12 @@ def schema(
     check_ending(out, "--out", "json")
     text = _schema_text()
     if out is None:
-        say(text, nl=False)
+        echo(text, nl=False)
         print_json(json.loads(text))
     else:
         write_text(out, text)
-        say(f"wrote {out}")
-        publish({"written": [out]})
+        echo(f"wrote {out}")
+        emit_json({"written": [out]})
 
 
 def _schema_text() -> str:

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from vedette.cli.errors import check_ending, named_options
+from vedette.cli.errors import check_ending, option_errors
 from vedette.cli.options import ScenarioName, Trust
 from vedette.cli.output import console as new_console
-from vedette.cli.output import is_verbose, note, publish, say
-from vedette.cli.running import Approval
+from vedette.cli.output import echo, emit_json, is_verbose, note
+from vedette.cli.running import CodeTrust
 from vedette.internal.extras import require_packages
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from vedette.scenarios import Scenario
     from vedette.simulation import Truth
 
-_MOST_ROWS, _FIRST_ROWS = 8, 3  # largest table shown in full; rows shown of a longer one without --verbose
+_MAX_ROWS, _FIRST_ROWS = 8, 3  # largest table shown in full; rows shown of a longer one without --verbose
 PICTURE_FORMATS = ("png", "pdf", "svg")
 
 
@@ -45,17 +45,17 @@ def show(
         require_packages("vedette show --out", "matplotlib")
     loaded = load_scenario(scenario)
     if not resolved or out is not None:  # the targets move by the scenario's motion model
-        Approval(trust)(loaded)
+        CodeTrust(trust)(loaded)
     if resolved:
         from vedette.scenarios.dumping import dump_scenario
 
-        say(dump_scenario(loaded.model), nl=False)
+        echo(dump_scenario(loaded.model), nl=False)
     else:
         _print_tables(loaded)
     if out is not None:
         _draw(loaded, out)
-        (note if resolved else say)(f"wrote {out}")
-    publish({"file": loaded.path, "scenario": loaded.model.model_dump(mode="json"), "picture": out})
+        (note if resolved else echo)(f"wrote {out}")
+    emit_json({"file": loaded.path, "scenario": loaded.model.model_dump(mode="json"), "picture": out})
 
 
 def _print_tables(scenario: Scenario) -> None:
@@ -101,9 +101,9 @@ def _sensors(scenario: Scenario) -> Table:
     from vedette.scenarios.summary import moves_from
 
     model = scenario.model
-    starts = [] if moves_from(model) else ["moves from"]
+    start_column = [] if moves_from(model) else ["moves from"]
     direction = "course\n(deg)" if model.by_compass else "heading\n(deg)"
-    table = _numbers_table("sensors", "name", "x\n(m)", "y\n(m)", direction, "platform", *starts)
+    table = _numbers_table("sensors", "name", "x\n(m)", "y\n(m)", direction, "platform", *start_column)
     rows: list[tuple[str | Text, ...]] = []
     for name, sensor in zip(model.sensor_names, model.sensors, strict=True):
         heading = sensor.heading_deg
@@ -111,16 +111,16 @@ def _sensors(scenario: Scenario) -> Table:
             heading = start_course(heading, model.north(), sensor.position)
         place = (f"{sensor.position[0]:g}", f"{sensor.position[1]:g}")
         start = "-" if sensor.platform.kind == "still" else sensor.moves_from.replace("_", " ")
-        rows.append((Text(name), *place, f"{heading:g}", sensor.platform.kind, *[start for _ in starts]))
-    return _filled(table, rows)
+        rows.append((Text(name), *place, f"{heading:g}", sensor.platform.kind, *[start for _ in start_column]))
+    return _with_rows(table, rows)
 
 
-def _filled(table: Table, rows: Sequence[tuple[str | Text, ...]]) -> Table:
+def _with_rows(table: Table, rows: Sequence[tuple[str | Text, ...]]) -> Table:
     """Return the table with its rows; of a long table the first rows, without `--verbose`."""
-    few = is_verbose() or len(rows) <= _MOST_ROWS
-    for row in rows if few else rows[:_FIRST_ROWS]:
+    show_all = is_verbose() or len(rows) <= _MAX_ROWS
+    for row in rows if show_all else rows[:_FIRST_ROWS]:
         table.add_row(*row)
-    if not few:
+    if not show_all:
         table.caption = f"{len(rows) - _FIRST_ROWS} more: --verbose lists all"
         table.caption_justify = "left"
     return table
@@ -141,20 +141,20 @@ def _sensing(scenario: Scenario) -> Table:
 def _targets(scenario: Scenario) -> Table:
     import numpy as np
 
-    truth = truth_of(scenario)
+    truth = sample_truth(scenario)
     table = _numbers_table("targets", "id", "from\n(s)", "to\n(s)", "x\n(m)", "y\n(m)", "vx\n(m/s)", "vy\n(m/s)")
     scans = truth.scans
-    found: list[tuple[str | Text, ...]] = []
+    table_rows: list[tuple[str | Text, ...]] = []
     for target in np.unique(truth.ids):
         rows = np.flatnonzero(truth.ids == target)
         first, last = truth.times[scans[rows[0]]], truth.times[scans[rows[-1]]]
         x, y, *velocity = truth.states[rows[0]]
         speeds = [f"{value:.1f}" for value in velocity[:2]] + ["-"] * (2 - len(velocity))
-        found.append((str(target + 1), f"{first:g}", f"{last:g}", f"{x:.0f}", f"{y:.0f}", *speeds))
-    return _filled(table, found)
+        table_rows.append((str(target + 1), f"{first:g}", f"{last:g}", f"{x:.0f}", f"{y:.0f}", *speeds))
+    return _with_rows(table, table_rows)
 
 
-def truth_of(scenario: Scenario) -> Truth:
+def sample_truth(scenario: Scenario) -> Truth:
     """Return the true targets of one run; with process noise they differ from run to run."""
     import numpy as np
 
@@ -168,7 +168,9 @@ def _draw(scenario: Scenario, out: Path) -> None:
     from vedette.evaluation.figures import save_figure
 
     name = out.suffix[1:].lower()
-    with named_options({"path": "--out"}):
-        written = save_figure(scenario_figure(scenario, truth_of(scenario)), out.with_suffix(""), formats=(name,))[0]
+    with option_errors({"path": "--out"}):
+        written = save_figure(scenario_figure(scenario, sample_truth(scenario)), out.with_suffix(""), formats=(name,))[
+            0
+        ]
     if written != out:
         written.replace(out)

@@ -12,18 +12,18 @@ from vedette.cli.assumptions import note_assumptions
 from vedette.cli.compiling import compiling
 from vedette.cli.completing import one_of
 from vedette.cli.documents import run_document
-from vedette.cli.errors import named_options, usage_error
+from vedette.cli.errors import option_errors, usage_error
 from vedette.cli.options import BAD_ROWS, BadRows, Overwrite, SensorsFile, Speed, Trust
-from vedette.cli.output import note, publish, say
+from vedette.cli.output import echo, emit_json, note
 from vedette.cli.progress import bar
 from vedette.cli.run_summary import print_run
 from vedette.cli.running import (
-    Approval,
+    CodeTrust,
     end_stopped,
     interruptible,
-    warn_of_recording,
+    print_recording_warnings,
 )
-from vedette.cli.scenario_files import warn
+from vedette.cli.scenario_files import print_warnings
 from vedette.internal.extras import without
 from vedette.internal.text import pluralise
 
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 FORMATS = ("csv", "geojson", "parquet", "czml", "mcap")
 ON_EARTH = ("geojson", "czml", "mcap")
 _SHOWN_ROWS = 5
-_LASTING = 10  # smallest number of estimates of a lasting track
+_MIN_ESTIMATES = 10  # smallest number of estimates of a lasting track
 
 
 def track(
@@ -78,10 +78,10 @@ def track(
 
     _check_formats(formats or (), out)
     if out is not None:
-        with named_options({"directory": "--out"}):
+        with option_errors({"directory": "--out"}):
             check_target(out, overwrite)
-    found, cautions = read_recording(sensors, scans, truth, speed=speed, bad_rows=bad_rows, trust=trust)
-    scenario, recording, assumed = found
+    recorded, warnings = read_recording(sensors, scans, truth, speed=speed, bad_rows=bad_rows, trust=trust)
+    scenario, recording, assumed = recorded
     if "clutter" in assumed:
         note("`vedette calibrate` estimates clutter, noise and detection from the same scans.")
     on_earth = [name for name in formats or () if name in ON_EARTH]
@@ -89,27 +89,27 @@ def track(
         raise usage_error(f"expected an origin in {sensors}, as {on_earth[0]} has degrees; got none", "--format")
     written: list[Path] = []
     with interruptible("nothing was written"):
-        record = _tracked(scenario, recording)
+        record = _run_tracker(scenario, recording)
         print_run(record, scenario)
-        warned = warn_of_recording(record, scenario)
+        recording_warnings = print_recording_warnings(record, scenario)
         sizes = pluralise(record.num_scans, "scan"), pluralise(recording.num_measurements, "measurement")
-        say(f"{scans}: {', '.join(sizes)}, {pluralise(len(scenario.model.sensors), 'sensor')}")
+        echo(f"{scans}: {', '.join(sizes)}, {pluralise(len(scenario.model.sensors), 'sensor')}")
         joins = joins_of_run(record, scenario) if join else ()
-        say(f"  tracks      {_tracks(with_joined_tracks(record, joins))}")
+        echo(f"  tracks      {_describe_tracks(with_joined_tracks(record, joins))}")
         if joins:
-            say(f"  joined      {pluralise(len(joins), 'gap')} between labels of one track (--no-join: none)")
+            echo(f"  joined      {pluralise(len(joins), 'gap')} between labels of one track (--no-join: none)")
         if out is not None:
             written = _save(record, scenario, out, formats, joins, overwrite=overwrite)
     if out is not None:
-        if lacking := without("vedette track --out: figures", "matplotlib"):
-            note(lacking)
+        if missing_package := without("vedette track --out: figures", "matplotlib"):
+            note(missing_package)
         else:
             with interruptible(f"wrote {out}, but not all of its figures"):
                 _draw(record, scenario, out)
-        say(f"Wrote {out}: {', '.join(_contents(out, written))}")
-    origin = {"assumptions": assumed, "skipped": recording.skipped, "warnings": [*cautions, *warned]}
+        echo(f"Wrote {out}: {', '.join(_contents(out, written))}")
+    origin = {"assumptions": assumed, "skipped": recording.skipped, "warnings": [*warnings, *recording_warnings]}
     joined = [join._asdict() for join in joins]
-    publish({**run_document(record, scenario), **origin, "joins": joined, "folder": out, "written": written})
+    emit_json({**run_document(record, scenario), **origin, "joins": joined, "folder": out, "written": written})
 
 
 def _check_formats(formats: Sequence[str], out: Path | None) -> None:
@@ -123,7 +123,7 @@ def _check_formats(formats: Sequence[str], out: Path | None) -> None:
         raise usage_error("expected with --out, which names the folder", "--format")
 
 
-def _tracked(scenario: Scenario, recording: RecordedScans) -> RunRecord:
+def _run_tracker(scenario: Scenario, recording: RecordedScans) -> RunRecord:
     """Run the tracker over all scans; exit if the run stops early."""
     from vedette.evaluation.runs import track_recording
     from vedette.simulation.journal import RunInterrupted, RunStopped
@@ -149,12 +149,12 @@ def _save(
     from vedette.scenarios.dumping import dump_kept
     from vedette.simulation.storage import save_run
 
-    if lacking := without("vedette track --out: a folder of results", "pyarrow"):
-        note(f"{lacking}; the tracks are written without it")
+    if missing_package := without("vedette track --out: a folder of results", "pyarrow"):
+        note(f"{missing_package}; the tracks are written without it")
     else:
         save_run(record, out, scenario_text=dump_kept(scenario), overwrite=overwrite)
-    usual = ("csv", "geojson") if scenario.model.origin is not None else ("csv",)
-    written = [out / "tracks" / f"tracks.{name}" for name in dict.fromkeys(formats or usual)]
+    default_formats = ("csv", "geojson") if scenario.model.origin is not None else ("csv",)
+    written = [out / "tracks" / f"tracks.{name}" for name in dict.fromkeys(formats or default_formats)]
     table = table_of_run(record, scenario, joins)
     for path in written:
         write_tracks(path, table)
@@ -169,15 +169,15 @@ def read_recording(
 
     if bad_rows not in BAD_ROWS:
         raise usage_error(f"expected one of {', '.join(BAD_ROWS)}; got {bad_rows!r}", "--bad-rows")
-    found = scenario_of_recording(sensors, scans, truth, speed=speed, bad_rows=bad_rows)
-    Approval(trust)(found.scenario)
-    cautions = warn(found.scenario)
-    for text in found.recording.skipped[:_SHOWN_ROWS]:
+    recorded = scenario_of_recording(sensors, scans, truth, speed=speed, bad_rows=bad_rows)
+    CodeTrust(trust)(recorded.scenario)
+    warnings = print_warnings(recorded.scenario)
+    for text in recorded.recording.skipped[:_SHOWN_ROWS]:
         note(f"skipped: {text}")
-    if len(found.recording.skipped) > _SHOWN_ROWS:
-        note(f"skipped: {len(found.recording.skipped) - _SHOWN_ROWS} more rows")
-    note_assumptions(found.assumed, sensors)
-    return found, cautions
+    if len(recorded.recording.skipped) > _SHOWN_ROWS:
+        note(f"skipped: {len(recorded.recording.skipped) - _SHOWN_ROWS} more rows")
+    note_assumptions(recorded.assumed, sensors)
+    return recorded, warnings
 
 
 def _contents(out: Path, written: list[Path]) -> list[str]:
@@ -188,15 +188,17 @@ def _contents(out: Path, written: list[Path]) -> list[str]:
     return [*names, *figures, *([pluralise(tables, "table")] if tables else [])]
 
 
-def _tracks(record: RunRecord) -> str:
+def _describe_tracks(record: RunRecord) -> str:
     """Return the number of tracks and of lasting tracks, in words."""
-    seen: dict[tuple[int, ...], int] = {}
+    num_estimates: dict[tuple[int, ...], int] = {}
     for estimate in record.estimates:
         for label in map(tuple, estimate.labels.tolist()):
-            seen[label] = seen.get(label, 0) + 1
-    lasting = sum(number >= _LASTING for number in seen.values())
-    mean = sum(seen.values()) / max(record.num_scans, 1)
-    return f"{len(seen)} ({lasting} with at least {_LASTING} estimates), {mean:.1f} present on average"
+            num_estimates[label] = num_estimates.get(label, 0) + 1
+    num_lasting = sum(number >= _MIN_ESTIMATES for number in num_estimates.values())
+    mean = sum(num_estimates.values()) / max(record.num_scans, 1)
+    return (
+        f"{len(num_estimates)} ({num_lasting} with at least {_MIN_ESTIMATES} estimates), {mean:.1f} present on average"
+    )
 
 
 def _draw(record: RunRecord, scenario: Scenario, out: Path) -> None:

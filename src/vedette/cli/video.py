@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from vedette.cli.errors import named_options, usage_error
-from vedette.cli.output import note, publish, say
+from vedette.cli.errors import option_errors, usage_error
+from vedette.cli.output import echo, emit_json, note
 from vedette.cli.progress import bar
 from vedette.cli.results import saved_run
 from vedette.cli.running import interruptible
@@ -49,12 +49,12 @@ def video(
         record, scenario = saved_run(folder)
         if speed is not None:
             seconds = float(record.times[-1] - record.times[0]) / speed
-        with bar("frames") as progress, named_options({"path": "--out", "seconds": "--seconds"}):
+        with bar("frames") as progress, option_errors({"path": "--out", "seconds": "--seconds"}):
             number = write_video(
                 record, scenario, out, fps=fps, seconds=seconds, size=size, trust=trust, progress=progress
             )
-    unmeasured = () if trust else measurement_code(scenario)
-    if unmeasured:
-        note(f"without measurements, as drawing them runs {', '.join(unmeasured)}: --trust allows it")
-    say(f"wrote {out}: {pluralise(number, 'frame')}, {number / fps:.1f} s")
-    publish({"video": out, "frames": number, "seconds": number / fps, "without_measurements_of": unmeasured})
+    untrusted_code = () if trust else measurement_code(scenario)
+    if untrusted_code:
+        note(f"without measurements, as drawing them runs {', '.join(untrusted_code)}: --trust allows it")
+    echo(f"wrote {out}: {pluralise(number, 'frame')}, {number / fps:.1f} s")
+    emit_json({"video": out, "frames": number, "seconds": number / fps, "without_measurements_of": untrusted_code})

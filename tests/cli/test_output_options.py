@@ -119,7 +119,7 @@ def test_documents_have_the_numbers_unrounded(place: Path) -> None:
     assert all(f"{each['total_mean_m']:.2f}" in call("results", "trial-results").stdout for each in group["strategies"])
 
 
-def test_faults_are_in_the_document_and_are_said_when_quiet(place: Path) -> None:
+def test_faults_are_in_the_document_and_printed_when_quiet(place: Path) -> None:
     result = call("check", "faulty.yaml", "short.yaml", "absent.yaml", "--json")
     faulty, short, absent = json.loads(result.stdout)["files"]
     assert (result.exit_code, result.stderr) == (1, "")
@@ -141,7 +141,7 @@ MISSING = [
 
 
 @pytest.mark.parametrize("words", MISSING, ids=" ".join)
-def test_what_is_missing_is_no_such_file(place: Path, words: tuple[str, ...]) -> None:
+def test_a_missing_file_is_reported(place: Path, words: tuple[str, ...]) -> None:
     result = call(*words)
     assert result.exit_code == 1
     (line,) = result.output.splitlines()
@@ -154,7 +154,7 @@ def test_a_folder_is_no_scenario(place: Path) -> None:
 
 
 @pytest.mark.parametrize("command", ["check", "run", "show", "reproduce"])
-def test_a_campaign_file_is_no_scenario_and_what_checks_it_is_said(place: Path, command: str) -> None:
+def test_a_campaign_file_is_rejected_as_scenario_with_advice(place: Path, command: str) -> None:
     result = call(command, "spec.toml")
     assert result.exit_code == 1
     assert "vedette campaign spec.toml --dry-run" in result.output
@@ -162,7 +162,7 @@ def test_a_campaign_file_is_no_scenario_and_what_checks_it_is_said(place: Path, 
 
 
 @pytest.mark.parametrize("words", [("init", "a.yaml"), ("generate", "a.yaml"), ("crowd", "a.yaml")], ids=" ".join)
-def test_the_option_that_overwrites_is_named_and_does(place: Path, words: tuple[str, ...]) -> None:
+def test_the_overwrite_option_is_named_and_works(place: Path, words: tuple[str, ...]) -> None:
     assert call(*words).exit_code == 0
     refused = call(*words)
     assert (refused.exit_code, refused.stderr) == (1, "a.yaml: already there; --overwrite replaces it\n")
@@ -186,7 +186,7 @@ def test_names_are_whole_at_any_width(columns: int) -> None:
         assert [line.split()[0] for line in lines if not line.startswith(" ")] == list(names)
 
 
-def test_completion_knows_what_there_is(place: Path) -> None:
+def test_completion_lists_available_names(place: Path) -> None:
     (place / "scenes").mkdir()
     assert completing.built_in_scenarios("") == list(list_builtin())
     assert completing.campaigns("deciding") == [name for name in sorted(published_comparisons()) if name != "paper-a"]
@@ -215,7 +215,7 @@ def test_completion_knows_what_there_is(place: Path) -> None:
     ],
     ids=lambda each: " ".join(each),
 )
-def test_a_shell_is_given_names(place: Path, words: tuple[str, ...], expected: list[str]) -> None:
+def test_shell_completion_lists_names(place: Path, words: tuple[str, ...], expected: list[str]) -> None:
     environment = {"_VEDETTE_COMPLETE": "complete_bash", "COMP_WORDS": " ".join(("vedette", *words))}
     done = subprocess.run(
         [sys.executable, "-c", "from vedette.cli import app; app(prog_name='vedette')"],
