@@ -33,7 +33,7 @@ from vedette.recorded.instants import Look, without_bias
 from vedette.scenarios.build import build_poses, build_tracking
 from vedette.scenarios.calibrated import problem_of
 from vedette.scenarios.of_recording import scenario_of_recording
-from vedette.tracking import LateScans, SensorScan
+from vedette.tracking import OutOfSequenceTracker, SensorScan
 
 DEGREES_A_SECOND = 0.1 / 60.0
 DRIFTS = {
@@ -75,7 +75,7 @@ def redraw(folder: Path, scene: Scene, seconds: float, seed: int, first: float, 
     at_first = calibrate(replace(problem, recording=problem.recording.between(0.0, first)))
     problem = warm_started(problem, at_first)
     once = problem.with_biases(np.array([each.start for each in problem.parameters]))
-    late = LateScans(tracking.tracker, build_poses(true), window=5.0)
+    late = OutOfSequenceTracker(tracking.tracker, build_poses(true), window=5.0)
     follower, spent = OnlineBiasEstimator(problem, window, every), 0.0
     state = follower.initial()
     timelines, rows, scores = [late.initial()] * len(WAYS), list[tuple[float, ...]](), list[list[float]]()
@@ -83,7 +83,7 @@ def redraw(folder: Path, scene: Scene, seconds: float, seed: int, first: float, 
         if scan.time < first - window:
             continue
         begun = time.process_time()
-        state, _ = follower.take(state, scan)
+        state, _ = follower.process(state, scan)
         spent += time.process_time() - begun
         if state.num_estimates == 0:
             continue
@@ -95,7 +95,7 @@ def redraw(folder: Path, scene: Scene, seconds: float, seed: int, first: float, 
         rows.append((scan.time, *errors, *turns))
         scores.append([])
         for w, bias in enumerate(biases):
-            timelines[w], _ = late.take(timelines[w], [without(scan, problem, bias)])
+            timelines[w], _ = late.process(timelines[w], [without(scan, problem, bias)])
             belief = timelines[w].state
             assert belief.time is not None
             found = tracking.estimate(belief.fused, belief.step).means[:, :2]

@@ -20,7 +20,7 @@ from timing import Figures, Measure, Once, cpu_seconds
 from vedette.gym import ScenarioEnv
 from vedette.scenarios import Scenario, load_scenario, with_fields
 from vedette.simulation import SimulationRun
-from vedette.tracking import Stages
+from vedette.tracking import StageTimer
 
 FILTERS: dict[str, dict[str, Any]] = {
     "lmb": {"filter": {"kind": "lmb"}, "fusion": {"kind": "sequential"}},
@@ -33,7 +33,7 @@ def scene(kind: str) -> Scenario:
     return with_fields(load_scenario("paper-a"), FILTERS[kind])
 
 
-def walked(env: ScenarioEnv, run: int, stages: Stages | None = None) -> int:
+def walked(env: ScenarioEnv, run: int, stages: StageTimer | None = None) -> int:
     """All scans of a run, by `SimulationRun.step` alone; how many."""
     experiment = env.episodes.built.experiment
     world, rng = SimulationRun(experiment, seed=1, run=run), np.random.default_rng(run)
@@ -77,7 +77,7 @@ def measures() -> Iterator[Measure]:
 
 def shares(kind: str) -> dict[str, float]:
     """Of the time of all scans of ten runs, with what an observation takes each time."""
-    env, stages = ScenarioEnv(scene(kind)), Stages()
+    env, stages = ScenarioEnv(scene(kind)), StageTimer()
     for run in range(10):
         walked(env, run, stages)
     env.reset(seed=1)

@@ -6,10 +6,10 @@
 The sensors of a scenario stand still and scan as it says; a share of their scans arrives late, uniformly by up to
 `--delay` seconds, each scan by itself. After every scan time the estimate is read off what has arrived by then,
 predicted to now. Prints for each share late the OSPA distance, with its standard error over the runs, where what is
-late is put in its place (`LateScans`) and where it is dropped; how many steps were worked for each scan; the CPU time
-of a scan; and the memory that a second of window holds (instants as pickled). A second table has the mean OSPA of the
-median and of the worst run, and the share of runs that end with a lost target. Runs are paired: the truth and the scans
-are the same in every line. Equal arguments print equal tables, but for the times.
+late is put in its place (`OutOfSequenceTracker`) and where it is dropped; how many steps were worked for each scan; the
+CPU time of a scan; and the memory that a second of window holds (instants as pickled). A second table has the mean OSPA
+of the median and of the worst run, and the share of runs that end with a lost target. Runs are paired: the truth and
+the scans are the same in every line. Equal arguments print equal tables, but for the times.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from vedette.simulation.experiment import Experiment
 from vedette.simulation.loop import SCANS, TRUTH, run_stream, sensor_streams
 from vedette.simulation.scans import simulate_scans
 from vedette.simulation.truth import Truth
-from vedette.tracking import LateScans, SensorScan, Timeline
+from vedette.tracking import OutOfSequenceTracker, SensorScan, Timeline
 
 SHARES = (0.0, 0.1, 0.2, 0.3, 0.5)
 WAYS = ("put in place", "dropped")
@@ -54,15 +54,15 @@ def run(experiment: Experiment, number: int, share: float, delay: float, window:
     """One run of which a share of the scans is late."""
     truth = experiment.targets.truth(experiment.times, rng=run_stream(SEED, number, TRUTH))
     arrivals = sorted(arriving(experiment, truth, number, share, delay), key=lambda pair: pair[0])
-    late = LateScans(experiment.tracker, experiment.poses, window)
+    late = OutOfSequenceTracker(experiment.tracker, experiment.poses, window)
     timeline, estimates, steps, spent, place = late.initial(), [], 0, 0.0, 0
     for step, now in enumerate(experiment.times.tolist(), start=1):
         begun = time.process_time()
         while place < len(arrivals) and arrivals[place][0] <= now:
-            timeline, info = late.take(timeline, [arrivals[place][1]])
+            timeline, info = late.process(timeline, [arrivals[place][1]])
             steps, place = steps + len(info.steps), place + 1
         spent += time.process_time() - begun
-        estimates.append(experiment.estimate(late.at(timeline, now).fused, step))
+        estimates.append(experiment.estimate(late.state_at(timeline, now).fused, step))
     cutoff = load_scenario(experiment.name).model.ospa.cutoff
     ospa = float(ospa_of_run(truth, estimates, cutoff=cutoff, order=1.0)[:, 0].mean())
     lost = match_run(truth, estimates, cutoff=cutoff, order=1.0).num_missed[-1] > 0
@@ -84,10 +84,10 @@ def arriving(
 
 def held(timeline: Timeline) -> float:
     """Bytes for each second between the first and the last instant that are kept."""
-    if len(timeline.instants) < 2:
+    if len(timeline.entries) < 2:
         return 0.0
-    seconds = timeline.instants[-1].time - timeline.instants[0].time
-    return len(pickle.dumps(timeline.instants)) / seconds
+    seconds = timeline.entries[-1].time - timeline.entries[0].time
+    return len(pickle.dumps(timeline.entries)) / seconds
 
 
 def table(name: str, runs: int, delay: float, window: float) -> Iterator[str]:

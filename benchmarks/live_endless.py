@@ -4,8 +4,8 @@
     python benchmarks/live_endless.py --write docs/evidence/live-scans.md
 
 Two sensors that measure positions see four targets, each of which comes and goes every few minutes; one scan in ten is
-late by up to 20 s, some beyond the window, and one line in a thousand is damaged. `vedette.live.Keeping` takes the
-lines one after the other, with a snapshot every second and a record, which is all that may grow. Resident memory is
+late by up to 20 s, some beyond the window, and one line in a thousand is damaged. `vedette.live.PersistentLoop` takes
+the lines one after the other, with a snapshot every second and a record, which is all that may grow. Resident memory is
 that of this process, from /proc (Linux).
 """
 
@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 from pages import write_between
 
-from vedette.live import Keeping, encoded, live_of
+from vedette.live import PersistentLoop, build_live_loop, encode_line
 from vedette.scenarios.of_recording import scenario_of_sensors
 
 SCENE = """
@@ -74,24 +74,29 @@ def table(scans: int) -> Iterator[str]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "scene.yaml").write_text(SCENE, "utf-8")
-        live = live_of(scenario_of_sensors(folder / "scene.yaml"), window=WINDOW)
-        keeping = Keeping(live, snapshot=folder / "state", every=1.0, record=folder / "came")
+        live = build_live_loop(scenario_of_sensors(folder / "scene.yaml"), max_delay=WINDOW)
+        persistent = PersistentLoop(live, snapshot=folder / "state", snapshot_interval=1.0, record=folder / "came")
         begun, num = time.perf_counter(), 0
         for line in lines(scans):
-            answers = keeping.take(line)
+            answers = persistent.process(line)
             for answer in answers:
-                encoded(answer)
+                encode_line(answer)
             num += "error" not in answers[0]
             if num in marks:
                 marks.remove(num)
-                keeping.save()
-                timeline = keeping.state.timeline
+                persistent.save()
+                timeline = persistent.state.timeline
                 sizes = [(folder / "state").stat().st_size / 1e3, (folder / "came").stat().st_size / 1e6]
-                counts = [len(answers[0]["tracks"]), keeping.state.num_errors, timeline.num_late, timeline.num_dropped]
+                counts = [
+                    len(answers[0]["tracks"]),
+                    persistent.state.num_errors,
+                    timeline.num_late,
+                    timeline.num_dropped,
+                ]
                 cells = [f"{num:,}", f"{resident():.0f}", f"{sizes[0]:.0f}", f"{sizes[1]:.1f}"]
                 cells += [str(len(os.listdir("/proc/self/fd"))), *map(str, counts)]
                 yield "| " + " | ".join([*cells, f"{num / (time.perf_counter() - begun):.0f}"]) + " |"
-        keeping.close()
+        persistent.close()
 
 
 def main() -> None:

@@ -4,12 +4,12 @@
     python benchmarks/live_scans.py --write docs/evidence/live-scans.md
 
 Sensors of a generated scene (`vedette generate`) scan every second, all at one time (`together`) or each at its own
-part of the second (`apart`); every line is taken by `vedette.live.Live.take` and its answers made lines, in wall time
-of this process, the reading of the JSON included, without pipe or network. A line after which a plan is due is counted
-under plans: its time is from the line to the plan, with the explanation; what it took of processors, all threads
-together, is more than that on an idle machine, and less on a busy one. The first run is not counted. What is printed
-are quantiles over all lines of all runs, and the lines a second that were taken without plans. Sensors see 250 m
-(`limited`) or all of the region (`full`). Decisions are made to the end, and with the limit of `--planning-timeout`.
+part of the second (`apart`); every line is taken by `vedette.live.LiveLoop.process` and its answers made lines, in wall
+time of this process, the reading of the JSON included, without pipe or network. A line after which a plan is due is
+counted under plans: its time is from the line to the plan, with the explanation; what it took of processors, all
+threads together, is more than that on an idle machine, and less on a busy one. The first run is not counted. What is
+printed are quantiles over all lines of all runs, and the lines a second that were taken without plans. Sensors see 250
+m (`limited`) or all of the region (`full`). Decisions are made to the end, and with the limit of `--planning-timeout`.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 from pages import write_between
 
-from vedette.live import Live, encoded, live_of
+from vedette.live import LiveLoop, build_live_loop, encode_line
 from vedette.scenarios import GeneratedScene, load_scenario, scene_text
 from vedette.scenarios.build import build_experiment
 from vedette.scenarios.of_recording import scenario_of_sensors
@@ -38,12 +38,14 @@ DECIDE_EVERY, WITHIN = 5.0, 0.03  # s
 SEED = 5
 
 
-def scene(sensors: int, targets: int, view: Any, folder: Path, within: float | None = None) -> tuple[Experiment, Live]:
+def scene(
+    sensors: int, targets: int, view: Any, folder: Path, within: float | None = None
+) -> tuple[Experiment, LiveLoop]:
     """What is simulated, and the loop that takes it."""
     path = folder / "scene.yaml"
     path.write_text(scene_text(GeneratedScene(num_sensors=sensors, num_targets=targets, view=view)), "utf-8")
     known = scenario_of_sensors(path, decide_every=DECIDE_EVERY, plan_within=within)
-    return build_experiment(load_scenario(path)), live_of(known, decide_every=DECIDE_EVERY)
+    return build_experiment(load_scenario(path)), build_live_loop(known, decide_every=DECIDE_EVERY)
 
 
 def lines(experiment: Experiment, run: int, scans: int, apart: bool) -> Iterator[bytes]:
@@ -61,15 +63,15 @@ def lines(experiment: Experiment, run: int, scans: int, apart: bool) -> Iterator
                 yield json.dumps({**told, "measurements": seen.tolist()}).encode()
 
 
-def timed(live: Live, sent: list[bytes]) -> tuple[list[float], list[float], list[float], list[int]]:
+def timed(live: LiveLoop, sent: list[bytes]) -> tuple[list[float], list[float], list[float], list[int]]:
     """Milliseconds to estimates and to plans, those of processors, and how many targets were estimated."""
     state = live.initial()
     estimates, plans, processor, tracks = list[float](), list[float](), list[float](), list[int]()
     for line in sent:
         begun, used = time.perf_counter(), time.process_time()
-        state, answers = live.take(state, line)
+        state, answers = live.process(state, line)
         for answer in answers:
-            encoded(answer)
+            encode_line(answer)
         spent = 1e3 * (time.perf_counter() - begun)
         if "error" in answers[-1]:
             raise SystemExit(answers[-1]["error"])

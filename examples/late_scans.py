@@ -2,8 +2,8 @@
 
     python examples/late_scans.py [--picture FILE]
 
-Two radars scan in turn; the second one's link brings its scans 4 to 20 s late, in any order. `LateScans` makes the
-steps since then again, so that in the end all is believed as if nothing had been late.
+Two radars scan in turn; the second one's link brings its scans 4 to 20 s late, in any order. `OutOfSequenceTracker`
+makes the steps since then again, so that in the end all is believed as if nothing had been late.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from vedette import models
 from vedette.densities import map_estimate
 from vedette.filters import SequentialLmbFilter
 from vedette.simulation import simulate_scan
-from vedette.tracking import Central, LateScans, SensorScan
+from vedette.tracking import Central, OutOfSequenceTracker, SensorScan
 
 TIMES = np.arange(0.0, 120.0, 2.0)
 POSES = np.array([[-3000.0, 0.0, 0.0], [2000.0, -1500.0, 0.0]])
@@ -52,12 +52,12 @@ def arrivals(rng: np.random.Generator) -> list[tuple[float, SensorScan]]:
 
 def follow(scans: list[tuple[float, SensorScan]], window: float) -> tuple[np.ndarray, int]:
     """(num_times,) error of what is believed at each time, NaN where nobody is; and how many scans were dropped."""
-    late = LateScans(make_tracker(), POSES, window=window)
+    late = OutOfSequenceTracker(make_tracker(), POSES, window=window)
     timeline, waiting, errors = late.initial(), list(scans), []
     for now in TIMES:
         while waiting and waiting[0][0] <= now:
-            timeline, _ = late.take(timeline, [waiting.pop(0)[1]])
-        means = map_estimate(late.at(timeline, now).fused).means
+            timeline, _ = late.process(timeline, [waiting.pop(0)[1]])
+        means = map_estimate(late.state_at(timeline, now).fused).means
         errors.append(np.linalg.norm(means[0, :2] - ship(now)[:2]) if len(means) else np.nan)
     return np.array(errors), timeline.num_dropped
 

@@ -74,7 +74,7 @@ def test_the_search_finds_pages_from_disk(tmp_path: Path, docs: ModuleType, brow
         ("expected loss", "expected_loss"),
         ("bearing_range", "bearing_range"),
         ("late", "Late scans"),
-        ("LateInfo", "LateInfo"),
+        ("OutOfSequenceInfo", "OutOfSequenceInfo"),
         ("late scans", "Late scans"),
         ("vedette live", "Live scans: vedette live"),
         ("vedette track", "Recorded scans: vedette track"),

@@ -23,7 +23,7 @@ from vedette.models import CellGrid, Region
 from vedette.scenarios import load_scenario
 from vedette.scenarios.build import build_experiment
 from vedette.simulation import RunRecord, Scan
-from vedette.tracking import LateScans, SensorScan, State, Timeline
+from vedette.tracking import OutOfSequenceTracker, SensorScan, State, Timeline
 
 SCENARIO = load_scenario("paper-e")
 WIDEST = 160
@@ -37,16 +37,16 @@ def record() -> RunRecord:
 @pytest.fixture(scope="module")
 def timeline() -> Timeline:
     experiment = build_experiment(SCENARIO)
-    late = LateScans(experiment.tracker, experiment.poses)
+    late = OutOfSequenceTracker(experiment.tracker, experiment.poses)
     scans = [SensorScan(s, float(t), np.array([[0.1 * t, 300.0]]), [0.0, 0.0, 0.0]) for t in (1, 3, 2) for s in (0, 1)]
     came = late.initial()
     for scan in scans:
-        came, _ = late.take(came, [scan])
+        came, _ = late.process(came, [scan])
     return came
 
 
 def test_a_run_and_its_parts(record: RunRecord, timeline: Timeline) -> None:
-    decision, instant = record.decisions[0], timeline.instants[0]
+    decision, instant = record.decisions[0], timeline.entries[0]
     joint = run_scenario(SCENARIO, "jdm", seed=1).decisions[0].plan
     parts: list[Any] = [record, decision, decision.plan, *decision.plan.actions, record.truth, record.health]
     parts += [joint, *joint.tables, *decision.plan.tables, *record.estimates]
@@ -102,7 +102,7 @@ def test_what_a_timeline_and_its_states_say(timeline: Timeline) -> None:
     assert re.fullmatch(r"State after .*\n  fused: \w+ of \d+ labels, .* targets expected", repr(timeline.state))
     assert timeline.state.fused._repr_html_() in timeline.state._repr_html_()
     assert repr(State((), "my own")) == "State before the first scan, of 0 sensors\n  fused: str"
-    scan = timeline.instants[0].scans[1]
+    scan = timeline.entries[0].scans[1]
     assert repr(scan) == "SensorScan of sensor 1, time 1, measurements [[0.1, 300.0]], pose [0.0, 0.0, 0.0]"
 
 

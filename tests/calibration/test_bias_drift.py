@@ -96,7 +96,7 @@ def test_biases_are_followed_and_taken_off_as_scans_come(problem: Problem, tmp_p
     follower, i = OnlineBiasEstimator(problem, window=90.0, every=60.0), place(problem, 1, "range")
     state, scans = follower.initial(), list(problem.recording.arrivals())
     for scan in scans:
-        state, without = follower.take(state, scan)
+        state, without = follower.process(state, scan)
         if state.num_estimates == 0:
             np.testing.assert_allclose(
                 without.measurements[:, 1], np.maximum(scan.measurements[:, 1] - (-150.0, 300.0)[scan.sensor], 1.0)
@@ -118,7 +118,7 @@ def test_biases_are_followed_and_taken_off_as_scans_come(problem: Problem, tmp_p
     found = load_snapshot(tmp_path / "state.npz")
     again = found["state"]
     for scan in scans[found["rest"] :]:
-        again, _ = follower.take(again, scan)
+        again, _ = follower.process(again, scan)
     assert follower.biases(again, now).tobytes() == follower.biases(state, now).tobytes()
 
 
@@ -156,7 +156,7 @@ def test_sensors_of_scans_that_are_to_come_can_be_followed(tmp_path: Path) -> No
     assert {each.sensor for each in problem.parameters} == {0, 1}
     assert problem.recording.scans == ()
     follower = OnlineBiasEstimator(problem)
-    state, scan = follower.take(follower.initial(), SensorScan(0, 3.0, [[0.1, 500.0]], (1.0, 2.0, 0.0)))
+    state, scan = follower.process(follower.initial(), SensorScan(0, 3.0, [[0.1, 500.0]], (1.0, 2.0, 0.0)))
     assert (state.newest, state.due, state.num_estimates) == (3.0, 63.0, 0)
     np.testing.assert_array_equal(scan.measurements, [[0.1, 500.0]])
 
@@ -168,10 +168,10 @@ def test_bad_parts_are_refused(problem: Problem) -> None:
         OnlineBiasEstimator(problem, window=0.0)
     follower = OnlineBiasEstimator(problem)
     with pytest.raises(InputError, match=r"scan.sensor: expected a whole number from 0 to 1; got 2"):
-        follower.take(follower.initial(), SensorScan(2, 0.0, [[0.1, 500.0]], (1.0, 2.0, 0.0)))
+        follower.process(follower.initial(), SensorScan(2, 0.0, [[0.1, 500.0]], (1.0, 2.0, 0.0)))
     with pytest.raises(InputError, match=r"scan of sensor 1 at 2 s: scan: expected an array of shape \(any, 2\)"):
-        follower.take(follower.initial(), SensorScan(1, 2.0, [[0.1, 500.0, 3.0]], (1.0, 2.0, 0.0)))
+        follower.process(follower.initial(), SensorScan(1, 2.0, [[0.1, 500.0, 3.0]], (1.0, 2.0, 0.0)))
     with pytest.raises(InputError, match="scan of sensor 1 at 2 s: scan: expected finite numbers"):
-        follower.take(follower.initial(), SensorScan(1, 2.0, [[0.1, math.nan]], (1.0, 2.0, 0.0)))
-    _, empty = follower.take(follower.initial(), SensorScan(1, 2.0, [], (1.0, 2.0, 0.0)))
+        follower.process(follower.initial(), SensorScan(1, 2.0, [[0.1, math.nan]], (1.0, 2.0, 0.0)))
+    _, empty = follower.process(follower.initial(), SensorScan(1, 2.0, [], (1.0, 2.0, 0.0)))
     assert empty.measurements.shape == (0, 2)

@@ -45,7 +45,7 @@ def test_lines_in_lines_out(place: Path) -> None:
 PROGRAM = [sys.executable, "-c", "from vedette.cli import app; app(prog_name='vedette')"]
 
 
-def test_after_a_kill_it_goes_on_and_the_record_replays_to_the_same_bytes(place: Path) -> None:
+def test_a_killed_loop_resumes_and_its_record_replays_to_the_same_bytes(place: Path) -> None:
     lines = walk(10)
     words = [*PROGRAM, *WORDS, "--decide-every", "4", "--planner", "idm"]
     kept = [*words, "--snapshot", "state", "--snapshot-interval", "0", "--record", "came"]

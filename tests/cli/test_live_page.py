@@ -79,7 +79,7 @@ def test_dates_are_its_clock(browser: Browser, folder: Path) -> None:
         loop.kill()
 
 
-def test_it_draws_what_comes_and_outlives_a_kill(browser: Browser, folder: Path) -> None:
+def test_the_page_draws_scans_and_survives_a_kill(browser: Browser, folder: Path) -> None:
     loop, lines = Loop(folder), walk(12)
     try:
         page = browser.open(loop.page, width=1400)
@@ -126,7 +126,7 @@ def test_it_draws_what_comes_and_outlives_a_kill(browser: Browser, folder: Path)
     assert json.loads(first.stdout.splitlines()[-1])["time"] == 11.0
 
 
-def test_a_page_from_elsewhere_gets_no_socket(browser: Browser, folder: Path) -> None:
+def test_a_foreign_page_gets_no_socket(browser: Browser, folder: Path) -> None:
     loop = Loop(folder)
     try:
         script = "new WebSocket('ws://127.0.0.1:PORT/PATH')".replace("PORT", str(loop.port))

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from recordings import write_recording
-from vedette.live import Live, encoded, live_of
+from vedette.live import LiveLoop, build_live_loop, encode_line
 from vedette.scenarios.of_recording import scenario_of_sensors
 
 REGION = "region: {x_min: -6000.0, x_max: 6000.0, y_min: -6000.0, y_max: 6000.0}\n"
@@ -46,11 +46,11 @@ def write_live(folder: Path, **options: Any) -> list[bytes]:
     return [json.dumps(line).encode() for line in lines.values()]
 
 
-def small(folder: Path, text: str = SYNCHRONOUS, **options: Any) -> Live:
+def small(folder: Path, text: str = SYNCHRONOUS, **options: Any) -> LiveLoop:
     """A loop of two sensors that measure positions."""
     (folder / "small.yaml").write_text(text, "utf-8")
     known = scenario_of_sensors(folder / "small.yaml", decide_every=options.get("decide_every"))
-    return live_of(known, num_threads=1, **options)
+    return build_live_loop(known, num_threads=1, **options)
 
 
 def line(sensor: Any = 1, time: Any = 0.0, measurements: Any = (), **more: Any) -> bytes:
@@ -66,10 +66,10 @@ def walk(num: int, seed: int = 0) -> list[bytes]:
     return lines
 
 
-def answered(live: Live, lines: list[bytes]) -> list[bytes]:
+def answered(live: LiveLoop, lines: list[bytes]) -> list[bytes]:
     """All answers, as lines."""
     state, found = live.initial(), list[bytes]()
     for one in lines:
-        state, answers = live.take(state, one)
-        found += map(encoded, answers)
+        state, answers = live.process(state, one)
+        found += map(encode_line, answers)
     return found

@@ -1,4 +1,4 @@
-"""Lines of scans in, lines of estimates and plans out: what LateScans says of the same scans, whatever else comes."""
+"""Live loop: its answers are those of `OutOfSequenceTracker` for the same scans, whatever other lines arrive."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ import pytest
 
 from live.examples import SYNCHRONOUS, answered, line, small, walk, write_live
 from vedette.errors import InputError
-from vedette.live import MOST_BYTES, Live, live_of
+from vedette.live import MAX_LINE_BYTES, LiveLoop, build_live_loop
 from vedette.recorded import Conventions, Origin, Site, parse_scans
 from vedette.recorded.tables import read_table
 from vedette.scenarios.build import build_experiment
 from vedette.scenarios.of_recording import scenario_of_sensors
-from vedette.tracking import LateScans, SensorScan
+from vedette.tracking import OutOfSequenceTracker, SensorScan
 
 
 def test_the_estimates_are_those_of_the_same_scans_read_from_a_file(tmp_path: Path) -> None:
@@ -29,16 +29,16 @@ def test_the_estimates_are_those_of_the_same_scans_read_from_a_file(tmp_path: Pa
     sites = [Site(s.name or "", s.measurement.kind, s.pose) for s in model.sensors]
     conventions = Conventions({"sensor": "radar", "bearing": "brg_deg"}, {}, "north")
     recorded = parse_scans(read_table(tmp_path / "scans.csv"), sites, conventions, origin)
-    late = LateScans(experiment.tracker, experiment.poses)
+    late = OutOfSequenceTracker(experiment.tracker, experiment.poses)
     timeline, wanted = late.initial(), []
     first = float(experiment.times[0])
     for time, scans, poses in zip(recorded.times.tolist(), recorded.scans, recorded.poses, strict=True):
         for s, scan in enumerate(scans):
             if scan is not None:
                 at = time + recorded.start - (recorded.start - first)
-                timeline, _ = late.take(timeline, [SensorScan(s, at, scan, poses[s])])
+                timeline, _ = late.process(timeline, [SensorScan(s, at, scan, poses[s])])
                 wanted.append(experiment.estimate(timeline.state.fused, timeline.state.step))
-    answers = [json.loads(answer) for answer in answered(live_of(known), lines)]
+    answers = [json.loads(answer) for answer in answered(build_live_loop(known), lines)]
     assert len(answers) == len(wanted) == len(lines)
     for answer, estimate in zip(answers, wanted, strict=True):
         tracks = answer["tracks"]
@@ -54,7 +54,7 @@ def test_the_estimates_are_those_of_the_same_scans_read_from_a_file(tmp_path: Pa
     assert answers[-1]["time"] == pytest.approx(recorded.start + recorded.times[-1], abs=1e-6)
 
 
-def test_any_order_of_arrival_ends_in_the_same_tracks(tmp_path: Path) -> None:
+def test_any_order_of_arrival_gives_the_same_tracks(tmp_path: Path) -> None:
     live, lines = small(tmp_path), walk(12)
     *_, last = map(json.loads, answered(live, lines))
     for seed in range(3):
@@ -64,7 +64,7 @@ def test_any_order_of_arrival_ends_in_the_same_tracks(tmp_path: Path) -> None:
         assert (other["late"] > 0, other["dropped"]) == (True, 0)
 
 
-def test_a_bias_is_taken_off_what_lines_say(tmp_path: Path) -> None:
+def test_biases_are_removed_from_the_measurements_of_lines(tmp_path: Path) -> None:
     (tmp_path / "biased").mkdir()
     biased = SYNCHRONOUS.replace("position: [0.0, 0.0]}", "position: [0.0, 0.0], bias: {x: 30.0, y: -5.0, clock: 1.0}}")
     plain, told = [], []
@@ -82,7 +82,7 @@ BAD: list[tuple[bytes, str]] = [
     (b"\xff{}", "line 3: expected a JSON object; it is damaged"),
     (b"[" * 100_000, "line 3: expected a JSON object; it is damaged: it is nested too deeply"),
     (b"3", "line 3: expected a JSON object; got 3"),
-    (b" " * 3 + b"x" * MOST_BYTES, f"line 3: expected at most {MOST_BYTES} bytes"),
+    (b" " * 3 + b"x" * MAX_LINE_BYTES, f"line 3: expected at most {MAX_LINE_BYTES} bytes"),
     (b'{"sensor": 1, "sensor": 2}', "'sensor' stands there twice"),
     (b'{"sensor": 1, "time": NaN, "measurements": []}', "NaN is no number"),
     (b'{"sensor": 1, "time": 1e999, "measurements": []}', "too large a number"),
@@ -124,17 +124,17 @@ BAD: list[tuple[bytes, str]] = [
 
 
 @pytest.mark.parametrize(("bad", "words"), BAD, ids=range(len(BAD)))
-def test_a_bad_line_is_told_and_the_loop_goes_on_as_if_it_had_not_come(tmp_path: Path, bad: bytes, words: str) -> None:
+def test_a_bad_line_is_reported_and_has_no_other_effect(tmp_path: Path, bad: bytes, words: str) -> None:
     live, lines = small(tmp_path), walk(1)
     state = live.initial()
     for one in lines:
-        state, _ = live.take(state, one)
-    after, (answer,) = live.take(state, bad)
+        state, _ = live.process(state, one)
+    after, (answer,) = live.process(state, bad)
     assert words in answer["error"]
     assert answer["error"].startswith("line 3")
     assert (after.num_errors, after.num_lines, after.timeline) == (1, 3, state.timeline)
     good = line(1, 1.0, [[4.0, 51.0]])
-    assert live.take(after, good)[1][0]["tracks"] == live.take(state, good)[1][0]["tracks"]
+    assert live.process(after, good)[1][0]["tracks"] == live.process(state, good)[1][0]["tracks"]
 
 
 def test_what_a_part_of_ones_own_raises_is_told(tmp_path: Path) -> None:
@@ -143,14 +143,14 @@ def test_what_a_part_of_ones_own_raises_is_told(tmp_path: Path) -> None:
     def fails(density: Any, step: int) -> Any:
         raise RuntimeError("no estimate today")
 
-    broken = Live(live.late, live.sites, fails, live.conventions)
-    state, (answer,) = broken.take(broken.initial(), line())
+    broken = LiveLoop(live.tracker, live.sites, fails, live.conventions)
+    state, (answer,) = broken.process(broken.initial(), line())
     assert answer["error"].startswith("line 1: RuntimeError: no estimate today")
-    assert state.timeline.num_taken == 0
+    assert state.timeline.num_processed == 0
 
 
-def test_a_wrong_clock_is_not_believed_but_all_clocks_are(tmp_path: Path) -> None:
-    live = small(tmp_path, ahead=10.0)
+def test_one_wrong_clock_is_rejected_but_agreeing_clocks_are_accepted(tmp_path: Path) -> None:
+    live = small(tmp_path, max_lead=10.0)
     lines = [line(1, 0.0), line(1, 500.0), line(1, 501.0), line(2, 1.0), line(1, 502.0), line(1, 503.0)]
     answers = [json.loads(answer) for answer in answered(live, [*lines, line(1, 2.0), line(2, 3.0)])]
     assert ["error" in answer for answer in answers] == [False, True, True, False, True, True, False, False]
@@ -167,14 +167,14 @@ def test_a_wrong_clock_is_not_believed_but_all_clocks_are(tmp_path: Path) -> Non
     assert sum("error" in json.loads(answer) for answer in answered(live, [line(1, 0.0), *apart])) == 12
 
 
-def test_plans_come_after_all_scans_of_their_time(tmp_path: Path) -> None:
+def test_plans_follow_all_scans_of_their_time(tmp_path: Path) -> None:
     live, lines = small(tmp_path, decide_every=5.0), walk(12)
     answers = [json.loads(answer) for answer in answered(live, lines)]
     plans = {answer["line"]: answer["plan"] for answer in answers if "plan" in answer}
     assert {number: plan["time"] for number, plan in plans.items()} == {12: 5.0, 22: 10.0}
     state = live.initial()
     for one in lines[:12]:
-        state, _ = live.take(state, one)
+        state, _ = live.process(state, one)
     assert live.planner is not None
     belief = state.timeline.state
     plan = live.planner.plan(belief, state.timeline.poses, rng=np.random.default_rng(0))
@@ -196,7 +196,7 @@ def test_the_decision_times_of_a_scenario_are_kept(tmp_path: Path) -> None:
     assert not any("plan" in answer for answer in still)
 
 
-def test_a_plan_that_cannot_be_made_costs_no_scan(tmp_path: Path) -> None:
+def test_a_failing_planner_loses_no_scan(tmp_path: Path) -> None:
     live = small(tmp_path, decide_every=5.0)
 
     class Fails:
@@ -205,7 +205,7 @@ def test_a_plan_that_cannot_be_made_costs_no_scan(tmp_path: Path) -> None:
         def plan(self, *_: Any, **__: Any) -> Any:
             raise RuntimeError("no idea")
 
-    broken = Live(live.late, live.sites, live.estimate, live.conventions, planner=Fails(), decide_every=5.0)
+    broken = LiveLoop(live.tracker, live.sites, live.estimate, live.conventions, planner=Fails(), decide_every=5.0)
     answers = [json.loads(answer) for answer in answered(broken, walk(8))]
     (error,) = (answer["error"] for answer in answers if "error" in answer)
     assert error.startswith("line 12, plan at 5 s: RuntimeError: no idea (test_loop.py, line ")
@@ -223,8 +223,8 @@ def test_units_and_bearings_are_those_of_the_file(tmp_path: Path) -> None:
         north = line(1, float(k), [[45.0, 0.5]], pose=[1.0, 2.0, 0.5 * np.pi - 0.5])
         metres = line(1, float(k), [[45.0, 500.0]], pose=[1.0, 2.0, 0.5 * np.pi - 0.5])
         for live, sent in ((plain, east), (compass, north), (own, metres)):
-            timelines = live.take(live.initial(), sent)[0].timeline
-            np.testing.assert_allclose(timelines.instants[0].scans[0].measurements, [[0.25 * np.pi, 500.0]], rtol=1e-12)
+            timelines = live.process(live.initial(), sent)[0].timeline
+            np.testing.assert_allclose(timelines.entries[0].scans[0].measurements, [[0.25 * np.pi, 500.0]], rtol=1e-12)
             np.testing.assert_allclose(timelines.poses[0], [1.0, 2.0, 0.5], rtol=1e-12)
 
 
@@ -240,7 +240,7 @@ LIMITED = "{kind: limited_range, max_range: 600.0, probability: 0.9}"
     ],
 )
 @pytest.mark.parametrize("births", [True, False])
-def test_without_a_region_it_is_as_far_as_the_sensors_see(tmp_path: Path, old: str, new: str, births: bool) -> None:
+def test_without_a_region_the_grid_covers_the_sensors_range(tmp_path: Path, old: str, new: str, births: bool) -> None:
     text = NO_REGION if births else re.sub("birth: .*\n", "", NO_REGION)
     text = text.replace(old, new)
     said = text + "region: {x_min: -600.0, x_max: 700.0, y_min: -600.0, y_max: 600.0}\n"
@@ -255,14 +255,14 @@ def test_without_a_region_it_is_as_far_as_the_sensors_see(tmp_path: Path, old: s
 
 
 @pytest.mark.parametrize("num", [2_000, pytest.param(10_000, marks=pytest.mark.slow)])
-def test_many_scans_leave_no_more_behind_than_a_few(tmp_path: Path, num: int) -> None:
+def test_memory_does_not_grow_with_the_number_of_scans(tmp_path: Path, num: int) -> None:
     live = small(tmp_path, window=5.0)
     state, counts = live.initial(), []
     for k in range(num):
-        state, _ = live.take(state, line(1 + k % 2, 0.5 * k, [[0.0, 50.0]] if k % 3 else []))
+        state, _ = live.process(state, line(1 + k % 2, 0.5 * k, [[0.0, 50.0]] if k % 3 else []))
         if k in (999, num - 1):
             gc.collect()
-            counts.append((len(gc.get_objects()), len(state.timeline.instants)))
+            counts.append((len(gc.get_objects()), len(state.timeline.entries)))
     assert counts[1][1] == counts[0][1] == 11
     assert abs(counts[1][0] - counts[0][0]) < 200
 
@@ -281,7 +281,7 @@ def test_an_unsuitable_file_is_reported(tmp_path: Path, text: str, words: str) -
         small(tmp_path, text)
 
 
-def test_who_knows_the_targets_does_not_decide(tmp_path: Path) -> None:
+def test_planners_that_need_the_true_targets_are_rejected(tmp_path: Path) -> None:
     for name in ("oracle", "told"):
         with pytest.raises(InputError, match=f"expected one that does not know the targets; got {name}"):
             small(tmp_path, decide_every=5.0, planner=name)

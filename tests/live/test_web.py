@@ -13,8 +13,8 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.protocol import State
 
-from live.test_serving import take
-from vedette.live import Exchange, TcpServer, serving, web
+from live.test_server import take
+from vedette.live import LineServer, TcpServer, server, web
 from vedette.live.web import WebServer
 
 Connect = Callable[..., Awaitable[ClientConnection]]
@@ -23,7 +23,7 @@ Scene = Callable[[str, Connect], Awaitable[None]]
 
 @pytest.fixture(autouse=True)
 def soon(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(serving, "WRONG_SECONDS", 0.001)
+    monkeypatch.setattr(server, "WRONG_TOKEN_DELAY", 0.001)
 
 
 class Numbered:
@@ -44,7 +44,7 @@ def served(scene: Scene, token: str | None = None, screen: Any = None, answers: 
     told, came = list[str](), list[ClientConnection]()
 
     async def play() -> None:
-        server = await WebServer(Exchange(answers, token, told.append), screen or Numbered(), "127.0.0.1").listen(0)
+        server = await WebServer(LineServer(answers, token, told.append), screen or Numbered(), "127.0.0.1").listen(0)
         host, port = server.sockets[0].getsockname()[:2]
 
         async def client(path: str = "/", **options: Any) -> ClientConnection:
@@ -82,7 +82,7 @@ async def heard(socket: ClientConnection) -> Any:
     return json.loads(await socket.recv())
 
 
-def test_answers_go_to_all_and_errors_to_who_caused_them() -> None:
+def test_answers_go_to_all_clients_and_errors_to_their_sender() -> None:
     async def scene(address: str, client: Connect) -> None:
         one, other = await client(), await client()
         await one.send("bad\nword\nanother")
@@ -108,7 +108,7 @@ def test_the_page_is_served_and_nothing_else() -> None:
 @pytest.mark.parametrize(
     "origin", ["http://elsewhere.example", "null", "http://127.0.0.1:1", "http://localhost", "http://[", "file://"]
 )
-def test_no_page_from_elsewhere_may_come(origin: str) -> None:
+def test_foreign_pages_are_rejected(origin: str) -> None:
     async def scene(address: str, client: Connect) -> None:
         for path in ("/", "/page"):
             assert await refused(client, path, origin=origin) == 403
@@ -121,7 +121,7 @@ def test_no_page_from_elsewhere_may_come(origin: str) -> None:
 
 
 @pytest.mark.parametrize("host", ["elsewhere.example", "127.0.0.1.elsewhere.example", "", "0.0.0.0", "["])
-def test_no_other_name_of_this_machine_opens_it(host: str) -> None:
+def test_other_names_of_this_machine_are_rejected(host: str) -> None:
     """A name that somebody else lets point here would make his page one of ours."""
 
     async def scene(address: str, client: Connect) -> None:
@@ -145,7 +145,7 @@ def test_without_the_token_there_is_neither_page_nor_socket() -> None:
     assert all("had no token" in text for text in served(scene, "s&cret"))
 
 
-def test_a_message_too_long_ends_who_sent_it_alone() -> None:
+def test_a_message_that_is_too_long_disconnects_only_its_sender() -> None:
     async def scene(address: str, client: Connect) -> None:
         one, other = await client(), await client()
         with contextlib.suppress(ConnectionClosed):
@@ -158,7 +158,7 @@ def test_a_message_too_long_ends_who_sent_it_alone() -> None:
     assert "sent a message of more than 1000000 bytes, and was put out" in text
 
 
-def test_what_cannot_be_taken_at_all_is_told() -> None:
+def test_unreadable_lines_are_reported() -> None:
     def fail(line: bytes) -> tuple[dict[str, Any], ...]:
         raise OSError("no space left")
 
@@ -172,8 +172,8 @@ def test_what_cannot_be_taken_at_all_is_told() -> None:
     assert "was put out: OSError: no space left" in text
 
 
-def test_who_does_not_read_is_put_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(serving, "MOST_UNREAD", 100_000)
+def test_clients_that_do_not_read_are_disconnected(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "MAX_UNREAD_BYTES", 100_000)
 
     async def scene(address: str, client: Connect) -> None:
         deaf, one = await client(max_queue=1), await client()
@@ -186,8 +186,8 @@ def test_who_does_not_read_is_put_out(monkeypatch: pytest.MonkeyPatch) -> None:
     assert any("does not read its answers, and was put out" in text for text in served(scene))
 
 
-def test_one_client_too_many_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(serving, "MOST_CLIENTS", 1)
+def test_a_client_beyond_the_limit_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "MAX_CLIENTS", 1)
 
     async def scene(address: str, client: Connect) -> None:
         await client()
@@ -198,7 +198,7 @@ def test_one_client_too_many_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_silent_sockets_make_way_before_their_handshake(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(serving, "MOST_WAITING", 2)
+    monkeypatch.setattr(server, "MAX_WAITING", 2)
 
     async def scene(address: str, client: Connect) -> None:
         silent = [await asyncio.open_connection(*address.split(":")) for _ in range(4)]
@@ -214,7 +214,7 @@ def test_silent_sockets_make_way_before_their_handshake(monkeypatch: pytest.Monk
     assert text.endswith("had not entered, and made way")
 
 
-def test_a_slow_page_gets_the_latest_and_how_many_it_missed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_slow_page_gets_the_latest_frame_and_the_number_missed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(web, "FRAMES_PER_SECOND", 1e6)
 
     async def scene(address: str, client: Connect) -> None:
@@ -242,7 +242,7 @@ def test_a_slow_page_gets_the_latest_and_how_many_it_missed(monkeypatch: pytest.
     assert served(scene) == []
 
 
-def test_without_pages_nothing_is_drawn_and_a_fault_of_the_screen_is_told() -> None:
+def test_without_pages_nothing_is_drawn_and_faults_of_the_screen_are_reported() -> None:
     class Faulty(Numbered):
         def frame(self) -> bytes:
             self.num += 1
@@ -272,7 +272,7 @@ def test_a_browser_cannot_send_lines_to_tcp_under_http() -> None:
         return ()
 
     async def play() -> None:
-        server = await TcpServer(Exchange(note, None, told.append)).listen("127.0.0.1", 0)
+        server = await TcpServer(LineServer(note, None, told.append)).listen("127.0.0.1", 0)
         async with server:
             reader, writer = await asyncio.open_connection(*server.sockets[0].getsockname()[:2])
             writer.write(b'POST / HTTP/1.1\r\nHost: x\r\n\r\n{"sensor": 1, "time": 0, "measurements": []}\r\n')

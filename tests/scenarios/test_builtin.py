@@ -20,7 +20,7 @@ from vedette.scenarios.sections.sensing import Clutter, Detection, Measurement, 
 from vedette.scenarios.sections.targets import RecordedTargets, ScriptedTargets
 from vedette.scenarios.sections.world import Motion
 from vedette.simulation import Truth
-from vedette.tracking import Delayed
+from vedette.tracking import DelayedScanTracker
 
 LAYOUTS: dict[str, dict[str, Any]] = {
     "paper-a": {
@@ -203,7 +203,7 @@ def test_the_land_of_the_patrol_has_no_ship_on_it_and_the_boats_off_it() -> None
     for zone in zones:
         way = np.concatenate([places, starts])[:, np.newaxis]
         assert zone.courses(ConstraintContext((way,), np.ones(1)))[0].all()
-    assert isinstance(build_experiment(scenario).tracker, Delayed)
+    assert isinstance(build_experiment(scenario).tracker, DelayedScanTracker)
 
 
 def test_the_ships_come_with_their_origin_and_licence() -> None:

@@ -19,7 +19,7 @@ from vedette.evaluation.actions import action_axis, describe_action, drawn_angle
 from vedette.evaluation.rewards import mean_rewards
 from vedette.evaluation.runs import run_scenario
 from vedette.evaluation.track_table import table_of_run
-from vedette.live import live_of
+from vedette.live import build_live_loop
 from vedette.platforms import (
     Actions,
     ByCompass,
@@ -138,13 +138,13 @@ def boats(folder: Path, text: str = BOATS) -> Any:
 def test_the_course_of_a_plan_is_the_course_of_a_pose(tmp_path: Path) -> None:
     """What a plan tells a boat, the boat reports when it goes there; both ways it is one direction in the plane."""
     known = boats(tmp_path)
-    live = live_of(known, decide_every=5.0, num_threads=1)
+    live = build_live_loop(known, decide_every=5.0, num_threads=1)
     state, plans = live.initial(), []
     for k in range(7):
         for s, name in enumerate(("one", "two")):
             pose = {"lon": 0.35 + 0.01 * s, "lat": 50.7, "course_deg": 60.0 if s == 0 else 0.0}
             line = {"sensor": name, "time": float(k), "measurements": [[120.0, 800.0]], "pose": pose}
-            state, answers = live.take(state, json.dumps(line).encode())
+            state, answers = live.process(state, json.dumps(line).encode())
             assert not any("error" in answer for answer in answers)
             plans += [answer["plan"] for answer in answers if "plan" in answer]
     (plan,) = plans
@@ -160,7 +160,7 @@ def test_the_course_of_a_plan_is_the_course_of_a_pose(tmp_path: Path) -> None:
         there = options.courses[options.which[row], 0]
         pose = {"lon": 0.35 + 0.01 * s, "lat": 50.7, "course_deg": action["course_deg"]}
         line = {"sensor": s + 1, "time": 10.0, "measurements": [], "pose": pose}
-        after, _ = live.take(state, json.dumps(line).encode())
+        after, _ = live.process(state, json.dumps(line).encode())
         told = after.timeline.poses[s]
         assert math.remainder(told[2] - there[2], 2.0 * math.pi) == pytest.approx(0.0, abs=1e-12)
         away = there[:2] - poses[s, :2]
@@ -168,7 +168,7 @@ def test_the_course_of_a_plan_is_the_course_of_a_pose(tmp_path: Path) -> None:
         # The compass of the boat's own bearings is the same one.
         pose["heading_deg"] = pose.pop("course_deg")
         line["pose"] = pose
-        after, _ = live.take(state, json.dumps(line).encode())
+        after, _ = live.process(state, json.dumps(line).encode())
         assert after.timeline.poses[s, 2] == pytest.approx(float(told[2]), abs=1e-12)
 
 
@@ -180,16 +180,16 @@ def test_lines_from_north_are_answered_from_north(tmp_path: Path) -> None:
     text = text.replace("{lon: 0.35, lat: 50.7}", "[98900.0, 0.0]").replace("{lon: 0.36, lat: 50.7}", "[99600.0, 0.0]")
     text = text.replace("course_deg: 60", "heading_deg: 30").replace("course_deg: 0}", "heading_deg: 90}")
     text = text.replace("courses_deg: [0, 60, 135, 270]", "headings_deg: [90, 30, -45, 180]")
-    live = live_of(boats(tmp_path, text), decide_every=1.0, num_threads=1)
+    live = build_live_loop(boats(tmp_path, text), decide_every=1.0, num_threads=1)
     state, plans = live.initial(), []
     for k in range(3):
         for s in (1, 2):
             pose = [98200.0 + 700.0 * s, 0.0, math.radians(60.0)]
             line = {"sensor": s, "time": float(k), "measurements": [[2.0, 800.0]], "pose": pose}
-            state, answers = live.take(state, json.dumps(line).encode())
+            state, answers = live.process(state, json.dumps(line).encode())
             plans += [answer["plan"] for answer in answers if "plan" in answer]
     assert state.timeline.poses[0, 2] == pytest.approx(math.radians(30.0))
-    assert state.timeline.instants[0].scans[0].measurements[0, 0] == pytest.approx(math.pi / 2.0 - 2.0)
+    assert state.timeline.entries[0].scans[0].measurements[0, 0] == pytest.approx(math.pi / 2.0 - 2.0)
     assert {action["course_deg"] for plan in plans for action in plan["actions"]} <= {0.0, 60.0, 135.0, 270.0}
 
 
@@ -204,14 +204,14 @@ def test_lines_from_north_are_answered_from_north(tmp_path: Path) -> None:
     ],
 )
 def test_a_course_that_is_none_is_refused(tmp_path: Path, pose: Any, words: str) -> None:
-    live = live_of(boats(tmp_path), num_threads=1)
+    live = build_live_loop(boats(tmp_path), num_threads=1)
     line = json.dumps({"sensor": 1, "time": 0.0, "measurements": [], "pose": pose}).encode()
-    ((answer,),) = (live.take(live.initial(), line)[1],)
+    ((answer,),) = (live.process(live.initial(), line)[1],)
     assert words in answer["error"]
 
 
 def test_live_tracks_have_courses_and_speeds(tmp_path: Path) -> None:
-    live = live_of(boats(tmp_path), num_threads=1)
+    live = build_live_loop(boats(tmp_path), num_threads=1)
     state, origin = live.initial(), FAR
     (start,) = origin.to_plane([0.355], [50.705])
     for k in range(12):
@@ -222,7 +222,7 @@ def test_live_tracks_have_courses_and_speeds(tmp_path: Path) -> None:
             distance, azimuth = inverse((lon, 50.7), (lon_t, lat_t))
             row = [math.degrees(azimuth) % 360.0, distance]
             line = {"sensor": s + 1, "time": float(k), "measurements": [row], "pose": {"lon": lon, "lat": 50.7}}
-            state, answers = live.take(state, json.dumps(line).encode())
+            state, answers = live.process(state, json.dumps(line).encode())
     (track,) = answers[0]["tracks"]
     assert track["course_deg"] == pytest.approx(45.0, abs=5.0)
     assert track["speed_mps"] == pytest.approx(math.hypot(track["vx"], track["vy"]))

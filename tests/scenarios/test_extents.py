@@ -13,7 +13,7 @@ import pytest
 from vedette.errors import InputError
 from vedette.evaluation.runs import run_scenario
 from vedette.kernels.base.types import Floats
-from vedette.live import live_of
+from vedette.live import build_live_loop
 from vedette.recorded.extents import box_of, wild
 from vedette.scenarios.calibrated import problem_of
 from vedette.scenarios.cautions import cautions
@@ -132,7 +132,7 @@ def test_rows_beyond_a_region_that_is_given_are_counted_and_named(tmp_path: Path
 
 def test_a_live_loop_takes_nothing_from_beyond(tmp_path: Path) -> None:
     (tmp_path / "radar.yaml").write_text(SENSORS % LIMITED, "utf-8")
-    live = live_of(scenario_of_sensors(tmp_path / "radar.yaml"))
+    live = build_live_loop(scenario_of_sensors(tmp_path / "radar.yaml"))
     told = []
     for has_wild in (False, True):
         state, answers = live.initial(), list[dict[str, Any]]()
@@ -141,7 +141,7 @@ def test_a_live_loop_takes_nothing_from_beyond(tmp_path: Path) -> None:
             measured = np.column_stack([np.arctan2(*places.T), np.hypot(*places.T)]).tolist()
             measured += [[0.2, 3e5]] if has_wild and k == 9 else []
             line = json.dumps({"sensor": "R", "time": time, "measurements": measured})
-            state, found = live.take(state, line.encode())
+            state, found = live.process(state, line.encode())
             answers += found
         assert not [answer["error"] for answer in answers if "error" in answer]
         told.append(answers)

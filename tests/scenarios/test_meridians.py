@@ -13,7 +13,7 @@ import pytest
 from reference.geodesy import inverse
 from vedette.evaluation.runs import run_scenario
 from vedette.evaluation.scans import scan_table, scans_of_record
-from vedette.live import Live, live_of
+from vedette.live import LiveLoop, build_live_loop
 from vedette.platforms import PlaneCompass
 from vedette.recorded import Conventions, Origin, Site, parse_scans, table_of
 from vedette.scenarios import load_scenario
@@ -112,23 +112,23 @@ def test_a_ship_between_two_far_radars_is_one_track(tmp_path: Path) -> None:
     assert np.hypot(*(last.means[0, :2] - truth)) < 10.0
 
 
-def far_loop(folder: Path) -> Live:
+def far_loop(folder: Path) -> LiveLoop:
     text = SENSORS + "region: {x_min: -20e3, x_max: 120e3, y_min: -20e3, y_max: 40e3}\n"
     (folder / "live.yaml").write_text(
         text.replace("bearings: north", "bearings: north, units: {bearing: deg}"), "utf-8"
     )
-    return live_of(scenario_of_sensors(folder / "live.yaml"), num_threads=1)
+    return build_live_loop(scenario_of_sensors(folder / "live.yaml"), num_threads=1)
 
 
 def test_lines_and_own_headings_are_from_true_north_at_the_sensor(tmp_path: Path) -> None:
     live = far_loop(tmp_path)
     pose = {"lon": RADARS["B"][0], "lat": RADARS["B"][1], "heading_deg": 30.0}
     line = {"sensor": "B", "time": 0.0, "measurements": [seen("B", SHIP)], "pose": pose}
-    timeline = live.take(live.initial(), json.dumps(line).encode())[0].timeline
+    timeline = live.process(live.initial(), json.dumps(line).encode())[0].timeline
     x, y, heading = timeline.poses[1][:3]
     turned = 1.4 * math.sin(math.radians(50.7))
     assert math.degrees(heading) == pytest.approx(60.0 + turned, abs=0.005)
-    angle, distance = timeline.instants[0].scans[1].measurements[0]
+    angle, distance = timeline.entries[0].scans[1].measurements[0]
     place = np.array([x, y]) + distance * np.array([math.cos(angle), math.sin(angle)])
     assert np.hypot(*(place - FAR.to_plane([SHIP[0]], [SHIP[1]])[0])) < 5.0
 

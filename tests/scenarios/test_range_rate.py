@@ -17,7 +17,7 @@ from vedette.errors import InputError, ScenarioError
 from vedette.evaluation.metrics import ospa_of_run
 from vedette.evaluation.scans import scan_table
 from vedette.kernels.base.types import OWN_VELOCITY
-from vedette.live import live_of
+from vedette.live import build_live_loop
 from vedette.live.messages import read_message
 from vedette.recorded import Conventions, Site, parse_scans
 from vedette.recorded.tables import Table
@@ -157,12 +157,12 @@ def test_lines_become_tracks_with_velocities(tmp_path: Path) -> None:
         "sensors:\n  - {name: a, position: [-900.0, 0.0]}\n",
         "utf-8",
     )
-    live = live_of(scenario_of_sensors(tmp_path / "radars.yaml", speed=15.0))
+    live = build_live_loop(scenario_of_sensors(tmp_path / "radars.yaml", speed=15.0))
     state = live.initial()
     for k in range(4):
         rows = [[0.0, 900.0 - 14.0 * k, -7.0], [0.0, 5000.0, 0.0]]
         line = {"sensor": "a", "time": 2.0 * k, "measurements": rows, "pose": [-900.0, 0.0, 0.0]}
-        state, answers = live.take(state, json.dumps(line).encode())
+        state, answers = live.process(state, json.dumps(line).encode())
     (answer,) = answers
     assert answer["beyond"] == 1
     assert [round(each["vx"]) for each in answer["tracks"]] == [-7]

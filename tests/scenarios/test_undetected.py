@@ -22,7 +22,7 @@ from vedette.scenarios.dumping import dump_scenario
 from vedette.scenarios.sections.undetected import MAX_CELLS, UndetectedSection
 from vedette.scenarios.summary import facts
 from vedette.simulation.loop import run_stream
-from vedette.tracking import Central, Distributed, Searching
+from vedette.tracking import Central, Distributed, UndetectedTargetTracker
 
 SHORT = (
     ("num_steps: 20", "num_steps: 6"),
@@ -39,7 +39,7 @@ def scenario(undetected: str, *changes: tuple[str, str]) -> Scenario:
 
 def test_the_tracker_searches() -> None:
     tracker: Any = build_experiment(scenario(WHOLE)).tracker
-    assert isinstance(tracker, Searching)
+    assert isinstance(tracker, UndetectedTargetTracker)
     assert isinstance(tracker.tracker, Distributed)
     model = tracker.model
     assert model.grid == CellGrid(Region(-100.0, 100.0, -50.0, 50.0), 7, 4)

@@ -37,7 +37,7 @@ def posterior(place, looks):
 
 
 @pytest.mark.parametrize("seeing", [(0,), (0, 1)])
-def test_a_birth_has_the_velocity_that_its_range_rates_say(seeing):
+def test_a_birth_has_the_velocity_of_its_range_rates(seeing):
     scans = [SENSOR.measurement.measure(STATES, pose) if s in seeing else None for s, pose in enumerate(POSES)]
     born = births_from_scans(BIRTH, NOBODY, (SENSOR,) * 2, scans, POSES, 7)
     assert born is not None

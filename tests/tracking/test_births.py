@@ -17,7 +17,7 @@ from vedette.fusion import Clmb, LabelMatchedFusion
 from vedette.fusion.matching import OWN_LABELS
 from vedette.models import BirthModel, MeasurementBirth
 from vedette.tracking import Central, Distributed, State
-from vedette.tracking.births import Unexplained, _pool, births_due, births_from_scans
+from vedette.tracking.births import UnexplainedMeasurements, _pool, birth_candidates, births_from_scans
 
 STD = np.array([10.0, 10.0, 5.0, 5.0])
 MEASURED = MeasurementBirth(expected=0.4, max_existence=0.3, std=STD)
@@ -31,7 +31,7 @@ def born(belief: Any, scans: Any, **options: Any) -> Any:
     return births_from_scans(BIRTH, belief, SENSORS, scans, POSES, 7, **options)
 
 
-def test_existence_is_shared_out_by_what_is_unexplained() -> None:
+def test_existence_is_divided_by_the_unexplained_probability() -> None:
     """Against the formulas, by hand: one track, one measurement of it, and others far away."""
     cov = np.diag([9.0, 9.0, 4.0, 4.0])
     belief = lmb([[1, 0]], [0.6], [[0.0, 0.0, 1.0, 1.0]], [cov])
@@ -53,7 +53,7 @@ def test_existence_is_shared_out_by_what_is_unexplained() -> None:
     assert born(NOBODY, [scan[:1], None]).existence[0] == pytest.approx(0.3)  # no more than that
 
 
-def test_what_two_sensors_measure_of_one_target_is_one_birth() -> None:
+def test_measurements_of_one_target_by_two_sensors_are_one_birth() -> None:
     here, there = np.array([[10.0, 0.0], [200.0, 0.0]]), np.array([[16.0, 4.0]])
     made = born(NOBODY, [here, there])
     np.testing.assert_allclose(made.tracks.means[:, :2], [[13.0, 2.0], [200.0, 0.0]])
@@ -64,7 +64,7 @@ def test_what_two_sensors_measure_of_one_target_is_one_birth() -> None:
     np.testing.assert_allclose(np.sort(again.tracks.means[:, 0]), np.sort(made.tracks.means[:, 0]))
 
 
-def pooled_one_by_one(found: Unexplained) -> tuple[list[np.ndarray], list[float]]:
+def pooled_one_by_one(found: UnexplainedMeasurements) -> tuple[list[np.ndarray], list[float]]:
     """Every measurement meets every group: the definition."""
     places: list[np.ndarray] = []
     probabilities: list[float] = []
@@ -85,14 +85,12 @@ def pooled_one_by_one(found: Unexplained) -> tuple[list[np.ndarray], list[float]
 
 @pytest.mark.parametrize("num_sensors", [1, 2, 5])
 @pytest.mark.parametrize("side", [30.0, 300.0, 3000.0])
-def test_pools_are_the_same_to_the_bit_as_where_every_measurement_meets_every_group(
-    num_sensors: int, side: float
-) -> None:
+def test_pooling_with_cells_equals_pooling_without_cells_to_the_bit(num_sensors: int, side: float) -> None:
     rng = np.random.default_rng(round(side) + num_sensors)
     for num in (0, 1, 200):
         positions = rng.uniform(-side, side, (num, 2)).round(0)  # whole metres: distances that are equal
         probabilities = rng.choice([0.2, 0.5, 0.9, 1.0], num)
-        found = Unexplained(positions, probabilities, rng.integers(0, num_sensors, num))
+        found = UnexplainedMeasurements(positions, probabilities, rng.integers(0, num_sensors, num))
         made = _pool(found, MEASURED)
         places, least = pooled_one_by_one(found)
         np.testing.assert_array_equal(made.states, np.reshape(places, (-1, 2)))
@@ -105,13 +103,13 @@ def test_labels_follow_the_sites_or_are_a_sensors_own() -> None:
     made = births_from_scans(sites, NOBODY, SENSORS[:1], [scan], POSES[:1], 1)
     assert made is not None
     np.testing.assert_array_equal(made.tracks.labels, [[1, 2]])
-    due = births_due(sites, 1, 1.0, made)
+    due = birth_candidates(sites, 1, 1.0, made)
     assert due is not None
     np.testing.assert_array_equal(due.tracks.labels, [[1, 0], [1, 1], [1, 2]])
     np.testing.assert_allclose(due.existence, [0.5, 0.3, 0.3])
     due.validate()
-    assert births_due(sites, 2, 1.0, None).tracks.num_tracks == 0  # type: ignore[union-attr]  # sites at step 1 alone
-    assert births_due(targets().birth, 1, 1.0, None) is None
+    assert birth_candidates(sites, 2, 1.0, None).tracks.num_tracks == 0  # type: ignore[union-attr]  # sites at step 1 alone
+    assert birth_candidates(targets().birth, 1, 1.0, None) is None
     own = born(NOBODY, [None, scan], owner=1)
     np.testing.assert_array_equal(own.tracks.labels, [[7, 2 * OWN_LABELS]])
     assert born(NOBODY, [None, None]).tracks.num_tracks == 0
@@ -148,7 +146,7 @@ TRUTH = np.array([[3.0, -4.0, 2.0, 1.0], [95.0, 5.0, -1.0, 2.0], [0.0, 200.0, 3.
 @pytest.mark.parametrize(
     "kind", [SequentialLmbFilter, MultiSensorLmbFilter, MultiSensorGlmbFilter, "feedback", "matched"]
 )
-def test_targets_are_found_without_any_site(kind: Any) -> None:
+def test_targets_are_found_without_birth_sites(kind: Any) -> None:
     if kind == "feedback":
         tracker: Any = Distributed(filters(WORLD, SENSORS), Clmb((0.5, 0.5)), feedback=True)
     elif kind == "matched":
@@ -229,7 +227,7 @@ def test_scans_at_different_times() -> None:
         plain.step(plain.initial(), [None], POSES[:1], 1.0, rngs=rngs(1))
 
 
-def test_a_sensor_that_keeps_its_belief_counts_by_what_it_sees_whether_it_scanned_or_not() -> None:
+def test_without_feedback_a_sensor_counts_by_its_view_even_without_a_scan() -> None:
     local, thirds, poses = filters(targets(), (*SENSORS, SENSORS[0])), (1 / 3, 1 / 3, 1 / 3), np.zeros((3, 3))
     mean, cov = [[0.0, 0.0, 1.0, 1.0]], [np.diag([9.0, 9.0, 4.0, 4.0])]
     beliefs = tuple(lmb([[1, 0]], [r], mean, cov) for r in (0.9, 0.5, 0.3))

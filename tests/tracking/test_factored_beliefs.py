@@ -10,7 +10,7 @@ import numpy as np
 from tracking.scenes import lmb, sensor
 from vedette.densities import GLMB, FactoredGLMB, LabelledDensity, TrackTable, as_lmb
 from vedette.models import BirthModel, MeasurementBirth
-from vedette.tracking.base import bytes_of_belief
+from vedette.tracking.base import belief_bytes
 from vedette.tracking.births import births_from_scans
 
 STD = np.array([10.0, 10.0, 5.0, 5.0])
@@ -33,12 +33,12 @@ def pair() -> GLMB:
 def test_bytes_are_those_of_an_lmb_where_labels_are_alone() -> None:
     alone = targets([[1, 0], [1, 1]], [0.6, 0.9])
     product = FactoredGLMB.from_lmb(alone)
-    assert bytes_of_belief(product) == bytes_of_belief(alone)
+    assert belief_bytes(product) == belief_bytes(alone)
     both = FactoredGLMB.product([product, FactoredGLMB.from_glmb(pair())], 4)
-    assert bytes_of_belief(both) == bytes_of_belief(alone) + bytes_of_belief(pair())
+    assert belief_bytes(both) == belief_bytes(alone) + belief_bytes(pair())
 
 
-def test_births_are_those_beside_the_lmb() -> None:
+def test_births_match_those_of_the_lmb_filter() -> None:
     alone = FactoredGLMB.from_lmb(targets([[1, 0], [1, 1]], [0.6, 0.9]))
     product = FactoredGLMB.product([alone, FactoredGLMB.from_glmb(pair())], 4)
     scan = np.array([[2.0, -1.0], [101.0, 0.0], [302.0, 1.0], [-300.0, 50.0]])

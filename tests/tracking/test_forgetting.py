@@ -15,7 +15,7 @@ from vedette.errors import InputError
 from vedette.filters import FactoredGlmbFilter, LmbFilter
 from vedette.fusion import Clmb, FieldsOfView, LabelMatchedFusion
 from vedette.tracking import Distributed, State
-from vedette.tracking.losing import without_forgotten
+from vedette.tracking.lost_labels import drop_forgotten_labels
 
 BORN = models.MeasurementBirth(0.5, 0.03, np.array([20.0, 20.0, 8.0, 8.0]))
 WORLD = models.TargetModel(
@@ -53,7 +53,7 @@ def mean_labels(states: list[State]) -> float:
 
 
 @pytest.mark.parametrize("kind", [LmbFilter, FactoredGlmbFilter])
-def test_own_tracks_do_not_pile_up(kind: Any) -> None:
+def test_local_tracks_do_not_accumulate(kind: Any) -> None:
     fusion = LabelMatchedFusion(Clmb((0.5, 0.5), by_views=True))
     filters = tuple(kind(WORLD, SENSOR) for _ in range(2))
     states, infos = follow(Distributed(filters, fusion), 150, passing)
@@ -82,7 +82,7 @@ def test_a_target_that_is_out_of_view_for_a_while_keeps_its_label(away: int) -> 
     assert len(sure[-1]) == 1
 
 
-def test_what_is_forgotten_is_unseen_and_vaguer_than_a_birth() -> None:
+def test_forgotten_labels_are_out_of_view_and_vaguer_than_a_birth() -> None:
     places = np.array([[-150.0, 0.0], [900.0, 0.0], [900.0, 100.0], [900.0, 200.0], [-150.0, 50.0]])
     existence, stds = np.array([0.9, 0.9, 0.9, 0.02, 0.02]), np.array([10.0, 100.0, 120.0, 10.0, 60.0])
     means = np.hstack([places, np.zeros((5, 2))])
@@ -92,10 +92,10 @@ def test_what_is_forgotten_is_unseen_and_vaguer_than_a_birth() -> None:
     peaks, of_birth = existence / stds**2, 0.03 / 20.0**2
     gone = [2]
     assert [i for i in range(5) if peaks[i] < of_birth and abs(places[i, 0]) > 400.0] == gone
-    kept, dropped = without_forgotten(belief, BORN, views, 0, 0.1)
+    kept, dropped = drop_forgotten_labels(belief, BORN, views, 0, 0.1)
     assert [label[1] for label in kept.tracks.labels.tolist()] == [0, 1, 3, 4]
     assert dropped == pytest.approx(0.9)
-    assert without_forgotten(belief, BORN, views, 0, 0.0) == (belief, 0.0)
+    assert drop_forgotten_labels(belief, BORN, views, 0, 0.0) == (belief, 0.0)
 
 
 def test_the_least_detection_is_a_probability() -> None:

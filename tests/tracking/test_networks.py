@@ -16,8 +16,8 @@ from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb, FusionLimits, L
 from vedette.fusion.rebasing import rebase, with_labels_of
 from vedette.models import MeasurementBirth
 from vedette.tracking import BeliefNetwork, Central, Distributed, Network, ScanNetwork, State, Tracker
-from vedette.tracking.base import bytes_of_belief
-from vedette.tracking.network import NEVER, bytes_of_messages, hop_counts, metropolis_weights, parts_of_belief
+from vedette.tracking.base import belief_bytes
+from vedette.tracking.network import NEVER, belief_parts, hop_counts, message_bytes, metropolis_weights
 
 EQUAL = (1 / 3, 1 / 3, 1 / 3)
 MERGING = Clmb(EQUAL, by_views=True)
@@ -51,7 +51,7 @@ def belief_network(fusion: Any, network: Network) -> BeliefNetwork:
     return BeliefNetwork(filters(WORLD, SENSORS), fusion, network, MERGING)
 
 
-def test_who_hears_whom() -> None:
+def test_hop_counts_and_arrivals() -> None:
     network, rng = Network(radio_range=120.0, hops=1, delay=2), np.random.default_rng(0)
     links = network.links(LINE, rng)
     np.testing.assert_array_equal(links, [[0, 1, 0], [1, 0, 1], [0, 1, 0]])
@@ -69,7 +69,7 @@ def test_who_hears_whom() -> None:
     assert Network(120.0, consensus_rounds=4).bytes_sent(hop_counts(links), [10, 20, 30]) == (120, 120, 120)
 
 
-def test_links_fail_as_often_as_they_are_said_to() -> None:
+def test_links_fail_with_the_given_probability() -> None:
     network, rng = Network(loss=0.3), np.random.default_rng(3)
     drawn = np.array([network.links(LINE, rng) for _ in range(4000)])
     assert (drawn == drawn.swapaxes(1, 2)).all()
@@ -88,14 +88,14 @@ def test_metropolis_weights_keep_the_mean() -> None:
 
 @pytest.mark.parametrize("network", [Network(), Network(120.0), Network(hops=2)])
 @pytest.mark.parametrize("kind", [SequentialLmbFilter, MultiSensorGlmbFilter])
-def test_a_network_in_which_all_hear_all_is_the_central_filter(kind: Any, network: Network) -> None:
+def test_a_fully_connected_network_equals_the_central_filter(kind: Any, network: Network) -> None:
     central = follow(Central(kind(WORLD, SENSORS)))
     for state, expected in zip(follow(scan_network(network, kind)), central, strict=True):
         assert all(belief is state.fused for belief in state.local)
         np.testing.assert_array_equal(state.fused.tracks.means, expected.fused.tracks.means)
 
 
-def test_scans_that_are_late_are_put_in_their_place() -> None:
+def test_late_scans_are_processed_at_their_own_time() -> None:
     """Each sensor's belief is that of a central filter that has heard what has reached it by then."""
     states = follow(scan_network(Network(120.0, delay=1)), num_steps=5)
     hops = hop_counts(Network(120.0).links(LINE, np.random.default_rng(0)))
@@ -112,7 +112,7 @@ def test_scans_that_are_late_are_put_in_their_place() -> None:
             assert_same_lmb(state.local[i], belief, 1e-12)
 
 
-def test_groups_that_meet_again_merge_what_they_know() -> None:
+def test_groups_that_meet_again_merge_their_beliefs() -> None:
     """Sensor 1 alone sees target 1, sensor 3 target 2; apart they know one each, together both."""
     near = tuple(sensor(3.0, 0.95, 0.1, max_range=120.0) for _ in range(3))
     poses = np.array([[0.0, 60.0, 0.0], [600.0, 600.0, 0.0], [100.0, -100.0, 0.0]])
@@ -136,7 +136,7 @@ def test_groups_that_meet_again_merge_what_they_know() -> None:
 @pytest.mark.parametrize(
     "fusion", [ParallelUpdate(), Clmb(EQUAL), ArithmeticAverage(EQUAL, limits=FusionLimits(max_components=1))]
 )
-def test_consensus_becomes_the_fusion_of_all(fusion: Any) -> None:
+def test_consensus_converges_to_the_fusion_of_all_sensors(fusion: Any) -> None:
     """On a line of three, where two rounds reach everyone; the more rounds, the nearer, down to rounding."""
     central = follow(Distributed(filters(WORLD, SENSORS), fusion, feedback=True))
     errors = []
@@ -153,14 +153,14 @@ def test_consensus_becomes_the_fusion_of_all(fusion: Any) -> None:
 
 
 @pytest.mark.parametrize("fusion", [ParallelUpdate(), Clmb(EQUAL)])
-def test_beliefs_in_a_network_in_which_all_hear_all_are_the_distributed_tracker(fusion: Any) -> None:
+def test_a_fully_connected_belief_network_equals_the_distributed_tracker(fusion: Any) -> None:
     central = follow(Distributed(filters(WORLD, SENSORS), fusion, feedback=True))
     for state, expected in zip(follow(belief_network(fusion, Network())), central, strict=True):
         assert all(belief is state.fused for belief in state.local)
         assert_same_lmb(state.fused, expected.fused, 1e-12)
 
 
-def test_beliefs_that_are_late_are_predicted_to_now() -> None:
+def test_late_beliefs_are_predicted_to_the_current_time() -> None:
     states = follow(belief_network(Clmb(EQUAL), Network(delay=1)), num_steps=4)
     local = filters(WORLD, SENSORS)
     # At step 1 nothing has arrived: each has its own. At step 2 it has those of step 1 of the others, a second older.
@@ -180,7 +180,7 @@ def test_beliefs_that_are_late_are_predicted_to_now() -> None:
         assert_same_lmb(states[1].local[i], Clmb(EQUAL).fuse(late)[0], 1e-12)
 
 
-def test_births_are_shared_by_those_who_hear_each_other() -> None:
+def test_connected_sensors_share_births() -> None:
     world = targets(existence=(), measured=MeasurementBirth(0.5, 0.1, np.array([10.0, 10.0, 5.0, 5.0])))
     for tracker in (
         ScanNetwork(SequentialLmbFilter(world, SENSORS), Network(), MERGING),
@@ -192,7 +192,7 @@ def test_births_are_shared_by_those_who_hear_each_other() -> None:
         assert (state.fused.tracks.labels[:, 1] < 1_000_000).all()
 
 
-def test_what_a_scan_said_can_be_added_to_another_prediction() -> None:
+def test_the_information_of_a_scan_can_be_added_to_another_prediction() -> None:
     """A Kalman update of one prediction, taken over to another, is the update of the other by the same measurement."""
     rng = np.random.default_rng(1)
     roots = rng.normal(size=(2, 4, 4))
@@ -244,7 +244,7 @@ def test_bad_networks() -> None:
         belief_network(object(), Network())
 
 
-def test_what_a_late_message_says_goes_by_where_it_was_taken() -> None:
+def test_late_scans_use_the_pose_at_their_own_time() -> None:
     """Sensor 2 saw the target before it went away; sensor 1 sees nothing there."""
     near = tuple(sensor(3.0, 0.95, 0.1, max_range=100.0) for _ in range(2))
     world = targets(existence=(0.5,))
@@ -281,15 +281,15 @@ def line_of_labels(*labels: int, moved: float = 0.0) -> LMB:
     return LMB.from_bernoullis([(1, i) for i in labels], np.full(num, 0.5), means, np.tile(np.eye(4), (num, 1, 1)))
 
 
-def test_what_the_others_have_already_is_not_sent() -> None:
-    label, name = bytes_of_belief(line_of_labels(0)), 8
+def test_parts_that_others_already_have_are_not_sent() -> None:
+    label, name = belief_bytes(line_of_labels(0)), 8
     links = Network(radio_range=120.0).links(LINE, np.random.default_rng(0))
     hops = hop_counts(links)
     shared, own = line_of_labels(0, 1, 2), line_of_labels(0, 1, 2, moved=1.0)
     assert label == 8 * (2 + 1 + 1 + 4 + 10)
 
     def sent(hears: int | None, *beliefs: LMB) -> tuple[int, ...]:
-        return bytes_of_messages(Network(120.0, hears), hops, [(belief,) for belief in beliefs])
+        return message_bytes(Network(120.0, hears), hops, [(belief,) for belief in beliefs])
 
     # Names are passed on by the one in the middle; of equal content nothing else is.
     assert sent(None, shared, shared, shared) == (9 * name, 9 * name, 9 * name)
@@ -310,7 +310,7 @@ def test_parts_have_the_bytes_of_the_whole(factored: bool) -> None:
     if factored:
         pair, _ = as_glmb(line_of_labels(7, 8), max_hypotheses=10)
         belief = FactoredGLMB.product([FactoredGLMB.from_lmb(belief), FactoredGLMB.from_glmb(pair)], 4)
-    parts = parts_of_belief(belief)
+    parts = belief_parts(belief)
     assert len(parts) == (4 if factored else 3)
-    assert sum(parts.values()) == bytes_of_belief(belief)
-    assert len(parts_of_belief(line_of_labels(0, 1, 2, moved=1e-12)).keys() & parts.keys()) == 0
+    assert sum(parts.values()) == belief_bytes(belief)
+    assert len(belief_parts(line_of_labels(0, 1, 2, moved=1e-12)).keys() & parts.keys()) == 0

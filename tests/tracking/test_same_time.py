@@ -56,7 +56,7 @@ def test_scans_that_come_apart_are_those_that_come_together(kind: Any) -> None:
 
 
 @pytest.mark.parametrize("kind", [DeltaGlmbFilter, LmbFilter, FactoredGlmbFilter])
-def test_a_step_of_no_time_is_an_update(kind: Any) -> None:
+def test_a_step_of_zero_time_is_an_update(kind: Any) -> None:
     filter_ = kind(targets(), SENSORS[0], Limits(max_components=1))
     rng = np.random.default_rng(2)
     scan, again = (scans_of(TRUTH, SENSORS[:1], POSES[:1], rng)[0] for _ in range(2))
@@ -70,7 +70,7 @@ def test_a_step_of_no_time_is_an_update(kind: Any) -> None:
     np.testing.assert_allclose(as_lmb(waited).existence, as_lmb(belief).existence, atol=1e-12)
 
 
-def test_nobody_dies_and_none_is_born_of_no_time() -> None:
+def test_zero_time_has_no_deaths_and_no_births() -> None:
     world = targets((0.5, 0.3))
     world = replace(world, birth=replace(world.birth, steps=None))  # at every step
     tracker = Distributed(filters(world, SENSORS), Clmb((0.5, 0.5)))
@@ -84,7 +84,7 @@ def test_nobody_dies_and_none_is_born_of_no_time() -> None:
     assert later.local[0].tracks.num_tracks == 2 * again.local[0].tracks.num_tracks
 
 
-def test_who_was_measured_at_one_time_by_scans_that_came_apart_is_born_once() -> None:
+def test_separate_scans_of_one_time_give_one_birth() -> None:
     born = models.MeasurementBirth(expected=0.5, max_existence=0.1, std=np.array([20.0, 20.0, 5.0, 5.0]))
     world = targets((), born)
     tracker = Central(SequentialLmbFilter(world, SENSORS))
@@ -127,7 +127,7 @@ def test_scans_that_come_apart_over_a_network_are_those_that_come_together(netwo
 
 
 @pytest.mark.parametrize("network", [Network(), Network(120.0), Network(60.0)])
-def test_beliefs_that_come_apart_over_a_network_say_what_each_scan_said_once(network: Network) -> None:
+def test_delayed_beliefs_count_each_scan_once(network: Network) -> None:
     """Whoever divides by the common prediction adds what each scan has said, in one round or in three."""
     tracker = BeliefNetwork(filters(targets(), THREE), ParallelUpdate(), network, Clmb(EQUAL))
     for together, apart in both_ways(tracker):
@@ -138,7 +138,7 @@ def test_beliefs_that_come_apart_over_a_network_say_what_each_scan_said_once(net
 
 @pytest.mark.parametrize("network", [Network(), Network(120.0, hops=1), Network(loss=0.3)])
 @pytest.mark.parametrize("beliefs", [False, True])
-def test_nobody_moves_dies_or_is_born_of_no_time_in_a_network(network: Network, beliefs: bool) -> None:
+def test_zero_time_in_a_network_has_no_motion_deaths_or_births(network: Network, beliefs: bool) -> None:
     world = targets((0.5, 0.3))
     world = replace(world, birth=replace(world.birth, steps=None))  # at every step
     tracker: Tracker = ScanNetwork(SequentialLmbFilter(world, THREE), network, Clmb(EQUAL))
@@ -153,7 +153,7 @@ def test_nobody_moves_dies_or_is_born_of_no_time_in_a_network(network: Network, 
 
 
 @pytest.mark.parametrize("delay", [0, 1])
-def test_who_was_measured_by_scans_that_came_apart_is_born_once_in_a_network(delay: int) -> None:
+def test_separate_scans_of_one_time_give_one_birth_in_a_network(delay: int) -> None:
     world, near = targets((), BORN), [np.array([[10.0, 0.0]]), np.array([[12.0, 1.0], [300.0, 0.0]])]
     trackers = (
         ScanNetwork(SequentialLmbFilter(world, SENSORS), Network(delay=delay), Clmb((0.5, 0.5))),
@@ -167,7 +167,7 @@ def test_who_was_measured_by_scans_that_came_apart_is_born_once_in_a_network(del
         assert own[0] == own[1] == [10.0, 300.0]  # late or not, all know of all scans of 1 s at 2 s
 
 
-def test_time_does_not_run_back_and_does_not_stand_still_where_beliefs_are_late() -> None:
+def test_time_must_not_decrease_nor_repeat_with_delayed_beliefs() -> None:
     tracker = central(SequentialLmbFilter)
     nothing = [np.zeros((0, 2))] * 2
     state, _ = tracker.step(tracker.initial(), nothing, POSES, 1.0, rngs=rngs(2))

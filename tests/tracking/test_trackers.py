@@ -20,7 +20,7 @@ from vedette.simulation.experiment import Experiment
 from vedette.simulation.journal import STAGES, RunStopped
 from vedette.simulation.loop import FILTER, PLANNER, SCANS, TRUTH, run_stream
 from vedette.simulation.replay import scans_of
-from vedette.tracking import Central, CentralFilter, Distributed, State, Tracker, stage_of
+from vedette.tracking import Central, CentralFilter, Distributed, State, Tracker, failed_stage
 
 QUICK = PlanningSettings(num_samples=4, horizon_steps=2, num_threads=1)
 
@@ -53,7 +53,7 @@ def assert_same(first: RunRecord, second: RunRecord) -> None:
             assert table.mean.tobytes() == another.mean.tobytes()
 
 
-def test_the_loop_is_the_one_written_out_by_hand(experiment: Experiment) -> None:
+def test_the_tracker_equals_a_plain_loop(experiment: Experiment) -> None:
     planner: Any = replace(build_planner(load_scenario("paper-e"), "jdm"), settings=QUICK)  # type: ignore[type-var]
     record = run(experiment, planner)
     tracker: Any = experiment.tracker
@@ -196,7 +196,7 @@ def test_a_decision_from_a_central_belief(experiment: Experiment) -> None:
     assert record.decisions[0].plan.tables[0].mean.shape == (13, 13)
 
 
-def test_the_time_between_scans_is_told_to_the_filters(experiment: Experiment) -> None:
+def test_filters_receive_the_time_between_scans(experiment: Experiment) -> None:
     tracker: Any = experiment.tracker
     own = Own(tracker.filters[0])
     alone, rng = Distributed((own,)), np.random.default_rng(0)
@@ -260,7 +260,7 @@ def test_trackers_that_cannot_be_made(experiment: Experiment) -> None:
         Central(first)
 
 
-def test_an_exception_says_in_which_stage_it_was_raised(experiment: Experiment) -> None:
+def test_an_exception_names_its_stage(experiment: Experiment) -> None:
     class Failing(Own):
         def step(self, *_: Any, **__: Any) -> Any:
             raise NumericalError("no hypothesis")
@@ -270,8 +270,8 @@ def test_an_exception_says_in_which_stage_it_was_raised(experiment: Experiment) 
     scans, rngs = [np.empty((0, 2))] * 2, [np.random.default_rng(0)] * 2
     with pytest.raises(NumericalError) as caught:
         broken.step(broken.initial(), scans, experiment.poses, 1.0, rngs=rngs)
-    assert stage_of(caught.value) == "the filter of sensor 2"
-    assert stage_of(ValueError("elsewhere")) is None
+    assert failed_stage(caught.value) == "the filter of sensor 2"
+    assert failed_stage(ValueError("elsewhere")) is None
 
 
 def test_a_filter_without_a_report_is_named(experiment: Experiment) -> None:

@@ -18,7 +18,7 @@ from vedette.kernels.gaussian.row_noise import row_length
 from vedette.models.arguments import float_array, instance, positive
 from vedette.recorded.instants import Look, in_order, without_bias
 from vedette.tracking import SensorScan
-from vedette.tracking.late import name_of, own_scan
+from vedette.tracking.out_of_sequence import copy_scan, scan_name
 
 _KEPT = 4.0  # number of windows whose estimates are kept
 
@@ -129,7 +129,7 @@ class OnlineBiasEstimator:
         """Return the state before the first scan: biases at the parameters' start values."""
         return BiasEstimatorState(self.problem.parameters)
 
-    def take(self, state: BiasEstimatorState, scan: SensorScan) -> tuple[BiasEstimatorState, SensorScan]:
+    def process(self, state: BiasEstimatorState, scan: SensorScan) -> tuple[BiasEstimatorState, SensorScan]:
         """Process a scan, and estimate the biases again if that is due.
 
         Args:
@@ -161,11 +161,11 @@ class OnlineBiasEstimator:
         return SensorScan(scan.sensor, without.time, without.scan, without.pose)
 
     def _checked(self, scan: SensorScan) -> SensorScan:
-        own = own_scan(scan, len(self.problem.sites))
+        own = copy_scan(scan, len(self.problem.sites))
         dim = len(COMPONENTS[self.problem.sites[own.sensor].kind])
         measured = own.measurements if own.measurements.size else np.empty((0, dim))
         length = row_length(dim) if measured.shape[-1] == row_length(dim) else dim
-        return replace(own, measurements=float_array(f"{name_of(own)}: scan", measured, (None, length)))
+        return replace(own, measurements=float_array(f"{scan_name(own)}: scan", measured, (None, length)))
 
     def biases(self, state: BiasEstimatorState, time: float) -> Floats:
         """(num_parameters,) values of the parameters at a time.

@@ -22,7 +22,7 @@ from vedette.cli.scenario_files import print_warnings
 from vedette.internal.extras import require_packages
 
 if TYPE_CHECKING:
-    from vedette.live import Keeping
+    from vedette.live import PersistentLoop
     from vedette.reports.live import LiveScreen
 
 
@@ -115,8 +115,8 @@ def live(
 
     Reads one JSON line per scan; writes estimates, and plans when a decision is due.
     """
-    from vedette.live import Keeping, live_of
-    from vedette.live.serving import check_address
+    from vedette.live import PersistentLoop, build_live_loop
+    from vedette.live.server import check_address
     from vedette.scenarios.of_recording import scenario_of_sensors
 
     sources = [_parse_source(address) for address in listen or ["stdin"]]
@@ -130,12 +130,14 @@ def live(
     CodeTrust(trust)(live_scenario.scenario)
     print_warnings(live_scenario.scenario)
     note_assumptions(live_scenario.assumed, sensors)
-    loop = live_of(live_scenario, planner, window=max_delay, ahead=max_lead, decide_every=decide_every, seed=seed)
+    loop = build_live_loop(
+        live_scenario, planner, max_delay=max_delay, max_lead=max_lead, decide_every=decide_every, seed=seed
+    )
     screen = None
     if any(source.kind == "ws" for source in sources):
         from vedette.reports.live import LiveScreen
 
-        screen = LiveScreen(live_scenario.scenario, loop, lambda: keeping.state)
+        screen = LiveScreen(live_scenario.scenario, loop, lambda: persistent.state)
         loop = screen.live
     options = (max_delay, max_lead, speed, planner if loop.planner else "", decide_every, planning_timeout, seed)
     identity = hashlib.sha256(repr(options).encode() + sensors.read_bytes()).hexdigest()
@@ -143,15 +145,17 @@ def live(
 
     with interruptible("what came is kept where --snapshot or --record say so"):
         compile_if_cold(live_scenario.scenario)
-        keeping = Keeping(loop, of=identity, snapshot=snapshot, every=snapshot_interval, record=record, tell=note)
+        persistent = PersistentLoop(
+            loop, identity=identity, snapshot=snapshot, snapshot_interval=snapshot_interval, record=record, report=note
+        )
         try:
             with compiling():
-                for answers in keeping.resume():
+                for answers in persistent.resume():
                     _print_answers(answers)
-                asyncio.run(_listen(keeping, screen, sources, token))
+                asyncio.run(_listen(persistent, screen, sources, token))
         finally:
-            keeping.close()
-    emit_json(_document(keeping))
+            persistent.close()
+    emit_json(_document(persistent))
 
 
 class _Source(NamedTuple):
@@ -173,34 +177,36 @@ def _parse_source(listen: str) -> _Source:
 
 
 def _print_answers(answers: Iterable[dict[str, Any]]) -> None:
-    from vedette.live import encoded
+    from vedette.live import encode_line
 
     for answer in answers:
-        echo(encoded(answer).decode(), nl=False)
+        echo(encode_line(answer).decode(), nl=False)
 
 
-async def _listen(keeping: Keeping, screen: LiveScreen | None, sources: Sequence[_Source], token: str | None) -> None:
+async def _listen(
+    persistent: PersistentLoop, screen: LiveScreen | None, sources: Sequence[_Source], token: str | None
+) -> None:
     """Process lines until standard input ends, or until Ctrl-C if there are clients; do not wait for them."""
     import asyncio
 
-    from vedette.live import Exchange, TcpServer, lines_of
+    from vedette.live import LineServer, TcpServer, iter_lines
 
-    def take(line: bytes) -> Iterable[dict[str, Any]]:
-        answers = keeping.take(line)
+    def process(line: bytes) -> Iterable[dict[str, Any]]:
+        answers = persistent.process(line)
         _print_answers(answers)
         if screen is not None:
             screen.note(answers)
         return answers
 
-    exchange = Exchange(take, token, note)
+    line_server = LineServer(process, token, note)
     async with contextlib.AsyncExitStack() as servers:
         for source in sources:
             if source.kind == "tcp":
-                server: Any = await TcpServer(exchange).listen(source.host, source.port)
+                server: Any = await TcpServer(line_server).listen(source.host, source.port)
             elif screen is not None and source.kind == "ws":
                 from vedette.live.web import WebServer
 
-                server = await WebServer(exchange, screen, source.host).listen(source.port)
+                server = await WebServer(line_server, screen, source.host).listen(source.port)
             else:
                 continue
             servers.callback(server.close)
@@ -211,19 +217,19 @@ async def _listen(keeping: Keeping, screen: LiveScreen | None, sources: Sequence
                 + (f"; the page is http://{address}/" if source.kind == "ws" else "")
             )
         if any(source.kind == "stdin" for source in sources):
-            async for line in lines_of(sys.stdin.buffer):
-                await exchange.answer(line, None)
+            async for line in iter_lines(sys.stdin.buffer):
+                await line_server.answer(line, None)
         if any(source.kind != "stdin" for source in sources):
             await asyncio.Event().wait()
 
 
-def _document(keeping: Keeping) -> dict[str, Any]:
-    state = keeping.state
+def _document(persistent: PersistentLoop) -> dict[str, Any]:
+    state = persistent.state
     timeline = state.timeline
     return {
         "lines": state.num_lines,
         "errors": state.num_errors,
-        "scans": timeline.num_taken,
+        "scans": timeline.num_processed,
         "late": timeline.num_late,
         "dropped": timeline.num_dropped,
         "repeated": timeline.num_repeated,

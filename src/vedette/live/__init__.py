@@ -1,24 +1,24 @@
 """Live tracking: lines of JSON with scans in, estimates and plans out; recorded, and resumed after interruptions."""
 
-from vedette.live.building import live_of
-from vedette.live.keeping import Keeping
-from vedette.live.lines import LineSplitter, lines_of
-from vedette.live.loop import Answer, Live, LiveState, encoded
-from vedette.live.messages import MOST_BYTES, Message, read_message
-from vedette.live.serving import Exchange, TcpServer
+from vedette.live.building import build_live_loop
+from vedette.live.lines import LineSplitter, iter_lines
+from vedette.live.loop import Answer, LiveLoop, LiveState, encode_line
+from vedette.live.messages import MAX_LINE_BYTES, Message, read_message
+from vedette.live.persistence import PersistentLoop
+from vedette.live.server import LineServer, TcpServer
 
 __all__ = [
-    "MOST_BYTES",
+    "MAX_LINE_BYTES",
     "Answer",
-    "Exchange",
-    "Keeping",
+    "LineServer",
     "LineSplitter",
-    "Live",
+    "LiveLoop",
     "LiveState",
     "Message",
+    "PersistentLoop",
     "TcpServer",
-    "encoded",
-    "lines_of",
-    "live_of",
+    "build_live_loop",
+    "encode_line",
+    "iter_lines",
     "read_message",
 ]

@@ -7,33 +7,33 @@ from typing import Any
 from vedette.control import ConstraintReportingPlanner, RequiresTruth
 from vedette.errors import InputError
 from vedette.internal.quantities import COMPONENTS
-from vedette.live.loop import Live
+from vedette.live.loop import LiveLoop
 from vedette.models.arguments import reject
 from vedette.recorded.extents import box_of
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.scenarios.of_recording import OfSensors
 from vedette.scenarios.sections.planners import Named
 from vedette.scenarios.sections.recording import sites_of
-from vedette.tracking import LateScans
+from vedette.tracking import OutOfSequenceTracker
 
 
-def live_of(
-    known: OfSensors,
+def build_live_loop(
+    live_scenario: OfSensors,
     planner: str = "jdm",
     *,
-    window: float = 30.0,
-    ahead: float = 60.0,
+    max_delay: float = 30.0,
+    max_lead: float = 60.0,
     decide_every: float | None = None,
     seed: int = 0,
     num_threads: int = 0,
-) -> Live:
+) -> LiveLoop:
     """Return the live loop of a scenario.
 
     Args:
-        known: scenario and conventions, see `vedette.scenarios.of_recording.scenario_of_sensors`.
+        live_scenario: scenario and conventions, see `vedette.scenarios.of_recording.scenario_of_sensors`.
         planner: name of the planner, used if there are decisions: at the scenario's times or every `decide_every`.
-        window: largest delay of a scan in s.
-        ahead: largest time in s by which a scan may be ahead of all others.
+        max_delay: largest delay of a scan in s.
+        max_lead: largest time in s by which a scan may be ahead of all others.
         decide_every: time between decisions in s; None: at the times of the scenario.
         seed: seed for decisions and for filters that draw random numbers.
         num_threads: number of threads for a decision; 0: one per processor.
@@ -42,33 +42,33 @@ def live_of(
         InputError: incompatible parts, a kind of measurement that lines cannot express, or a planner that needs the
             true targets.
     """
-    model = known.scenario.model
+    model = live_scenario.scenario.model
     sites = tuple(sites_of(model))
     for site in sites:
         if site.kind not in COMPONENTS:
             raise reject(f"sensor {site.name}", f"measurements of kind {', '.join(COMPONENTS)}", site.kind)
-    experiment = build_experiment(known.scenario)
-    decides = None
+    experiment = build_experiment(live_scenario.scenario)
+    built = None
     if decide_every is not None or experiment.decision_steps:
-        decides = build_planner(known.scenario, planner, num_threads)
-        inside: Any = decides
+        built = build_planner(live_scenario.scenario, planner, num_threads)
+        inner: Any = built
         while isinstance(
-            inside, Named | ConstraintReportingPlanner
+            inner, Named | ConstraintReportingPlanner
         ):  # these pass the truth on and do not need it themselves
-            inside = inside.planner
-        if isinstance(inside, RequiresTruth):
+            inner = inner.planner
+        if isinstance(inner, RequiresTruth):
             raise InputError(f"planner: expected one that does not know the targets; got {planner}")
-    return Live(
-        LateScans(experiment.tracker, experiment.poses, window, seed),
+    return LiveLoop(
+        OutOfSequenceTracker(experiment.tracker, experiment.poses, max_delay, seed),
         sites,
         experiment.estimate,
-        known.conventions,
+        live_scenario.conventions,
         None if model.origin is None else model.origin.build(),
-        first=float(experiment.times[0]),
-        planner=decides,
+        first_time=float(experiment.times[0]),
+        planner=built,
         decision_times=tuple(float(experiment.times[step - 1]) for step in experiment.decision_steps),
         decide_every=decide_every,
-        ahead=ahead,
+        max_lead=max_lead,
         seed=seed,
-        within=box_of(model.region.build().corners),
+        valid_area=box_of(model.region.build().corners),
     )

@@ -9,37 +9,37 @@ import threading
 from collections.abc import AsyncIterator
 from typing import Any
 
-from vedette.live.messages import MOST_BYTES
+from vedette.live.messages import MAX_LINE_BYTES
 
 CHUNK = 1 << 16
 
 
 class LineSplitter:
-    """Splitter of arriving bytes into lines, in bounded memory: at most `most + 1` bytes of a line are kept."""
+    """Splitter of arriving bytes into lines, in bounded memory: at most `max_bytes + 1` bytes of a line are kept."""
 
-    def __init__(self, most: int) -> None:
-        self._most, self._part = most, bytearray()
+    def __init__(self, max_bytes: int) -> None:
+        self._max_bytes, self._part = max_bytes, bytearray()
 
     def feed(self, data: bytes) -> list[bytes]:
         """Return the lines that these bytes complete, stripped, without empty ones."""
-        found = []
+        lines = []
         *ended, last = data.split(b"\n")
         for piece in ended:
-            self._keep(piece)
-            found.append(bytes(self._part).strip())
+            self._append(piece)
+            lines.append(bytes(self._part).strip())
             self._part.clear()
-        self._keep(last)
-        return [line for line in found if line]
+        self._append(last)
+        return [line for line in lines if line]
 
     def rest(self) -> list[bytes]:
         """Return the last line if it has no end."""
         return self.feed(b"\n")
 
-    def _keep(self, piece: bytes) -> None:
-        self._part += piece[: self._most + 1 - len(self._part)]
+    def _append(self, piece: bytes) -> None:
+        self._part += piece[: self._max_bytes + 1 - len(self._part)]
 
 
-async def lines_of(source: Any) -> AsyncIterator[bytes]:
+async def iter_lines(source: Any) -> AsyncIterator[bytes]:
     """Yield the lines of a binary file such as standard input, which is read ahead by one chunk."""
     loop, chunks = asyncio.get_running_loop(), asyncio.Queue[bytes](1)
     try:  # a buffered file would stay locked while it waits for data, even at the end of the process
@@ -55,7 +55,7 @@ async def lines_of(source: Any) -> AsyncIterator[bytes]:
                 asyncio.run_coroutine_threadsafe(chunks.put(data), loop).result()
 
     threading.Thread(target=read, daemon=True).start()
-    splitter = LineSplitter(MOST_BYTES)
+    splitter = LineSplitter(MAX_LINE_BYTES)
     while data := await chunks.get():
         for line in splitter.feed(data):
             yield line

@@ -23,12 +23,12 @@ from vedette.recorded import Conventions, Origin, Site
 from vedette.recorded.extents import beyond_reach, is_within, places_of
 from vedette.simulation.journal import error_cause
 from vedette.simulation.loop import PLANNER
-from vedette.tracking import LateScans, SensorScan, Timeline
+from vedette.tracking import OutOfSequenceTracker, SensorScan, Timeline
 
 Answer: TypeAlias = dict[str, Any]
 # Number of consecutive scans that must agree on a time far ahead before it is accepted, since all sensors may have been
 # silent for long. If they are all from one of several sensors, more are needed, as it may only be the fastest one.
-_AGREEING, _ALONE = 3, 10
+_MIN_AGREEING, _MIN_AGREEING_ALONE = 3, 10
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,39 +61,40 @@ class LiveState:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Live:
+class LiveLoop:
     """A loop that processes lines with scans, in any order of time, and answers each.
 
     The same lines in the same order have the same answers, byte for byte.
 
     Attributes:
-        late: tracker for scans in any order of arrival.
+        tracker: tracker for scans in any order of arrival.
         sites: the sensors, as in `read_message`.
         estimate: estimator of the targets.
         conventions, origin: conventions of the lines, and origin of the plane.
-        first: time of the first scan on the clock of the tracker, in s, if times are dates; other times are unchanged.
+        first_time: time of the first scan on the clock of the tracker, in s, if times are dates; other times are
+            unchanged.
         planner: planner of the decisions; None: no decisions.
         decision_times: times of the decisions in s, increasing.
         decide_every: time between decisions in s, from the first scan on, instead of `decision_times`.
-        ahead: s; a scan further ahead of all others is refused unless several in a row agree, because one wrong clock
-            would otherwise end the window of all other sensors.
+        max_lead: s; a scan further ahead of all others is refused unless several in a row agree, because one wrong
+            clock would otherwise end the window of all other sensors.
         seed: seed of the decisions.
-        within: (2, 2) lower left and upper right corner of the area of valid measurements, in m; others are left out
-            and counted in the answer as `beyond`. None: no limit.
+        valid_area: (2, 2) lower left and upper right corner of the area of valid measurements, in m; others are left
+            out and counted in the answer as `beyond`. None: no limit.
     """
 
-    late: LateScans
+    tracker: OutOfSequenceTracker
     sites: tuple[Site, ...]
     estimate: Estimator
     conventions: Conventions
     origin: Origin | None = None
-    first: float = 0.0
+    first_time: float = 0.0
     planner: Planner | None = None
     decision_times: tuple[float, ...] = ()
     decide_every: float | None = None
-    ahead: float = 60.0
+    max_lead: float = 60.0
     seed: int = 0
-    within: Floats | None = None
+    valid_area: Floats | None = None
 
     @property
     def compass(self) -> Compass | None:
@@ -104,13 +105,13 @@ class Live:
 
     def initial(self) -> LiveState:
         """Return the state before the first line."""
-        return LiveState(self.late.initial(), latest=(-math.inf,) * len(self.sites))
+        return LiveState(self.tracker.initial(), latest=(-math.inf,) * len(self.sites))
 
-    def take(self, state: LiveState, line: bytes) -> tuple[LiveState, tuple[Answer, ...]]:
+    def process(self, state: LiveState, line: bytes) -> tuple[LiveState, tuple[Answer, ...]]:
         """Process a line; answer with the estimates and, if one was due, a plan, or with the error in the line.
 
         Returns:
-            The state after the line, and the answers; `encoded` converts each into a line.
+            The state after the line, and the answers; `encode_line` converts each into a line.
         """
         state = replace(state, num_lines=state.num_lines + 1)
         place = f"line {state.num_lines}"
@@ -118,32 +119,32 @@ class Live:
             message = read_message(line, place, self.sites, self.conventions, self.origin)
             checked, time = self._on_clock(state, message, place)
             if checked.claimants:
-                wanted = f"at most {self.ahead:g} s after the latest, or {_AGREEING} scans in a row that agree"
-                wanted += f" ({_ALONE} of one sensor)" if len(self.sites) > 1 else ""
-                fault = str(reject(f"{place}, time", wanted, f"{time - (state.timeline.newest or 0.0):g} s after it"))
-                return _failed(checked, fault)
-            scan, num_beyond = self._within(message.scan)
-            timeline, _ = self.late.take(state.timeline, [replace(scan, time=time)])
+                expected = f"at most {self.max_lead:g} s after the latest, or {_MIN_AGREEING} scans in a row that agree"
+                expected += f" ({_MIN_AGREEING_ALONE} of one sensor)" if len(self.sites) > 1 else ""
+                fault = str(reject(f"{place}, time", expected, f"{time - (state.timeline.newest or 0.0):g} s after it"))
+                return _error_answer(checked, fault)
+            scan, num_beyond = self._drop_invalid(message.scan)
+            timeline, _ = self.tracker.process(state.timeline, [replace(scan, time=time)])
             latest = list(state.latest)
             latest[message.scan.sensor] = max(latest[message.scan.sensor], time)
-            taken = replace(checked, timeline=timeline, latest=tuple(latest))
-            answer = self._estimates(taken) | ({"beyond": num_beyond} if num_beyond else {})
+            processed = replace(checked, timeline=timeline, latest=tuple(latest))
+            answer = self._estimates(processed) | ({"beyond": num_beyond} if num_beyond else {})
         except Exception as error:  # custom code may raise anything; the loop continues with the next line
             text = str(error) if isinstance(error, VedetteError) else error_cause(error)
-            return _failed(state, text if text.startswith(place) else f"{place}: {text}")
-        if self._is_due(taken):
-            taken, plan = self._decided(taken)
-            return taken, (answer, plan)
-        return taken, (answer,)
+            return _error_answer(state, text if text.startswith(place) else f"{place}: {text}")
+        if self._is_due(processed):
+            processed, plan = self._decide(processed)
+            return processed, (answer, plan)
+        return processed, (answer,)
 
-    def _within(self, scan: SensorScan) -> tuple[SensorScan, int]:
-        """Return the scan without measurements outside `within` or the sensor's reach, and the number removed."""
+    def _drop_invalid(self, scan: SensorScan) -> tuple[SensorScan, int]:
+        """Return the scan without measurements outside `valid_area` or the sensor's reach, and the number removed."""
         site, pose = self.sites[scan.sensor], np.asarray(scan.pose)
-        if self.within is None or site.kind not in PLACED:
+        if self.valid_area is None or site.kind not in PLACED:
             return scan, 0
         measured = np.asarray(scan.measurements, np.float64).reshape(-1, len(COMPONENTS[site.kind]))
         places = places_of(measured, pose, site.kind)
-        inside = is_within(places, self.within) & ~beyond_reach(places, pose[:2], site.reach)
+        inside = is_within(places, self.valid_area) & ~beyond_reach(places, pose[:2], site.reach)
         return replace(scan, measurements=measured[inside]), int(np.count_nonzero(~inside))
 
     def _on_clock(self, state: LiveState, message: Message, place: str) -> tuple[LiveState, float]:
@@ -151,72 +152,72 @@ class Live:
 
         The state has claimants if the scan's time is not accepted.
         """
-        told = message.scan.time
+        line_time = message.scan.time
         if state.start is None:
-            start = told - self.first if message.is_utc else 0.0
-            time = told - start
-            state = replace(state, start=start, is_utc=message.is_utc, due=self._due_after(time, time))
+            start = line_time - self.first_time if message.is_utc else 0.0
+            time = line_time - start
+            state = replace(state, start=start, is_utc=message.is_utc, due=self._next_decision_time(time, time))
         elif message.is_utc != state.is_utc:
-            came = utc_text(told) if message.is_utc else f"{told:g}"
-            raise reject(f"{place}, time", "dates, as before" if state.is_utc else "seconds, as before", came)
+            given = utc_text(line_time) if message.is_utc else f"{line_time:g}"
+            raise reject(f"{place}, time", "dates, as before" if state.is_utc else "seconds, as before", given)
         assert state.start is not None
-        time, newest = told - state.start, state.timeline.newest
-        if newest is None or time <= newest + self.ahead:
+        time, newest = line_time - state.start, state.timeline.newest
+        if newest is None or time <= newest + self.max_lead:
             return replace(state, claimed=math.inf, claimants=()), time
-        agreed = state.claimants if abs(time - state.claimed) <= self.ahead else ()
+        agreed = state.claimants if abs(time - state.claimed) <= self.max_lead else ()
         claimants = (*agreed, message.scan.sensor)
-        enough = _AGREEING if len(set(claimants)) > 1 or len(self.sites) == 1 else _ALONE
-        return replace(state, claimed=time, claimants=() if len(claimants) >= enough else claimants), time
+        needed = _MIN_AGREEING if len(set(claimants)) > 1 or len(self.sites) == 1 else _MIN_AGREEING_ALONE
+        return replace(state, claimed=time, claimants=() if len(claimants) >= needed else claimants), time
 
-    def _told(self, state: LiveState, time: float) -> Answer:
+    def _line_time(self, state: LiveState, time: float) -> Answer:
         """Return a time of the tracker's clock in the form of times in lines."""
-        told = time + (state.start or 0.0)
-        return {"time": told, "utc": utc_text(told)} if state.is_utc else {"time": told}
+        line_time = time + (state.start or 0.0)
+        return {"time": line_time, "utc": utc_text(line_time)} if state.is_utc else {"time": line_time}
 
     def _estimates(self, state: LiveState) -> Answer:
         timeline = state.timeline
         belief = timeline.state
         assert belief.time is not None  # a scan was taken, or one before it
-        found = self.estimate(belief.fused, belief.step)
-        names = ("x", "y", "vx", "vy")[: 4 if found.means.shape[1] >= 4 else 2]
+        estimate = self.estimate(belief.fused, belief.step)
+        names = ("x", "y", "vx", "vy")[: 4 if estimate.means.shape[1] >= 4 else 2]
         names = (*names, "z", "vz") if any(site.kind in HEIGHT_DEPENDENT for site in self.sites) else names
-        stds = np.sqrt(np.diagonal(found.covs, axis1=1, axis2=2))[:, : len(names)]
+        stds = np.sqrt(np.diagonal(estimate.covs, axis1=1, axis2=2))[:, : len(names)]
         tracks: list[Answer] = []
         for label, mean, std, existence in zip(
-            found.labels.tolist(), found.means.tolist(), stds.tolist(), found.existence.tolist(), strict=True
+            estimate.labels.tolist(), estimate.means.tolist(), stds.tolist(), estimate.existence.tolist(), strict=True
         ):
-            named = dict(zip(names, mean, strict=False))
-            tracks.append({"label": ".".join(map(str, label)), **named, "std": std, "existence": existence})
+            components = dict(zip(names, mean, strict=False))
+            tracks.append({"label": ".".join(map(str, label)), **components, "std": std, "existence": existence})
         if self.origin is not None and tracks:
-            for track, (lon, lat) in zip(tracks, self.origin.to_degrees(found.means[:, :2]).tolist(), strict=True):
+            for track, (lon, lat) in zip(tracks, self.origin.to_degrees(estimate.means[:, :2]).tolist(), strict=True):
                 track.update(lon=lon, lat=lat)
         compass = self.compass
         if compass is not None and len(names) >= 4:
-            for track, (course, speed) in zip(tracks, courses_of(compass, found.means).tolist(), strict=True):
+            for track, (course, speed) in zip(tracks, courses_of(compass, estimate.means).tolist(), strict=True):
                 track.update(course_deg=course, speed_mps=speed)
         counts = {"late": timeline.num_late, "dropped": timeline.num_dropped, "repeated": timeline.num_repeated}
-        return {"line": state.num_lines, **self._told(state, belief.time), "tracks": tracks, **counts}
+        return {"line": state.num_lines, **self._line_time(state, belief.time), "tracks": tracks, **counts}
 
-    def _due_after(self, first: float, now: float) -> float:
+    def _next_decision_time(self, first: float, now: float) -> float:
         """Return the time of the first decision after `now`, in s."""
         if self.planner is None:
             return math.inf
         if self.decide_every is not None:
             return first + (math.floor((now - first) / self.decide_every) + 1.0) * self.decide_every
-        place = bisect_right(self.decision_times, now)
-        return self.decision_times[place] if place < len(self.decision_times) else math.inf
+        index = bisect_right(self.decision_times, now)
+        return self.decision_times[index] if index < len(self.decision_times) else math.inf
 
     def _is_due(self, state: LiveState) -> bool:
         """Return True if all scans up to the time of the next decision have arrived, or a later one has."""
         newest = state.timeline.newest
         return newest is not None and (newest > state.due or min(state.latest) >= state.due)
 
-    def _decided(self, state: LiveState) -> tuple[LiveState, Answer]:
+    def _decide(self, state: LiveState) -> tuple[LiveState, Answer]:
         """Return the state after a decision from the current belief, and its plan or error."""
         assert self.planner is not None
         timeline, now = state.timeline, state.timeline.state.time
         assert now is not None
-        after = replace(state, due=self._due_after(state.due, now), num_decisions=state.num_decisions + 1)
+        after = replace(state, due=self._next_decision_time(state.due, now), num_decisions=state.num_decisions + 1)
         seeds = np.random.SeedSequence(self.seed, spawn_key=(0, PLANNER, state.num_decisions))
         try:
             plan = self.planner.plan(timeline.state, timeline.poses, rng=np.random.default_rng(seeds))
@@ -225,29 +226,29 @@ class Live:
                 for site, own, row in zip(self.sites, plan.actions, plan.chosen_actions, strict=True)
             ]
             rewards = [{"mean": mean, "standard_error": error} for mean, error in plan.expected_rewards]
-            told = {**self._told(state, now), "planner": plan.planner, "actions": actions}
-            told |= {"expected_rewards": rewards, "notes": plan.notes}
-            return after, {"line": state.num_lines, "plan": {**told, "why": _why(plan)}}
+            answer = {**self._line_time(state, now), "planner": plan.planner, "actions": actions}
+            answer |= {"expected_rewards": rewards, "notes": plan.notes}
+            return after, {"line": state.num_lines, "plan": {**answer, "why": _explanation(plan)}}
         except Exception as error:  # as above; the scan itself was processed
-            told = {
+            answer = {
                 "line": state.num_lines,
                 "error": f"line {state.num_lines}, plan at {now:g} s: {error_cause(error)}",
             }
-            return replace(after, num_errors=after.num_errors + 1), told
+            return replace(after, num_errors=after.num_errors + 1), answer
 
 
-def _why(plan: Any) -> str:
+def _explanation(plan: Any) -> str:
     try:
         return str(plan.explain())
     except VedetteError as error:
         return f"not known: {error}"
 
 
-def _failed(state: LiveState, text: str) -> tuple[LiveState, tuple[Answer, ...]]:
+def _error_answer(state: LiveState, text: str) -> tuple[LiveState, tuple[Answer, ...]]:
     return replace(state, num_errors=state.num_errors + 1), ({"line": state.num_lines, "error": text},)
 
 
-def encoded(answer: Answer) -> bytes:
+def encode_line(answer: Answer) -> bytes:
     """Return an answer as a line of JSON, with its end. Numbers that are not finite become null."""
     try:
         text = json.dumps(answer, ensure_ascii=False, allow_nan=False)

@@ -22,8 +22,8 @@ from vedette.recorded.tables import Table, is_number, seconds
 from vedette.recorded.turns import bearings_of
 from vedette.tracking import SensorScan
 
-MOST_BYTES = 1_000_000  # per line
-MOST_MEASUREMENTS = 2000  # per scan
+MAX_LINE_BYTES = 1_000_000  # per line
+MAX_MEASUREMENTS = 2000  # per scan
 _KEYS = ("sensor", "time", "measurements", "pose", "velocity", "times", "stds", "snr_db")
 
 
@@ -75,7 +75,7 @@ def read_message(
     if not isinstance(time, str) and (isinstance(time, bool) or not isinstance(time, int | float)):
         raise reject(f"{place}, time", "seconds, or a text in ISO 8601", time)
     rows = _rows(data["measurements"], f"{place}, measurements", site)
-    pose, more = _pose(data.get("pose"), f"{place}, pose", site)
+    pose, more_components = _pose(data.get("pose"), f"{place}, pose", site)
     if "pose.heading_deg" not in pose and conventions.bearings is None and not site.compass:
         conventions = replace(conventions, bearings="east")
     course = pose.pop("pose.course_deg", None)
@@ -92,23 +92,26 @@ def read_message(
         **{name: unit for name, unit in conventions.units.items() if name in names},
     }
     units |= {f"{name}_std": units[name] for name in names if name in units}
-    named = {_OF_POSE[name]: name for name in pose}
+    column_names = {_POSE_COLUMNS[name]: name for name in pose}
     # The loop removes measurements beyond the reach, and counts them.
-    everywhere = replace(site, reach=math.inf, turn="none")
-    read = parse_scans(
-        Table(columns, range(1, num + 1), place), [everywhere], replace(conventions, columns=named, units=units), origin
+    unlimited_site = replace(site, reach=math.inf, turn="none")
+    scans_read = parse_scans(
+        Table(columns, range(1, num + 1), place),
+        [unlimited_site],
+        replace(conventions, columns=column_names, units=units),
+        origin,
     )
-    at = read.poses[0, 0].copy()
-    at[3 : 3 + len(more)] = more
-    if "velocity.x" in pose and len(at) >= BEAM:  # rows have a velocity for range rates only
-        at[OWN_VELOCITY:BEAM] = pose["velocity.x"], pose["velocity.y"]
+    pose_vector = scans_read.poses[0, 0].copy()
+    pose_vector[3 : 3 + len(more_components)] = more_components
+    if "velocity.x" in pose and len(pose_vector) >= BEAM:  # rows have a velocity for range rates only
+        pose_vector[OWN_VELOCITY:BEAM] = pose["velocity.x"], pose["velocity.y"]
     if course is not None and origin is not None:  # a position in degrees needed an origin
-        at[2] = origin.angle(math.radians(course), at)
-    scan = read.scans[0][0]
+        pose_vector[2] = origin.angle(math.radians(course), pose_vector)
+    scan = scans_read.scans[0][0]
     if "times" in data and scan is not None:
-        lags = _lags(data["times"], f"{place}, times", len(rows), read.start, read.is_utc)
-        at = _with_beam(at, scan, lags, site, f"{place}, times")
-    return Message(SensorScan(number, read.start, scan, at), read.is_utc)
+        lags = _lags(data["times"], f"{place}, times", len(rows), scans_read.start, scans_read.is_utc)
+        pose_vector = _with_beam(pose_vector, scan, lags, site, f"{place}, times")
+    return Message(SensorScan(number, scans_read.start, scan, pose_vector), scans_read.is_utc)
 
 
 def _lags(given: Any, place: str, num: int, time: float, is_utc: bool) -> Floats:
@@ -134,7 +137,7 @@ def _with_beam(pose: Floats, scan: Floats, lags: Floats, site: Site, place: str)
     return with_beam(pose, velocity, middle, site.turn.rate)
 
 
-_OF_POSE = {
+_POSE_COLUMNS = {
     "pose.x": "own_x",
     "pose.y": "own_y",
     "pose.heading_rad": "own_heading",
@@ -147,8 +150,8 @@ _OF_POSE = {
 
 
 def _object(line: bytes, place: str) -> Mapping[str, Any]:
-    if len(line) > MOST_BYTES:
-        raise reject(place, f"at most {MOST_BYTES} bytes", "more")
+    if len(line) > MAX_LINE_BYTES:
+        raise reject(place, f"at most {MAX_LINE_BYTES} bytes", "more")
     try:
         data = parse_json(line)
     except ValueError as fault:
@@ -177,8 +180,8 @@ def _rows(given: Any, field: str, site: Site) -> list[list[float]]:
     names = COMPONENTS[site.kind]
     if not isinstance(given, list):
         raise reject(field, f"a list of [{', '.join(names)}]", given)
-    if len(given) > MOST_MEASUREMENTS:
-        raise reject(field, f"at most {MOST_MEASUREMENTS} of a scan", len(given))
+    if len(given) > MAX_MEASUREMENTS:
+        raise reject(field, f"at most {MAX_MEASUREMENTS} of a scan", len(given))
     for i, row in enumerate(given):
         third = row[2:] if isinstance(row, list) else []
         measured = [each for each, name in zip(third, names[2:], strict=False) if not (each is None and name in GAPS)]
@@ -214,8 +217,8 @@ def _pose(given: Any, field: str, site: Site) -> tuple[dict[str, float], list[fl
     if given is None:
         return {}, []
     if isinstance(given, dict):
-        known = {"lon", "lat"} <= set(given) <= {"lon", "lat", "course_deg", "heading_deg"}
-        if not known or {"course_deg", "heading_deg"} <= set(given):
+        is_valid = {"lon", "lat"} <= set(given) <= {"lon", "lat", "course_deg", "heading_deg"}
+        if not is_valid or {"course_deg", "heading_deg"} <= set(given):
             wanted = "lon, lat and, if it is known, course_deg or heading_deg"
             raise reject(field, wanted, ", ".join(map(str, given)) or "nothing")
         for name, value in given.items():

@@ -6,11 +6,11 @@ import time
 from collections.abc import Callable
 from typing import Protocol
 
-SECONDS = 60.0  # between two remarks of one kind and address
-_MOST_ADDRESSES = 16  # addresses per kind that have separate remarks
+REMARK_INTERVAL = 60.0  # between two remarks of one kind and address
+_MAX_ADDRESSES = 16  # addresses per kind that have separate remarks
 
 
-class Named(Protocol):
+class NamedClient(Protocol):
     """A client that remarks are about."""
 
     name: str
@@ -23,14 +23,16 @@ class Remarks:
     From the 17th address of a kind on, addresses share their remarks, which also limits the remarks of many addresses.
 
     Args:
-        tell: receives each remark that is passed on.
+        emit: receives each remark that is passed on.
     """
 
-    def __init__(self, tell: Callable[[str], object]) -> None:
-        self._tell = tell
-        self._known: dict[tuple[str, str], list[float]] = {}  # by kind and address: time of the last one, number since
+    def __init__(self, emit: Callable[[str], object]) -> None:
+        self._emit = emit
+        self._entries: dict[
+            tuple[str, str], list[float]
+        ] = {}  # by kind and address: time of the last one, number since
 
-    def __call__(self, client: Named, kind: str, detail: str = "") -> None:
+    def __call__(self, client: NamedClient, kind: str, detail: str = "") -> None:
         """Remark that a client did something.
 
         Args:
@@ -39,19 +41,19 @@ class Remarks:
             detail: further text for this remark.
         """
         now = time.monotonic()
-        known = self._of(kind, client.address, now)
-        if known[0] and now - known[0] < SECONDS:
-            known[1] += 1
+        entry = self._entry(kind, client.address, now)
+        if entry[0] and now - entry[0] < REMARK_INTERVAL:
+            entry[1] += 1
             return
-        more = f" (and {known[1]:.0f} more such lines were left out)" if known[1] else ""
-        known[:] = now, 0.0
-        self._tell(f"{client.name} {kind}{detail}{more}")
+        more = f" (and {entry[1]:.0f} more such lines were left out)" if entry[1] else ""
+        entry[:] = now, 0.0
+        self._emit(f"{client.name} {kind}{detail}{more}")
 
-    def _of(self, kind: str, address: str, now: float) -> list[float]:
-        if (kind, address) not in self._known:
-            old = [key for key, (last, num) in self._known.items() if not num and now - last >= SECONDS]
+    def _entry(self, kind: str, address: str, now: float) -> list[float]:
+        if (kind, address) not in self._entries:
+            old = [key for key, (last, num) in self._entries.items() if not num and now - last >= REMARK_INTERVAL]
             for key in old:
-                del self._known[key]
-            if sum(of == kind for of, _ in self._known) >= _MOST_ADDRESSES:
+                del self._entries[key]
+            if sum(known_kind == kind for known_kind, _ in self._entries) >= _MAX_ADDRESSES:
                 address = ""
-        return self._known.setdefault((kind, address), [0.0, 0.0])
+        return self._entries.setdefault((kind, address), [0.0, 0.0])

@@ -148,7 +148,7 @@ class RecordedScans(SummaryRepr):
         return RecordedScans(*parts, self.skipped, self.bearings)
 
     def arrivals(self) -> Iterator[SensorScan]:
-        """Yield every scan separately, in order of time, as `LateScans` takes them; times as in `times`."""
+        """Yield every scan separately, in order of time, as `OutOfSequenceTracker` takes them; times as in `times`."""
         for time, scans, poses in zip(self.times.tolist(), self.scans, self.poses, strict=True):
             for s, scan in enumerate(scans):
                 if scan is not None:

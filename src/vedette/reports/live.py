@@ -16,7 +16,7 @@ from vedette.evaluation.diagnostics import diagnostics_line, run_diagnostics
 from vedette.evaluation.figures.scene import build_scene
 from vedette.evaluation.scans import UNKNOWN
 from vedette.kernels.base.types import Floats
-from vedette.live import Answer, Live, LiveState
+from vedette.live import Answer, LiveLoop, LiveState
 from vedette.reports.html import render
 from vedette.reports.replay import (
     decimals_for,
@@ -71,7 +71,7 @@ class LiveScreen:
         page: the HTML page, with sensors and zones but no scan.
     """
 
-    def __init__(self, scenario: Scenario, live: Live, state: Callable[[], LiveState]) -> None:
+    def __init__(self, scenario: Scenario, live: LiveLoop, state: Callable[[], LiveState]) -> None:
         self._scenario, self._state = scenario, state
         self._planner = None if live.planner is None else LastPlanCache(live.planner)
         self.live = live if self._planner is None else replace(live, planner=self._planner)
@@ -134,7 +134,7 @@ class LiveScreen:
             "counts": {
                 "lines": state.num_lines,
                 "not taken": state.num_errors,
-                "scans": timeline.num_taken,
+                "scans": timeline.num_processed,
                 "late": timeline.num_late,
                 "too late": timeline.num_dropped,
                 "repeated": timeline.num_repeated,
@@ -155,9 +155,9 @@ class LiveScreen:
 
     def _scans(self, timeline: Timeline, places: int) -> list[list[list[float]]]:
         """Return the measurements at the latest scan time."""
-        if not timeline.instants:
+        if not timeline.entries:
             return [[] for _ in self._sections]
-        latest = timeline.instants[-1]
+        latest = timeline.entries[-1]
         scans = [latest.scans.get(s) for s in range(len(self._sections))]
         drawn = (
             None if scan is None else Scan(scan.measurements, np.full(len(scan.measurements), UNKNOWN))
@@ -180,7 +180,7 @@ class LiveScreen:
 
     def _health(self, timeline: Timeline) -> str:
         """Return the diagnostics of the latest scans in one line."""
-        latest = timeline.instants[-_HEALTH_OF:]
+        latest = timeline.entries[-_HEALTH_OF:]
         if not latest:
             return ""
         health = Health.unreported(len(latest), len(self._sections))

@@ -18,7 +18,7 @@ from vedette.kernels.base.types import Bools, Floats
 from vedette.simulation.health import Health
 from vedette.simulation.records import Decision, RunRecord, ScansFile
 from vedette.simulation.truth import Truth
-from vedette.tracking import Stages, TrackerInfo, stage_of
+from vedette.tracking import StageTimer, TrackerInfo, failed_stage
 
 Score: TypeAlias = Callable[[Truth, Sequence[Estimate]], Floats]
 
@@ -91,7 +91,7 @@ class Journal:
         self._off: list[Bools] = []
         self._decisions: list[Decision] = []
         self.health = Health.unreported(truth.num_scans, num_sensors)
-        self._clocks: list[Stages] = [Stages()]
+        self._clocks: list[StageTimer] = [StageTimer()]
         self._fusion: list[float] = []
 
     @property
@@ -99,11 +99,11 @@ class Journal:
         """Time of the present scan, s."""
         return float(self.truth.times[self.step - 1])
 
-    def begin(self, step: int) -> Stages:
+    def begin(self, step: int) -> StageTimer:
         """Start a scan; return its stage timer."""
         self.step = step
         if step > 1:
-            self._clocks.append(Stages())
+            self._clocks.append(StageTimer())
         return self._clocks[-1]
 
     def timing(self, stage: str) -> AbstractContextManager[None]:
@@ -129,7 +129,7 @@ class Journal:
 
     def stage(self, error: BaseException) -> str:
         """Return the stage that failed, in words."""
-        return stage_of(error) or "the movement of the sensors"
+        return failed_stage(error) or "the movement of the sensors"
 
     def place(self, error: BaseException) -> str:
         """Return the run and the place in it where an error occurred, in words."""

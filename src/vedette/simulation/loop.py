@@ -18,7 +18,7 @@ from vedette.simulation.journal import Journal, Score
 from vedette.simulation.records import RunRecord
 from vedette.simulation.scans import Scan, active_scans, simulate_scans
 from vedette.simulation.truth import Truth
-from vedette.tracking import Central, Stages, State, Tracker, TrackerInfo
+from vedette.tracking import Central, StageTimer, State, Tracker, TrackerInfo
 
 # Streams of one run, so that truth and scans do not depend on what a strategy draws.
 TRUTH, SCANS, FILTER, PLANNER, RANDOM_CONTROL, DROP_OUTS, SCENES = range(7)
@@ -59,7 +59,7 @@ class RunningTracker:
         self._estimate, self._rngs, self._state = estimate, rngs, self._tracker.initial()
 
     def step(
-        self, step: int, scans: Sequence[Any], poses: Floats, time: float, clock: Stages
+        self, step: int, scans: Sequence[Any], poses: Floats, time: float, clock: StageTimer
     ) -> tuple[State, TrackerInfo, Estimate]:
         """Process the scans of a step; return the new state, the tracker's report and the estimate."""
         with clock.timing("filter"):
@@ -130,7 +130,7 @@ class SimulationRun:
             raise InputError("world: expected a scan before the sensors are sent anywhere; got none yet")
         self.fleet = self.fleet.follow(actions, self.outcome.time)
 
-    def step(self, actions: Sequence[Floats | None] | None = None, *, stages: Stages | None = None) -> ScanOutcome:
+    def step(self, actions: Sequence[Floats | None] | None = None, *, stages: StageTimer | None = None) -> ScanOutcome:
         """Simulate one scan of every sensor, process it in the tracker, and estimate the targets.
 
         Args:
@@ -145,7 +145,7 @@ class SimulationRun:
             raise InputError(f"world: expected one of {len(self.experiment.times)} scans to come; all are done")
         if actions is not None:
             self.follow(actions)
-        experiment, clock = self.experiment, Stages() if stages is None else stages
+        experiment, clock = self.experiment, StageTimer() if stages is None else stages
         step = 1 if self.outcome is None else self.outcome.step + 1
         time = float(experiment.times[step - 1])
         poses, off = self.fleet.poses(time), self.fleet.off(time)

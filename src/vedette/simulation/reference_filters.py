@@ -14,7 +14,7 @@ from vedette.kernels.base.types import Floats
 from vedette.models import SensorModel, TargetModel
 from vedette.simulation.cramer_rao import scan_information, transition_jacobians
 from vedette.simulation.truth import Truth
-from vedette.tracking.program import UNKNOWN_VARIANCE, untold
+from vedette.tracking.program import UNKNOWN_VARIANCE, unknown_info
 
 _SURE = 0.999
 _LOST = 1000.0  # m and m/s: standard deviation of a target before its first scan
@@ -37,7 +37,7 @@ class _Reference:
         return LMB.empty(self.targets.state_dim)
 
     def _believed(self, labels: Any, means: Floats, covs: Floats) -> tuple[LMB, FilterInfo]:
-        info = untold(len(means))
+        info = unknown_info(len(means))
         if len(means) == 0:
             return self.initial(), info
         return LMB.from_bernoullis(labels, np.full(len(means), _SURE), means, covs), info

@@ -18,7 +18,7 @@ from vedette.models.arguments import float_array, generator, pose_vector, reject
 from vedette.models.bias import NO_BIAS, with_offsets
 from vedette.models.functions import numbers_at, write_rows
 from vedette.simulation.true_sensors import TrueSensor
-from vedette.tracking import Stages
+from vedette.tracking import StageTimer
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -123,7 +123,7 @@ def simulate_scans(
 
     A sensor that is None does not scan and draws nothing; its entry is None.
     """
-    states, stages, scans = float_array("truth_states", truth_states, (None, None)), Stages(), list[Scan | None]()
+    states, stages, scans = float_array("truth_states", truth_states, (None, None)), StageTimer(), list[Scan | None]()
     names = _named(ids, len(states))
     for s, (pose, sensor, rng) in enumerate(zip(poses, sensors, rngs, strict=True)):
         with stages.timing("scans", s):

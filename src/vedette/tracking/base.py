@@ -23,8 +23,8 @@ from vedette.models.arguments import float_array, one_a_sensor, real, reject
 
 # s. The belief before the first scan has no targets, so the length of the first prediction has no effect.
 FIRST_PERIOD = 1.0
-NUMBER = 8  # bytes; each symmetric matrix is sent as its triangle, without compression
-_NOTE = "stage: "
+NUMBER_BYTES = 8  # bytes; each symmetric matrix is sent as its triangle, without compression
+_NOTE_PREFIX = "stage: "
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -38,7 +38,7 @@ class State(SummaryRepr):
         time: time of that scan in s; None before the first.
         memory: data of the tracker itself for the next step, such as birth candidates; None if it needs none.
         undetected: intensity of undetected targets, if `BirthModel.anywhere` has cells for those of the belief, or the
-            tracker maintains it (`Searching`); else None.
+            tracker maintains it (`UndetectedTargetTracker`); else None.
     """
 
     local: tuple[Any, ...]
@@ -50,15 +50,15 @@ class State(SummaryRepr):
 
     def _summary(self) -> str:
         when = "before the first scan" if self.time is None else f"after scan {self.step}, at {self.time:g} s"
-        unfound = "" if self.undetected is None else f", {self.undetected.total:.3g} not yet found"
-        return f"{when}, of {pluralise(len(self.local), 'sensor')}{unfound}"
+        undetected = "" if self.undetected is None else f", {self.undetected.total:.3g} not yet found"
+        return f"{when}, of {pluralise(len(self.local), 'sensor')}{undetected}"
 
     def _detail(self) -> str:
         return f"fused: {in_short(self.fused)}"
 
     def _repr_html_(self) -> str:
-        said: str = self.fused._repr_html_() if isinstance(self.fused, SummaryRepr) else ""
-        return f"<p><b>{escape(self.in_short())}</b></p>{said}"
+        fused_html: str = self.fused._repr_html_() if isinstance(self.fused, SummaryRepr) else ""
+        return f"<p><b>{escape(self.in_short())}</b></p>{fused_html}"
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -117,13 +117,13 @@ class Tracker(Protocol):
             InputError: a number of scans, poses or generators that differs from the number of sensors; a time before
                 the last.
             ModelError, NumericalError: from the filters and the fusion. Every exception has a note with the stage that
-                raised it (`vedette.tracking.stage_of`).
+                raised it (`vedette.tracking.failed_stage`).
         """
         ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class AroundTracker:
+class TrackerWrapper:
     """Base of trackers that wrap another tracker.
 
     Attributes:
@@ -160,11 +160,11 @@ def check_step(
     now = real("time", time)
     if state.time is not None and now < state.time:
         raise InputError(f"time: expected one from that of the last scan on, {state.time:g} s; got {now:g}")
-    at = float_array("poses", poses, (num_sensors, None))
-    return at, FIRST_PERIOD if state.time is None else now - state.time
+    pose_array = float_array("poses", poses, (num_sensors, None))
+    return pose_array, FIRST_PERIOD if state.time is None else now - state.time
 
 
-class Stages:
+class StageTimer:
     """Stopwatch for the stages of a step; it also adds a note with the stage to an exception raised inside.
 
     Attributes:
@@ -181,25 +181,25 @@ class Stages:
         try:
             yield
         except BaseException as error:
-            if stage_of(error) is None:  # the innermost stage is the most precise
-                error.add_note(f"{_NOTE}the {name}" + ("" if sensor is None else f" of sensor {sensor + 1}"))
+            if failed_stage(error) is None:  # the innermost stage is the most precise
+                error.add_note(f"{_NOTE_PREFIX}the {name}" + ("" if sensor is None else f" of sensor {sensor + 1}"))
             raise
         finally:
             self.seconds[name] = self.seconds.get(name, 0.0) + perf_counter() - start
 
 
-def stage_of(error: BaseException) -> str | None:
-    """Return the stage that raised an exception, such as "the filter of sensor 2"; None without a note of `Stages`."""
-    notes = [note for note in getattr(error, "__notes__", ()) if note.startswith(_NOTE)]
-    return notes[0].removeprefix(_NOTE) if notes else None
+def failed_stage(error: BaseException) -> str | None:
+    """Return the stage that raised an exception, such as "the filter of sensor 2"; None without a note of it."""
+    notes = [note for note in getattr(error, "__notes__", ()) if note.startswith(_NOTE_PREFIX)]
+    return notes[0].removeprefix(_NOTE_PREFIX) if notes else None
 
 
-def bytes_of_scan(scan: Any, pose: Any) -> int:
+def scan_bytes(scan: Any, pose: Any) -> int:
     """Return the bytes of the measurements and of the sensor's pose; 0 without a scan."""
-    return 0 if scan is None else NUMBER * (np.size(scan) + len(pose))
+    return 0 if scan is None else NUMBER_BYTES * (np.size(scan) + len(pose))
 
 
-def bytes_of_belief(belief: Any) -> int:
+def belief_bytes(belief: Any) -> int:
     """Return the bytes of labels, existences or hypotheses, and track components; 0 for a density without labels."""
     if not isinstance(belief, LabelledDensity):
         return 0
@@ -207,9 +207,9 @@ def bytes_of_belief(belief: Any) -> int:
     num, dim = len(tracks.labels), int(tracks.means.shape[1])
     numbers = 2 * num + len(tracks.log_weights) * (1 + dim + dim * (dim + 1) // 2)
     if belief.is_lmb:
-        return NUMBER * (numbers + num)
-    own = belief.to_factors()
-    hyps = len(own.hyp_log_weights) + len(own.hyp_tracks)
+        return NUMBER_BYTES * (numbers + num)
+    factors = belief.to_factors()
+    hyps = len(factors.hyp_log_weights) + len(factors.hyp_tracks)
     # A factor of one label is sent as its existence alone.
-    singles = int(np.count_nonzero(bernoulli_factors(own))) if belief.is_product else 0
-    return NUMBER * (numbers + hyps - 2 * singles)
+    num_single = int(np.count_nonzero(bernoulli_factors(factors))) if belief.is_product else 0
+    return NUMBER_BYTES * (numbers + hyps - 2 * num_single)

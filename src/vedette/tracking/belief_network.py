@@ -16,15 +16,15 @@ from vedette.fusion.matching import common_labels, relabelled
 from vedette.fusion.rebasing import rebase, with_labels_of
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import reject
-from vedette.tracking.base import Stages, State, TrackerInfo, check_step
-from vedette.tracking.births import births_due, births_heard, births_waiting
-from vedette.tracking.distributed import check_labels_of_births
+from vedette.tracking.base import StageTimer, State, TrackerInfo, check_step
+from vedette.tracking.births import birth_candidates, births_from_received_scans, combine_births
+from vedette.tracking.distributed import check_birth_labels
 from vedette.tracking.local import LocalFilters
-from vedette.tracking.merging import merged, views_of, with_weights
-from vedette.tracking.network import NEVER, Network, bytes_of_messages, heard_by, hop_counts, metropolis_weights
+from vedette.tracking.merging import merge_equally, select_views, with_weights
+from vedette.tracking.network import NEVER, Network, hop_counts, message_bytes, metropolis_weights, received_from
 
 
-class _Sent(NamedTuple):
+class _SentMessages(NamedTuple):
     """The messages that the sensors sent at a step, and the steps at which the others receive them."""
 
     step: int
@@ -40,7 +40,7 @@ class _Memory(NamedTuple):
     """Birth candidates of each sensor for the next step, and the messages that may still be on their way."""
 
     births: tuple[LMB | None, ...]
-    sent: tuple[_Sent, ...]
+    sent: tuple[_SentMessages, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,7 +79,7 @@ class BeliefNetwork(LocalFilters):
             raise reject("network", "a Network", self.network)
         for rule in (self.fusion, self.merging):
             with_weights(rule, [1.0])
-        check_labels_of_births(self.fusion, self.targets)
+        check_birth_labels(self.fusion, self.targets)
         if requires_common_prior(self.fusion) and self.network.delay > 0:
             raise InputError("network.delay: expected 0, as the fusion divides by the prediction of the same time")
 
@@ -92,94 +92,96 @@ class BeliefNetwork(LocalFilters):
         self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[State, TrackerInfo]:
         """Filter each sensor's scan, send the beliefs and fuse those that have arrived; see `Tracker.step`."""
-        at, dt = check_step(state, scans, poses, time, rngs, len(self.filters))
+        pose_array, dt = check_step(state, scans, poses, time, rngs, len(self.filters))
         if dt == 0.0 and self.network.delay > 0:
             expected = f"one after that of the last scan, {time:g} s, as beliefs that are late would count again"
             raise reject("time", expected, time)
-        step, stages, num = state.step + 1, Stages(), len(self.filters)
-        hops = hop_counts(self.network.links(at, rngs[0]))
-        with stages.timing("filter"):
-            predictions, local, infos = self._filtered(state, scans, at, dt, rngs)
+        step, timer, num = state.step + 1, StageTimer(), len(self.filters)
+        hops = hop_counts(self.network.links(pose_array, rngs[0]))
+        with timer.timing("filter"):
+            predictions, local, infos = self._filter(state, scans, pose_array, dt, rngs)
         scanned, arrives = tuple(scan is not None for scan in scans), self.network.arrivals(hops, step)
-        sent = _Sent(step, float(time), at, scanned, predictions, local, arrives)
-        waiting = (*state.memory.sent, sent)
-        with stages.timing("fusion"):
-            fused, reports = self._fused(waiting, hops)
-            whole, report = merged(self.merging, self._for_fusion(fused), range(num), self._views(sent))
-        with stages.timing("births"):
+        sent = _SentMessages(step, float(time), pose_array, scanned, predictions, local, arrives)
+        pending = (*state.memory.sent, sent)
+        with timer.timing("fusion"):
+            fused, reports = self._fuse_received(pending, hops)
+            merged_belief, report = merge_equally(self.merging, self._for_fusion(fused), range(num), self._views(sent))
+        with timer.timing("births"):
             before = state.memory.births if dt == 0.0 else (None,) * num
-            births = self._births(before, fused, scans, at, sent)
-        longest = self.network.longest_delay(num)
-        memory = _Memory(births, tuple(own for own in waiting if own.step + longest > step))
+            births = self._births(before, fused, scans, pose_array, sent)
+        max_delay = self.network.longest_delay(num)
+        memory = _Memory(births, tuple(own for own in pending if own.step + max_delay > step))
         messages: list[tuple[Any, ...]] = [(belief,) for belief in local]
         if requires_common_prior(self.fusion) and len({id(own) for own in predictions}) > 1:
             messages = list(zip(local, predictions, strict=True))
-        heard = bytes_of_messages(self.network, hops, messages)
-        told = TrackerInfo(infos, report or reports[0], stages.seconds, heard)
-        return State(tuple(fused), whole, step, float(time), memory), told
+        bytes_sent = message_bytes(self.network, hops, messages)
+        info = TrackerInfo(infos, report or reports[0], timer.seconds, bytes_sent)
+        return State(tuple(fused), merged_belief, step, float(time), memory), info
 
-    def _filtered(
+    def _filter(
         self, state: State, scans: Sequence[Any], poses: Floats, dt: float, rngs: Sequence[np.random.Generator]
     ) -> tuple[tuple[Any, ...], tuple[Any, ...], tuple[FilterInfo, ...]]:
         """Return the predictions (None unless the fusion divides by them), posteriors and reports of all sensors."""
         step, birth = state.step + 1, self.targets.birth
         predictions: list[Any] = []
-        found: dict[tuple[int, int], Any] = {}
+        predicted: dict[tuple[int, int], Any] = {}
         results = []
-        for s, (belief, own) in enumerate(zip(state.local, state.memory.births, strict=True)):
-            due = births_due(birth, step, dt, own)
+        for s, (belief, candidates) in enumerate(zip(state.local, state.memory.births, strict=True)):
+            births = birth_candidates(birth, step, dt, candidates)
             if not requires_common_prior(self.fusion):
                 predictions.append(None)
-                results.append(self._stepped(s, belief, scans[s], poses[s], dt, step, due, rngs[s]))
+                results.append(self._step_filter(s, belief, scans[s], poses[s], dt, step, births, rngs[s]))
                 continue
-            key = id(belief), id(own)  # sensors with the same belief share one prediction object
-            if key not in found:
-                found[key], _ = self._predicted(s, belief, dt, step, due)
-            predictions.append(found[key])
-            results.append(self._updated(s, found[key], scans[s], poses[s], rngs[s]))
+            key = id(belief), id(candidates)  # sensors with the same belief share one prediction object
+            if key not in predicted:
+                predicted[key], _ = self._predict(s, belief, dt, step, births)
+            predictions.append(predicted[key])
+            results.append(self._update(s, predicted[key], scans[s], poses[s], rngs[s]))
         beliefs, infos = zip(*results, strict=True)
         return tuple(predictions), beliefs, infos
 
-    def _fused(self, waiting: Sequence[_Sent], hops: Ints) -> tuple[list[Any], list[FusionInfo | None]]:
+    def _fuse_received(self, pending: Sequence[_SentMessages], hops: Ints) -> tuple[list[Any], list[FusionInfo | None]]:
         """Return each sensor's fused belief and report; sensors that fused the same messages share one object."""
-        now, num = waiting[-1], len(self.filters)
+        now, num = pending[-1], len(self.filters)
         shares = self._weights(hops)
-        done: dict[tuple[Any, ...], tuple[Any, FusionInfo | None]] = {}
+        cache: dict[tuple[Any, ...], tuple[Any, FusionInfo | None]] = {}
         beliefs, reports = [], []
         for i in range(num):
             newest = [
-                max((own for own in waiting if own.arrives[i, j] <= now.step), key=lambda own: own.step, default=None)
+                max((own for own in pending if own.arrives[i, j] <= now.step), key=lambda own: own.step, default=None)
                 for j in range(num)
             ]
             messages = {j: sent for j, sent in enumerate(newest) if sent is not None and shares[i, j] > 0.0}
-            weights = self._heard_weights(shares[i, list(messages)])
+            weights = self._received_weights(shares[i, list(messages)])
             key = (*((j, sent.step) for j, sent in messages.items()), *weights.tolist())
-            if key not in done:
-                done[key] = self._fuse(list(messages.values()), list(messages), weights)
-            belief, report = done[key]
+            if key not in cache:
+                cache[key] = self._fuse(list(messages.values()), list(messages), weights)
+            belief, report = cache[key]
             beliefs.append(belief)
             reports.append(report)
         return beliefs, reports
 
-    def _heard_weights(self, shares: Floats) -> Floats:
+    def _received_weights(self, shares: Floats) -> Floats:
         """Return the weights of the received messages: scaled to sum 1 for a mean, unchanged for a sum."""
         return shares if requires_common_prior(self.fusion) else shares / shares.sum()
 
-    def _fuse(self, messages: Sequence[_Sent], heard: Sequence[int], weights: Floats) -> tuple[Any, FusionInfo | None]:
+    def _fuse(
+        self, messages: Sequence[_SentMessages], senders: Sequence[int], weights: Floats
+    ) -> tuple[Any, FusionInfo | None]:
         """Return the fusion of these sensors' messages and its report.
 
         weights: of a mean, or of a sum if the fusion divides by the prediction.
         """
-        seen = views_of([self._views(sent) for sent in messages], heard)
+        views = select_views([self._views(sent) for sent in messages], senders)
         if not requires_common_prior(self.fusion):
             now = max(messages, key=lambda sent: sent.step)
-            current = [self._current(sent, now, j) for sent, j in zip(messages, heard, strict=True)]
+            current = [self._current(sent, now, j) for sent, j in zip(messages, senders, strict=True)]
             if len(current) == 1:
                 return current[0], None
-            fused, report = with_weights(self.fusion, weights.tolist()).fuse(self._for_fusion(current), seen)
-            return self._as_kept(fused), report
-        predictions = [sent.predictions[j] for sent, j in zip(messages, heard, strict=True)]
-        posteriors = [sent.beliefs[j] for sent, j in zip(messages, heard, strict=True)]
+            fused, report = with_weights(self.fusion, weights.tolist()).fuse(self._for_fusion(current), views)
+            return self._as_filter_density(fused), report
+        predictions = [sent.predictions[j] for sent, j in zip(messages, senders, strict=True)]
+        posteriors = [sent.beliefs[j] for sent, j in zip(messages, senders, strict=True)]
         base = predictions[0]
         if any(prediction is not base for prediction in predictions):
             if isinstance(self.merging, LabelMatchedFusion):
@@ -187,23 +189,23 @@ class BeliefNetwork(LocalFilters):
                 predictions = list(map(relabelled, predictions, names))
                 posteriors = list(map(relabelled, posteriors, names))
             merging = with_weights(self.merging, (weights / weights.sum()).tolist())
-            base, _ = merging.fuse(self._for_fusion(predictions), seen.if_all_scanned())
+            base, _ = merging.fuse(self._for_fusion(predictions), views.if_all_scanned())
             for prediction in predictions:
                 base = with_labels_of(base, prediction)
-        posteriors = [rebase(*own, base) for own in zip(posteriors, predictions, strict=True)]
-        fused, report = with_weights(self.fusion, weights.tolist()).fuse(posteriors, replace(seen, prediction=base))
-        return self._kept(fused), report
+        posteriors = [rebase(*pair, base) for pair in zip(posteriors, predictions, strict=True)]
+        fused, report = with_weights(self.fusion, weights.tolist()).fuse(posteriors, replace(views, prediction=base))
+        return self._drop_labels(fused), report
 
-    def _views(self, sent: _Sent) -> FieldsOfView:
+    def _views(self, sent: _SentMessages) -> FieldsOfView:
         return FieldsOfView(self.sensors, sent.poses, sent.scanned)
 
-    def _current(self, sent: _Sent, now: _Sent, sensor: int) -> Any:
+    def _current(self, sent: _SentMessages, now: _SentMessages, sensor: int) -> Any:
         """Return a sensor's belief, predicted without births to the time of the step `now`."""
         if sent is now:
             return sent.beliefs[sensor]
-        nobody = LMB.empty(self.targets.state_dim)
+        no_births = LMB.empty(self.targets.state_dim)
         elapsed = now.time - sent.time
-        return self._predicted(sensor, sent.beliefs[sensor], elapsed, now.step, nobody)[0]
+        return self._predict(sensor, sent.beliefs[sensor], elapsed, now.step, no_births)[0]
 
     def _weights(self, hops: Ints) -> Floats:
         """Weight that each sensor gives to each sensor of its group, received or not, (num_sensors, num_sensors)."""
@@ -214,23 +216,30 @@ class BeliefNetwork(LocalFilters):
         return np.asarray(shares * sizes if requires_common_prior(self.fusion) else shares)
 
     def _births(
-        self, before: Sequence[LMB | None], fused: Sequence[Any], scans: Sequence[Any], poses: Floats, sent: _Sent
+        self,
+        earlier: Sequence[LMB | None],
+        fused: Sequence[Any],
+        scans: Sequence[Any],
+        poses: Floats,
+        sent: _SentMessages,
     ) -> tuple[LMB | None, ...]:
         """Return each sensor's birth candidates for the next step.
 
-        Sensors with the same belief and the same received scans share one object. before: candidates from earlier scans
-        of the same time.
+        Sensors with the same belief and the same received scans share one object. earlier: candidates from earlier
+        scans of the same time.
         """
         birth, num = self.targets.birth, len(fused)
         if birth.from_measurements is None:
             return (None,) * num
-        found: dict[tuple[Any, ...], LMB | None] = {}
+        cache: dict[tuple[Any, ...], LMB | None] = {}
         births = []
         for i, belief in enumerate(fused):
-            heard = heard_by(i, sent.arrives, sent.step)
-            key = id(belief), id(before[i]), heard
-            if key not in found:
-                own = births_heard(birth, belief, self.sensors, scans, poses, sent.step + 1, heard)
-                found[key] = births_waiting(birth, before[i], own)
-            births.append(found[key])
+            received = received_from(i, sent.arrives, sent.step)
+            key = id(belief), id(earlier[i]), received
+            if key not in cache:
+                candidates = births_from_received_scans(
+                    birth, belief, self.sensors, scans, poses, sent.step + 1, received
+                )
+                cache[key] = combine_births(birth, earlier[i], candidates)
+            births.append(cache[key])
         return tuple(births)

@@ -28,13 +28,13 @@ from vedette.models.arguments import pose_vector, reject
 from vedette.tracking.birth_velocities import at_scan_time, with_velocities
 
 # A measurement unexplained with at most this probability makes no birth: each birth costs a track until the next scan.
-LEAST_UNEXPLAINED = 0.01
+MIN_UNEXPLAINED = 0.01
 # Squared distance, in standard deviations of a birth, within which the measurements of two sensors are attributed to
 # one target: the 99 % quantile of the chi-squared distribution with two degrees of freedom.
 _SAME_TARGET = 9.21
 
 
-class Unexplained(NamedTuple):
+class UnexplainedMeasurements(NamedTuple):
     """Measurements that no track explains with certainty."""
 
     states: Floats  # (num, state_dim) at rest where it was taken
@@ -50,14 +50,14 @@ def check_measured_births(birth: BirthModel, sensors: Sequence[SensorModel]) -> 
             raise reject(f"sensors[{s}].measurement", expected, "one without")
 
 
-def births_of_tracker(birth: BirthModel, local: Any) -> BirthModel:
+def tracker_births(birth: BirthModel, local: Any) -> BirthModel:
     """Return the births that the tracker must add: without those from measurements if a filter starts tracks itself.
 
     A filter that starts tracks has `starts_tracks`. Raises `InputError` if the tracker must start tracks and the
     expected number of births is to be learnt.
     """
     if getattr(local, "starts_tracks", False):
-        return _at_sites(birth)
+        return _births_at_sites(birth)
     if birth.from_measurements is not None and birth.from_measurements.is_learnt:
         wanted = f"a number, as the beliefs of {type(local).__name__} have no intensity of undetected targets"
         raise reject("MeasurementBirth.expected", wanted, birth.from_measurements.expected)
@@ -65,12 +65,12 @@ def births_of_tracker(birth: BirthModel, local: Any) -> BirthModel:
 
 
 @lru_cache(maxsize=100)
-def _at_sites(birth: BirthModel) -> BirthModel:
+def _births_at_sites(birth: BirthModel) -> BirthModel:
     """Return the births at sites; the same object for each model, since filters cache what they derive from it."""
     return replace(birth, from_measurements=None)
 
 
-def births_due(birth: BirthModel, step: int, dt: float, measured: LMB | None) -> LMB | None:
+def birth_candidates(birth: BirthModel, step: int, dt: float, measured: LMB | None) -> LMB | None:
     """Return the birth candidates of the `dt` seconds before a step, at sites and from measurements.
 
     Returns None if there are births at sites only, which filters add themselves. measured: the result of
@@ -109,57 +109,59 @@ def births_from_scans(
     if model is None:
         return None
     first = birth.num_sites if owner is None else OWN_LABELS * (owner + 1)
-    begin = BirthsOfMeasurements(model.std, float(model.expected), float(model.max_existence), step, first)
+    parameters = BirthsOfMeasurements(model.std, float(model.expected), float(model.max_existence), step, first)
     scanned = [s for s, scan in enumerate(scans) if scan is not None]
     if len(scanned) == 1:
-        made = _born_of_one(belief, sensors[scanned[0]], scans[scanned[0]], poses[scanned[0]], begin)
+        births = _births_of_single_sensor(belief, sensors[scanned[0]], scans[scanned[0]], poses[scanned[0]], parameters)
     else:
-        made = _born(unexplained(model, belief, sensors, scans, poses), begin)
-    made = with_velocities(made, model.std, sensors, scans, poses)
-    return at_scan_time(made, [pose_vector("pose", poses[s]) for s in scanned])
+        births = _births_of_pool(unexplained_measurements(model, belief, sensors, scans, poses), parameters)
+    births = with_velocities(births, model.std, sensors, scans, poses)
+    return at_scan_time(births, [pose_vector("pose", poses[s]) for s in scanned])
 
 
-def births_waiting(birth: BirthModel, before: LMB | None, found: LMB | None) -> LMB | None:
+def combine_births(birth: BirthModel, earlier: LMB | None, later: LMB | None) -> LMB | None:
     """Return the birth candidates after separate scans of one time: earlier ones, and later ones not close to them.
 
-    before, found: results of `births_from_scans` for the earlier scans and for these.
+    earlier, later: results of `births_from_scans` for the earlier scans and for these.
     """
     model = birth.from_measurements
-    if model is None or found is None or before is None:
-        return found if before is None else before
-    places, new = before.tracks.means[:, :2], found.tracks.means[:, :2]
-    apart = ((new[:, np.newaxis] - places) / model.std[:2]) ** 2
-    far = np.flatnonzero((apart.sum(axis=-1) > _SAME_TARGET).all(axis=1))
-    kept = unchecked(LMB, take_tracks(found.tracks, far), found.existence_logit[far])
-    return births_within(before, None, 0.0, kept)
+    if model is None or later is None or earlier is None:
+        return later if earlier is None else earlier
+    places, new = earlier.tracks.means[:, :2], later.tracks.means[:, :2]
+    distances = ((new[:, np.newaxis] - places) / model.std[:2]) ** 2
+    distant = np.flatnonzero((distances.sum(axis=-1) > _SAME_TARGET).all(axis=1))
+    added = unchecked(LMB, take_tracks(later.tracks, distant), later.existence_logit[distant])
+    return births_within(earlier, None, 0.0, added)
 
 
-def unexplained(
+def unexplained_measurements(
     model: MeasurementBirth, belief: LabelledDensity, sensors: Sequence[SensorModel], scans: Sequence[Any], poses: Any
-) -> Unexplained:
+) -> UnexplainedMeasurements:
     """Return the measurements that no track explains with certainty, pooled over sensors; see `births_from_scans`."""
     lmb = _as_kernel(belief)
-    found = [
-        _unexplained(lmb, sensor, scans[s], poses[s], s) for s, sensor in enumerate(sensors) if scans[s] is not None
+    by_sensor = [
+        _unexplained_by_sensor(lmb, sensor, scans[s], poses[s], s)
+        for s, sensor in enumerate(sensors)
+        if scans[s] is not None
     ]
-    if not found:
-        return Unexplained(np.empty((0, len(model.std))), np.empty(0), np.empty(0, np.int64))
-    return _pool(Unexplained(*map(np.concatenate, zip(*found, strict=True))), model)
+    if not by_sensor:
+        return UnexplainedMeasurements(np.empty((0, len(model.std))), np.empty(0), np.empty(0, np.int64))
+    return _pool(UnexplainedMeasurements(*map(np.concatenate, zip(*by_sensor, strict=True))), model)
 
 
-def births_heard(
+def births_from_received_scans(
     birth: BirthModel,
     belief: LabelledDensity,
     sensors: Sequence[SensorModel],
     scans: Sequence[Any],
     poses: Any,
     step: int,
-    heard: Sequence[int],
+    received: Sequence[int],
 ) -> LMB | None:
-    """Return `births_from_scans` for the scans of the sensors `heard`; the first is the owner if some are missing."""
-    known = [scan if s in heard else None for s, scan in enumerate(scans)]
-    owner = None if len(heard) == len(sensors) else heard[0]
-    return births_from_scans(birth, belief, sensors, known, poses, step, owner=owner)
+    """Return `births_from_scans` for the scans of the sensors `received`; if some are missing, the first owns them."""
+    received_scans = [scan if s in received else None for s, scan in enumerate(scans)]
+    owner = None if len(received) == len(sensors) else received[0]
+    return births_from_scans(birth, belief, sensors, received_scans, poses, step, owner=owner)
 
 
 def _as_kernel(belief: LabelledDensity) -> Lmb:
@@ -168,7 +170,7 @@ def _as_kernel(belief: LabelledDensity) -> Lmb:
     return as_lmb(belief).to_kernel()
 
 
-def _look(belief: Lmb, sensor: SensorModel, scan: Any, pose: Any) -> ScanInput:
+def _scan_input(belief: Lmb, sensor: SensorModel, scan: Any, pose: Any) -> ScanInput:
     """Return a scan, already checked by the filters, as input of kernels."""
     measurements = np.ascontiguousarray(scan, np.float64)
     if not len(measurements):
@@ -178,25 +180,29 @@ def _look(belief: Lmb, sensor: SensorModel, scan: Any, pose: Any) -> ScanInput:
     )
 
 
-def _unexplained(belief: Lmb, sensor: SensorModel, scan: Any, pose: Any, number: int) -> Unexplained:
-    given = _look(belief, sensor, scan, pose)
+def _unexplained_by_sensor(
+    belief: Lmb, sensor: SensorModel, scan: Any, pose: Any, number: int
+) -> UnexplainedMeasurements:
+    scan_input = _scan_input(belief, sensor, scan, pose)
     with model_errors():
-        explained = prob_explained(belief, given, sensor.to_kernel(), _truncation(sensor.meas_dim))
-    free = np.flatnonzero(explained < 1.0 - LEAST_UNEXPLAINED)
-    states = sensor.measurement.states_at(given.measurements[free], given.pose, belief.tracks.components.means.shape[1])
-    return Unexplained(states, 1.0 - explained[free], np.full(len(free), number))
+        explained = prob_explained(belief, scan_input, sensor.to_kernel(), _truncation(sensor.meas_dim))
+    indices = np.flatnonzero(explained < 1.0 - MIN_UNEXPLAINED)
+    states = sensor.measurement.states_at(
+        scan_input.measurements[indices], scan_input.pose, belief.tracks.components.means.shape[1]
+    )
+    return UnexplainedMeasurements(states, 1.0 - explained[indices], np.full(len(indices), number))
 
 
-def _born_of_one(
-    belief: LabelledDensity, sensor: SensorModel, scan: Any, pose: Any, begin: BirthsOfMeasurements
+def _births_of_single_sensor(
+    belief: LabelledDensity, sensor: SensorModel, scan: Any, pose: Any, parameters: BirthsOfMeasurements
 ) -> LMB:
     """Return the birth candidates from the scan of a single sensor."""
     lmb = _as_kernel(belief)
-    given = _look(lmb, sensor, scan, pose)
-    states = sensor.measurement.states_at(given.measurements, given.pose, len(begin.std))
+    scan_input = _scan_input(lmb, sensor, scan, pose)
+    states = sensor.measurement.states_at(scan_input.measurements, scan_input.pose, len(parameters.std))
     models = sensor.to_kernel(), _truncation(sensor.meas_dim)
     with model_errors():
-        return LMB.from_kernel(births_unexplained(lmb, given, states, *models, LEAST_UNEXPLAINED, begin))
+        return LMB.from_kernel(births_unexplained(lmb, scan_input, states, *models, MIN_UNEXPLAINED, parameters))
 
 
 @cache
@@ -205,34 +211,39 @@ def _truncation(meas_dim: int) -> Truncation:
     return Limits().truncation(meas_dim)
 
 
-def _pool(found: Unexplained, model: MeasurementBirth) -> Unexplained:
+def _pool(measurements: UnexplainedMeasurements, model: MeasurementBirth) -> UnexplainedMeasurements:
     """Return one entry for measurements of different sensors that are close together, the least explained first.
 
     A group has at most one measurement per sensor. Its state is their mean, and its probability that of the least
     explained measurement.
     """
-    order = np.argsort(-found.probabilities, kind="stable")
-    if (found.sensors == found.sensors[:1]).all():  # every measurement by itself
-        return Unexplained(found.states[order], found.probabilities[order], np.empty(0, np.int64))
-    states, totals = np.empty(found.states.shape), np.zeros(len(order))
-    probabilities, members = np.empty(len(order)), np.zeros((len(order), int(found.sensors.max(initial=0)) + 1), bool)
+    order = np.argsort(-measurements.probabilities, kind="stable")
+    if (measurements.sensors == measurements.sensors[:1]).all():  # every measurement by itself
+        return UnexplainedMeasurements(
+            measurements.states[order], measurements.probabilities[order], np.empty(0, np.int64)
+        )
+    states, totals = np.empty(measurements.states.shape), np.zeros(len(order))
+    probabilities, members = (
+        np.empty(len(order)),
+        np.zeros((len(order), int(measurements.sensors.max(initial=0)) + 1), bool),
+    )
     cells, num = _Cells(model.std[:2] * math.sqrt(_SAME_TARGET)), 0
     for i in order.tolist():
-        near = cells.near(found.states[i, :2])
-        near = near[~members[near, found.sensors[i]]]
-        distances = (((states[near, :2] - found.states[i, :2]) / model.std[:2]) ** 2).sum(axis=1)
+        near = cells.near(measurements.states[i, :2])
+        near = near[~members[near, measurements.sensors[i]]]
+        distances = (((states[near, :2] - measurements.states[i, :2]) / model.std[:2]) ** 2).sum(axis=1)
         nearest = int(distances.argmin()) if len(near) else -1
         if len(near) and distances[nearest] <= _SAME_TARGET:
             group = int(near[nearest])
             cells.remove(group, states[group, :2])
         else:
             group = num
-            states[num], probabilities[num], num = found.states[i], found.probabilities[i], num + 1
+            states[num], probabilities[num], num = measurements.states[i], measurements.probabilities[i], num + 1
         totals[group] += 1.0
-        states[group] += (found.states[i] - states[group]) / totals[group]
-        members[group, found.sensors[i]] = True
+        states[group] += (measurements.states[i] - states[group]) / totals[group]
+        members[group, measurements.sensors[i]] = True
         cells.add(group, states[group, :2])
-    return Unexplained(states[:num], probabilities[:num], np.empty(0, np.int64))
+    return UnexplainedMeasurements(states[:num], probabilities[:num], np.empty(0, np.int64))
 
 
 class _Cells:
@@ -246,8 +257,8 @@ class _Cells:
     def near(self, position: Floats) -> Ints:
         """Return the groups that may lie within reach of a position, (num,), in increasing order."""
         x, y = self._cell(position)
-        around = [self._groups.get((x + i, y + j), ()) for i in (-1.0, 0.0, 1.0) for j in (-1.0, 0.0, 1.0)]
-        return np.array(sorted({group for groups in around for group in groups}), np.int64)
+        neighbours = [self._groups.get((x + i, y + j), ()) for i in (-1.0, 0.0, 1.0) for j in (-1.0, 0.0, 1.0)]
+        return np.array(sorted({group for groups in neighbours for group in groups}), np.int64)
 
     def add(self, group: int, place: Floats) -> None:
         """Add a group at a position."""
@@ -262,5 +273,5 @@ class _Cells:
         return x, y
 
 
-def _born(found: Unexplained, begin: BirthsOfMeasurements) -> LMB:
-    return LMB.from_kernel(births_of_measurements(found.states, found.probabilities, begin))
+def _births_of_pool(measurements: UnexplainedMeasurements, parameters: BirthsOfMeasurements) -> LMB:
+    return LMB.from_kernel(births_of_measurements(measurements.states, measurements.probabilities, parameters))

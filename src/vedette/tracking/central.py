@@ -13,15 +13,15 @@ from vedette.filters import FilterInfo
 from vedette.kernels.base.types import Floats
 from vedette.models import BirthModel, SensorModel, TargetModel
 from vedette.models.arguments import reject
-from vedette.tracking.base import Stages, State, TrackerInfo, bytes_of_scan, check_step
+from vedette.tracking.base import StageTimer, State, TrackerInfo, check_step, scan_bytes
 from vedette.tracking.births import (
-    births_due,
+    birth_candidates,
     births_from_scans,
-    births_of_tracker,
-    births_waiting,
     check_measured_births,
+    combine_births,
+    tracker_births,
 )
-from vedette.tracking.losing import undetected_of
+from vedette.tracking.lost_labels import undetected_intensity
 
 
 @runtime_checkable
@@ -53,7 +53,7 @@ class CentralFilter(Protocol):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class OfAllScans:
+class MultiSensorFilterTracker:
     """Base of trackers with one multi-sensor filter.
 
     Attributes:
@@ -83,9 +83,9 @@ class OfAllScans:
     @property
     def birth(self) -> BirthModel:
         """Births that the tracker adds to those of the filter."""
-        return births_of_tracker(self.targets.birth, self.filter)
+        return tracker_births(self.targets.birth, self.filter)
 
-    def _filtered(
+    def _filter(
         self,
         belief: Any,
         measured: LMB | None,
@@ -95,17 +95,17 @@ class OfAllScans:
         step: int,
         rng: np.random.Generator,
     ) -> tuple[Any, FilterInfo]:
-        """Return the belief after a step and the report. measured: birth candidates, as in `births_due`."""
-        due = births_due(self.birth, step, dt, measured)
-        births = {} if due is None else {"births": due}
+        """Return the belief after a step and the report. measured: birth candidates, as in `birth_candidates`."""
+        candidates = birth_candidates(self.birth, step, dt, measured)
+        births = {} if candidates is None else {"births": candidates}
         return self.filter.step(belief, scans, poses, dt, step, rng=rng, **births)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Central(OfAllScans):
+class Central(MultiSensorFilterTracker):
     """Central tracker: a single belief serves as the belief of every sensor and as the fused one.
 
-    Attributes and errors: as in `OfAllScans`.
+    Attributes and errors: as in `MultiSensorFilterTracker`.
     """
 
     def with_truth(self, truth: Any) -> Central:
@@ -120,16 +120,16 @@ class Central(OfAllScans):
         self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[State, TrackerInfo]:
         """Update the belief with all scans; see `Tracker.step`. Uses only `rngs[0]`."""
-        at, dt = check_step(state, scans, poses, time, rngs, len(self.sensors))
-        stages, step = Stages(), state.step + 1
-        with stages.timing("filter"):
-            belief, info = self._filtered(state.fused, state.memory, scans, at, dt, step, rngs[0])
-            measured = births_from_scans(self.birth, belief, self.sensors, scans, at, step + 1)
+        pose_array, dt = check_step(state, scans, poses, time, rngs, len(self.sensors))
+        timer, step = StageTimer(), state.step + 1
+        with timer.timing("filter"):
+            belief, info = self._filter(state.fused, state.memory, scans, pose_array, dt, step, rngs[0])
+            measured = births_from_scans(self.birth, belief, self.sensors, scans, pose_array, step + 1)
             if dt == 0.0:
-                measured = births_waiting(self.birth, state.memory, measured)
-        sent = tuple(bytes_of_scan(scan, pose) for scan, pose in zip(scans, at, strict=True))
-        return self._state(belief, step, float(time), measured), TrackerInfo((info,), None, stages.seconds, sent)
+                measured = combine_births(self.birth, state.memory, measured)
+        sent = tuple(scan_bytes(scan, pose) for scan, pose in zip(scans, pose_array, strict=True))
+        return self._state(belief, step, float(time), measured), TrackerInfo((info,), None, timer.seconds, sent)
 
     def _state(self, belief: Any, step: int, time: float | None, measured: LMB | None = None) -> State:
-        undetected = undetected_of(belief, self.targets.birth)
+        undetected = undetected_intensity(belief, self.targets.birth)
         return State((belief,) * len(self.sensors), belief, step, time, measured, undetected)

@@ -15,10 +15,10 @@ from vedette.fusion import FieldsOfView, Fusion, LabelMatchedFusion, SupportsLab
 from vedette.kernels.base.types import Floats
 from vedette.models import MeasurementBirth, TargetModel
 from vedette.models.arguments import flag, instance, probability
-from vedette.tracking.base import Stages, State, TrackerInfo, bytes_of_belief, check_step
-from vedette.tracking.births import births_due, births_from_scans, births_waiting
+from vedette.tracking.base import StageTimer, State, TrackerInfo, belief_bytes, check_step
+from vedette.tracking.births import birth_candidates, births_from_scans, combine_births
 from vedette.tracking.local import LocalFilters
-from vedette.tracking.losing import undetected_of, without_forgotten
+from vedette.tracking.lost_labels import drop_forgotten_labels, undetected_intensity
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,8 +32,8 @@ class Distributed(LocalFilters):
         feedback: True if the fused belief replaces the sensors' own (paper-notes 9). Without feedback, a fusion by
             views counts a sensor that did not scan as if it had, because its belief is its own, from its earlier scans.
         min_detection: without feedback and with births from measurements, a sensor drops labels that it would detect
-            with less than this probability, once a birth would have more information (`without_forgotten`). Otherwise
-            they would accumulate and be matched with other labels nearby. Their existence is added to
+            with less than this probability, once a birth would have more information (`drop_forgotten_labels`).
+            Otherwise they would accumulate and be matched with other labels nearby. Their existence is added to
             `FilterInfo.dropped_existence`. 0: none is dropped.
 
     Raises:
@@ -61,77 +61,83 @@ class Distributed(LocalFilters):
         if self._requires_common_prior:
             raise InputError("feedback: expected true, as the fusion is of beliefs that share their prediction")
         if len(self.filters) > 1:  # one sensor has nothing to match its labels with
-            check_labels_of_births(self.fusion, self.targets)
+            check_birth_labels(self.fusion, self.targets)
 
     def initial(self) -> State:
         """Return the state without targets; its fused belief is the first sensor's."""
         local = tuple(local.initial() for local in self.filters)
-        return State(local, local[0], undetected=undetected_of(local[0], self.targets.birth))
+        return State(local, local[0], undetected=undetected_intensity(local[0], self.targets.birth))
 
     def step(
         self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[State, TrackerInfo]:
         """Filter each sensor's scan, then fuse the beliefs; see `Tracker.step`."""
-        at, dt = check_step(state, scans, poses, time, rngs, len(self.filters))
-        step, stages, num, birth = state.step + 1, Stages(), len(self.filters), self.birth
+        pose_array, dt = check_step(state, scans, poses, time, rngs, len(self.filters))
+        step, timer, num, birth = state.step + 1, StageTimer(), len(self.filters), self.birth
         births: Sequence[LMB | None] = (None,) * num
         if birth.from_measurements is not None:
-            births = [births_due(birth, step, dt, own) for own in state.memory or births]
+            births = [birth_candidates(birth, step, dt, candidates) for candidates in state.memory or births]
         prediction, local, infos, scanned, sent = None, [], [], [], []
         if self._requires_common_prior:
-            with stages.timing("filter"):
-                prediction, _ = self._predicted(0, state.fused, dt, step, births[0])
+            with timer.timing("filter"):
+                prediction, _ = self._predict(0, state.fused, dt, step, births[0])
         for s in range(num):
-            with stages.timing("filter", s):
+            with timer.timing("filter", s):
                 if prediction is None:
-                    belief, info = self._stepped(s, state.local[s], scans[s], at[s], dt, step, births[s], rngs[s])
+                    belief, info = self._step_filter(
+                        s, state.local[s], scans[s], pose_array[s], dt, step, births[s], rngs[s]
+                    )
                 else:
-                    belief, info = self._updated(s, prediction, scans[s], at[s], rngs[s])
+                    belief, info = self._update(s, prediction, scans[s], pose_array[s], rngs[s])
             local.append(belief)
             infos.append(info)
-            sent.append(bytes_of_belief(belief))
+            sent.append(belief_bytes(belief))
             # Without feedback, a sensor's belief still has the information of its earlier scans.
             scanned.append(scans[s] is not None or not self.feedback)
         fused, report, measured, rule = local[0], None, None, self.fusion
         if rule is not None:
-            views = FieldsOfView(self.sensors, at, tuple(scanned), prediction)
-            with stages.timing("fusion"):
+            views = FieldsOfView(self.sensors, pose_array, tuple(scanned), prediction)
+            with timer.timing("fusion"):
                 if birth.from_measurements is not None and not self.feedback and self.min_detection > 0.0:
-                    local, infos = self._without_forgotten(birth.from_measurements, local, infos, views)
-                made = self._for_fusion(local)
+                    local, infos = self._drop_forgotten(birth.from_measurements, local, infos, views)
+                beliefs = self._for_fusion(local)
                 if isinstance(rule, LabelMatchedFusion):
                     # The sensors keep the matched labels, which outlast the sensor that made them; decisions need them.
-                    local, rule = rule.match(made), rule.rule
-                    made = self._for_fusion(local)
-                fused, report = rule.fuse(made, views)
+                    local, rule = rule.match(beliefs), rule.rule
+                    beliefs = self._for_fusion(local)
+                fused, report = rule.fuse(beliefs, views)
         if prediction is not None:
-            fused = self._kept(fused)
+            fused = self._drop_labels(fused)
         if self.feedback:
-            local = [self._as_kept(fused)] * num
+            local = [self._as_filter_density(fused)] * num
         if birth.from_measurements is not None:
-            with stages.timing("births"):
-                measured = self._measured(local, scans, at, step + 1)
+            with timer.timing("births"):
+                measured = self._measured_births(local, scans, pose_array, step + 1)
                 if dt == 0.0:
-                    measured = tuple(births_waiting(birth, *own) for own in zip(state.memory, measured, strict=True))
-        told = TrackerInfo(tuple(infos), report, stages.seconds, tuple(sent))
-        undetected = undetected_of(fused, self.targets.birth)
-        return State(tuple(local), fused, step, float(time), measured, undetected), told
+                    measured = tuple(
+                        combine_births(birth, *candidates) for candidates in zip(state.memory, measured, strict=True)
+                    )
+        tracker_info = TrackerInfo(tuple(infos), report, timer.seconds, tuple(sent))
+        undetected = undetected_intensity(fused, self.targets.birth)
+        return State(tuple(local), fused, step, float(time), measured, undetected), tracker_info
 
-    def _without_forgotten(
+    def _drop_forgotten(
         self, birth: MeasurementBirth, local: list[Any], infos: list[FilterInfo], views: FieldsOfView
     ) -> tuple[list[Any], list[FilterInfo]]:
         """Return the sensors' beliefs without forgotten labels, and their reports with the dropped existence."""
         kept, dropped = zip(
-            *(without_forgotten(belief, birth, views, s, self.min_detection) for s, belief in enumerate(local)),
+            *(drop_forgotten_labels(belief, birth, views, s, self.min_detection) for s, belief in enumerate(local)),
             strict=True,
         )
-        told = [
+        reports = [
             replace(info, dropped_existence=info.dropped_existence + lost)
             for info, lost in zip(infos, dropped, strict=True)
         ]
-        return list(kept), told
+        return list(kept), reports
 
-    def _measured(self, local: Sequence[Any], scans: Sequence[Any], poses: Floats, step: int) -> tuple[LMB | None, ...]:
+    def _measured_births(
+        self, local: Sequence[Any], scans: Sequence[Any], poses: Floats, step: int
+    ) -> tuple[LMB | None, ...]:
         """Return each sensor's birth candidates for `step`; one object for all sensors if they share a belief."""
         birth, sensors = self.birth, self.sensors
         if self.feedback or len(local) == 1:
@@ -142,7 +148,7 @@ class Distributed(LocalFilters):
         )
 
 
-def check_labels_of_births(fusion: Fusion, targets: TargetModel) -> None:
+def check_birth_labels(fusion: Fusion, targets: TargetModel) -> None:
     """Raise `InputError` if sensors label births from their own measurements and the fusion is by label.
 
     A fusion that divides by a common prediction is accepted: a tracker gives it the labels of that prediction.

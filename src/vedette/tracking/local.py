@@ -23,9 +23,9 @@ from vedette.filters.base import NO_POSE, NO_SCAN, SingleSensorFilter, blind_sen
 from vedette.fusion import PrevalidatedBeliefs
 from vedette.models import BirthModel, SensorModel, TargetModel
 from vedette.models.arguments import provides, reject, sequence
-from vedette.tracking.births import births_of_tracker, check_measured_births
+from vedette.tracking.births import check_measured_births, tracker_births
 
-_BORN = "targets are born of measurements"
+_MEASURED_BIRTHS = "targets are born of measurements"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,7 +46,7 @@ class LocalFilters:
     filters: tuple[Filter, ...]
     targets: TargetModel = field(init=False)
     sensors: tuple[SensorModel, ...] = field(init=False)
-    _are_own: bool = field(init=False, repr=False)  # True if all filters are the library's
+    _are_builtin: bool = field(init=False, repr=False)  # True if all filters are the library's
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "filters", sequence("filters", self.filters, "a Filter of each sensor"))
@@ -59,19 +59,19 @@ class LocalFilters:
             object.__setattr__(self, "filters", tuple(map(with_labelled_births, self.filters)))
         object.__setattr__(self, "targets", common_target_model(self.filters))
         object.__setattr__(self, "sensors", tuple(local.sensor for local in self.filters))
-        object.__setattr__(self, "_are_own", all(isinstance(local, SingleSensorFilter) for local in self.filters))
+        object.__setattr__(self, "_are_builtin", all(isinstance(local, SingleSensorFilter) for local in self.filters))
         birth = self.targets.birth
         check_measured_births(birth, self.sensors)
         for s in range(len(self.filters)):
             if birth.from_measurements is not None:
-                self._two_step(s, _BORN)
+                self._predict_update_filter(s, _MEASURED_BIRTHS)
 
     @property
     def birth(self) -> BirthModel:
         """Births that the tracker adds to those of the filters."""
-        return births_of_tracker(self.targets.birth, self.filters[0])
+        return tracker_births(self.targets.birth, self.filters[0])
 
-    def _stepped(
+    def _step_filter(
         self,
         s: int,
         belief: Any,
@@ -83,57 +83,61 @@ class LocalFilters:
         rng: np.random.Generator,
     ) -> tuple[Any, FilterInfo]:
         """Return the belief of sensor `s` after a scan, or its prediction if it did not scan, and the report."""
-        own = self.filters[s]
+        local = self.filters[s]
         if scan is None:
-            return self._predicted(s, belief, dt, step, births)
+            return self._predict(s, belief, dt, step, births)
         if births is None:
-            return own.step(belief, scan, pose, dt, step, rng=rng)
-        return self._two_step(s, _BORN).step(belief, scan, pose, dt, step, rng=rng, births=births)
+            return local.step(belief, scan, pose, dt, step, rng=rng)
+        return self._predict_update_filter(s, _MEASURED_BIRTHS).step(
+            belief, scan, pose, dt, step, rng=rng, births=births
+        )
 
-    def _predicted(self, s: int, belief: Any, dt: float, step: int, births: LMB | None) -> tuple[Any, FilterInfo]:
+    def _predict(self, s: int, belief: Any, dt: float, step: int, births: LMB | None) -> tuple[Any, FilterInfo]:
         """Return the prediction of sensor `s` over `dt` seconds, and the report."""
-        return self._two_step(s, "it must predict without a scan").predict(belief, dt, step, births=births)
+        return self._predict_update_filter(s, "it must predict without a scan").predict(belief, dt, step, births=births)
 
-    def _updated(
+    def _update(
         self, s: int, prediction: Any, scan: Any, pose: Any, rng: np.random.Generator
     ) -> tuple[Any, FilterInfo]:
         """Return the prediction updated with the scan of sensor `s`, and the report.
 
         No label is dropped. If the sensor did not scan, the prediction is returned unchanged.
         """
-        own = self.filters[s]
-        if not isinstance(own, LmbFilter | FactoredGlmbFilter):
-            raise reject(f"filters[{s}]", "an LmbFilter or FactoredGlmbFilter, as sensors share their prediction", own)
-        whole = replace(own, limits=own.limits.keeping_labels())
-        if isinstance(whole, FactoredGlmbFilter):
+        local = self.filters[s]
+        if not isinstance(local, LmbFilter | FactoredGlmbFilter):
+            raise reject(
+                f"filters[{s}]", "an LmbFilter or FactoredGlmbFilter, as sensors share their prediction", local
+            )
+        unlimited = replace(local, limits=local.limits.keeping_labels())
+        if isinstance(unlimited, FactoredGlmbFilter):
             # The errors of all sensors' splits add up, and mixtures are divided by the prediction without merging.
-            apart = replace(whole.limits, merge_distance=0.0)
-            num, error = len(self.filters), whole.max_split_error
-            whole = replace(whole, limits=apart, max_split_error=error / num, scans_together=num)
+            limits = replace(unlimited.limits, merge_distance=0.0)
+            num, error = len(self.filters), unlimited.max_split_error
+            unlimited = replace(unlimited, limits=limits, max_split_error=error / num, scans_together=num)
         if scan is None:
-            _, info = replace(whole, sensor=blind_sensor()).update(prediction, NO_SCAN, NO_POSE, rng=rng)
+            _, info = replace(unlimited, sensor=blind_sensor()).update(prediction, NO_SCAN, NO_POSE, rng=rng)
             return prediction, info
-        return whole.update(prediction, scan, pose, rng=rng)
+        return unlimited.update(prediction, scan, pose, rng=rng)
 
-    def _kept(self, belief: Any) -> Any:
+    def _drop_labels(self, belief: Any) -> Any:
         """Return the belief without the labels that the limits of the first filter drop."""
-        own = self.filters[0]
-        assert isinstance(own, SingleSensorFilter)
-        return own.limits.kept(belief)
+        local = self.filters[0]
+        assert isinstance(local, SingleSensorFilter)
+        return local.limits.kept(belief)
 
-    def _as_kept(self, belief: Any) -> Any:
+    def _as_filter_density(self, belief: Any) -> Any:
         """Return the density in the form of the filters: a product of GLMBs if they use these."""
         factored = isinstance(self.filters[0], FactoredGlmbFilter) and isinstance(belief, LabelledDensity)
         return FactoredGLMB.of(belief) if factored else belief
 
     def _for_fusion(self, beliefs: Sequence[Any]) -> Sequence[Any]:
         """Return the beliefs for fusion, marked as valid if all filters are the library's."""
-        return PrevalidatedBeliefs(beliefs) if self._are_own else beliefs
+        return PrevalidatedBeliefs(beliefs) if self._are_builtin else beliefs
 
-    def _two_step(self, s: int, why: str) -> PredictUpdateFilter:
-        own = self.filters[s]
-        if provides(own, PredictUpdateFilter):
-            found: PredictUpdateFilter = own
-            return found
+    def _predict_update_filter(self, s: int, why: str) -> PredictUpdateFilter:
+        local = self.filters[s]
+        if provides(local, PredictUpdateFilter):
+            provided: PredictUpdateFilter = local
+            return provided
         expected = f"a PredictUpdateFilter, with predict() and update(), as {why}"
-        raise reject(f"filters[{s}]", expected, type(own).__name__)
+        raise reject(f"filters[{s}]", expected, type(local).__name__)

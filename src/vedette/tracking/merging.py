@@ -12,7 +12,7 @@ from vedette.errors import InputError
 from vedette.fusion import FieldsOfView, Fusion, FusionInfo, LabelMatchedFusion
 
 
-def merged(
+def merge_equally(
     merging: Fusion, beliefs: Sequence[Any], sensors: Sequence[int], views: FieldsOfView
 ) -> tuple[Any, FusionInfo | None]:
     """Return the fusion of the sensors' beliefs with equal weights, and its report.
@@ -21,17 +21,17 @@ def merged(
     """
     if all(belief is beliefs[0] for belief in beliefs):
         return beliefs[0], None
-    equal = with_weights(merging, [1.0 / len(beliefs)] * len(beliefs))
-    return equal.fuse(beliefs, views_of([views] * len(beliefs), sensors))
+    fusion = with_weights(merging, [1.0 / len(beliefs)] * len(beliefs))
+    return fusion.fuse(beliefs, select_views([views] * len(beliefs), sensors))
 
 
-def views_of(views: Sequence[FieldsOfView], sensors: Sequence[int]) -> FieldsOfView:
+def select_views(views: Sequence[FieldsOfView], sensors: Sequence[int]) -> FieldsOfView:
     """Return the fields of view of some sensors, in that order, each taken from its own element of `views`."""
-    places = list(zip(views, sensors, strict=True))
+    pairs = list(zip(views, sensors, strict=True))
     return FieldsOfView(
-        tuple(own.sensors[s] for own, s in places),
-        np.array([own.poses[s] for own, s in places]),
-        tuple(own.scanned[s] for own, s in places),
+        tuple(view.sensors[s] for view, s in pairs),
+        np.array([view.poses[s] for view, s in pairs]),
+        tuple(view.scanned[s] for view, s in pairs),
     )
 
 

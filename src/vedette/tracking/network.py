@@ -16,7 +16,7 @@ from vedette.densities import FactoredGLMB, LabelledDensity, as_lmb
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models.arguments import reject
 from vedette.models.fields import Count, Limit, Natural, Share, check_fields
-from vedette.tracking.base import NUMBER, bytes_of_belief
+from vedette.tracking.base import NUMBER_BYTES, belief_bytes
 
 # Stands for "never" among step numbers and numbers of hops.
 NEVER = np.iinfo(np.int64).max // 2
@@ -50,7 +50,7 @@ class Network:
             raise reject("Network.consensus_rounds", "None with a delay or a number of hops", self.consensus_rounds)
 
     @property
-    def _most_hops(self) -> int:
+    def _hop_limit(self) -> int:
         return NEVER - 1 if self.hops is None else self.hops
 
     def links(self, poses: Floats, rng: np.random.Generator) -> Bools:
@@ -59,12 +59,12 @@ class Network:
         Random numbers are drawn from `rng` only if links can fail (`loss` > 0).
         """
         offsets = poses[:, None, :2] - poses[None, :, :2]
-        near: Bools = np.hypot(offsets[..., 0], offsets[..., 1]) <= self.radio_range
-        np.fill_diagonal(near, False)
+        linked: Bools = np.hypot(offsets[..., 0], offsets[..., 1]) <= self.radio_range
+        np.fill_diagonal(linked, False)
         if self.loss > 0.0:
-            works = np.triu(rng.random(near.shape) >= self.loss, 1)
-            near &= works | works.T
-        return near
+            intact = np.triu(rng.random(linked.shape) >= self.loss, 1)
+            linked &= intact | intact.T
+        return linked
 
     def arrivals(self, hops: Ints, step: int) -> Ints:
         """Step at which sensor i has the message that sensor j sends now, or `NEVER`, (num_sensors, num_sensors).
@@ -76,11 +76,11 @@ class Network:
 
     def reaches(self, hops: Ints) -> Bools:
         """Return True, elementwise, if messages may travel over this number of links."""
-        return np.asarray(hops <= self._most_hops)
+        return np.asarray(hops <= self._hop_limit)
 
     def longest_delay(self, num_sensors: int) -> int:
         """Return the largest delay of a message, in scans."""
-        return self.delay * min(num_sensors - 1, self._most_hops)
+        return self.delay * min(num_sensors - 1, self._hop_limit)
 
     def bytes_sent(self, hops: Ints, sizes: Sequence[int]) -> tuple[int, ...]:
         """Return the bytes that each sensor sends at a step, if sensor j has a message of `sizes[j]` bytes.
@@ -89,14 +89,16 @@ class Network:
         With consensus, each sensor sends its average, as large as the largest message, in each round. hops: as in
         `arrivals`.
         """
-        heard: Bools = (hops == 1).sum(axis=1) > 0
+        has_neighbours: Bools = (hops == 1).sum(axis=1) > 0
         if self.consensus_rounds is not None:
-            return tuple(self.consensus_rounds * max(sizes) if hears else 0 for hears in heard.tolist())
-        passes_on = (hops < self._most_hops) & heard.reshape(-1, 1)
+            return tuple(
+                self.consensus_rounds * max(sizes) if has_neighbour else 0 for has_neighbour in has_neighbours.tolist()
+            )
+        passes_on = (hops < self._hop_limit) & has_neighbours.reshape(-1, 1)
         return tuple((passes_on @ np.asarray(sizes, np.int64)).tolist())
 
 
-def heard_by(sensor: int, arrives: Ints, step: int) -> tuple[int, ...]:
+def received_from(sensor: int, arrives: Ints, step: int) -> tuple[int, ...]:
     """Return the sensors whose messages a sensor has by a step, itself included. arrives: from `Network.arrivals`."""
     return tuple(np.flatnonzero(arrives[sensor] <= step).tolist())
 
@@ -123,24 +125,24 @@ def metropolis_weights(links: Bools) -> Floats:
     return weights + np.diag(1.0 - weights.sum(axis=1))
 
 
-def parts_of_belief(belief: Any) -> dict[bytes, int]:
+def belief_parts(belief: Any) -> dict[bytes, int]:
     """Return the sizes of the independent parts of a belief in bytes, by a fingerprint of their content.
 
     A part is a label of an LMB, a factor of a factored density, or a whole GLMB. Sizes are counted as in
-    `bytes_of_belief`. The result is empty for a density without labels.
+    `belief_bytes`. The result is empty for a density without labels.
     """
     if not isinstance(belief, LabelledDensity):
         return {}
     tracks, dim = belief.tracks, belief.state_dim
-    of_component = 1 + dim + dim * (dim + 1) // 2
+    component_size = 1 + dim + dim * (dim + 1) // 2
     if belief.is_lmb:
-        firsts, own = np.arange(tracks.num_tracks + 1), np.ones(tracks.num_tracks, np.int64)
+        firsts, num_numbers = np.arange(tracks.num_tracks + 1), np.ones(tracks.num_tracks, np.int64)
         others = [logit.tobytes() for logit in as_lmb(belief).existence_logit]
     else:
         factored = FactoredGLMB.of(belief)
         firsts, hyps = factored.track_offsets, factored.factor_offsets
         entries = factored.hyp_offsets[hyps]
-        own = np.diff(hyps) + np.diff(entries) - 2 * factored.is_bernoulli
+        num_numbers = np.diff(hyps) + np.diff(entries) - 2 * factored.is_bernoulli
         others = [
             factored.hyp_log_weights[low:high].tobytes()
             + (factored.hyp_offsets[low : high + 1] - factored.hyp_offsets[low]).tobytes()
@@ -150,18 +152,18 @@ def parts_of_belief(belief: Any) -> dict[bytes, int]:
             )
         ]
         tracks = factored.tracks
-    sizes = NUMBER * (2 * np.diff(firsts) + np.diff(tracks.offsets[firsts]) * of_component + own)
+    sizes = NUMBER_BYTES * (2 * np.diff(firsts) + np.diff(tracks.offsets[firsts]) * component_size + num_numbers)
     parts = {}
     for (low, high), size, other in zip(pairwise(firsts.tolist()), sizes.tolist(), others, strict=True):
         start, end = tracks.offsets[low], tracks.offsets[high]
-        of_tracks = tracks.labels[low:high], tracks.offsets[low:high] - start
-        of_components = (array[start:end] for array in tracks.to_kernel().components)
-        content = b"".join([other, *(array.tobytes() for array in (*of_tracks, *of_components))])
-        parts[blake2b(content, digest_size=NUMBER).digest()] = size
+        track_arrays = tracks.labels[low:high], tracks.offsets[low:high] - start
+        component_arrays = (array[start:end] for array in tracks.to_kernel().components)
+        content = b"".join([other, *(array.tobytes() for array in (*track_arrays, *component_arrays))])
+        parts[blake2b(content, digest_size=NUMBER_BYTES).digest()] = size
     return parts
 
 
-def bytes_of_messages(network: Network, hops: Ints, messages: Sequence[Sequence[Any]]) -> tuple[int, ...]:
+def message_bytes(network: Network, hops: Ints, messages: Sequence[Sequence[Any]]) -> tuple[int, ...]:
     """Return the bytes that each sensor sends so that all sensors have the beliefs of those they can reach.
 
     Each sensor first sends the fingerprints of its own parts, one number each, as far as messages travel. Each part
@@ -171,32 +173,32 @@ def bytes_of_messages(network: Network, hops: Ints, messages: Sequence[Sequence[
     hops: as in `Network.arrivals`. messages: the beliefs that each sensor sends.
     """
     if network.consensus_rounds is not None:
-        return network.bytes_sent(hops, [sum(map(bytes_of_belief, beliefs)) for beliefs in messages])
-    held: list[dict[bytes, int]] = []
-    known: dict[int, dict[bytes, int]] = {}
+        return network.bytes_sent(hops, [sum(map(belief_bytes, beliefs)) for beliefs in messages])
+    parts_of_sensor: list[dict[bytes, int]] = []
+    parts_of_object: dict[int, dict[bytes, int]] = {}
     for beliefs in messages:
-        held.append({})
+        parts_of_sensor.append({})
         for belief in beliefs:
-            if id(belief) not in known:
-                known[id(belief)] = parts_of_belief(belief)
-            held[-1] |= known[id(belief)]
-    sent = np.array(network.bytes_sent(hops, [NUMBER * len(parts) for parts in held]))
+            if id(belief) not in parts_of_object:
+                parts_of_object[id(belief)] = belief_parts(belief)
+            parts_of_sensor[-1] |= parts_of_object[id(belief)]
+    sent = np.array(network.bytes_sent(hops, [NUMBER_BYTES * len(parts) for parts in parts_of_sensor]))
     holders, sizes = defaultdict[bytes, list[int]](list), dict[bytes, int]()
-    for sensor, parts in enumerate(held):
+    for sensor, parts in enumerate(parts_of_sensor):
         sizes |= parts
         for name in parts:
             holders[name].append(sensor)
-    together = defaultdict[tuple[int, ...], int](int)
+    size_of_holders = defaultdict[tuple[int, ...], int](int)
     for name, sensors in holders.items():
-        together[tuple(sensors)] += sizes[name]
-    for owners, size in together.items():
+        size_of_holders[tuple(sensors)] += sizes[name]
+    for owners, size in size_of_holders.items():
         sent[_senders(network, hops, owners)] += size
     return tuple(sent.tolist())
 
 
 def _senders(network: Network, hops: Ints, holders: Collection[int]) -> Ints:
     """Return the sensors that must transmit a part that `holders` have, so that every sensor in reach receives it."""
-    away = hops[:, list(holders)].min(axis=1)
-    lacking = np.flatnonzero((away > 0) & network.reaches(away))
-    before = (hops[lacking] == 1) & (away == away[lacking, None] - 1)
-    return np.unique(before.argmax(axis=1))
+    distance = hops[:, list(holders)].min(axis=1)
+    lacking = np.flatnonzero((distance > 0) & network.reaches(distance))
+    candidates = (hops[lacking] == 1) & (distance == distance[lacking, None] - 1)
+    return np.unique(candidates.argmax(axis=1))

@@ -90,7 +90,7 @@ class ProgramFilter:
         labels = [self._names.setdefault(row.label, (step, i)) for i, row in enumerate(rows)]
         if len(set(labels)) < len(labels):
             self._program.refuse("estimates of different labels", str([row.label for row in rows]))
-        info = untold(len(rows))
+        info = unknown_info(len(rows))
         if not rows:
             return self.initial(), info
         numbers = [row.existence for row in rows], [row.mean for row in rows], [row.cov for row in rows]
@@ -100,7 +100,7 @@ class ProgramFilter:
             self._program.refuse("states, covariances and existences", str(error))
 
 
-def untold(num_labels: int) -> FilterInfo:
+def unknown_info(num_labels: int) -> FilterInfo:
     """Return the report of a step with nothing known except the number of labels."""
     return FilterInfo(nan, 1, num_labels, 0.0, 0.0, 0, 0, 0, search_cut=False, cap_met=False)
 
@@ -108,39 +108,39 @@ def untold(num_labels: int) -> FilterInfo:
 class _Row:
     """One estimate of an answer, with its form checked."""
 
-    def __init__(self, program: Program, place: int, given: Any, dim: int) -> None:
-        known = {"state", "cov", "existence", "label"}
-        if not isinstance(given, dict) or not {"state"} <= set(given) <= known:
+    def __init__(self, program: Program, index: int, given: Any, dim: int) -> None:
+        keys = {"state", "cov", "existence", "label"}
+        if not isinstance(given, dict) or not {"state"} <= set(given) <= keys:
             program.refuse(
-                f'estimates[{place}] with "state" and perhaps "cov", "existence", "label"', repr(given)[:200]
+                f'estimates[{index}] with "state" and perhaps "cov", "existence", "label"', repr(given)[:200]
             )
         state = _numbers(
-            program, f"estimates[{place}].state", given["state"], tuple({dim: (dim,), 4: (4,), 2: (2,)}.values())
+            program, f"estimates[{index}].state", given["state"], tuple({dim: (dim,), 4: (4,), 2: (2,)}.values())
         )
         self.mean = np.zeros(dim)
         self.mean[: len(state)] = state
         self.cov = UNKNOWN_VARIANCE * np.eye(dim)
         if given.get("cov") is not None:
-            cov = _numbers(program, f"estimates[{place}].cov", given["cov"], ((len(state), len(state)),))
+            cov = _numbers(program, f"estimates[{index}].cov", given["cov"], ((len(state), len(state)),))
             self.cov[: len(state), : len(state)] = 0.5 * (cov + cov.T)
-        self.existence = float(_numbers(program, f"estimates[{place}].existence", given.get("existence", 1.0), ((),)))
+        self.existence = float(_numbers(program, f"estimates[{index}].existence", given.get("existence", 1.0), ((),)))
         label = given.get("label")
         if isinstance(label, list):
             label = tuple(label)
-        self.label: Hashable = ("unnamed", place) if label is None else label
+        self.label: Hashable = ("unnamed", index) if label is None else label
         try:
             hash(label)
         except TypeError:
-            program.refuse(f"estimates[{place}].label: a number or text", repr(given["label"])[:200])
+            program.refuse(f"estimates[{index}].label: a number or text", repr(given["label"])[:200])
 
 
 def _numbers(program: Program, name: str, given: Any, shapes: tuple[tuple[int, ...], ...]) -> Floats:
     """Return `given` as finite numbers in one of the shapes; otherwise refuse the program's answer."""
     try:
-        found = np.array(given, np.float64)
+        numbers = np.array(given, np.float64)
     except (TypeError, ValueError):
-        found = np.array(nan)
-    if found.shape not in shapes or not np.isfinite(found).all():
+        numbers = np.array(nan)
+    if numbers.shape not in shapes or not np.isfinite(numbers).all():
         wanted = " or ".join("x".join(map(str, shape)) + " finite numbers" if shape else "a number" for shape in shapes)
         program.refuse(f"{name}: {wanted}", repr(given)[:200])
-    return found
+    return numbers

@@ -27,7 +27,7 @@ FORMAT_NAME = "vedette-snapshot"
 FORMAT_VERSION = 1
 
 # Packages whose data classes may occur in a file; they hold arrays and open no files.
-_ROOMS = ("densities", "filters", "fusion", "tracking", "models", "control", "calibration", "kernels.base")
+_PACKAGES = ("densities", "filters", "fusion", "tracking", "models", "control", "calibration", "kernels.base")
 _BITS = {kind.__name__: kind for kind in (np.random.PCG64, np.random.PCG64DXSM, np.random.SFC64, np.random.Philox)}
 _PLAIN = (bool, int, str, type(None))
 
@@ -43,11 +43,11 @@ def save_snapshot(path: str | os.PathLike[str], parts: Mapping[str, Any]) -> Non
     Raises:
         InputError: an object of another type, with its place in `parts`; or a path that cannot be written.
     """
-    writing = _Writing()
-    root = writing.node(dict(parts), "parts")
-    text = json.dumps({"format": FORMAT_NAME, "version": FORMAT_VERSION, "root": root, "nodes": writing.nodes})
+    writer = _Writer()
+    root = writer.node(dict(parts), "parts")
+    text = json.dumps({"format": FORMAT_NAME, "version": FORMAT_VERSION, "root": root, "nodes": writer.nodes})
     arrays = {"structure": np.frombuffer(text.encode(), np.uint8)}
-    arrays |= {f"array{i}": array for i, array in enumerate(writing.arrays)}
+    arrays |= {f"array{i}": array for i, array in enumerate(writer.arrays)}
     write_file(Path(path), lambda file: np.savez(file, **arrays))  # type: ignore[arg-type]
 
 
@@ -72,7 +72,7 @@ def load_snapshot(path: str | os.PathLike[str]) -> dict[str, Any]:
             f"{source}: expected format version {FORMAT_VERSION}; got {error_summary(structure.get('version'))}"
         )
     try:
-        parts = _Reading(arrays, structure["nodes"]).value(structure["root"])
+        parts = _Reader(arrays, structure["nodes"]).value(structure["root"])
     except VedetteError as fault:
         raise InputError(f"{source}: expected valid parts; {fault}") from fault
     except (KeyError, IndexError, TypeError, ValueError, AttributeError, RecursionError) as fault:
@@ -82,7 +82,7 @@ def load_snapshot(path: str | os.PathLike[str]) -> dict[str, Any]:
     return parts
 
 
-class _Writing:
+class _Writer:
     """Writer of a structure as nodes that refer to each other by number."""
 
     def __init__(self) -> None:
@@ -95,8 +95,8 @@ class _Writing:
         """Return the number of the node of a value, written at its first occurrence."""
         if id(value) in self._numbers:
             return self._numbers[id(value)]
-        made = self._made(value, place)
-        self.nodes.append(made)
+        node = self._new_node(value, place)
+        self.nodes.append(node)
         number = len(self.nodes) - 1
         self._numbers[id(value)] = number
         self._kept.append(value)
@@ -144,12 +144,12 @@ class _Writing:
         ]
 
 
-class _Reading:
+class _Reader:
     """Reader of nodes; the value of each node is made once."""
 
     def __init__(self, arrays: Mapping[str, Any], nodes: list[list[Any]]) -> None:
         self._arrays, self._nodes = arrays, nodes
-        self._made: dict[int, Any] = {}
+        self._new_node: dict[int, Any] = {}
         self._makers: dict[str, Callable[..., Any]] = {
             "plain": self._plain,
             "float": float.fromhex,
@@ -163,10 +163,10 @@ class _Reading:
 
     def value(self, number: int) -> Any:
         """Return the value of a node. Nodes refer to earlier nodes only, so there are no cycles."""
-        if number not in self._made:
+        if number not in self._new_node:
             kind, *content = self._nodes[number]
-            self._made[number] = self._makers[kind](*content)
-        return self._made[number]
+            self._new_node[number] = self._makers[kind](*content)
+        return self._new_node[number]
 
     def _plain(self, value: Any) -> Any:
         if type(value) not in _PLAIN:
@@ -196,10 +196,10 @@ def _field_names(kind: type) -> tuple[str, ...] | None:
 
 def _class_of(module: str, name: str) -> Any:
     """Return a data class or named tuple of the library by its name; None for any other name."""
-    if not any(module == f"vedette.{room}" or module.startswith(f"vedette.{room}.") for room in _ROOMS):
+    if not any(module == f"vedette.{package}" or module.startswith(f"vedette.{package}.") for package in _PACKAGES):
         return None
     try:
-        found = getattr(import_module(module), name, None)
+        kind = getattr(import_module(module), name, None)
     except ImportError:
         return None
-    return found if isinstance(found, type) and _field_names(found) is not None else None
+    return kind if isinstance(kind, type) and _field_names(kind) is not None else None

@@ -16,11 +16,11 @@ from vedette.tracking import (
     BeliefNetwork,
     Central,
     CentralFilter,
-    Delayed,
+    DelayedScanTracker,
     Distributed,
     ScanNetwork,
-    Searching,
     Tracker,
+    UndetectedTargetTracker,
 )
 
 
@@ -29,10 +29,10 @@ def build_tracker(scenario: Scenario, filters: tuple[Filter, ...]) -> Tracker:
     section, found = scenario.model.undetected, _tracker_of_found(scenario, filters)
     lates = {s: sensor.scans.late.build() for s, sensor in enumerate(scenario.model.sensors) if sensor.scans.late}
     if lates:
-        found = Delayed(found, lates)
+        found = DelayedScanTracker(found, lates)
     if section is None or found.initial().undetected is not None:
         return found
-    return Searching(found, section.build(scenario.model.region))
+    return UndetectedTargetTracker(found, section.build(scenario.model.region))
 
 
 def _tracker_of_found(scenario: Scenario, filters: tuple[Filter, ...]) -> Tracker:

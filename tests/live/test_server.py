@@ -12,16 +12,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vedette.errors import InputError
-from vedette.live import Exchange, LineSplitter, TcpServer, remarks, serving
+from vedette.live import LineServer, LineSplitter, TcpServer, remarks, server
 
 
 @pytest.fixture(autouse=True)
 def soon(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(serving, "WRONG_SECONDS", 0.001)
+    monkeypatch.setattr(server, "WRONG_TOKEN_DELAY", 0.001)
 
 
 @given(st.lists(st.binary(max_size=12).map(lambda b: b.replace(b"\n", b"x")), max_size=8), st.data())
-def test_lines_do_not_depend_on_how_bytes_come(lines: list[bytes], data: st.DataObject) -> None:
+def test_lines_do_not_depend_on_the_chunks_of_bytes(lines: list[bytes], data: st.DataObject) -> None:
     whole = b"\n".join(lines)
     splitter, found, place = LineSplitter(5), list[bytes](), 0
     while place < len(whole):
@@ -61,7 +61,7 @@ def served(
     told, came = list[str](), list[Client]()
 
     async def play() -> None:
-        server = await TcpServer(Exchange(answers, token, told.append)).listen("127.0.0.1", 0)
+        server = await TcpServer(LineServer(answers, token, told.append)).listen("127.0.0.1", 0)
 
         async def client() -> Client:
             came.append(Client(*await asyncio.open_connection(*server.sockets[0].getsockname()[:2])))
@@ -78,7 +78,7 @@ def served(
     return told
 
 
-def test_answers_go_to_all_and_errors_to_who_caused_them() -> None:
+def test_answers_go_to_all_clients_and_errors_to_their_sender() -> None:
     async def scene(client: Callable[[], Awaitable[Client]]) -> None:
         one, other = await client(), await client()
         await other.send(b"here\n")
@@ -104,7 +104,7 @@ def test_answers_go_to_all_and_errors_to_who_caused_them() -> None:
     [b'{"token": "guess"}\n', b'{"token": 3}\n', b"secret\n", b"[]\n", b'{"token": ', b"x" * 200_000, b"\xff\n"],
     ids=range(7),
 )
-def test_without_the_token_nobody_enters(first: bytes) -> None:
+def test_clients_without_the_token_are_rejected(first: bytes) -> None:
     async def scene(client: Callable[[], Awaitable[Client]]) -> None:
         known, stranger = await client(), await client()
         await known.send(b'{"token": "secret"}\nword\n')
@@ -122,8 +122,8 @@ def test_without_the_token_nobody_enters(first: bytes) -> None:
     assert ["had no token" in text for text in served(scene, "secret")] == [True]
 
 
-def test_one_client_too_many_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(serving, "MOST_CLIENTS", 1)
+def test_a_client_beyond_the_limit_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "MAX_CLIENTS", 1)
 
     async def scene(client: Callable[[], Awaitable[Client]]) -> None:
         one = await client()
@@ -134,8 +134,8 @@ def test_one_client_too_many_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     served(scene)
 
 
-def test_who_does_not_read_is_put_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(serving, "MOST_UNREAD", 100_000)
+def test_clients_that_do_not_read_are_disconnected(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "MAX_UNREAD_BYTES", 100_000)
 
     async def scene(client: Callable[[], Awaitable[Client]]) -> None:
         deaf, one = await client(), await client()
@@ -151,13 +151,13 @@ def test_who_does_not_read_is_put_out(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("token", ["", " " * 20, "x" * 15, f" {'x' * 15} "])
-def test_a_token_that_can_be_guessed_is_refused(token: str) -> None:
+def test_a_short_token_is_rejected(token: str) -> None:
     with pytest.raises(InputError, match="--token: expected at least 16 letters; got"):
-        serving.check_address("127.0.0.1", token)
+        server.check_address("127.0.0.1", token)
 
 
-def test_of_too_many_that_have_not_entered_the_first_makes_way(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(serving, "MOST_WAITING", 2)
+def test_the_first_of_too_many_waiting_clients_is_disconnected(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "MAX_WAITING", 2)
 
     async def scene(client: Callable[[], Awaitable[Client]]) -> None:
         silent = [await client() for _ in range(2)]
@@ -173,9 +173,9 @@ def test_of_too_many_that_have_not_entered_the_first_makes_way(monkeypatch: pyte
     assert served(scene, "secret")[0].endswith("had not entered, and made way")
 
 
-def test_the_address_with_most_that_have_not_entered_makes_way(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(serving, "MOST_WAITING", 2)
-    exchange = Exchange(take, "secret", str)
+def test_a_client_of_the_address_with_most_waiting_is_disconnected(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "MAX_WAITING", 2)
+    exchange = LineServer(take, "secret", str)
     honest, *others = (Counted(f"{address}:{port}") for address, port in (("a", 1), ("b", 2), ("b", 3), ("b", 4)))
     for each in (honest, *others):
         exchange.open(each)
@@ -202,11 +202,11 @@ class Counted:
         self.gone = True
 
 
-def test_one_that_is_gone_is_sent_nothing() -> None:
+def test_nothing_is_sent_to_a_closed_connection() -> None:
     """To write to it is a line of asyncio's log each time."""
 
     async def play() -> list[int]:
-        exchange = Exchange(take, None, str)
+        exchange = LineServer(take, None, str)
         clients = Counted("a:1"), Counted("a:2")
         for each in clients:
             exchange.enter(each)
@@ -223,7 +223,7 @@ def test_the_end_of_a_server_is_no_traceback_while_clients_close() -> None:
 
     async def play() -> None:
         asyncio.get_running_loop().set_exception_handler(lambda loop, context: faults.append(context))
-        server = await TcpServer(Exchange(take, None, str)).listen("127.0.0.1", 0)
+        server = await TcpServer(LineServer(take, None, str)).listen("127.0.0.1", 0)
         deaf = Client(*await asyncio.open_connection(*server.sockets[0].getsockname()[:2]))
         deaf.reader._transport.pause_reading()  # type: ignore[attr-defined]
         for _ in range(200):
@@ -241,7 +241,7 @@ def test_the_end_of_a_server_is_no_traceback_while_clients_close() -> None:
     assert faults == []
 
 
-def test_what_cannot_be_taken_at_all_is_told() -> None:
+def test_unreadable_lines_are_reported() -> None:
     def fail(line: bytes) -> tuple[dict[str, Any], ...]:
         raise OSError("no space left")
 
@@ -254,7 +254,7 @@ def test_what_cannot_be_taken_at_all_is_told() -> None:
     assert "was put out: OSError: no space left" in text
 
 
-def test_of_many_remarks_of_a_kind_one_a_minute_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_remark_of_a_kind_per_minute_is_passed_on(monkeypatch: pytest.MonkeyPatch) -> None:
     told, now = list[str](), [100.0]
     monkeypatch.setattr(remarks.time, "monotonic", lambda: now[0])
     remark = remarks.Remarks(told.append)
@@ -273,10 +273,10 @@ def test_of_many_remarks_of_a_kind_one_a_minute_is_told(monkeypatch: pytest.Monk
     assert len(told) < 30
 
 
-@pytest.mark.parametrize("limit", ["MOST_CLIENTS", "MOST_OF_ADDRESS"])
-def test_the_client_that_is_silent_for_longest_makes_way(limit: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(serving, limit, 2)
-    monkeypatch.setattr(serving, "IDLE_SECONDS", 0.0)
+@pytest.mark.parametrize("limit", ["MAX_CLIENTS", "MAX_CLIENTS_PER_ADDRESS"])
+def test_the_client_that_was_silent_longest_is_disconnected(limit: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, limit, 2)
+    monkeypatch.setattr(server, "IDLE_SECONDS", 0.0)
 
     async def scene(client: Callable[[], Awaitable[Client]]) -> None:
         first, second = await client(), await client()
@@ -291,11 +291,11 @@ def test_the_client_that_is_silent_for_longest_makes_way(limit: str, monkeypatch
     assert [text.split(" was ")[1].split(" for ")[0] for text in served(scene)] == ["silent"]
 
 
-def test_who_guesses_waits_and_is_told_of_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    waited, wrong = list[float](), serving.WRONG_SECONDS
+def test_wrong_tokens_are_delayed_and_reported_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    waited, wrong = list[float](), server.WRONG_TOKEN_DELAY
 
     async def scene(client: Callable[[], Awaitable[Client]]) -> None:
-        monkeypatch.setattr(serving.asyncio, "sleep", slept)
+        monkeypatch.setattr(server.asyncio, "sleep", slept)
         for _ in range(3):
             stranger = await client()
             await stranger.send(b'{"token": "guess"}\n')
@@ -315,8 +315,8 @@ def test_who_guesses_waits_and_is_told_of_once(monkeypatch: pytest.MonkeyPatch) 
 @pytest.mark.parametrize(
     ("host", "token"), [("0.0.0.0", None), ("::", None), ("no.such.host.invalid", "a secret of words")]
 )
-def test_only_a_token_opens_it_to_others(host: str, token: str | None) -> None:
+def test_other_machines_need_a_token(host: str, token: str | None) -> None:
     with pytest.raises(InputError, match="--listen: expected a"):
-        serving.check_address(host, token)
-    serving.check_address("127.0.0.1", None)
-    serving.check_address("0.0.0.0", "a secret of words")
+        server.check_address(host, token)
+    server.check_address("127.0.0.1", None)
+    server.check_address("0.0.0.0", "a secret of words")

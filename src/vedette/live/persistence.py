@@ -13,12 +13,12 @@ from typing import Any, BinaryIO
 from vedette.errors import InputError
 from vedette.internal.files import lock_beside
 from vedette.live.lines import CHUNK, LineSplitter
-from vedette.live.loop import Answer, Live, LiveState
-from vedette.live.messages import MOST_BYTES, is_message
+from vedette.live.loop import Answer, LiveLoop, LiveState
+from vedette.live.messages import MAX_LINE_BYTES, is_message
 from vedette.tracking import load_snapshot, save_snapshot
 
 
-class Keeping:
+class PersistentLoop:
     """A live loop with its files.
 
     A line is written to the record before it is processed. After any interruption, the next loop starts from the
@@ -27,12 +27,12 @@ class Keeping:
 
     Args:
         live: the loop.
-        of: identifier of the loop in its snapshots, such as a digest of its files.
+        identity: identifier of the loop in its snapshots, such as a digest of its files.
         snapshot: file of the state; None: no snapshots.
-        every: time between snapshots in s.
+        snapshot_interval: time between snapshots in s.
         record: file of the lines; None: no record.
         clock: function that returns a time in s, for the times of snapshots.
-        tell: receives the message if a snapshot cannot be written; the loop continues.
+        report: receives the message if a snapshot cannot be written; the loop continues.
 
     Raises:
         InputError: a file that cannot be read or written, belongs to another loop, or is in use by another process.
@@ -40,17 +40,23 @@ class Keeping:
 
     def __init__(
         self,
-        live: Live,
+        live: LiveLoop,
         *,
-        of: str = "",
+        identity: str = "",
         snapshot: Path | None = None,
-        every: float = 10.0,
+        snapshot_interval: float = 10.0,
         record: Path | None = None,
         clock: Callable[[], float] = time.monotonic,
-        tell: Callable[[str], object] = print,
+        report: Callable[[str], object] = print,
     ) -> None:
         self.live, self.state = live, live.initial()
-        self._of, self._snapshot, self._every, self._clock, self._tell = of, snapshot, every, clock, tell
+        self._identity, self._snapshot, self._snapshot_interval, self._clock, self._report = (
+            identity,
+            snapshot,
+            snapshot_interval,
+            clock,
+            report,
+        )
         self._saved_at, self._saved_lines = clock(), 0
         self._path = record
         with contextlib.ExitStack() as locks:
@@ -58,27 +64,27 @@ class Keeping:
                 if file is not None and file.parent.is_dir():
                     locks.callback(lock_beside(file).close)
             if snapshot is not None and os.path.lexists(snapshot):
-                self.state = _state_of(load_snapshot(snapshot), snapshot, of)
+                self.state = _restored_state(load_snapshot(snapshot), snapshot, identity)
                 self._saved_lines = self.state.num_lines
-            self._record = None if record is None else _opened(record)
+            self._record = None if record is None else _open_record(record)
             self._locks = locks.pop_all()
 
     def resume(self) -> Iterator[tuple[Answer, ...]]:
         """Process the lines of the record after the snapshot; yield the answers to each."""
         if self._record is None:
             return
-        before, num = self.state.num_lines, 0
+        num_in_snapshot, num = self.state.num_lines, 0
         self._record.seek(0)
         for num, line in enumerate(_lines(self._record), start=1):
-            if num > before:
-                self.state, answers = self.live.take(self.state, line)
+            if num > num_in_snapshot:
+                self.state, answers = self.live.process(self.state, line)
                 yield answers
-        if num < before:
-            wanted = f"at least the {before} lines that the snapshot has taken"
+        if num < num_in_snapshot:
+            wanted = f"at least the {num_in_snapshot} lines that the snapshot has taken"
             raise InputError(f"{self._path}: expected {wanted}; got {num}")
-        _cut(self._record)
+        _truncate_incomplete_line(self._record)
 
-    def take(self, line: bytes) -> tuple[Answer, ...]:
+    def process(self, line: bytes) -> tuple[Answer, ...]:
         """Record a line, process it, save the state if a snapshot is due, and return the answers."""
         if self._record is not None:
             try:
@@ -86,8 +92,8 @@ class Keeping:
                 self._record.flush()
             except OSError as error:
                 raise InputError(f"{self._path}: expected room for the record; {error.strerror}") from error
-        self.state, answers = self.live.take(self.state, line)
-        if self._snapshot is not None and self._clock() - self._saved_at >= self._every:
+        self.state, answers = self.live.process(self.state, line)
+        if self._snapshot is not None and self._clock() - self._saved_at >= self._snapshot_interval:
             self.save()
         return answers
 
@@ -97,10 +103,10 @@ class Keeping:
             return
         try:
             parts = {field.name: getattr(self.state, field.name) for field in fields(self.state)}
-            save_snapshot(self._snapshot, {"of": self._of, **parts})
+            save_snapshot(self._snapshot, {"of": self._identity, **parts})
             self._saved_lines = self.state.num_lines
         except InputError as error:
-            self._tell(f"no snapshot: {error}")
+            self._report(f"no snapshot: {error}")
         self._saved_at = self._clock()
 
     def close(self) -> None:
@@ -111,15 +117,15 @@ class Keeping:
         self._locks.close()
 
 
-def _state_of(parts: dict[str, Any], path: Path, of: str) -> LiveState:
+def _restored_state(parts: dict[str, Any], path: Path, identity: str) -> LiveState:
     if set(parts) != {"of", *(field.name for field in fields(LiveState))}:
         raise InputError(f"{path}: expected a snapshot of a live loop; got one of {', '.join(map(str, parts))}")
-    if parts.pop("of") != of:
+    if parts.pop("of") != identity:
         raise InputError(f"{path}: expected a snapshot of the same sensors and options; got one of others")
     return LiveState(**parts)
 
 
-def _opened(path: Path) -> BinaryIO:
+def _open_record(path: Path) -> BinaryIO:
     if path.exists() and not path.is_file():
         raise InputError(f"{path}: expected a file for the record; got something else")
     try:
@@ -145,12 +151,12 @@ def _may_be_record(file: BinaryIO) -> bool:
 
 def _lines(file: BinaryIO) -> Iterator[bytes]:
     """Yield the complete lines of a record."""
-    splitter = LineSplitter(MOST_BYTES)
+    splitter = LineSplitter(MAX_LINE_BYTES)
     while chunk := file.read(CHUNK):
         yield from splitter.feed(chunk)
 
 
-def _cut(file: BinaryIO) -> None:
+def _truncate_incomplete_line(file: BinaryIO) -> None:
     """Remove an incomplete last line, and move to the end of the file."""
     size = end = file.seek(0, os.SEEK_END)
     while end > 0:

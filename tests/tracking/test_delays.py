@@ -1,4 +1,4 @@
-"""Scans that come late in a loop that goes on: what is believed is what LateScans believes of what has arrived."""
+"""Delayed scans: the density is that of `OutOfSequenceTracker` for the scans that have arrived."""
 
 from __future__ import annotations
 
@@ -8,16 +8,25 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tracking.test_late_scans import DRAW, TRACKERS, assert_equal_bits, tracker_of
 
 from tracking.scenes import rngs
-from tracking.test_late_scans import DRAW, TRACKERS, assert_equal_bits, tracker_of
 from vedette.errors import InputError, ScenarioError
 from vedette.evaluation.runs import run_scenario
 from vedette.kernels.base.types import Floats
 from vedette.scenarios import load_scenario, with_fields
 from vedette.scenarios.build import build_experiment
 from vedette.simulation import simulate_scans
-from vedette.tracking import Delay, Delayed, LateScans, SensorScan, State, Tracker, load_snapshot, save_snapshot
+from vedette.tracking import (
+    Delay,
+    DelayedScanTracker,
+    OutOfSequenceTracker,
+    SensorScan,
+    State,
+    Tracker,
+    load_snapshot,
+    save_snapshot,
+)
 
 LATE = {"share": 0.6, "up_to": 3.0, "start": 4.0, "end": 8.0, "window": None}
 STEPS = 12
@@ -51,7 +60,7 @@ class Loop:
 def test_without_delay_it_is_the_tracker(name: str) -> None:
     tracker, experiment = tracker_of(TRACKERS[name])
     loop = Loop(experiment)
-    states = zip(loop.states(tracker), loop.states(Delayed(tracker, {1: Delay(0.0, 9.0)})), strict=True)
+    states = zip(loop.states(tracker), loop.states(DelayedScanTracker(tracker, {1: Delay(0.0, 9.0)})), strict=True)
     for k, (plain, own) in enumerate(states, start=1):
         if k > 3:  # of targets that were born of measurements
             assert_equal_bits(own.memory.timeline.state, plain)
@@ -60,11 +69,11 @@ def test_without_delay_it_is_the_tracker(name: str) -> None:
 
 @pytest.mark.parametrize("window", [math.inf, 1.0])
 @pytest.mark.parametrize("name", ["paper-e", "measured"])
-def test_what_is_believed_is_what_late_scans_believe_of_what_has_arrived(name: str, window: float) -> None:
+def test_the_density_is_that_of_the_scans_that_have_arrived(name: str, window: float) -> None:
     tracker, experiment = tracker_of(TRACKERS[name])
     loop, delay = Loop(experiment), Delay(0.6, 3.0, 4.0, 8.0, window)
-    states = loop.states(Delayed(tracker, {0: delay}))
-    luck, late = np.random.default_rng((7, 0)), LateScans(tracker, experiment.poses)
+    states = loop.states(DelayedScanTracker(tracker, {0: delay}))
+    luck, late = np.random.default_rng((7, 0)), OutOfSequenceTracker(tracker, experiment.poses)
     luck.integers(2**32)  # the seed of filters that draw
     coming, waited, lost = list[tuple[float, SensorScan]](), 0, 0
     for k, (state, time) in enumerate(zip(states, loop.times, strict=True)):
@@ -74,8 +83,8 @@ def test_what_is_believed_is_what_late_scans_believe_of_what_has_arrived(name: s
             assert by == 0.0 or (4.0 <= time <= 8.0 and by < 3.0)
             if scan is not None and by <= window:
                 coming.append((time + by, SensorScan(s, time, scan, loop.poses[k][s])))
-        timeline, _ = late.take(late.initial(), [scan for arrives, scan in coming if arrives <= time])
-        believed = late.at(timeline, time)
+        timeline, _ = late.process(late.initial(), [scan for arrives, scan in coming if arrives <= time])
+        believed = late.state_at(timeline, time)
         for mine, wanted in ((state.fused, believed.fused), *zip(state.local, believed.local, strict=True)):
             np.testing.assert_array_equal(mine.tracks.labels, wanted.tracks.labels)
             np.testing.assert_array_equal(mine.tracks.means, wanted.tracks.means)
@@ -91,7 +100,7 @@ def scene(**late: Any) -> Any:
 def test_a_scenario_has_it_and_a_run_is_the_same_again() -> None:
     scenario = scene()
     experiment = build_experiment(scenario)
-    assert isinstance(experiment.tracker, Delayed)
+    assert isinstance(experiment.tracker, DelayedScanTracker)
     assert experiment.tracker.delays == {1: Delay(0.6, 3.0, 4.0, 8.0)}
     first, again = (run_scenario(scenario, "jdm", seed=3, num_threads=threads) for threads in (1, 2))
     np.testing.assert_array_equal(first.ospa, again.ospa)
@@ -99,14 +108,16 @@ def test_a_scenario_has_it_and_a_run_is_the_same_again() -> None:
     assert not np.array_equal(first.ospa, run_scenario(scene(share=0.0), "jdm", seed=3).ospa)
 
 
-def test_a_loop_with_scans_on_their_way_is_kept_in_a_file(tmp_path: Path) -> None:
+def test_a_loop_with_pending_scans_can_be_saved(tmp_path: Path) -> None:
     tracker, experiment = tracker_of({})
-    [*_, state] = Loop(experiment).states(Delayed(tracker, {0: Delay(1.0, 30.0)}))
+    [*_, state] = Loop(experiment).states(DelayedScanTracker(tracker, {0: Delay(1.0, 30.0)}))
     assert len(state.memory.coming) > 5
     save_snapshot(tmp_path / "loop.npz", {"state": state})
     given: Any = ([None, None], experiment.poses, 30.0)
     states = (state, load_snapshot(tmp_path / "loop.npz")["state"])
-    one, other = (Delayed(tracker, {0: Delay(1.0, 30.0)}).step(own, *given, rngs=rngs(2))[0] for own in states)
+    one, other = (
+        DelayedScanTracker(tracker, {0: Delay(1.0, 30.0)}).step(own, *given, rngs=rngs(2))[0] for own in states
+    )
     assert_equal_bits(one.memory.timeline.state, other.memory.timeline.state)
     assert 0 < len(one.memory.coming) == len(other.memory.coming) < len(state.memory.coming)
 
@@ -128,9 +139,9 @@ def test_bad_delays_of_a_scenario_are_named(late: dict[str, Any], message: str) 
 def test_bad_parts_are_refused() -> None:
     tracker, _ = tracker_of({})
     with pytest.raises(InputError, match=r"delays: expected sensors from 0 to 1; got 2"):
-        Delayed(tracker, {2: Delay(0.5, 3.0)})
+        DelayedScanTracker(tracker, {2: Delay(0.5, 3.0)})
     with pytest.raises(InputError, match=r"delays\[0\]: expected a Delay"):
-        Delayed(tracker, {0: 3.0})  # type: ignore[dict-item]
+        DelayedScanTracker(tracker, {0: 3.0})  # type: ignore[dict-item]
     with pytest.raises(InputError, match=r"Delay.window: expected seconds, at least 0; got nan"):
         Delay(0.5, 3.0, window=math.nan)
     with pytest.raises(InputError, match=r"Delay.end: expected a time from start on, 4 s; got 3"):

@@ -21,10 +21,10 @@ from vedette.tracking import (
     Distributed,
     Network,
     ScanNetwork,
-    Searching,
     State,
     Tracker,
-    stage_of,
+    UndetectedTargetTracker,
+    failed_stage,
 )
 
 REGION = models.Region(-200.0, 200.0, -100.0, 100.0)
@@ -67,7 +67,7 @@ def assert_same_bits(one: Any, other: Any) -> None:
 @pytest.mark.parametrize("name", TRACKERS)
 def test_beliefs_are_the_same_to_the_last_bit(name: str) -> None:
     tracker = TRACKERS[name]
-    searching = Searching(tracker, undetected())
+    searching = UndetectedTargetTracker(tracker, undetected())
     assert isinstance(searching, Tracker)
     assert searching.targets is tracker.targets
     assert searching.sensors == tracker.sensors
@@ -89,7 +89,7 @@ def test_the_intensity_is_that_of_plain_numpy(survival: float | None) -> None:
     expected, last = np.full(40, 3.0 / 40), None
     times = (1.0, 2.0, 4.5, 5.0)
     for step, (time, (state, _)) in enumerate(
-        zip(times, follow(Searching(TRACKERS["central"], model), times), strict=True)
+        zip(times, follow(UndetectedTargetTracker(TRACKERS["central"], model), times), strict=True)
     ):
         if last is not None:
             lives = SURVIVAL if survival is None else survival ** (time - last)
@@ -107,10 +107,10 @@ def _by_place(state, dt, params):
     return 0.5 if state[0] < 0.0 else 0.9 + state[2]
 
 
-def test_survival_is_that_of_the_targets_at_rest_in_the_middle_of_a_cell() -> None:
+def test_survival_is_evaluated_at_rest_at_cell_centres() -> None:
     world = replace(WORLD, survival=models.SurvivalModel(_by_place))
     model = models.UndetectedModel(GRID, 3.0)
-    searching = Searching(Central(SequentialLmbFilter(world, SENSORS)), model)
+    searching = UndetectedTargetTracker(Central(SequentialLmbFilter(world, SENSORS)), model)
     state = replace(searching.initial(), time=1.0, step=1)
     after, _ = searching.step(state, [None, None], POSES, 2.0, rngs=rngs(2))
     assert after.undetected is not None
@@ -120,7 +120,7 @@ def test_survival_is_that_of_the_targets_at_rest_in_the_middle_of_a_cell() -> No
 
 def test_before_the_first_scan_no_time_passes() -> None:
     expected = np.arange(40.0)
-    searching = Searching(TRACKERS["central"], undetected(expected=expected))
+    searching = UndetectedTargetTracker(TRACKERS["central"], undetected(expected=expected))
     state = searching.initial()
     assert state.undetected is not None
     np.testing.assert_array_equal(state.undetected.expected, expected)
@@ -129,9 +129,9 @@ def test_before_the_first_scan_no_time_passes() -> None:
     np.testing.assert_array_equal(after.undetected.expected, expected)
 
 
-def test_a_sensor_that_sees_less_than_a_cell_is_not_missed() -> None:
+def test_a_view_smaller_than_a_cell_still_counts() -> None:
     tiny = sensor(max_range=12.0)
-    searching = Searching(Central(SequentialLmbFilter(WORLD, (tiny,))), undetected())
+    searching = UndetectedTargetTracker(Central(SequentialLmbFilter(WORLD, (tiny,))), undetected())
     poses = np.array([[-175.0 + 14.0, 0.0, 0.0]])  # away from the middle of its cell
     after, _ = searching.step(searching.initial(), [np.empty((0, 2))], poses, 1.0, rngs=rngs(1))
     assert after.undetected is not None
@@ -141,26 +141,26 @@ def test_a_sensor_that_sees_less_than_a_cell_is_not_missed() -> None:
 
 
 def test_states_of_another_making_are_refused() -> None:
-    searching = Searching(TRACKERS["central"], undetected())
+    searching = UndetectedTargetTracker(TRACKERS["central"], undetected())
     state, scans = searching.initial(), [None, None]
     with pytest.raises(InputError, match=r"state\.undetected: expected an UndetectedIntensity, as of initial\(\)"):
         searching.step(replace(state, undetected=None), scans, POSES, 1.0, rngs=rngs(2))
     other = UndetectedIntensity.uniform(models.CellGrid(REGION, 2, 2), 1.0)
     with pytest.raises(InputError, match=r"state\.undetected: expected one of the model's grid") as raised:
         searching.step(replace(state, undetected=other), scans, POSES, 1.0, rngs=rngs(2))
-    assert stage_of(raised.value) == "the targets not yet found"
+    assert failed_stage(raised.value) == "the targets not yet found"
     with pytest.raises(InputError, match="scans: expected 2, one a sensor; got 1"):
         searching.step(state, [None], POSES, 1.0, rngs=rngs(2))
 
 
-def test_it_wants_a_tracker_and_a_model() -> None:
+def test_it_needs_a_tracker_and_a_model() -> None:
     wrong: Any = "tracker"
     with pytest.raises(InputError, match="tracker: expected a Tracker, with targets"):
-        Searching(wrong, undetected())
+        UndetectedTargetTracker(wrong, undetected())
     with pytest.raises(InputError, match=r"UndetectedModel\.birth_rate: expected a number, as it is the beliefs of"):
-        Searching(TRACKERS["central"], undetected(birth_rate="learnt"))
+        UndetectedTargetTracker(TRACKERS["central"], undetected(birth_rate="learnt"))
     with pytest.raises(InputError, match="model: expected an UndetectedModel; got tracker"):
-        Searching(TRACKERS["central"], wrong)
+        UndetectedTargetTracker(TRACKERS["central"], wrong)
 
 
 @model_function("prob_detection")
@@ -170,7 +170,7 @@ def _no_probability(state, pose, params):
 
 def test_an_invalid_detection_probability_is_reported() -> None:
     bad = replace(SENSORS[0], detection=models.DetectionModel(_no_probability))
-    searching = Searching(Central(SequentialLmbFilter(targets(()), (bad,))), undetected())
+    searching = UndetectedTargetTracker(Central(SequentialLmbFilter(targets(()), (bad,))), undetected())
     with pytest.raises(ModelError, match=r"probability is not in \[0, 1\]"):
         searching.step(searching.initial(), [np.empty((0, 2))], POSES[:1], 1.0, rngs=rngs(1))
 
@@ -192,24 +192,24 @@ class _Own:
 
 
 def test_a_tracker_of_ones_own_is_as_good() -> None:
-    state, _ = follow(Searching(_Own(), undetected()))[-1]
-    (other, _) = follow(Searching(TRACKERS["central"], undetected()))[-1]
+    state, _ = follow(UndetectedTargetTracker(_Own(), undetected()))[-1]
+    (other, _) = follow(UndetectedTargetTracker(TRACKERS["central"], undetected()))[-1]
     assert state.fused == "nothing"
     assert state.undetected.expected.tobytes() == other.undetected.expected.tobytes()
 
 
-def _without_limits(**limits: Any) -> Searching:
+def _without_limits(**limits: Any) -> UndetectedTargetTracker:
     own = SequentialLmbFilter(WORLD, SENSORS, Limits(**limits))
-    return Searching(Central(own), models.UndetectedModel(GRID, 0.0))
+    return UndetectedTargetTracker(Central(own), models.UndetectedModel(GRID, 0.0))
 
 
-def _state(searching: Searching, mean: Any, std: float, existence: float = 0.7) -> State:
+def _state(searching: UndetectedTargetTracker, mean: Any, std: float, existence: float = 0.7) -> State:
     belief = LMB.from_bernoullis([[1, 0]], [existence], [[*mean, 0.0, 0.0]], [np.diag([std, std, 1.0, 1.0]) ** 2])
     return replace(searching.initial(), local=(belief,) * 2, fused=belief, step=1, time=1.0)
 
 
 @pytest.mark.parametrize("scanned", [False, True])
-def test_what_a_filter_drops_is_undetected_again(scanned: bool) -> None:
+def test_dropped_labels_become_undetected_targets(scanned: bool) -> None:
     dropping, keeping = _without_limits(min_existence=0.9), _without_limits()
     state, scans = _state(dropping, (170.0, -80.0), 3.0), [np.empty((0, 2)) if scanned else None] * 2
     after, _ = dropping.step(state, scans, POSES, 2.0, rngs=rngs(2))
@@ -223,7 +223,7 @@ def test_what_a_filter_drops_is_undetected_again(scanned: bool) -> None:
     assert kept.undetected.total == 0.0
 
 
-def test_what_is_dropped_is_where_scans_have_missed_it() -> None:
+def test_dropped_labels_are_where_scans_missed_them() -> None:
     dropping = _without_limits(max_position_std=20.0)
     state = _state(dropping, (60.0, 20.0), 30.0)  # the first sensor sees to x = 60, and surely
     after, _ = dropping.step(state, [np.empty((0, 2)), None], POSES, 2.0, rngs=rngs(2))
@@ -237,10 +237,10 @@ def test_what_is_dropped_is_where_scans_have_missed_it() -> None:
     np.testing.assert_allclose(after.undetected.total, expected * share, rtol=0.03)
 
 
-def test_a_measurement_that_no_track_explains_is_looked_at_again() -> None:
+def test_an_unexplained_measurement_counts_as_undetected() -> None:
     birth = models.MeasurementBirth(1.0, 0.04, np.full(4, 5.0))
     world = replace(WORLD, birth=replace(WORLD.birth, from_measurements=birth))
-    searching = Searching(Central(SequentialLmbFilter(world, SENSORS)), models.UndetectedModel(GRID, 0.0))
+    searching = UndetectedTargetTracker(Central(SequentialLmbFilter(world, SENSORS)), models.UndetectedModel(GRID, 0.0))
     at = np.array([[-170.0, 80.0]])
     after, _ = searching.step(searching.initial(), [at, None], POSES, 1.0, rngs=rngs(2))
     assert after.undetected is not None

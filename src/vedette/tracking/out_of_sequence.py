@@ -39,7 +39,7 @@ class SensorScan(SummaryRepr):
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Instant(SummaryRepr):
+class TimelineEntry(SummaryRepr):
     """A time at which sensors scanned, and the state of the tracker after it.
 
     Attributes:
@@ -68,21 +68,21 @@ class Timeline(TabularRepr):
     """The instants in the window, which late scans may still change, and the final state before them.
 
     Attributes:
-        settled: state before all instants; it is final.
-        settled_poses: (num_sensors, 3 or more) poses of the sensors in that state.
-        instants: in order of time.
+        final_state: state before all entries; later scans do not change it.
+        final_poses: (num_sensors, 3 or more) poses of the sensors in that state.
+        entries: in order of time.
         newest: latest time of all scans that arrived, in s; None before the first.
-        num_taken: number of scans that were used.
+        num_processed: number of scans that were used.
         num_late: number of these that arrived after a scan of a later time.
         num_dropped: number of scans that arrived too late.
         num_repeated: number of scans that arrived again.
     """
 
-    settled: State
-    settled_poses: Floats
-    instants: tuple[Instant, ...] = ()
+    final_state: State
+    final_poses: Floats
+    entries: tuple[TimelineEntry, ...] = ()
     newest: float | None = None
-    num_taken: int = 0
+    num_processed: int = 0
     num_late: int = 0
     num_dropped: int = 0
     num_repeated: int = 0
@@ -90,44 +90,44 @@ class Timeline(TabularRepr):
     @property
     def state(self) -> State:
         """State at the latest instant."""
-        return self.instants[-1].state if self.instants else self.settled
+        return self.entries[-1].state if self.entries else self.final_state
 
     @property
     def poses(self) -> Floats:
         """Last pose of each sensor at the latest instant, (num_sensors, 3 or more)."""
-        return self.instants[-1].poses if self.instants else self.settled_poses
+        return self.entries[-1].poses if self.entries else self.final_poses
 
     def to_table(self) -> dict[str, list[Any]]:
         """Return one row per instant as columns: `time_s`, `num_scans` and `num_measurements` over all sensors."""
-        found = [sum(len(scan.measurements) for scan in instant.scans.values()) for instant in self.instants]
-        scans = [len(instant.scans) for instant in self.instants]
-        return {"time_s": [i.time for i in self.instants], "num_scans": scans, "num_measurements": found}
+        num_measurements = [sum(len(scan.measurements) for scan in instant.scans.values()) for instant in self.entries]
+        scans = [len(instant.scans) for instant in self.entries]
+        return {"time_s": [i.time for i in self.entries], "num_scans": scans, "num_measurements": num_measurements}
 
     def _summary(self) -> str:
-        told = f"{self.num_late} late, {self.num_dropped} dropped, {self.num_repeated} repeated"
-        return f"of {pluralise(len(self.instants), 'instant')}, {pluralise(self.num_taken, 'scan')} taken, {told}"
+        counts = f"{self.num_late} late, {self.num_dropped} dropped, {self.num_repeated} repeated"
+        return f"of {pluralise(len(self.entries), 'instant')}, {pluralise(self.num_processed, 'scan')} taken, {counts}"
 
     def _detail(self) -> str:
         return self.state.in_short()
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class LateInfo(SummaryRepr):
+class OutOfSequenceInfo(SummaryRepr):
     """Report on the processing of scans that arrived.
 
     Attributes:
         steps: reports of the tracker's steps, in order of time.
-        num_worked_again: number of instants that were computed before and had to be computed again.
+        num_recomputed: number of instants that were computed before and had to be computed again.
         dropped: scans that arrived too late.
     """
 
     steps: tuple[TrackerInfo, ...]
-    num_worked_again: int
+    num_recomputed: int
     dropped: tuple[SensorScan, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LateScans:
+class OutOfSequenceTracker:
     """Wrapper of a tracker for scans that arrive late, early or not at all, each with its own time.
 
     Scans of one time are one step of the tracker. If a scan arrives after scans of later times, the steps since its
@@ -142,7 +142,7 @@ class LateScans:
         poses: (num_sensors, 3 or more) pose of each sensor before its first scan.
         window: length of the window in s, back from the latest scan.
         seed: seed for filters that draw random numbers; a step has the same numbers whenever it is computed.
-        max_instants: largest number of instants in the window; with more of them, the window becomes shorter.
+        max_entries: largest number of instants in the window; with more of them, the window becomes shorter.
 
     Raises:
         InputError: `tracker` is not a tracker, the number of poses differs from that of the sensors, or a window or
@@ -153,7 +153,7 @@ class LateScans:
     poses: Any
     window: float = 30.0
     seed: int = 0
-    max_instants: int = 10_000
+    max_entries: int = 10_000
     _start: Floats = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -161,7 +161,7 @@ class LateScans:
         if self.window != math.inf:
             positive("window", self.window)
         count("seed", self.seed)
-        dimension("max_instants", self.max_instants)
+        dimension("max_entries", self.max_entries)
         num = len(self.tracker.sensors)
         given = [pose_vector(f"poses[{s}]", pose) for s, pose in enumerate(self.poses)]
         if len(given) != num:
@@ -175,7 +175,7 @@ class LateScans:
         """Return the timeline before the first scan."""
         return Timeline(self.tracker.initial(), self._start)
 
-    def take(self, timeline: Timeline, scans: Iterable[SensorScan]) -> tuple[Timeline, LateInfo]:
+    def process(self, timeline: Timeline, scans: Iterable[SensorScan]) -> tuple[Timeline, OutOfSequenceInfo]:
         """Process scans in their order of arrival; the scans of one call are processed together.
 
         Args:
@@ -190,101 +190,105 @@ class LateScans:
                 different scans of a sensor at one time. The given timeline is not changed.
             ModelError, NumericalError: from the tracker's step.
         """
-        came: dict[float, dict[int, SensorScan]] = {}
+        arrived: dict[float, dict[int, SensorScan]] = {}
         first, newest, dropped = math.inf, timeline.newest, list[SensorScan]()
-        taken = late = repeated = 0
+        num_processed = num_late = num_repeated = 0
         for given in scans:
-            scan = own_scan(given, len(self.tracker.sensors))
+            scan = copy_scan(given, len(self.tracker.sensors))
             if len(scan.pose) > self._start.shape[1]:
                 expected = f"at most {self._start.shape[1]} numbers, as of poses"
-                raise reject(f"{name_of(scan)}, pose", expected, len(scan.pose))
-            if newest is not None and (scan.time < newest - self.window or _is_settled(timeline, scan.time)):
+                raise reject(f"{scan_name(scan)}, pose", expected, len(scan.pose))
+            if newest is not None and (scan.time < newest - self.window or _is_final(timeline, scan.time)):
                 dropped.append(scan)
                 continue
-            before = _scans_at(timeline, scan.time) | came.get(scan.time, {})
-            if scan.sensor in before:
-                _check_same(before[scan.sensor], scan)
-                repeated += 1
+            known = _scans_at(timeline, scan.time) | arrived.get(scan.time, {})
+            if scan.sensor in known:
+                _check_equal(known[scan.sensor], scan)
+                num_repeated += 1
                 continue
-            came.setdefault(scan.time, {})[scan.sensor] = scan
-            taken, late = taken + 1, late + (newest is not None and scan.time < newest)
+            arrived.setdefault(scan.time, {})[scan.sensor] = scan
+            num_processed, num_late = num_processed + 1, num_late + (newest is not None and scan.time < newest)
             first, newest = min(first, scan.time), scan.time if newest is None else max(newest, scan.time)
-        kept = timeline.instants[: _place(timeline, first)]
-        made = self._worked(timeline, len(kept), came)
-        after = replace(
+        unchanged = timeline.entries[: _num_before(timeline, first)]
+        recomputed = self._recompute(timeline, len(unchanged), arrived)
+        updated = replace(
             timeline,
-            instants=kept + made,
+            entries=unchanged + recomputed,
             newest=newest,
-            num_taken=timeline.num_taken + taken,
-            num_late=timeline.num_late + late,
+            num_processed=timeline.num_processed + num_processed,
+            num_late=timeline.num_late + num_late,
             num_dropped=timeline.num_dropped + len(dropped),
-            num_repeated=timeline.num_repeated + repeated,
+            num_repeated=timeline.num_repeated + num_repeated,
         )
-        info = LateInfo(tuple(i.info for i in made), len(timeline.instants) - len(kept), tuple(dropped))
-        return self._settled(after), info
+        info = OutOfSequenceInfo(
+            tuple(i.info for i in recomputed), len(timeline.entries) - len(unchanged), tuple(dropped)
+        )
+        return self._finalise(updated), info
 
-    def at(self, timeline: Timeline, time: float) -> State:
+    def state_at(self, timeline: Timeline, time: float) -> State:
         """Return the state predicted to `time` from the scans so far; the timeline does not change.
 
         Raises:
             InputError: a time before the latest instant.
         """
-        return self.predicted(timeline, time)[0]
+        return self.predict(timeline, time)[0]
 
-    def predicted(self, timeline: Timeline, time: float) -> tuple[State, TrackerInfo]:
+    def predict(self, timeline: Timeline, time: float) -> tuple[State, TrackerInfo]:
         """Return the same state as `at`, and the tracker's report."""
         state, now = timeline.state, real("time", time)
-        if state.time == now and timeline.instants:
-            return state, timeline.instants[-1].info
+        if state.time == now and timeline.entries:
+            return state, timeline.entries[-1].info
         if state.time is not None and now < state.time:
             raise reject("time", f"one from {state.time:g} s on, the latest of all scans that came", now)
-        nothing = [None] * len(self._start)
-        return self.tracker.step(state, nothing, timeline.poses, now, rngs=self._streams(state.step + 1))
+        no_scans = [None] * len(self._start)
+        return self.tracker.step(state, no_scans, timeline.poses, now, rngs=self._generators(state.step + 1))
 
-    def _worked(
-        self, timeline: Timeline, num_kept: int, came: dict[float, dict[int, SensorScan]]
-    ) -> tuple[Instant, ...]:
-        """Return the instants after the first `num_kept` of the timeline, computed with the scans that arrived."""
-        due = {i.time: i.scans for i in timeline.instants[num_kept:]}
-        for time, scans in came.items():
-            due[time] = due.get(time, {}) | scans
-        before = timeline.instants[num_kept - 1] if num_kept else None
-        state = timeline.settled if before is None else before.state
-        poses = timeline.settled_poses if before is None else before.poses
-        made = []
-        for time in sorted(due):
+    def _recompute(
+        self, timeline: Timeline, num_unchanged: int, arrived: dict[float, dict[int, SensorScan]]
+    ) -> tuple[TimelineEntry, ...]:
+        """Return the instants after the first `num_unchanged` of the timeline, computed with the scans that arrived."""
+        scans_by_time = {i.time: i.scans for i in timeline.entries[num_unchanged:]}
+        for time, scans in arrived.items():
+            scans_by_time[time] = scans_by_time.get(time, {}) | scans
+        before = timeline.entries[num_unchanged - 1] if num_unchanged else None
+        state = timeline.final_state if before is None else before.state
+        poses = timeline.final_poses if before is None else before.poses
+        entries = []
+        for time in sorted(scans_by_time):
             poses = poses.copy()
-            for s, scan in due[time].items():
+            for s, scan in scans_by_time[time].items():
                 poses[s, : len(scan.pose)] = scan.pose
-            measured = [due[time][s].measurements if s in due[time] else None for s in range(len(poses))]
+            measured = [
+                scans_by_time[time][s].measurements if s in scans_by_time[time] else None for s in range(len(poses))
+            ]
             try:
-                state, info = self.tracker.step(state, measured, poses, time, rngs=self._streams(state.step + 1))
+                state, info = self.tracker.step(state, measured, poses, time, rngs=self._generators(state.step + 1))
             except InputError as error:
-                if time not in came:
+                if time not in arrived:
                     raise
-                raise InputError(f"{', '.join(map(name_of, came[time].values()))}: {error}") from None
-            made.append(Instant(time, due[time], poses, state, info))
-        return tuple(made)
+                raise InputError(f"{', '.join(map(scan_name, arrived[time].values()))}: {error}") from None
+            entries.append(TimelineEntry(time, scans_by_time[time], poses, state, info))
+        return tuple(entries)
 
-    def _streams(self, step: int) -> tuple[np.random.Generator, ...]:
+    def _generators(self, step: int) -> tuple[np.random.Generator, ...]:
         """Return the random generator of each sensor at a step."""
         return tuple(
             np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(step, s)))
             for s in range(len(self.tracker.sensors))
         )
 
-    def _settled(self, timeline: Timeline) -> Timeline:
-        """Return the timeline without the instants older than the window or beyond `max_instants`."""
+    def _finalise(self, timeline: Timeline) -> Timeline:
+        """Return the timeline without the instants older than the window or beyond `max_entries`."""
         if timeline.newest is None:
             return timeline
-        past = max(_place(timeline, timeline.newest - self.window), len(timeline.instants) - self.max_instants)
-        if past == 0:
+        num_final = max(_num_before(timeline, timeline.newest - self.window), len(timeline.entries) - self.max_entries)
+        if num_final == 0:
             return timeline
-        last = timeline.instants[past - 1]
-        return replace(timeline, settled=last.state, settled_poses=last.poses, instants=timeline.instants[past:])
+        last = timeline.entries[num_final - 1]
+        return replace(timeline, final_state=last.state, final_poses=last.poses, entries=timeline.entries[num_final:])
 
 
-def own_scan(scan: SensorScan, num_sensors: int) -> SensorScan:
+def copy_scan(scan: SensorScan, num_sensors: int) -> SensorScan:
     """Return a copy of the scan with its own arrays, so that later changes by the caller have no effect.
 
     The shape and values of the measurements are not checked here; the tracker checks them at its step. Raises
@@ -294,43 +298,43 @@ def own_scan(scan: SensorScan, num_sensors: int) -> SensorScan:
     if count("scan.sensor", scan.sensor) >= num_sensors:
         raise reject("scan.sensor", f"a whole number from 0 to {num_sensors - 1}", scan.sensor)
     real("scan.time", scan.time)
-    pose = pose_vector(f"{name_of(scan)}, pose", scan.pose)
-    measured = as_array(f"{name_of(scan)}: scan", scan.measurements, "fiu", "numbers in an array")
+    pose = pose_vector(f"{scan_name(scan)}, pose", scan.pose)
+    measured = as_array(f"{scan_name(scan)}: scan", scan.measurements, "fiu", "numbers in an array")
     return SensorScan(int(scan.sensor), float(scan.time), np.array(measured, float), pose.copy())
 
 
-def name_of(scan: SensorScan) -> str:
+def scan_name(scan: SensorScan) -> str:
     """Return the name of a scan in error messages."""
     return f"scan of sensor {scan.sensor} at {scan.time:g} s"
 
 
-def _place(timeline: Timeline, time: float) -> int:
+def _num_before(timeline: Timeline, time: float) -> int:
     """Return the number of instants before a time."""
-    return bisect_left(timeline.instants, time, key=_TIME)
+    return bisect_left(timeline.entries, time, key=_TIME)
 
 
-def _is_settled(timeline: Timeline, time: float) -> bool:
+def _is_final(timeline: Timeline, time: float) -> bool:
     """Return True if a time is not after the settled state."""
-    return timeline.settled.time is not None and time <= timeline.settled.time
+    return timeline.final_state.time is not None and time <= timeline.final_state.time
 
 
 def _scans_at(timeline: Timeline, time: float) -> dict[int, SensorScan]:
     """Return the scans of a time that are already in the timeline, by sensor."""
-    place = _place(timeline, time)
-    found = timeline.instants[place : place + 1]
-    return found[0].scans if found and found[0].time == time else {}
+    index = _num_before(timeline, time)
+    entries = timeline.entries[index : index + 1]
+    return entries[0].scans if entries and entries[0].time == time else {}
 
 
-def _check_same(there: SensorScan, again: SensorScan) -> None:
+def _check_equal(first: SensorScan, second: SensorScan) -> None:
     """Raise `InputError` if two scans of a sensor at one time differ in their pose or, in any order, measurements."""
-    if not np.array_equal(_in_order(there.measurements), _in_order(again.measurements)) or not np.array_equal(
-        there.pose, again.pose
+    if not np.array_equal(_sorted_rows(first.measurements), _sorted_rows(second.measurements)) or not np.array_equal(
+        first.pose, second.pose
     ):
-        place = f"scan of sensor {again.sensor} at {again.time:g} s"
+        place = f"scan of sensor {second.sensor} at {second.time:g} s"
         raise InputError(f"{place}: expected one scan of a sensor at a time; got a second one that differs")
 
 
-def _in_order(measurements: Floats) -> Floats:
+def _sorted_rows(measurements: Floats) -> Floats:
     """Return the rows sorted by their first number, then the second, and so on."""
     return (
         measurements[np.lexsort(measurements.T[::-1])] if measurements.ndim == 2 and measurements.size else measurements

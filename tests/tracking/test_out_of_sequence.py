@@ -17,8 +17,16 @@ from vedette.scenarios import load_scenario
 from vedette.scenarios.build import build_experiment
 from vedette.scenarios.overrides import with_fields
 from vedette.simulation import simulate_scan
-from vedette.tracking import Distributed, LateScans, SensorScan, Timeline, Tracker, load_snapshot, save_snapshot
-from vedette.tracking.late import _check_same
+from vedette.tracking import (
+    Distributed,
+    OutOfSequenceTracker,
+    SensorScan,
+    Timeline,
+    Tracker,
+    load_snapshot,
+    save_snapshot,
+)
+from vedette.tracking.out_of_sequence import _check_equal
 
 MEASURED = {
     "birth.sites": [],
@@ -78,10 +86,10 @@ def jumbled(scans: Sequence[SensorScan], delay: float, seed: int) -> list[Sensor
     return [scans[i] for i in np.argsort(arrival, kind="stable")]
 
 
-def one_by_one(late: LateScans, scans: Sequence[SensorScan]) -> Timeline:
+def one_by_one(late: OutOfSequenceTracker, scans: Sequence[SensorScan]) -> Timeline:
     timeline = late.initial()
     for scan in scans:
-        timeline, _ = late.take(timeline, [scan])
+        timeline, _ = late.process(timeline, [scan])
     return timeline
 
 
@@ -93,27 +101,27 @@ def assert_equal_bits(one: Any, other: Any) -> None:
 
 
 @pytest.mark.parametrize("changes", TRACKERS.values(), ids=TRACKERS)
-def test_any_order_of_arrival_ends_in_the_beliefs_of_the_scans_in_order(changes: dict[str, Any]) -> None:
+def test_any_order_of_arrival_gives_the_beliefs_of_scans_in_order(changes: dict[str, Any]) -> None:
     tracker, experiment = tracker_of(changes)
-    scans, late = asynchronous(experiment, 9), LateScans(tracker, experiment.poses, WINDOW)
+    scans, late = asynchronous(experiment, 9), OutOfSequenceTracker(tracker, experiment.poses, WINDOW)
     in_order = one_by_one(late, scans)
     for seed in range(2):
         shuffled = one_by_one(late, jumbled(scans, WINDOW, seed))
         assert shuffled.num_dropped == 0
-        assert shuffled.num_taken == len(scans)
+        assert shuffled.num_processed == len(scans)
         assert shuffled.num_late > 5
         assert_equal_bits(shuffled.state, in_order.state)
         np.testing.assert_array_equal(shuffled.poses, in_order.poses)
-    at_once, info = late.take(late.initial(), jumbled(scans, WINDOW, 5))
+    at_once, info = late.process(late.initial(), jumbled(scans, WINDOW, 5))
     assert_equal_bits(at_once.state, in_order.state)
     assert len(info.steps) == len({scan.time for scan in scans})
-    assert info.num_worked_again == 0
+    assert info.num_recomputed == 0
 
 
-def test_in_order_it_is_the_loop_that_a_user_writes() -> None:
+def test_scans_in_order_give_the_same_as_a_plain_loop() -> None:
     tracker, experiment = tracker_of({})
     scans = asynchronous(experiment, 9)
-    timeline = one_by_one(LateScans(tracker, experiment.poses, WINDOW), scans)
+    timeline = one_by_one(OutOfSequenceTracker(tracker, experiment.poses, WINDOW), scans)
     state, poses = tracker.initial(), experiment.poses.copy()
     for time in sorted({scan.time for scan in scans}):
         now = {scan.sensor: scan for scan in scans if scan.time == time}
@@ -125,93 +133,93 @@ def test_in_order_it_is_the_loop_that_a_user_writes() -> None:
     assert_equal_bits(timeline.state, state)
 
 
-def small(window: float = 5.0) -> LateScans:
+def small(window: float = 5.0) -> OutOfSequenceTracker:
     world, sensors = targets(), [sensor(), sensor(2.0)]
     from vedette.fusion import Clmb
 
-    return LateScans(Distributed(filters(world, sensors), Clmb((0.5, 0.5))), np.zeros((2, 3)), window)
+    return OutOfSequenceTracker(Distributed(filters(world, sensors), Clmb((0.5, 0.5))), np.zeros((2, 3)), window)
 
 
 def scan(sensor: int = 0, time: float = 1.0, measurements: Any = ((3.0, 1.0),), pose: Any = (0.0, 0.0, 0.0)) -> Any:
     return SensorScan(sensor, time, measurements, pose)
 
 
-def test_what_is_older_than_the_window_is_dropped_and_counted_and_changes_nothing() -> None:
+def test_scans_older_than_the_window_are_dropped_and_counted() -> None:
     late = small()
-    timeline, _ = late.take(late.initial(), [scan(time=1.0), scan(time=8.0)])
-    after, info = late.take(timeline, [scan(1, 2.9), scan(1, 2.5)])
+    timeline, _ = late.process(late.initial(), [scan(time=1.0), scan(time=8.0)])
+    after, info = late.process(timeline, [scan(1, 2.9), scan(1, 2.5)])
     assert [one.time for one in info.dropped] == [2.9, 2.5]
-    assert (after.num_dropped, after.num_taken, info.steps) == (2, 2, ())
+    assert (after.num_dropped, after.num_processed, info.steps) == (2, 2, ())
     assert after.state is timeline.state
-    taken, info = late.take(after, [scan(1, 3.0)])  # just within
-    assert (taken.num_taken, taken.num_late, info.num_worked_again) == (3, 1, 1)
+    taken, info = late.process(after, [scan(1, 3.0)])  # just within
+    assert (taken.num_processed, taken.num_late, info.num_recomputed) == (3, 1, 1)
 
 
-def test_no_more_is_kept_than_the_window_needs() -> None:
+def test_only_the_window_is_stored() -> None:
     late = small(window=5.0)
     timeline = one_by_one(late, [scan(k % 2, 0.5 * k) for k in range(1, 200)])
-    assert len(timeline.instants) == 11
+    assert len(timeline.entries) == 11
     assert timeline.state.step == 199
 
 
-def test_of_more_times_than_are_kept_the_oldest_are_settled() -> None:
-    late = replace(small(window=5.0), max_instants=4)
+def test_the_oldest_entries_beyond_the_limit_become_final() -> None:
+    late = replace(small(window=5.0), max_entries=4)
     timeline = one_by_one(late, [scan(0, 0.5 * k) for k in range(1, 10)])
-    assert [instant.time for instant in timeline.instants] == [3.0, 3.5, 4.0, 4.5]
+    assert [instant.time for instant in timeline.entries] == [3.0, 3.5, 4.0, 4.5]
     for time, num_dropped in ((2.6, 0), (2.5, 1), (2.1, 1)):  # that of the last settled one is over
-        after, _ = late.take(timeline, [scan(1, time)])
-        assert (after.num_dropped, len(after.instants)) == (num_dropped, 4)
-    with pytest.raises(InputError, match="max_instants: expected a whole number of at least 1; got 0"):
-        replace(small(), max_instants=0)
+        after, _ = late.process(timeline, [scan(1, time)])
+        assert (after.num_dropped, len(after.entries)) == (num_dropped, 4)
+    with pytest.raises(InputError, match="max_entries: expected a whole number of at least 1; got 0"):
+        replace(small(), max_entries=0)
 
 
 def test_a_scan_that_comes_again_is_counted_and_one_that_differs_is_refused() -> None:
     late = small()
-    timeline, _ = late.take(late.initial(), [scan(time=1.0), scan(time=2.0)])
-    again, info = late.take(timeline, [scan(time=1.0)])
+    timeline, _ = late.process(late.initial(), [scan(time=1.0), scan(time=2.0)])
+    again, info = late.process(timeline, [scan(time=1.0)])
     assert (again.num_repeated, info.steps, again.state) == (1, (), timeline.state)
     with pytest.raises(InputError, match=r"scan of sensor 0 at 1 s: expected one scan of a sensor at a time"):
-        late.take(timeline, [scan(time=1.0, measurements=[[9.0, 9.0]])])
+        late.process(timeline, [scan(time=1.0, measurements=[[9.0, 9.0]])])
     with pytest.raises(InputError, match="got a second one that differs"):
-        late.take(late.initial(), [scan(), scan(pose=(1.0, 0.0, 0.0))])
+        late.process(late.initial(), [scan(), scan(pose=(1.0, 0.0, 0.0))])
 
 
 def test_rows_that_come_again_in_another_order_are_the_same_scan() -> None:
     there = SensorScan(0, 1.0, np.array([[3.0, 1.0], [1.0, 2.0], [1.0, -2.0]]), np.zeros(3))
-    _check_same(there, replace(there, measurements=there.measurements[[2, 0, 1]]))
+    _check_equal(there, replace(there, measurements=there.measurements[[2, 0, 1]]))
     with pytest.raises(InputError, match="got a second one that differs"):
-        _check_same(there, replace(there, measurements=there.measurements[:, ::-1]))
+        _check_equal(there, replace(there, measurements=there.measurements[:, ::-1]))
 
 
 def test_scans_of_one_time_are_one_step_however_they_come() -> None:
     late = small()
-    together, _ = late.take(late.initial(), [scan(0), scan(1)])
-    apart, info = late.take(late.take(late.initial(), [scan(1)])[0], [scan(0)])
+    together, _ = late.process(late.initial(), [scan(0), scan(1)])
+    apart, info = late.process(late.process(late.initial(), [scan(1)])[0], [scan(0)])
     assert together.state.step == apart.state.step == 1
-    assert (apart.num_late, info.num_worked_again) == (0, 1)
+    assert (apart.num_late, info.num_recomputed) == (0, 1)
     assert_equal_bits(together.state, apart.state)
 
 
-def test_beliefs_of_now_are_predicted_and_kept_nowhere() -> None:
+def test_predicted_states_are_not_stored() -> None:
     late = small()
-    timeline, _ = late.take(late.initial(), [scan(0, 1.0), scan(1, 2.0)])
-    ahead = late.at(timeline, 4.5)
+    timeline, _ = late.process(late.initial(), [scan(0, 1.0), scan(1, 2.0)])
+    ahead = late.state_at(timeline, 4.5)
     nothing, _ = late.tracker.step(
         timeline.state, [None, None], timeline.poses, 4.5, rngs=[np.random.default_rng()] * 2
     )
     assert_equal_bits(ahead, nothing)
-    assert late.at(timeline, 2.0) is timeline.state
+    assert late.state_at(timeline, 2.0) is timeline.state
     assert timeline.state.time == 2.0
     with pytest.raises(InputError, match=r"time: expected one from 2 s on, the latest of all scans that came; got 1"):
-        late.at(timeline, 1.0)
+        late.state_at(timeline, 1.0)
 
 
-def test_arrays_that_a_caller_goes_on_to_change_do_not_change_what_is_worked_again() -> None:
+def test_arrays_changed_by_the_caller_do_not_change_recomputed_steps() -> None:
     late, buffer, pose = small(), np.array([[3.0, 1.0]]), np.zeros(3)
-    timeline, _ = late.take(late.initial(), [scan(0, 2.0, buffer, pose)])
+    timeline, _ = late.process(late.initial(), [scan(0, 2.0, buffer, pose)])
     buffer[:], pose[:] = 700.0, 500.0
-    timeline, _ = late.take(timeline, [scan(1, 1.0)])
-    expected, _ = late.take(late.initial(), [scan(0, 2.0), scan(1, 1.0)])
+    timeline, _ = late.process(timeline, [scan(1, 1.0)])
+    expected, _ = late.process(late.initial(), [scan(0, 2.0), scan(1, 1.0)])
     assert_equal_bits(timeline.state, expected.state)
 
 
@@ -232,11 +240,11 @@ def test_arrays_that_a_caller_goes_on_to_change_do_not_change_what_is_worked_aga
 )
 def test_a_bad_scan_is_refused_by_name_and_leaves_all_as_it_was(bad: Any, message: str) -> None:
     late = small()
-    timeline, _ = late.take(late.initial(), [scan()])
+    timeline, _ = late.process(late.initial(), [scan()])
     with pytest.raises(InputError) as error:
-        late.take(timeline, [scan(1, 2.0), bad])
+        late.process(timeline, [scan(1, 2.0), bad])
     assert str(error.value).startswith(message)
-    assert (timeline.num_taken, timeline.state.step) == (1, 1)
+    assert (timeline.num_processed, timeline.state.step) == (1, 1)
 
 
 @pytest.mark.parametrize(
@@ -252,16 +260,14 @@ def test_bad_parts_are_refused(changes: dict[str, Any], message: str) -> None:
     whole = small()
     given = {"tracker": whole.tracker, "poses": whole.poses, "window": 5.0, "seed": 0, **changes}
     with pytest.raises(InputError) as error:
-        LateScans(**given)
+        OutOfSequenceTracker(**given)
     assert str(error.value).startswith(message)
 
 
 @pytest.mark.parametrize("changes", TRACKERS.values(), ids=TRACKERS)
-def test_a_loop_that_is_stopped_and_taken_up_again_goes_on_as_if_nothing_had_been(
-    changes: dict[str, Any], tmp_path: Path
-) -> None:
+def test_a_resumed_loop_gives_the_answers_of_an_uninterrupted_one(changes: dict[str, Any], tmp_path: Path) -> None:
     tracker, experiment = tracker_of(changes)
-    late = LateScans(tracker, experiment.poses, WINDOW)
+    late = OutOfSequenceTracker(tracker, experiment.poses, WINDOW)
     scans = jumbled(asynchronous(experiment, 9), WINDOW, 1)
     rng = np.random.default_rng(4)
     timeline = one_by_one(late, scans[: len(scans) // 2])
@@ -272,13 +278,13 @@ def test_a_loop_that_is_stopped_and_taken_up_again_goes_on_as_if_nothing_had_bee
     ends = []
     for begun in (timeline, found["timeline"]):
         for one in scans[len(scans) // 2 :]:
-            begun, _ = late.take(begun, [one])
+            begun, _ = late.process(begun, [one])
         ends.append(begun)
     assert_equal_bits(ends[0].state, ends[1].state)
     assert ends[0].num_late == ends[1].num_late
 
 
-def test_what_is_no_snapshot_is_refused(tmp_path: Path) -> None:
+def test_other_files_are_rejected_as_snapshots(tmp_path: Path) -> None:
     path = tmp_path / "some.npz"
     with pytest.raises(InputError, match=r"some.npz: no such file; expected a snapshot"):
         load_snapshot(path)

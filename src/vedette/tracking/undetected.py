@@ -14,19 +14,19 @@ from vedette.kernels.base.types import Floats
 from vedette.kernels.steps.undetected import survival_probabilities, take_out_detected
 from vedette.models import SensorModel, UndetectedModel, kernel_motion
 from vedette.models.arguments import float_array, reject
-from vedette.tracking.base import AroundTracker, Stages, State, TrackerInfo
-from vedette.tracking.births import unexplained
-from vedette.tracking.losing import expected_in_cells, expected_of_lost, lost_labels
+from vedette.tracking.base import StageTimer, State, TrackerInfo, TrackerWrapper
+from vedette.tracking.births import unexplained_measurements
+from vedette.tracking.lost_labels import expected_in_cells, expected_lost_targets, lost_labels
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Searching(AroundTracker):
+class UndetectedTargetTracker(TrackerWrapper):
     """Wrapper of a tracker whose states also have the intensity of undetected targets (`State.undetected`).
 
     The beliefs are bit for bit those of the wrapped tracker. A scan multiplies the expected number in each cell by the
     mean over the cell of 1 - P_D; the wrapped tracker processes its measurements. Labels that the tracker drops become
-    undetected again (`expected_of_lost`). With births from measurements, birth candidates count as undetected until
-    they are born, because they are found only if they are observed again: a measurement that is unexplained with
+    undetected again (`expected_lost_targets`). With births from measurements, birth candidates count as undetected
+    until they are born, because they are found only if they are observed again: a measurement that is unexplained with
     probability p counts as p times the largest existence of such a birth. All scans are used at once, even if a network
     delivers them late or not at all.
 
@@ -39,18 +39,18 @@ class Searching(AroundTracker):
     """
 
     model: UndetectedModel
-    _middles: Floats = field(init=False, repr=False)  # (num_cells, state_dim)
+    _centres: Floats = field(init=False, repr=False)  # (num_cells, state_dim)
     _nodes: Floats = field(init=False, repr=False)  # (num_cells, num_nodes, state_dim)
     _node_weights: Floats = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        AroundTracker.__post_init__(self)
+        TrackerWrapper.__post_init__(self)
         if not isinstance(self.model, UndetectedModel):
             raise reject("model", "an UndetectedModel", self.model)
         if self.model.is_learnt:
             wanted = "a number, as it is the beliefs of filters with an intensity of undetected targets that learn it"
             raise reject("UndetectedModel.birth_rate", wanted, self.model.birth_rate)
-        object.__setattr__(self, "_middles", self.model.grid.states(self.targets.state_dim, 1)[:, 0].copy())
+        object.__setattr__(self, "_centres", self.model.grid.states(self.targets.state_dim, 1)[:, 0].copy())
         object.__setattr__(self, "_nodes", self.model.grid.states(self.targets.state_dim))
         object.__setattr__(self, "_node_weights", self.model.grid.node_weights())
 
@@ -67,18 +67,18 @@ class Searching(AroundTracker):
             InputError: a state without `undetected`, or with one on another grid; and the errors of the tracker.
         """
         after, info = self.tracker.step(state, scans, poses, time, rngs=rngs)
-        stages = Stages()
-        with stages.timing("targets not yet found"):
+        timer = StageTimer()
+        with timer.timing("targets not yet found"):
             expected = self._predicted(state, time)
-            at = float_array("poses", poses, (len(self.sensors), None))
-            looks = [own[:2] for own in zip(self.sensors, at, scans, strict=True) if own[2] is not None]
-            for sensor, pose in looks:
-                look = sensor.to_kernel(), pose, self._nodes, self._node_weights
-                expected = take_out_detected(*look, expected[np.newaxis])[0]
-            expected = expected + self._lost(state, after, looks, float(time)) + self._new(after, scans, at)
-        seconds = {**info.seconds, **stages.seconds}
-        left = UndetectedIntensity(self.model.grid, expected)
-        return replace(after, undetected=left), replace(info, seconds=seconds)
+            pose_array = float_array("poses", poses, (len(self.sensors), None))
+            scanned = [each[:2] for each in zip(self.sensors, pose_array, scans, strict=True) if each[2] is not None]
+            for sensor, pose in scanned:
+                inputs = sensor.to_kernel(), pose, self._nodes, self._node_weights
+                expected = take_out_detected(*inputs, expected[np.newaxis])[0]
+            expected = expected + self._lost(state, after, scanned, float(time)) + self._new(after, scans, pose_array)
+        seconds = {**info.seconds, **timer.seconds}
+        undetected = UndetectedIntensity(self.model.grid, expected)
+        return replace(after, undetected=undetected), replace(info, seconds=seconds)
 
     def _predicted(self, state: State, time: float) -> Floats:
         """Expected number in each cell before the scans of a time, (num_cells,); the initial one for the first."""
@@ -99,21 +99,23 @@ class Searching(AroundTracker):
         if self.model.survival is not None:
             return float(self.model.survival**dt)
         motion = kernel_motion(self.targets.motion, self.targets.survival)
-        return survival_probabilities(motion, dt, self._middles)
+        return survival_probabilities(motion, dt, self._centres)
 
     def _lost(
-        self, before: State, after: State, looks: Sequence[tuple[SensorModel, Floats]], time: float
+        self, before: State, after: State, scanned: Sequence[tuple[SensorModel, Floats]], time: float
     ) -> Floats | float:
         """Expected number in each cell of targets whose labels were dropped, (num_cells,), or 0."""
         lost = lost_labels(before.fused, (*after.local, after.fused))
         if before.time is None or lost is None or lost.tracks.num_tracks == 0:
             return 0.0
-        return expected_of_lost(lost, self.targets, looks, time - before.time, self.model.grid)
+        return expected_lost_targets(lost, self.targets, scanned, time - before.time, self.model.grid)
 
     def _new(self, after: State, scans: Sequence[Any], poses: Floats) -> Floats | float:
         """Expected number in each cell of birth candidates from measurements, (num_cells,), or 0."""
         birth = self.targets.birth.from_measurements
         if birth is None:
             return 0.0
-        found = unexplained(birth, after.fused, self.sensors, scans, poses)
-        return expected_in_cells(found.states[:, :2], birth.max_existence * found.probabilities, self.model.grid)
+        measurements = unexplained_measurements(birth, after.fused, self.sensors, scans, poses)
+        return expected_in_cells(
+            measurements.states[:, :2], birth.max_existence * measurements.probabilities, self.model.grid
+        )

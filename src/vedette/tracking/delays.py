@@ -11,8 +11,8 @@ import numpy as np
 
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import count, instance, positive, probability, real, reject
-from vedette.tracking.base import AroundTracker, State, TrackerInfo, check_step
-from vedette.tracking.late import LateScans, SensorScan, Timeline
+from vedette.tracking.base import State, TrackerInfo, TrackerWrapper, check_step
+from vedette.tracking.out_of_sequence import OutOfSequenceTracker, SensorScan, Timeline
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,13 +43,13 @@ class Delay:
         if not self.start <= self.end:
             raise reject("Delay.end", f"a time from start on, {self.start:g} s", self.end)
 
-    def drawn(self, time: float, rng: np.random.Generator) -> float:
+    def sample(self, time: float, rng: np.random.Generator) -> float:
         """Draw the delay of a scan of this time, in s; always draws two random numbers."""
-        luck, part = rng.random(2).tolist()
-        return self.up_to * part if self.start <= time <= self.end and luck < self.share else 0.0
+        uniform, fraction = rng.random(2).tolist()
+        return self.up_to * fraction if self.start <= time <= self.end and uniform < self.share else 0.0
 
 
-class _Coming(NamedTuple):
+class _PendingScan(NamedTuple):
     """A scan that has not arrived yet."""
 
     arrives: float  # s
@@ -60,13 +60,13 @@ class _Memory(NamedTuple):
     """Timeline of the scans that arrived (None before the first step), scans on their way, and seed for filters."""
 
     timeline: Timeline | None = None
-    coming: tuple[_Coming, ...] = ()
+    pending: tuple[_PendingScan, ...] = ()
     seed: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Delayed(AroundTracker):
-    """Wrapper of a tracker that receives some scans late and processes them at their own time (`LateScans`).
+class DelayedScanTracker(TrackerWrapper):
+    """Wrapper of a tracker that receives some scans late and processes them at their own time (`OutOfSequenceTracker`).
 
     Its state is the belief at the current time from the scans that have arrived, predicted if the latest of them is
     older. Births are labelled by the wrapped tracker's steps, in order of time.
@@ -83,7 +83,7 @@ class Delayed(AroundTracker):
     _window: float = field(init=False, repr=False)  # s; longer than every delay of a scan that is not lost
 
     def __post_init__(self) -> None:
-        AroundTracker.__post_init__(self)
+        TrackerWrapper.__post_init__(self)
         for s, delay in self.delays.items():
             if count("delays", s) >= len(self.sensors):
                 raise reject("delays", f"sensors from 0 to {len(self.sensors) - 1}", s)
@@ -102,30 +102,30 @@ class Delayed(AroundTracker):
 
         The delays of the scans of sensor s are drawn from `rngs[s]`.
         """
-        at, _ = check_step(state, scans, poses, time, rngs, len(self.sensors))
+        pose_array, _ = check_step(state, scans, poses, time, rngs, len(self.sensors))
         memory, now = state.memory, real("time", time)
         seed = int(rngs[0].integers(2**32)) if memory.timeline is None else memory.seed
-        late = LateScans(self.tracker, at, self._window, seed)
-        timeline = late.initial() if memory.timeline is None else memory.timeline
-        coming = (*memory.coming, *self._sent(scans, at, now, rngs))
-        timeline, taken = late.take(timeline, [own.scan for own in coming if own.arrives <= now])
-        believed, info = late.predicted(timeline, now)
-        if taken.steps:
-            seconds = [*(own.seconds for own in taken.steps), info.seconds]
-            spent = {stage: sum(own.get(stage, 0.0) for own in seconds) for stage in ("filter", "fusion")}
-            info = replace(taken.steps[-1], seconds=spent)
-        left = _Memory(timeline, tuple(own for own in coming if own.arrives > now), seed)
-        return replace(believed, step=state.step + 1, time=now, memory=left), info
+        tracker = OutOfSequenceTracker(self.tracker, pose_array, self._window, seed)
+        timeline = tracker.initial() if memory.timeline is None else memory.timeline
+        pending = (*memory.pending, *self._sent(scans, pose_array, now, rngs))
+        timeline, report = tracker.process(timeline, [each.scan for each in pending if each.arrives <= now])
+        current, info = tracker.predict(timeline, now)
+        if report.steps:
+            seconds = [*(each.seconds for each in report.steps), info.seconds]
+            stage_seconds = {stage: sum(each.get(stage, 0.0) for each in seconds) for stage in ("filter", "fusion")}
+            info = replace(report.steps[-1], seconds=stage_seconds)
+        remaining = _Memory(timeline, tuple(each for each in pending if each.arrives > now), seed)
+        return replace(current, step=state.step + 1, time=now, memory=remaining), info
 
     def _sent(
         self, scans: Sequence[Any], poses: Floats, now: float, rngs: Sequence[np.random.Generator]
-    ) -> list[_Coming]:
+    ) -> list[_PendingScan]:
         """Return the scans of a time that arrive now or later; lost ones are left out."""
-        found = []
+        pending = []
         for s, scan in enumerate(scans):
             if scan is not None:
                 delay = self.delays.get(s)
-                by = 0.0 if delay is None else delay.drawn(now, rngs[s])
-                if delay is None or by <= delay.window:
-                    found.append(_Coming(now + by, SensorScan(s, now, scan, poses[s])))
-        return found
+                seconds = 0.0 if delay is None else delay.sample(now, rngs[s])
+                if delay is None or seconds <= delay.window:
+                    pending.append(_PendingScan(now + seconds, SensorScan(s, now, scan, poses[s])))
+        return pending
