@@ -30,8 +30,8 @@ from pages import write_between
 
 from vedette.calibration import Calibration, calibrate
 from vedette.evaluation.runs import run_scenario
-from vedette.scenarios.calibrated import calibrated_text, problem_of
-from vedette.scenarios.of_recording import scenario_of_recording
+from vedette.scenarios.calibration import build_problem, calibrated_text
+from vedette.scenarios.from_recording import scenario_from_recording
 
 RADARS = {"Calshot": ((-3000.0, -3000.0), 5.0), "Ryde": ((3500.0, -2500.0), 8.0), "boat": ((0.0, 3500.0), 11.0)}
 BIASES = {
@@ -145,19 +145,19 @@ def redraw(
     write_scans(folder, scene, seconds, seed, motion, PLACED if position else BIASES)
     scans = folder / "scans.csv"
     begun, passes = time.process_time(), [0]
-    scenario = scenario_of_recording(folder / "told.yaml", scans, speed=scene.speed).scenario
+    scenario = scenario_from_recording(folder / "told.yaml", scans, speed=scene.speed).scenario
 
     def progress() -> None:
         passes[0] += 1
 
-    calibration = calibrate(problem_of(scenario, position=position), progress)
+    calibration = calibrate(build_problem(scenario, position=position), progress)
     spent = time.process_time() - begun
     text = calibrated_text(scenario, folder / "told.yaml", calibration, folder)
     (folder / "found.yaml").write_text(text, "utf-8")
     scores = []
     for name in ("found", "true", "told"):
         at = folder / f"{name}.yaml"
-        tracked = scenario_of_recording(at, scans, folder / "truth.csv", speed=scene.speed).scenario
+        tracked = scenario_from_recording(at, scans, folder / "truth.csv", speed=scene.speed).scenario
         scores.append(float(np.nanmean(run_scenario(tracked, "still", seed=0).ospa[:, 0])))
     return Redraw(calibration, (scores[0], scores[1], scores[2]), spent, passes[0])
 

@@ -20,7 +20,7 @@ from vedette.errors import ScenarioError
 from vedette.evaluation import ospa_of_run
 from vedette.internal.unit_warnings import suppress_unit_warnings
 from vedette.models import CellGrid
-from vedette.scenarios import Scenario, with_fields
+from vedette.scenarios import Scenario, replace_fields
 from vedette.scenarios.build import build_experiment
 from vedette.simulation import SimulationRun
 
@@ -170,7 +170,7 @@ class Case:
     def in_scene(self, scene: Scene) -> Scenario:
         """The scenario of the scene's first run with this filter. Raises `ScenarioError` where it is refused."""
         fields = self.fields if self.fusion is None else {**self.fields, "fusion": self.fusion}
-        return with_fields(scene.scenario(0), fields)
+        return replace_fields(scene.scenario(0), fields)
 
 
 def cases(errors: Iterable[float] = ()) -> Iterator[Case]:

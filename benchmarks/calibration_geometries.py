@@ -24,8 +24,8 @@ import numpy as np
 from pages import write_between
 
 from vedette.calibration import Calibration, calibrate
-from vedette.scenarios.calibrated import problem_of
-from vedette.scenarios.of_recording import scenario_of_recording
+from vedette.scenarios.calibration import build_problem
+from vedette.scenarios.from_recording import scenario_from_recording
 
 BIASES = ((60.0, -0.5), (-40.0, 0.8), (100.0, 1.5))  # m, degrees
 PERIODS = (5.0, 7.0, 9.0)  # s
@@ -100,8 +100,8 @@ def redraw(name: str, seed: int) -> tuple[Calibration, dict[tuple[int, str], flo
     with tempfile.TemporaryDirectory() as place:
         folder, rng = Path(place), np.random.default_rng([seed, list(GEOMETRIES).index(name)])
         truth = write_scans(folder, GEOMETRIES[name], rng)
-        scenario = scenario_of_recording(folder / "radars.yaml", folder / "scans.csv", speed=8.0).scenario
-        return calibrate(problem_of(scenario)), truth
+        scenario = scenario_from_recording(folder / "radars.yaml", folder / "scans.csv", speed=8.0).scenario
+        return calibrate(build_problem(scenario)), truth
 
 
 def lines(redraws: int) -> Iterator[str]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from vedette.models import SensorModel, TargetModel
-from vedette.scenarios import Scenario, with_fields
+from vedette.scenarios import Scenario, replace_fields
 from vedette.scenarios.sections.tracking import Filter
 from vedette.tracking import State, Tracker
 
@@ -36,7 +36,7 @@ def with_filter(scenario: Scenario, fields: Fields) -> Scenario:
     kinds = ("clmb", "cm_delta_glmb")
     if scenario.model.fusion.kind in kinds:
         fields = {**fields, "fusion.kind": kinds[fields["filter.kind"] != "lmb"]}
-    return with_fields(scenario, fields)
+    return replace_fields(scenario, fields)
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ from vedette.evaluation import ospa
 from vedette.filters import PredictUpdateFilter
 from vedette.internal.processes import end_with_parent
 from vedette.models import SensorModel, TargetModel
-from vedette.scenarios import GeneratedCrowd, Scenario, crowd_text, parse_scenario, with_fields
+from vedette.scenarios import GeneratedCrowd, Scenario, crowd_text, parse_scenario, replace_fields
 from vedette.scenarios.build import build_experiment
 from vedette.simulation import Experiment, Truth, simulate_scan
 
@@ -62,7 +62,7 @@ class Row:
 
 def prepared(crowd: GeneratedCrowd, kind: str) -> tuple[Experiment, Truth, list[np.ndarray]]:
     """The experiment, the true targets and the scans."""
-    scenario = with_fields(Scenario(parse_scenario(crowd_text(crowd))), {"filter.kind": kind})
+    scenario = replace_fields(Scenario(parse_scenario(crowd_text(crowd))), {"filter.kind": kind})
     experiment = build_experiment(scenario)
     rng = np.random.default_rng(0)
     truth = experiment.targets.truth(experiment.times, rng=rng)

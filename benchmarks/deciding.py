@@ -39,7 +39,7 @@ from vedette.evaluation.statistics import paired_difference, summarise
 from vedette.evaluation.tail_summary import summarise_tail, tail_header
 from vedette.internal.processes import end_with_parent
 from vedette.kernels.base.types import Floats
-from vedette.scenarios import Scenario, with_fields
+from vedette.scenarios import Scenario, replace_fields
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.simulation import simulate
 
@@ -67,7 +67,7 @@ Runs = dict[str, dict[int, Score]]  # by strategy and run
 def prepared(scene: Scene) -> Scenario:
     """The scenario with all strategies in it."""
     given = scene.scenario()
-    return with_fields(given, {"planners": strategies(given), "control.explain": False})
+    return replace_fields(given, {"planners": strategies(given), "control.explain": False})
 
 
 def score(scene_name: str, strategy: str, run: int) -> Score:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from vedette.scenarios import GeneratedScene, Scenario, load_scenario, parse_scenario, scene_text, with_fields
+from vedette.scenarios import GeneratedScene, Scenario, load_scenario, parse_scenario, replace_fields, scene_text
 from vedette.scenarios.generated import PATTERNS, VIEWS
 from vedette.scenarios.sections.fusion import Fusion
 from vedette.scenarios.sections.tracking import Filter
@@ -126,14 +126,14 @@ def layout(number: int) -> Scenario:
     ]
     if given.model.birth.from_measurements is not None and motion == "turning":
         fields["birth.from_measurements.std"] = [20.0, 20.0, 6.0, 6.0, np.radians(TURN_RATE)]
-    return with_fields(given, fields)
+    return replace_fields(given, fields)
 
 
 def scenes() -> Iterator[Scene]:
     """All of them, in the order of the table."""
     for name, (filters, fields) in product(("paper-a", "paper-e"), FILTERS.items()):
         title = f"{name}, {filters}"
-        yield Scene(title, name, cache(lambda name=name, fields=fields: with_fields(load_scenario(name), fields)))
+        yield Scene(title, name, cache(lambda name=name, fields=fields: replace_fields(load_scenario(name), fields)))
     for number, size in enumerate(SIZES):
         title = f"layout {number}"
         yield Scene(title, "layouts", cache(lambda number=number: layout(number)), 1.0 if size <= 5 else 0.3)

@@ -31,8 +31,8 @@ from vedette.kernels.base.types import Floats
 from vedette.models import Bias
 from vedette.recorded.instants import Look, without_bias
 from vedette.scenarios.build import build_poses, build_tracking
-from vedette.scenarios.calibrated import problem_of
-from vedette.scenarios.of_recording import scenario_of_recording
+from vedette.scenarios.calibration import build_problem
+from vedette.scenarios.from_recording import scenario_from_recording
 from vedette.tracking import OutOfSequenceTracker, SensorScan
 
 DEGREES_A_SECOND = 0.1 / 60.0
@@ -69,9 +69,9 @@ def true_bias(sensor: int, at: float) -> Bias:
 def redraw(folder: Path, scene: Scene, seconds: float, seed: int, first: float, window: float, every: float) -> Outcome:
     """One recording whose scans come in one by one."""
     ships = write_scans(folder, scene, seconds, seed, drifts=DRIFTS)
-    told = scenario_of_recording(folder / "told.yaml", folder / "scans.csv", speed=scene.speed).scenario
-    true = scenario_of_recording(folder / "true.yaml", folder / "scans.csv", speed=scene.speed).scenario
-    problem, tracking = problem_of(told), build_tracking(true)
+    told = scenario_from_recording(folder / "told.yaml", folder / "scans.csv", speed=scene.speed).scenario
+    true = scenario_from_recording(folder / "true.yaml", folder / "scans.csv", speed=scene.speed).scenario
+    problem, tracking = build_problem(told), build_tracking(true)
     at_first = calibrate(replace(problem, recording=problem.recording.between(0.0, first)))
     problem = warm_started(problem, at_first)
     once = problem.with_biases(np.array([each.start for each in problem.parameters]))

@@ -18,7 +18,7 @@ import numpy as np
 from timing import Figures, Measure, Once, cpu_seconds
 
 from vedette.gym import ScenarioEnv
-from vedette.scenarios import Scenario, load_scenario, with_fields
+from vedette.scenarios import Scenario, load_scenario, replace_fields
 from vedette.simulation import SimulationRun
 from vedette.tracking import StageTimer
 
@@ -30,7 +30,7 @@ FILTERS: dict[str, dict[str, Any]] = {
 
 def scene(kind: str) -> Scenario:
     """Paper-a, with filters of a kind."""
-    return with_fields(load_scenario("paper-a"), FILTERS[kind])
+    return replace_fields(load_scenario("paper-a"), FILTERS[kind])
 
 
 def walked(env: ScenarioEnv, run: int, stages: StageTimer | None = None) -> int:

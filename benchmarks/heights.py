@@ -25,7 +25,7 @@ from pages import write_between
 
 from vedette.evaluation import track_recording
 from vedette.kernels.base.types import Floats
-from vedette.scenarios.of_recording import scenario_of_recording
+from vedette.scenarios.from_recording import scenario_from_recording
 
 RADARS = {"R": (-10e3, 0.0, 30.0), "S": (10e3, 0.0, 200.0)}
 PERIOD, DURATION = 4.0, 200.0
@@ -97,7 +97,7 @@ def write(folder: Path, aircraft: Aircraft, kind: str, num_radars: int) -> None:
 
 def track(folder: Path, aircraft: Aircraft) -> Floats:
     """(4,) mean error in the plane and in height, m; share of aircraft with an estimate; median squared error."""
-    found = scenario_of_recording(folder / "radars.yaml", folder / "scans.csv", speed=250.0)
+    found = scenario_from_recording(folder / "radars.yaml", folder / "scans.csv", speed=250.0)
     record, has_height = track_recording(found.scenario, found.recording), found.scenario.model.has_heights
     kept = [0, 1, 4] if has_height else [0, 1]
     plane, heights, squares, shares = list[float](), list[float](), list[float](), list[float]()

@@ -24,7 +24,7 @@ import numpy as np
 from pages import write_between
 
 from vedette.live import PersistentLoop, build_live_loop, encode_line
-from vedette.scenarios.of_recording import scenario_of_sensors
+from vedette.scenarios.from_recording import scenario_from_sensors
 
 SCENE = """
 region: {x_min: -1000.0, x_max: 1000.0, y_min: -1000.0, y_max: 1000.0}
@@ -74,7 +74,7 @@ def table(scans: int) -> Iterator[str]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "scene.yaml").write_text(SCENE, "utf-8")
-        live = build_live_loop(scenario_of_sensors(folder / "scene.yaml"), max_delay=WINDOW)
+        live = build_live_loop(scenario_from_sensors(folder / "scene.yaml"), max_delay=WINDOW)
         persistent = PersistentLoop(live, snapshot=folder / "state", snapshot_interval=1.0, record=folder / "came")
         begun, num = time.perf_counter(), 0
         for line in lines(scans):

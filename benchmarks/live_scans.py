@@ -29,7 +29,7 @@ from pages import write_between
 from vedette.live import LiveLoop, build_live_loop, encode_line
 from vedette.scenarios import GeneratedScene, load_scenario, scene_text
 from vedette.scenarios.build import build_experiment
-from vedette.scenarios.of_recording import scenario_of_sensors
+from vedette.scenarios.from_recording import scenario_from_sensors
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.loop import SCANS, TRUTH, run_stream, sensor_streams
 from vedette.simulation.scans import simulate_scans
@@ -44,7 +44,7 @@ def scene(
     """What is simulated, and the loop that takes it."""
     path = folder / "scene.yaml"
     path.write_text(scene_text(GeneratedScene(num_sensors=sensors, num_targets=targets, view=view)), "utf-8")
-    known = scenario_of_sensors(path, decide_every=DECIDE_EVERY, plan_within=within)
+    known = scenario_from_sensors(path, decide_every=DECIDE_EVERY, plan_within=within)
     return build_experiment(load_scenario(path)), build_live_loop(known, decide_every=DECIDE_EVERY)
 
 

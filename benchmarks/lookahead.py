@@ -42,7 +42,7 @@ from vedette.evaluation.runs import measure_run
 from vedette.evaluation.tail_summary import summarise_tail, tail_header
 from vedette.internal.processes import end_with_parent
 from vedette.kernels.base.types import Floats
-from vedette.scenarios import Scenario, load_scenario, with_fields
+from vedette.scenarios import Scenario, load_scenario, replace_fields
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.scenarios.sections.deciding import Lookahead
 from vedette.simulation import simulate
@@ -87,7 +87,7 @@ def scenario_of(scene: str) -> Scenario:
     if scene in SCENES:
         return load_scenario(scene)
     if not scene.startswith("layout-"):
-        return with_fields(load_scenario(scene), SPARSE)
+        return replace_fields(load_scenario(scene), SPARSE)
     given, rng = scenario_of("paper-a"), np.random.default_rng(FIRST_LAYOUT + int(scene.removeprefix("layout-")))
     places, courses = rng.uniform(0.0, SIDE, (4, 2)), rng.uniform(0.0, 2.0 * np.pi, 4)
     sensors = rng.uniform(-MARGIN, SIDE + MARGIN, (2, 2)).tolist()
@@ -99,7 +99,7 @@ def scenario_of(scene: str) -> Scenario:
         "targets.tracks": [{"state": state} for state in states],
         **{f"sensors.{s}.position": place for s, place in enumerate(sensors)},
     }
-    return with_fields(given, layout)
+    return replace_fields(given, layout)
 
 
 def ahead(depth: int, discount: float | None) -> dict[str, Any]:
@@ -149,7 +149,7 @@ def around(num: int) -> list[float]:
 
 def score(scene: str, strategy: Strategy, run: int, seed: int) -> Score:
     """One run."""
-    scenario = with_fields(scenario_of(scene), strategy.fields)
+    scenario = replace_fields(scenario_of(scene), strategy.fields)
     planner, ospa = build_planner(scenario, strategy.planner, 1), scenario.model.ospa
     assert planner is not None
     timed = Timed(planner)

@@ -20,8 +20,8 @@ from vedette.scenarios import (
     crowd_text,
     load_scenario,
     parse_scenario,
+    replace_fields,
     scene_text,
-    with_fields,
 )
 
 BASE = """
@@ -72,7 +72,7 @@ def own(name: str, fields: dict[str, Any], num_sensors: int = 1, fusion: dict[st
         base = Scenario(parse_scenario(BASE))
         [sensor] = base.model.model_dump(mode="json")["sensors"]
         several = {"sensors": [{**sensor, "name": f"sensor {s}"} for s in range(num_sensors)]}
-        return with_fields(base, {**several, "fusion": fusion or {"kind": "none"}, **fields, "name": name})
+        return replace_fields(base, {**several, "fusion": fusion or {"kind": "none"}, **fields, "name": name})
 
     return Scene(name, lambda run: scenario())
 
@@ -162,7 +162,7 @@ def crossing_targets() -> Iterator[Scene]:
 
 def builtin(name: str, planner: str, share: float = 1.0, **fields: Any) -> Scene:
     """A scenario that comes with the library, with some sections replaced, under a strategy."""
-    scenario = cache(lambda: with_fields(load_scenario(name), fields))
+    scenario = cache(lambda: replace_fields(load_scenario(name), fields))
     return Scene(f"{name}, {planner}", lambda run: scenario(), planner, share)
 
 
@@ -176,7 +176,7 @@ def still_sensors() -> Scene:
         places, courses = rng.uniform(0.0, LAYOUT_SIDE, (4, 2)), rng.uniform(0.0, 2.0 * np.pi, 4)
         states = np.column_stack([places, LAYOUT_SPEED * np.cos(courses), LAYOUT_SPEED * np.sin(courses)]).tolist()
         sensors = rng.uniform(0.0, LAYOUT_SIDE, (2, 2)).tolist()
-        return with_fields(
+        return replace_fields(
             given,
             {
                 "birth.sites": [{"existence": 0.02, "mean": state, "std": std} for state in states],

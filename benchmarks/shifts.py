@@ -27,7 +27,7 @@ from pages import write_between
 from vedette.control import MaxActive, Plan
 from vedette.evaluation.metrics import ospa_of_run
 from vedette.kernels.base.types import Bools, Floats
-from vedette.scenarios import Scenario, load_scenario, with_fields
+from vedette.scenarios import Scenario, load_scenario, replace_fields
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.simulation import simulate
 
@@ -103,7 +103,7 @@ class Shifts:
 
 def scenario_of(name: str) -> Scenario:
     """The scene with sensors that can be switched off."""
-    return with_fields(load_scenario(name), {"sensors.*.switchable": True, "control.explain": False, **SCENES[name]})
+    return replace_fields(load_scenario(name), {"sensors.*.switchable": True, "control.explain": False, **SCENES[name]})
 
 
 def measured(scenario: Scenario, choice: str, share: int, run: int) -> tuple[float, float]:

@@ -25,7 +25,7 @@ from pages import write_between
 from vedette.evaluation import track_recording
 from vedette.kernels.base.types import Floats
 from vedette.models.turns import Turn
-from vedette.scenarios.of_recording import scenario_of_recording
+from vedette.scenarios.from_recording import scenario_from_recording
 
 PERIODS = 2.5, 4.0, 10.0, 12.0
 PLACES = {"R": (0.0, 0.0), "S": (9000.0, -7000.0)}
@@ -100,7 +100,7 @@ def write(folder: Path, radars: dict[str, list[tuple[float, ...]]], places: dict
 
 def track(folder: Path, flights: Flights) -> tuple[float, float, float]:
     """Of the estimates within 2 km of an aircraft, after 60 s: mean error in m, median squared error, number a scan."""
-    found = scenario_of_recording(folder / "radars.yaml", folder / "scans.csv", speed=250.0)
+    found = scenario_from_recording(folder / "radars.yaml", folder / "scans.csv", speed=250.0)
     record = track_recording(found.scenario, found.recording)
     errors, squares, counts = list[float](), list[float](), list[int]()
     for time, estimate in zip(record.times.tolist(), record.estimates, strict=True):

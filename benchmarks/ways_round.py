@@ -24,7 +24,7 @@ import numpy as np
 
 from vedette.evaluation.metrics import ospa_of_run
 from vedette.kernels.base.types import Floats
-from vedette.scenarios import Scenario, load_scenario, with_fields
+from vedette.scenarios import Scenario, load_scenario, replace_fields
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.simulation import simulate
 
@@ -78,7 +78,7 @@ def scenario_of(scene: str, run: int) -> Scenario:
         **{f"sensors.{s}.position": own for s, own in enumerate(sensors.tolist())},
         "control.constraints": SCENES[scene],
     }
-    return with_fields(load_scenario("beyond-the-gap"), fields)
+    return replace_fields(load_scenario("beyond-the-gap"), fields)
 
 
 def measured(scene: str, planner: str, run: int) -> tuple[float, float]:

@@ -19,7 +19,7 @@ import numpy as np
 
 from vedette.evaluation import run_scenario
 from vedette.gym import Observation, ScenarioEnv, policy_planner
-from vedette.scenarios import Scenario, load_scenario, with_fields
+from vedette.scenarios import Scenario, load_scenario, replace_fields
 
 KEPT = Path(__file__).with_name("gym_policy.npz")
 TOLD, HIDDEN = 6, 8
@@ -66,7 +66,7 @@ def scene(name: str = "eight-mobile", scans: int = 100) -> Scenario:
     fields: dict[str, Any] = {"planners": {"policy": {"kind": "custom", "function": f"{__file__}:steer"}}}
     if name == "eight-mobile":
         fields |= {"time.num_steps": scans, "control.decision_steps": list(range(1, scans))}
-    return with_fields(load_scenario(name), fields)
+    return replace_fields(load_scenario(name), fields)
 
 
 def play(env: ScenarioEnv, policy: Network, seed: int, run: int) -> float:

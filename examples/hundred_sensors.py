@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from vedette.evaluation import run_scenario
-from vedette.scenarios import load_scenario, with_fields
+from vedette.scenarios import load_scenario, replace_fields
 from vedette.scenarios.generated import GeneratedScene, scene_text
 from vedette.simulation import RunRecord
 
@@ -30,7 +30,7 @@ def main() -> dict[str, RunRecord]:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "scene.yaml"
         file.write_text(scene_text(GeneratedScene(num_sensors=100, decide_every=5)), "utf-8")
-        scenario = with_fields(load_scenario(file), SHORTER)
+        scenario = replace_fields(load_scenario(file), SHORTER)
     records = {}
     for planner in ("still", "nearest", "jdm"):
         record = records[planner] = run_scenario(scenario, planner, seed=1, num_threads=1)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from vedette.evaluation import custom_metrics, measure_run, run_scenario
-from vedette.scenarios import load_scenario, with_fields
+from vedette.scenarios import load_scenario, replace_fields
 from vedette.simulation import RunRecord
 
 SCENARIO = load_scenario("two-views-1")
@@ -25,7 +25,7 @@ FUSIONS = {
 def main() -> dict[str, RunRecord]:
     records = {}
     for name, fusion in FUSIONS.items():
-        scenario = with_fields(SCENARIO, {"fusion": fusion})
+        scenario = replace_fields(SCENARIO, {"fusion": fusion})
         record = records[name] = run_scenario(scenario, "still", seed=1)
         tracked = measure_run(record, scenario, custom_metrics(scenario)).custom["tracked_share"]
         error = record.ospa[:, 0].mean()

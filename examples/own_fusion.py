@@ -12,7 +12,7 @@ import numpy as np
 
 from vedette.densities import LMB, track_moments
 from vedette.evaluation import run_scenario
-from vedette.scenarios import load_scenario, with_fields
+from vedette.scenarios import load_scenario, replace_fields
 
 FUSIONS = {
     "own: the surest sensor": {"kind": "custom", "function": "own_fusion:SurestSensor"},
@@ -43,7 +43,7 @@ def main() -> tuple[np.ndarray, dict[str, np.ndarray]]:
     errors = {}
     for name, fusion in FUSIONS.items():
         parts = {"filter": {"kind": "lmb"}, "fusion": {**fusion, "feedback": True}}
-        scenario = with_fields(load_scenario("paper-a"), parts)
+        scenario = replace_fields(load_scenario("paper-a"), parts)
         records = [run_scenario(scenario, "fixed", seed=1, run=run) for run in range(RUNS)]
         errors[name] = np.mean([record.ospa[:, 0] for record in records], axis=0)
         print(f"{name:24} OSPA {errors[name][10:].mean():5.1f} m")

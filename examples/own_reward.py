@@ -15,7 +15,7 @@ import numpy as np
 
 from vedette import models
 from vedette.evaluation import run_scenario
-from vedette.scenarios import Scenario, load_scenario, with_fields
+from vedette.scenarios import Scenario, load_scenario, replace_fields
 from vedette.simulation import RunRecord
 
 HARBOUR = np.array([-150.0, -700.0])
@@ -44,11 +44,11 @@ class HarbourReward:
 
 
 def scenarios() -> dict[str, Scenario]:
-    plain = with_fields(load_scenario("paper-a"), {"filter": {"kind": "lmb"}, "fusion": {"kind": "sequential"}})
+    plain = replace_fields(load_scenario("paper-a"), {"filter": {"kind": "lmb"}, "fusion": {"kind": "sequential"}})
     own = {"kind": "custom", "function": "own_reward:HarbourReward"}  # module:name; file.py:name beside a scenario
     return {
-        "expected loss": with_fields(plain, {"control.reward": {"kind": "expected_loss", "cutoff": 100.0}}),
-        "own: near the harbour": with_fields(plain, {"control.reward": own}),
+        "expected loss": replace_fields(plain, {"control.reward": {"kind": "expected_loss", "cutoff": 100.0}}),
+        "own: near the harbour": replace_fields(plain, {"control.reward": own}),
     }
 
 

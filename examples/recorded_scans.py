@@ -11,14 +11,14 @@ from __future__ import annotations
 from pathlib import Path
 
 from vedette.evaluation import track_recording
-from vedette.scenarios.of_recording import OfRecording, scenario_of_recording
+from vedette.scenarios.from_recording import RecordingScenario, scenario_from_recording
 from vedette.simulation import RunRecord
 
 FILES = Path(__file__).parent / "recording"
 
 
-def main() -> tuple[OfRecording, RunRecord]:
-    found = scenario_of_recording(FILES / "radars.yaml", FILES / "scans.csv", FILES / "truth.csv")
+def main() -> tuple[RecordingScenario, RunRecord]:
+    found = scenario_from_recording(FILES / "radars.yaml", FILES / "scans.csv", FILES / "truth.csv")
     record = track_recording(found.scenario, found.recording)
     for section, text in found.assumed.items():
         print(f"assumed {section}: {text}")
@@ -27,7 +27,7 @@ def main() -> tuple[OfRecording, RunRecord]:
     return found, record
 
 
-def draw(result: tuple[OfRecording, RunRecord]):
+def draw(result: tuple[RecordingScenario, RunRecord]):
     from vedette.evaluation.figures import build_scene, tracks_figure
 
     found, record = result

@@ -21,7 +21,7 @@ from vedette.evaluation.scans import scans_of_record
 from vedette.internal.programs import MOST_BYTES, Program
 from vedette.scenarios import Scenario, load_scenario
 from vedette.scenarios.build import build_sensors
-from vedette.scenarios.overrides import with_fields
+from vedette.scenarios.overrides import replace_fields
 from vedette.simulation.journal import RunStopped
 from vedette.simulation.records import RunRecord
 from vedette.tracking.program import UNKNOWN_VARIANCE
@@ -51,7 +51,7 @@ def section(folder: Path, text: str, **more: Any) -> dict[str, Any]:
 
 
 def planned(name: str, program: dict[str, Any], **fields: Any) -> Scenario:
-    return with_fields(load_scenario(name), {"planners": {"mine": program}, **fields})
+    return replace_fields(load_scenario(name), {"planners": {"mine": program}, **fields})
 
 
 def tracked(program: dict[str, Any], **fields: Any) -> Scenario:
@@ -60,7 +60,7 @@ def tracked(program: dict[str, Any], **fields: Any) -> Scenario:
     own = {"kind": "central", "filter": program}
     targets = {"kind": "scripted", "tracks": tracks}
     scene = {"fusion": own, "targets": targets, "time.num_steps": 4, "ospa.cutoff": 10.0}
-    return with_fields(load_scenario("two-views-1"), {**scene, **fields})
+    return replace_fields(load_scenario("two-views-1"), {**scene, **fields})
 
 
 def same(one: RunRecord, other: RunRecord) -> bool:
@@ -87,7 +87,7 @@ def test_what_a_planner_is_told_holds_no_truth_and_its_seed_is_that_of_the_run(t
     (tmp_path / "place" / "scene.yaml").write_text(
         Path(load_scenario("two-searchers").path or "").read_text(encoding="utf-8"), encoding="utf-8"
     )
-    scenario = with_fields(
+    scenario = replace_fields(
         load_scenario(tmp_path / "place" / "scene.yaml"),
         {"planners": {"mine": section(tmp_path, text)}, **SHORT},
     )
@@ -231,7 +231,7 @@ def test_a_tracker_is_told_every_scan_with_its_time_and_pose(tmp_path: Path) -> 
 def test_a_tracker_need_not_know_turn_rates(tmp_path: Path) -> None:
     told = "[{'state': [1.0, 2.0, 3.0, 4.0], 'cov': [[float(i == j) for i in range(4)] for j in range(4)]}]"
     program = section(tmp_path, ANSWERS.replace("ANSWER", SAYS % told))
-    scenario = with_fields(load_scenario("polar-10"), {"fusion": {"kind": "central", "filter": program}})
+    scenario = replace_fields(load_scenario("polar-10"), {"fusion": {"kind": "central", "filter": program}})
     estimate = run_scenario(scenario, "still", seed=0).estimates[0]
     assert estimate.means.tolist() == [[1.0, 2.0, 3.0, 4.0, 0.0]]
     assert np.diagonal(estimate.covs[0]).tolist() == [1.0, 1.0, 1.0, 1.0, UNKNOWN_VARIANCE]
@@ -240,7 +240,7 @@ def test_a_tracker_need_not_know_turn_rates(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["polar-10", "three-positions"])
 def test_the_tracker_of_the_page_reports_what_the_first_sensor_says(name: str, tmp_path: Path) -> None:
     program = section(tmp_path, SHOWN["last.py"])
-    scenario = with_fields(load_scenario(name), {"fusion": {"kind": "central", "filter": program}})
+    scenario = replace_fields(load_scenario(name), {"fusion": {"kind": "central", "filter": program}})
     sensor = build_sensors(scenario)[0].filter.sensor
     record = run_scenario(scenario, "still", seed=0)
     scan = scans_of_record(record, scenario)[4][0]

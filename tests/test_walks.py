@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 import vedette
 from vedette.cli import app
 from vedette.kernels.base.compile import JIT_ENABLED
-from vedette.scenarios import load_scenario, with_fields
+from vedette.scenarios import load_scenario, replace_fields
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.simulation.loop import sensor_streams
 from vedette.simulation.scans import simulate_scans
@@ -51,7 +51,7 @@ def calls_of(work: Callable[[], Any]) -> Counter[str]:
 @pytest.fixture(scope="module")
 def walks() -> dict[str, Counter[str]]:
     """Of the fifth scan of `paper-a` and of a second decision by the expected loss after it, when all is warm."""
-    scenario = with_fields(load_scenario("paper-a"), {"control.reward": {"kind": "expected_loss", "cutoff": 100.0}})
+    scenario = replace_fields(load_scenario("paper-a"), {"control.reward": {"kind": "expected_loss", "cutoff": 100.0}})
     experiment, planner = build_experiment(scenario), build_planner(scenario, "jdm", num_threads=1)
     assert planner is not None
     tracker, poses, rng = experiment.tracker, experiment.poses, np.random.default_rng(0)

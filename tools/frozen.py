@@ -121,14 +121,14 @@ def computed(case: Case) -> Arrays:
 def _run(case: Case, folder: Path) -> Arrays:
     from vedette.evaluation.metrics import ospa_of_run
     from vedette.evaluation.runs import measure_run
-    from vedette.scenarios import load_scenario, with_fields
+    from vedette.scenarios import load_scenario, replace_fields
     from vedette.scenarios.build import build_experiment, build_planner
     from vedette.simulation import simulate
 
     if case.scenario == RANDOM:
         strategy, scenario = _random(case.run, folder), load_scenario(folder / "scenario.yaml")
     else:
-        strategy, scenario = case.strategy, with_fields(load_scenario(case.scenario), case.fields)
+        strategy, scenario = case.strategy, replace_fields(load_scenario(case.scenario), case.fields)
     ospa = scenario.model.ospa
     experiment, planner = build_experiment(scenario), build_planner(scenario, strategy, 1)
     watched = Watched(experiment.tracker)

@@ -20,8 +20,8 @@ from vedette.calibration import (
 )
 from vedette.calibration.bias_drift import WindowEstimate
 from vedette.errors import InputError
-from vedette.scenarios.calibrated import problem_of
-from vedette.scenarios.of_recording import scenario_of_recording, scenario_of_sensors
+from vedette.scenarios.calibration import build_problem
+from vedette.scenarios.from_recording import scenario_from_recording, scenario_from_sensors
 from vedette.tracking import SensorScan, load_snapshot, save_snapshot
 
 BIASES = {"boat": (300.0, 2.0, 0.0), "Calshot": (-150.0, -1.0, 0.0)}
@@ -34,7 +34,7 @@ def problem(tmp_path_factory: pytest.TempPathFactory) -> Problem:
     folder = tmp_path_factory.mktemp("drifting")
     write_recording(folder, seconds=240.0, biases=BIASES, drift=DRIFT)
     (folder / "radars.yaml").write_text(SENSORS + MOTION, "utf-8")
-    return problem_of(scenario_of_recording(folder / "radars.yaml", folder / "scans.csv").scenario)
+    return build_problem(scenario_from_recording(folder / "radars.yaml", folder / "scans.csv").scenario)
 
 
 def place(problem: Problem, sensor: int, name: str) -> int:
@@ -152,7 +152,7 @@ def test_a_bias_goes_on_as_far_as_its_change_stands_out(problem: Problem) -> Non
 def test_sensors_of_scans_that_are_to_come_can_be_followed(tmp_path: Path) -> None:
     region = "region: {x_min: -6000, x_max: 6000, y_min: -6000, y_max: 6000}\n"
     (tmp_path / "radars.yaml").write_text(SENSORS + MOTION + region, "utf-8")
-    problem = problem_of(scenario_of_sensors(tmp_path / "radars.yaml").scenario, bearings="north")
+    problem = build_problem(scenario_from_sensors(tmp_path / "radars.yaml").scenario, bearings="north")
     assert {each.sensor for each in problem.parameters} == {0, 1}
     assert problem.recording.scans == ()
     follower = OnlineBiasEstimator(problem)

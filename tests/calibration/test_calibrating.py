@@ -17,8 +17,8 @@ from vedette.calibration.maximum_likelihood import _scores, covariance, maximise
 from vedette.filters import Limits, SequentialLmbFilter, common_target_model
 from vedette.kernels.base.types import Floats
 from vedette.scenarios.build import build_sensors
-from vedette.scenarios.calibrated import calibrated_text, problem_of
-from vedette.scenarios.of_recording import OfRecording, scenario_of_recording
+from vedette.scenarios.calibration import build_problem, calibrated_text
+from vedette.scenarios.from_recording import RecordingScenario, scenario_from_recording
 from vedette.tracking import Central
 
 BIASES = {"boat": (300.0, 2.0, 0.0), "Calshot": (-150.0, -1.0, 0.0)}
@@ -32,10 +32,10 @@ TRUTH = {
 MOTION = "motion: {kind: constant_velocity, sigma_v: 0.05}\n"
 
 
-def recorded(folder: Path, seconds: float = 150.0, text: str = SENSORS + MOTION) -> OfRecording:
+def recorded(folder: Path, seconds: float = 150.0, text: str = SENSORS + MOTION) -> RecordingScenario:
     write_recording(folder, seconds=seconds, biases=BIASES)
     (folder / "radars.yaml").write_text(text, "utf-8")
-    return scenario_of_recording(folder / "radars.yaml", folder / "scans.csv")
+    return scenario_from_recording(folder / "radars.yaml", folder / "scans.csv")
 
 
 def at_start(problem: Problem) -> Floats:
@@ -59,7 +59,7 @@ def test_the_likelihood_is_the_sum_of_what_the_filter_reports(tmp_path: Path) ->
         state, info = tracker.step(state, list(measured), poses, time, rngs=rngs)
         total.append(info.filters[0].log_likelihood)
         state, _ = tracker.step(state, [None, None], poses, time + 1e-9, rngs=rngs)  # who is born is there at once
-    problem = problem_of(scenario)
+    problem = build_problem(scenario)
     found = problem.log_likelihoods(at_start(problem))
     assert found.sum() == pytest.approx(sum(total), rel=1e-9)
     assert sorted(found[found != 0.0].tolist()) == pytest.approx(sorted(total), rel=1e-6)
@@ -75,7 +75,7 @@ def test_clutter_of_the_region_weighs_as_much_wherever_a_bias_takes_it(tmp_path:
     lines = (tmp_path / "scans.csv").read_text("utf-8").splitlines()
     (tmp_path / "scans.csv").write_text("\n".join(line for line in lines if "boat" not in line), "utf-8")
     (tmp_path / "radars.yaml").write_text(text, "utf-8")
-    problem = problem_of(scenario_of_recording(tmp_path / "radars.yaml", tmp_path / "scans.csv").scenario)
+    problem = build_problem(scenario_from_recording(tmp_path / "radars.yaml", tmp_path / "scans.csv").scenario)
     before, turned = at_start(problem), at_start(problem)
     turned[[each.component for each in problem.parameters].index("bearing")] = 20.0
     total = problem.log_likelihoods(before).sum()
@@ -91,7 +91,7 @@ def test_clutter_of_the_region_weighs_as_much_wherever_a_bias_takes_it(tmp_path:
 
 
 def test_scores_are_those_of_finer_differences(tmp_path: Path) -> None:
-    problem = problem_of(recorded(tmp_path).scenario)
+    problem = build_problem(recorded(tmp_path).scenario)
     at = at_truth(problem)
     steps = np.array([0.01 if each.scale == "plain" else 0.001 for each in problem.parameters])
     coarse = _scores(problem.log_likelihoods, at, 8.0 * steps).sum(axis=0)
@@ -101,7 +101,7 @@ def test_scores_are_those_of_finer_differences(tmp_path: Path) -> None:
 
 def test_the_search_finds_the_top_of_a_grid(tmp_path: Path) -> None:
     """Over the bias and the noise of a radar's range; the others are as they are in truth."""
-    problem = problem_of(recorded(tmp_path).scenario)
+    problem = build_problem(recorded(tmp_path).scenario)
     names = [(each.sensor, each.name) for each in problem.parameters]
     own = [names.index((1, "range")), names.index((1, "noise.sigma_range"))]
     whole = at_truth(problem)
@@ -123,13 +123,13 @@ def test_the_search_finds_the_top_of_a_grid(tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def calibrated(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, OfRecording, Calibration]:
+def calibrated(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, RecordingScenario, Calibration]:
     folder = tmp_path_factory.mktemp("calibrated")
     found = recorded(folder, 240.0)
-    return folder, found, calibrate(problem_of(found.scenario))
+    return folder, found, calibrate(build_problem(found.scenario))
 
 
-def test_biases_of_two_radars_are_found(calibrated: tuple[Path, OfRecording, Calibration]) -> None:
+def test_biases_of_two_radars_are_found(calibrated: tuple[Path, RecordingScenario, Calibration]) -> None:
     _, _, calibration = calibrated
     assert calibration.log_likelihood > calibration.initial_log_likelihood + 300.0
     assert calibration.converged
@@ -145,12 +145,12 @@ def test_biases_of_two_radars_are_found(calibrated: tuple[Path, OfRecording, Cal
 
 
 def test_the_file_that_comes_out_reads_back_with_all_that_was_in_it(
-    calibrated: tuple[Path, OfRecording, Calibration],
+    calibrated: tuple[Path, RecordingScenario, Calibration],
 ) -> None:
     folder, (scenario, _, _), calibration = calibrated
     text = calibrated_text(scenario, folder / "radars.yaml", calibration, folder)
     (folder / "found.yaml").write_text(text, "utf-8")
-    again = scenario_of_recording(folder / "found.yaml", folder / "scans.csv").scenario.model
+    again = scenario_from_recording(folder / "found.yaml", folder / "scans.csv").scenario.model
     assert again.motion == scenario.model.motion
     assert again.origin == scenario.model.origin
     assert again.recording is not None
@@ -160,14 +160,14 @@ def test_the_file_that_comes_out_reads_back_with_all_that_was_in_it(
         holder = getattr(sensor, kind if rest else "bias")
         assert getattr(holder, rest[0] if rest else kind) == pytest.approx(each.value, rel=1e-6)
     # What was found is where it begins: it is said already.
-    problem = problem_of(scenario_of_recording(folder / "found.yaml", folder / "scans.csv").scenario)
+    problem = build_problem(scenario_from_recording(folder / "found.yaml", folder / "scans.csv").scenario)
     assert [each.start for each in problem.parameters] == pytest.approx(
         [each.value for each in calibration.estimates], 1e-6
     )
 
 
 def test_files_that_are_named_are_found_from_another_folder(
-    calibrated: tuple[Path, OfRecording, Calibration], tmp_path: Path
+    calibrated: tuple[Path, RecordingScenario, Calibration], tmp_path: Path
 ) -> None:
     folder, (scenario, _, _), calibration = calibrated
     (folder / "with.yaml").write_text(SENSORS + MOTION + "targets: {kind: recorded, path: truth.csv}\n", "utf-8")
@@ -196,7 +196,7 @@ def test_radars_without_common_targets_are_named(tmp_path: Path) -> None:
         "sensors:\n  - {name: a, position: [0, 0]}\n  - {name: b, position: [30000, 0]}\n" + MOTION,
         "utf-8",
     )
-    problem = problem_of(scenario_of_recording(tmp_path / "radars.yaml", tmp_path / "scans.csv").scenario)
+    problem = build_problem(scenario_from_recording(tmp_path / "radars.yaml", tmp_path / "scans.csv").scenario)
     why = {(each.parameter.sensor, each.parameter.name): each.reason for each in calibrate(problem).estimates}
     for one in ((0, "bearing_deg"), (1, "bearing_deg"), (1, "clock")):
         assert "no other sensor observes enough of the same targets" in why[one]
@@ -221,7 +221,7 @@ def test_positions_are_compared_with_those_of_the_first_sensor(tmp_path: Path) -
         "sensors:\n  - {name: a, position: [0, 0]}\n  - {name: b, position: [3000, 0]}\n" + MOTION,
         "utf-8",
     )
-    problem = problem_of(scenario_of_recording(tmp_path / "sensors.yaml", tmp_path / "scans.csv").scenario)
+    problem = build_problem(scenario_from_recording(tmp_path / "sensors.yaml", tmp_path / "scans.csv").scenario)
     found = {(each.parameter.sensor, each.parameter.name): each for each in calibrate(problem).estimates}
     assert (0, "x") not in found
     for name, truth in (("x", 200.0), ("y", -100.0)):
@@ -233,7 +233,11 @@ def test_positions_are_compared_with_those_of_the_first_sensor(tmp_path: Path) -
 def test_places_are_asked_of_the_others_alone(tmp_path: Path) -> None:
     scenario = recorded(tmp_path, 30.0).scenario
     plain, asked = (
-        [(each.sensor, each.name) for each in problem_of(scenario, position=position).parameters if each.kind == "bias"]
+        [
+            (each.sensor, each.name)
+            for each in build_problem(scenario, position=position).parameters
+            if each.kind == "bias"
+        ]
         for position in (False, True)
     )
     assert plain == [(0, "bearing_deg"), (0, "range"), (1, "bearing_deg"), (1, "range"), (1, "clock")]
@@ -261,8 +265,8 @@ def two_radars(folder: Path, targets: Sequence[tuple[float, ...]], names: str = 
         f"sensors:\n{''.join(sensors)}" + MOTION,
         "utf-8",
     )
-    scenario = scenario_of_recording(folder / "radars.yaml", folder / "scans.csv").scenario
-    return problem_of(scenario, position=True)
+    scenario = scenario_from_recording(folder / "radars.yaml", folder / "scans.csv").scenario
+    return build_problem(scenario, position=True)
 
 
 def biases_of(problem: Problem) -> Calibration:
@@ -303,7 +307,7 @@ def test_of_a_radar_alone_no_place_is_found(tmp_path: Path) -> None:
 
 
 def test_values_and_scales_are_each_others_inverse(tmp_path: Path) -> None:
-    problem = problem_of(recorded(tmp_path, 30.0).scenario)
+    problem = build_problem(recorded(tmp_path, 30.0).scenario)
     values = np.array([each.start + 0.01 for each in problem.parameters])
     np.testing.assert_allclose(problem.values(problem.free(values.tolist())), values, rtol=1e-12)
     bearing = next(each for each in problem.parameters if each.component == "bearing")

@@ -12,8 +12,8 @@ import pytest
 from recordings import SENSORS, write_recording
 from vedette.calibration import Problem
 from vedette.scenarios.build import build_sensors
-from vedette.scenarios.calibrated import problem_of
-from vedette.scenarios.of_recording import scenario_of_recording
+from vedette.scenarios.calibration import build_problem
+from vedette.scenarios.from_recording import scenario_from_recording
 from vedette.tracking import Central
 
 POSE = [0.0, 0.0, 0.5]
@@ -24,8 +24,8 @@ def problem(folder: Path, clutter: str, more: str = "") -> tuple[Problem, Any, A
     write_recording(folder, seconds=120.0)
     text = SENSORS.replace("sensors:\n", f"  clutter: {clutter}\nsensors:\n", 1) + more
     (folder / "radars.yaml").write_text(text, "utf-8")
-    scenario = scenario_of_recording(folder / "radars.yaml", folder / "scans.csv").scenario
-    found = problem_of(scenario)
+    scenario = scenario_from_recording(folder / "radars.yaml", folder / "scans.csv").scenario
+    found = build_problem(scenario)
     tracker, rates = found.tracker(found.values(found.free([each.start for each in found.parameters])))
     assert isinstance(tracker, Central)
     return found, (tracker, rates), build_sensors(scenario)

@@ -15,7 +15,7 @@ from vedette.cli import app
 from vedette.cli.output import wrap_line
 from vedette.scenarios import Scenario, load_scenario
 from vedette.scenarios.dumping import dump_scenario
-from vedette.scenarios.overrides import with_fields
+from vedette.scenarios.overrides import replace_fields
 
 PROGRAM = [sys.executable, "-c", "from vedette.cli import app; app()"]
 ODD = r"[/bold]x [red] :cat: é 猫 $x \frac"
@@ -30,7 +30,7 @@ def odd(tmp_path: Path) -> Path:
     fields = {"name": ODD, "sensors.0.name": ODD, "time.num_steps": 3, "ospa.from_step": None, "ospa.to_step": None}
     fields |= {"birth.steps": [1], "targets.tracks": [{"state": [x, 0.0, 1.0, 1.0]} for x in (0.0, 300.0)]}
     path = tmp_path / "odd.yaml"
-    path.write_text(dump_scenario(with_fields(load_scenario("linear-10"), fields).model), encoding="utf-8")
+    path.write_text(dump_scenario(replace_fields(load_scenario("linear-10"), fields).model), encoding="utf-8")
     assert Scenario(load_scenario(path).model).name == ODD
     return path
 

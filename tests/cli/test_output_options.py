@@ -18,7 +18,7 @@ from vedette.campaigns.published import published_comparisons
 from vedette.cli import app, completing
 from vedette.scenarios import list_builtin, load_scenario
 from vedette.scenarios.dumping import dump_scenario
-from vedette.scenarios.overrides import with_fields
+from vedette.scenarios.overrides import replace_fields
 
 COMMANDS: dict[str, Any] = typer.main.get_command(app).commands  # type: ignore[attr-defined]
 SPEC = 'name = "trial"\nscenarios = ["short.yaml"]\nplanners = ["still", "own"]\nruns = 2\n'
@@ -31,7 +31,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     fields: dict[str, Any] = {"time.num_steps": 3, "ospa.from_step": None, "ospa.to_step": None}
     fields |= {"birth.steps": [1], "targets.tracks": [{"state": [x, 0.0, 1.0, 1.0]} for x in (0.0, 40.0)]}
     fields |= {"planners": {"own": {"kind": "independent"}}}
-    text = dump_scenario(with_fields(load_scenario("linear-10"), fields).model)
+    text = dump_scenario(replace_fields(load_scenario("linear-10"), fields).model)
     (tmp_path / "short.yaml").write_text(text, "utf-8")
     (tmp_path / "faulty.yaml").write_text(text.replace("num_steps: 3", "num_steps: few"), "utf-8")
     (tmp_path / "spec.toml").write_text(SPEC, "utf-8")

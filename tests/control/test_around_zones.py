@@ -32,7 +32,7 @@ from vedette.fusion import ParallelUpdate
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models import Region
 from vedette.platforms import GridPlatform, HeadingPlatform, Stationary
-from vedette.scenarios import load_scenario, with_fields
+from vedette.scenarios import load_scenario, replace_fields
 from vedette.scenarios.build import build_planner
 from vedette.tracking import State
 
@@ -220,7 +220,7 @@ def test_land_in_degrees_is_gone_around_in_metres() -> None:
     """A degree of latitude is 111.2 km, one of longitude at 50.78 degrees 70.5 km."""
     ring = [{"lon": lon, "lat": lat} for lon, lat in ((-1.1, 50.77), (-1.08, 50.77), (-1.08, 50.80), (-1.1, 50.80))]
     changes = {"origin": {"lon": -1.1, "lat": 50.78}, "control.constraints": [{"kind": "keep_out", "polygon": ring}]}
-    planner: Any = build_planner(with_fields(load_scenario("beyond-the-gap"), changes), "jdm", 1)
+    planner: Any = build_planner(replace_fields(load_scenario("beyond-the-gap"), changes), "jdm", 1)
     graph = visibility_graph(planner.constraints)
     assert graph is not None
     east, south, north = 0.02 * 70_500.0, -0.01 * 111_200.0, 0.02 * 111_200.0

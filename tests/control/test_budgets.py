@@ -19,7 +19,7 @@ from vedette.evaluation.runs import run_scenario
 from vedette.platforms import HeadingPlatform, Operated, Sequences, Stationary
 from vedette.platforms.base import options_at
 from vedette.platforms.operated import LEFT
-from vedette.scenarios import load_scenario, with_fields
+from vedette.scenarios import load_scenario, replace_fields
 
 TIMES = np.arange(1.0, 7.0)
 
@@ -97,7 +97,7 @@ def test_no_strategy_scans_longer_than_the_budget(planner: str) -> None:
             scenario.model.model_dump(mode="json", exclude_unset=True)["sensors"], (6.0, 4.0), (0.0, 0.25), strict=True
         )
     ]
-    model = with_fields(scenario, {"sensors": sensors, "fusion": {"kind": "sequential"}, "filter": {"kind": "lmb"}})
+    model = replace_fields(scenario, {"sensors": sensors, "fusion": {"kind": "sequential"}, "filter": {"kind": "lmb"}})
     record = run_scenario(model, planner, seed=0)
     first = model.model.decision_steps[0]
     num_scans = (~record.off[first:]).sum(axis=0)
@@ -117,4 +117,4 @@ def test_mistakes_are_named() -> None:
     with pytest.raises(InputError, match="expected 6 components, the last of them the seconds left to scan; got 3"):
         options_at("platform", Operated(Stationary(), budget=3.0), np.zeros(3), TIMES)
     with pytest.raises(ScenarioError, match=r"sensors\[0\].budget.seconds"):
-        with_fields(load_scenario("paper-a"), {"sensors": [{"position": [0.0, 0.0], "budget": {"seconds": 0.0}}]})
+        replace_fields(load_scenario("paper-a"), {"sensors": [{"position": [0.0, 0.0], "budget": {"seconds": 0.0}}]})

@@ -28,7 +28,7 @@ from vedette.errors import InputError
 from vedette.evaluation import ospa_of_run
 from vedette.fusion import Clmb
 from vedette.platforms import GridPlatform, HeadingPlatform, Sequences
-from vedette.scenarios import load_scenario, with_fields
+from vedette.scenarios import load_scenario, replace_fields
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.simulation import simulate
 
@@ -268,7 +268,7 @@ def test_decisions_after_the_end_are_not_planned_for() -> None:
 def test_depth_does_not_harm_where_a_single_decision_is_best() -> None:
     """On paper-a, whose sensors see all, whatever is decided now can be mended later."""
     fields = {"filter": {"kind": "lmb"}, "fusion": {"kind": "clmb"}, "control.reward": {"kind": "expected_loss"}}
-    scenario = with_fields(load_scenario("paper-a"), fields)
+    scenario = replace_fields(load_scenario("paper-a"), fields)
     experiment, score = build_experiment(scenario), partial(ospa_of_run, cutoff=100.0, order=1.0)
     ahead, single = (build_planner(scenario, name, 1) for name in ("lookahead", "jdm"))
     assert isinstance(ahead, HorizonPlanner)

@@ -13,7 +13,7 @@ from vedette.evaluation.runs import run_scenario
 from vedette.platforms import HeadingPlatform, Patrolling, Stationary
 from vedette.platforms.base import options_at
 from vedette.platforms.patrolling import CLOCKS
-from vedette.scenarios import Scenario, load_scenario, with_fields
+from vedette.scenarios import Scenario, load_scenario, replace_fields
 
 PLACES, RADIUS, EVERY = ((0.0, 250.0), (-250.0, -100.0)), 80.0, 45.0
 TIMES = np.arange(1.0, 13.0)
@@ -73,7 +73,7 @@ def visited(fields: dict[str, Any] | None = None) -> Scenario:
     lmb = {"filter": {"kind": "lmb"}, "fusion": {"kind": "sequential"}, "time.num_steps": 110}
     decisions = {"control.decision_steps": list(range(5, 110, 5)), "control.constraints": [constraint]}
     assert steps < 110
-    return with_fields(scene, {**lmb, **decisions, **(fields or {})})
+    return replace_fields(scene, {**lmb, **decisions, **(fields or {})})
 
 
 @pytest.mark.parametrize("planner", ["jdm", "idm", "lookahead", "nearest", "random"])

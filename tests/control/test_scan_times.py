@@ -36,7 +36,7 @@ from vedette.densities import UndetectedIntensity
 from vedette.errors import InputError
 from vedette.fusion import ParallelUpdate
 from vedette.models import CellGrid, Region
-from vedette.scenarios import load_scenario, with_fields
+from vedette.scenarios import load_scenario, replace_fields
 from vedette.scenarios.build import build_sensors
 
 
@@ -130,7 +130,7 @@ def test_who_does_not_scan_finds_nobody() -> None:
 
 
 def test_scenarios_tell_planners_when_their_sensors_scan() -> None:
-    scenario = with_fields(load_scenario("paper-a"), {"sensors.1.scans": {"every": 4, "first": 2}})
+    scenario = replace_fields(load_scenario("paper-a"), {"sensors.1.scans": {"every": 4, "first": 2}})
     first, second = build_sensors(scenario)
     assert first.scan_times is None
     assert second.scan_times is not None

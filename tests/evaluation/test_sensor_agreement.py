@@ -14,12 +14,12 @@ from recordings import write_recording
 from vedette.evaluation.runs import run_scenario
 from vedette.evaluation.sensor_agreement import disagreement_warnings
 from vedette.scenarios import load_scenario
-from vedette.scenarios.cautions import cautions
-from vedette.scenarios.of_recording import scenario_of_recording
+from vedette.scenarios.from_recording import scenario_from_recording
+from vedette.scenarios.warnings import scenario_warnings
 
 
 def told(folder: Path) -> tuple[str, ...]:
-    made = scenario_of_recording(folder / "radars.yaml", folder / "scans.csv")
+    made = scenario_from_recording(folder / "radars.yaml", folder / "scans.csv")
     return disagreement_warnings(run_scenario(made.scenario, "still", seed=0), made.scenario)
 
 
@@ -89,7 +89,7 @@ def test_coverage_without_overlap_gives_a_warning_before_the_run(tmp_path: Path)
     apart = math.hypot(3002.0, 3002.0)
     for reach, warned in ((0.55 * apart, False), (0.45 * apart, True)):
         (tmp_path / "radars.yaml").write_text(near.replace("REACH", f"{reach:.1f}"), "utf-8")
-        made = scenario_of_recording(tmp_path / "radars.yaml", tmp_path / "scans.csv")
-        found = [line for line in cautions(made.scenario) if "no place in common" in line]
+        made = scenario_from_recording(tmp_path / "radars.yaml", tmp_path / "scans.csv")
+        found = [line for line in scenario_warnings(made.scenario) if "no place in common" in line]
         assert bool(found) == warned
     assert "Calshot and boat see no place in common" in found[0]

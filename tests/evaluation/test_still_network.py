@@ -34,8 +34,8 @@ from vedette.evaluation.runs import run_scenario
 from vedette.platforms import Actions
 from vedette.recorded import Origin
 from vedette.scenarios import Scenario, load_scenario
-from vedette.scenarios.overrides import with_fields
-from vedette.scenarios.views import HOLE, NO_GO, Zone
+from vedette.scenarios.overrides import replace_fields
+from vedette.scenarios.zones import HOLE, NO_GO, Zone
 from vedette.simulation.records import RunRecord
 
 SECTOR = {"kind": "limited_sector", "probability": 0.9, "max_range": 700.0, "half_width_deg": 60.0}
@@ -44,7 +44,7 @@ STILL = Actions((), np.empty((1, 0)))
 
 @pytest.fixture(scope="module")
 def scenario() -> Scenario:
-    return with_fields(load_scenario("paper-a"), STILL_NETWORK)
+    return replace_fields(load_scenario("paper-a"), STILL_NETWORK)
 
 
 @pytest.fixture(scope="module")
@@ -91,7 +91,7 @@ def test_a_strategy_with_a_custom_reward_shows_its_name(scenario: Scenario) -> N
     named = {
         "planners": {"by-gospa": {"kind": "joint", "reward": {"kind": "expected_gospa"}}, "as-is": {"kind": "joint"}}
     }
-    own = with_fields(scenario, named)
+    own = replace_fields(scenario, named)
     rewards = {name: build_scene(own, name).reward for name in ("by-gospa", "as-is", "jdm")}
     assert rewards == {
         "by-gospa": "minus squared GOSPA, m²",
@@ -159,7 +159,7 @@ def test_a_hole_is_cut_out_whichever_way_round_it_is_given() -> None:
 
 def test_fields_and_degrees_are_drawn() -> None:
     changes = {"origin": {"lon": -1.2, "lat": 50.7}, "sensors.*.detection": SECTOR}
-    scene = with_fields(load_scenario("paper-a"), changes)
+    scene = replace_fields(load_scenario("paper-a"), changes)
     record = run_scenario(scene, "still", seed=0)
     figure = tracks_figure(record, scene=build_scene(scene, "still"))
     (axes,) = figure.axes

@@ -26,7 +26,7 @@ from vedette.densities import (
 )
 from vedette.filters import Limits
 from vedette.models import BirthModel, CellGrid, Region, TargetModel, constant_survival, constant_velocity
-from vedette.scenarios import with_fields
+from vedette.scenarios import replace_fields
 from vedette.scenarios.build import build_experiment
 from vedette.simulation import CLUTTER, Scan, SimulationRun
 
@@ -215,7 +215,7 @@ def test_one_site_and_one_scan_have_the_posterior_in_closed_form() -> None:
     fields = {"time.num_steps": 1, "birth.sites": [site((20.0, 30.0), std, r)]}
     fields |= {"sensors.*.detection.probability": detection, "sensors.*.clutter.rate": clutter}
     scene = own("one site", fields)
-    experiment = build_experiment(with_fields(scene.scenario(0), EXACT.fields))
+    experiment = build_experiment(replace_fields(scene.scenario(0), EXACT.fields))
     experiment = replace(experiment, targets=PriorTargets(experiment.tracker.targets))
     predicted = multivariate_normal([20.0, 30.0], (std**2 + 10.0**2) * np.eye(2))
     for run in range(20):

@@ -17,7 +17,7 @@ from vedette.evaluation.runs import run_scenario
 from vedette.filters import DeltaGlmbFilter, FactoredGlmbFilter, Gibbs, Limits, RankedAssignment
 from vedette.scenarios import load_scenario
 from vedette.scenarios.build import build_experiment, build_sensors
-from vedette.scenarios.overrides import with_fields
+from vedette.scenarios.overrides import replace_fields
 from vedette.simulation.replay import scans_of
 
 pytestmark = pytest.mark.lanes
@@ -182,7 +182,7 @@ def test_gibbs_converges_to_ranked():
 def test_in_the_paper_scenario_the_bound_is_what_was_cut_off():
     """Much of a scan's weight lies in variations beyond the cap, however little they matter."""
     fewer = {"time.num_steps": 14, "ospa.from_step": 1, "ospa.to_step": 14, "control.decision_steps": None}
-    scenario = with_fields(load_scenario("paper-a"), {**fewer, "filter.limits.max_hypotheses": 100})
+    scenario = replace_fields(load_scenario("paper-a"), {**fewer, "filter.limits.max_hypotheses": 100})
     record = run_scenario(scenario, "still", seed=0, run=1, num_threads=1)
     tracker: Any = build_sensors(scenario)[0].filter
     scans: Any = scans_of(record, build_experiment(scenario))

@@ -9,7 +9,7 @@ import pytest
 
 from vedette.densities import LMB, FactoredGLMB
 from vedette.evaluation import run_scenario
-from vedette.scenarios import Scenario, load_scenario, parse_scenario, with_fields
+from vedette.scenarios import Scenario, load_scenario, parse_scenario, replace_fields
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.scenarios.sections import ScenarioModel
 from vedette.simulation import simulate
@@ -103,7 +103,7 @@ def sixteen(fusion: dict[str, Any], outside: float = 0.0) -> Scenario:
     fields = {"time.num_steps": 25, "targets": {"kind": "scripted", "tracks": tracks}, "fusion": fusion}
     default: Any = ScenarioModel.model_fields["filter"].default
     chosen = {"filter": default.model_dump(mode="json"), "sensors.*.detection.outside": outside}
-    return with_fields(whole, {**fields, **chosen})
+    return replace_fields(whole, {**fields, **chosen})
 
 
 def mean_ospa(scenario: Scenario) -> float:
@@ -164,7 +164,7 @@ def test_a_decision_of_matched_beliefs_goes_by_common_labels() -> None:
     ],
 )
 def test_a_joint_decision_says_where_it_goes_by_another_rule_than_the_tracks(fusion: str, said: str | None) -> None:
-    loaded = with_fields(scene(fusion), {"control.reward": {"kind": "cauchy_schwarz"}})
+    loaded = replace_fields(scene(fusion), {"control.reward": {"kind": "cauchy_schwarz"}})
     experiment, planner = build_experiment(loaded), build_planner(loaded, "jdm", 1)
     assert planner is not None
     plan = planner.plan(experiment.tracker.initial(), experiment.poses, rng=np.random.default_rng(0))

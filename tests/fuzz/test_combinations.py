@@ -19,7 +19,7 @@ from vedette.evaluation.runs import custom_metrics, measure_run, run_scenario
 from vedette.scenarios import Scenario, load_scenario
 from vedette.scenarios.build import build_planner
 from vedette.scenarios.dumping import dump_scenario
-from vedette.scenarios.strategy_cautions import strategy_cautions
+from vedette.scenarios.strategy_warnings import strategy_warnings
 from vedette.simulation import RunRecord
 
 Check = Callable[[np.random.Generator], object]
@@ -48,7 +48,7 @@ def accepted(path: Path) -> bool:
 
 def strategies(scenario: Scenario) -> list[str]:
     """Every strategy but those of which the check warns that a run refuses them; the scenario's own must go."""
-    found, warned = [], "".join(text.partition(" is refused")[0] for _, text in strategy_cautions(scenario))
+    found, warned = [], "".join(text.partition(" is refused")[0] for _, text in strategy_warnings(scenario))
     for name in (*STRATEGIES, *scenario.model.planners):
         try:
             build_planner(scenario, name)

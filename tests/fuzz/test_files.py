@@ -29,9 +29,9 @@ from vedette.recorded.cleaning import Cleaning
 from vedette.recorded.targets import RecordedTargets
 from vedette.scenarios import Scenario, list_builtin, load_scenario, parse_scenario
 from vedette.scenarios.build import build_experiment, build_planner
-from vedette.scenarios.dumping import dump_scenario, files_of
-from vedette.scenarios.overrides import with_fields
-from vedette.scenarios.summary import facts, one_line
+from vedette.scenarios.dumping import dump_scenario, scenario_files
+from vedette.scenarios.overrides import replace_fields
+from vedette.scenarios.summary import summary_line, summary_rows
 from vedette.scenarios.yaml_reader import read_yaml
 from vedette.simulation.journal import RunStopped
 
@@ -94,12 +94,12 @@ def scenario_bytes(rng: np.random.Generator) -> bytes:
 
 def check_accepted(scenario: Scenario) -> None:
     """What checking accepts can be told, written, read back and built."""
-    one_line(scenario).encode()
-    for _, text in facts(scenario.model):
+    summary_line(scenario).encode()
+    for _, text in summary_rows(scenario.model):
         text.encode()
     text = dump_scenario(scenario.model)
     assert parse_scenario(text, folder=scenario.folder) == scenario.model
-    files_of(scenario.model, scenario.folder)
+    scenario_files(scenario.model, scenario.folder)
     if has_custom(scenario.model.model_dump()):
         return
     build_experiment(scenario)
@@ -231,7 +231,7 @@ def test_fields_set_by_path(try_cases: TryCases, folder: Path) -> None:
     def check(rng: np.random.Generator) -> None:
         fields = {pick(rng, PATHS): value(rng) for _ in range(int(rng.integers(1, 3)))}
         with bounded(fields):
-            changed = outcome(lambda: with_fields(pick(rng, loaded), fields))
+            changed = outcome(lambda: replace_fields(pick(rng, loaded), fields))
             if changed is not None:
                 check_accepted(changed)
 

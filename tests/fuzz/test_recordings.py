@@ -27,7 +27,7 @@ from vedette.cli import app
 from vedette.errors import VedetteError
 from vedette.recorded import Cleaning, RecordedTargets
 from vedette.recorded.tables import is_empty, read_table
-from vedette.scenarios.of_recording import scenario_of_recording
+from vedette.scenarios.from_recording import scenario_from_recording
 
 TryCases = Callable[[Callable[[np.random.Generator], object], int], None]
 RADAR = """origin: {lon: -1.1171, lat: 50.7865}
@@ -99,7 +99,7 @@ def tracked(words: list[str], counts: Counter[str], command: str = "track") -> d
 
 def check_accounted(scans: Path, sensors: Path, bad_rows: str) -> None:
     """Each row is a measurement, empty, or named as skipped."""
-    recording = scenario_of_recording(sensors, scans, bad_rows=bad_rows).recording
+    recording = scenario_from_recording(sensors, scans, bad_rows=bad_rows).recording
     table = read_table(scans)
     measured = [name for name in table.columns if re.fullmatch(r"range.*|brg.*|bearing.*", name)]
     empty = sum(all(is_empty(cells[i]) for cells in map(table.columns.get, measured)) for i in range(len(table.rows)))  # type: ignore[index]
@@ -135,7 +135,7 @@ def test_damaged_tables_are_calibrated_or_refused(try_cases: TryCases, folder: P
         found = tracked(words, counts, "calibrate")
         if found is not None:
             assert np.isfinite([value for value in numbers_of(found) if value is not None]).all()
-            scenario_of_recording(folder / "found.yaml", folder / "s.csv", bad_rows=bad_rows)
+            scenario_from_recording(folder / "found.yaml", folder / "s.csv", bad_rows=bad_rows)
 
     try_cases(check, 2)
     print(dict(counts))

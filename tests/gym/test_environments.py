@@ -19,7 +19,7 @@ from vedette.errors import InputError
 from vedette.evaluation import ospa, run_scenario
 from vedette.gym import Observation, ScenarioEnv, ScenarioParallelEnv, expected_loss, policy_planner
 from vedette.gym.observing import belief_arrays
-from vedette.scenarios import Scenario, load_scenario, with_fields
+from vedette.scenarios import Scenario, load_scenario, replace_fields
 from vedette.simulation import RunRecord, ScanOutcome, Truth
 from vedette.simulation.loop import SCENES, run_stream
 
@@ -35,13 +35,13 @@ def scene(name: str) -> Scenario:
     paper = load_scenario("paper-a")
     if name == "alone":
         first = paper.model.model_dump(mode="json")["sensors"][:1]
-        return with_fields(paper, {**ALONE, "sensors": first})
+        return replace_fields(paper, {**ALONE, "sensors": first})
     fields: dict[str, dict[str, Any]] = {
         "lmb": LMBS,
         "one moves": {**LMBS, "sensors.1.platform": {"kind": "still"}},
         "fenced": {**LMBS, **FENCED},
     }
-    return with_fields(paper, fields[name]) if name in fields else load_scenario(name)
+    return replace_fields(paper, fields[name]) if name in fields else load_scenario(name)
 
 
 def go_on(observation: Observation) -> np.ndarray:
@@ -90,7 +90,7 @@ def test_both_checkers_pass(name: str) -> None:
 @pytest.mark.parametrize("name", ["lmb", "six-cameras", "fenced"])
 def test_a_policy_has_the_same_run_as_a_planner_and_in_an_environment(name: str) -> None:
     planners = {"mine": {"kind": "custom", "function": f"{__file__}:steer"}}
-    scenario = with_fields(scene(name), {"planners": planners})
+    scenario = replace_fields(scene(name), {"planners": planners})
     env = ScenarioEnv(scenario)
     for run in (0, 3):
         episode(env, seed=5, options={"run": run})
@@ -233,11 +233,11 @@ def test_agents_are_the_sensors_with_their_own_first() -> None:
 
 def test_scenarios_are_drawn_anew_for_every_run() -> None:
     several = [
-        with_fields(scene("lmb"), {"name": f"clutter {rate}", "sensors.*.clutter.rate": rate}) for rate in (1, 9)
+        replace_fields(scene("lmb"), {"name": f"clutter {rate}", "sensors.*.clutter.rate": rate}) for rate in (1, 9)
     ]
 
     def made(rng: np.random.Generator) -> Scenario:
-        return with_fields(several[0], {"sensors.0.position": rng.uniform(-500.0, 500.0, 2).tolist()})
+        return replace_fields(several[0], {"sensors.0.position": rng.uniform(-500.0, 500.0, 2).tolist()})
 
     env, places = ScenarioEnv(several), ScenarioEnv(made)
     names, starts = set(), set()
@@ -323,7 +323,7 @@ def test_wrong_actions_and_steps_are_told() -> None:
     episode(env)
     with pytest.raises(InputError, match="step: expected a reset first, as the run is over"):
         env.step([0, 0])
-    still = with_fields(scene("lmb"), {"sensors.*.platform": {"kind": "still"}})
+    still = replace_fields(scene("lmb"), {"sensors.*.platform": {"kind": "still"}})
     with pytest.raises(InputError, match="sensors: expected one with a choice of actions at least; got none"):
         ScenarioEnv(still)
     alone = ScenarioEnv(scene("alone"), reward="expected_loss")

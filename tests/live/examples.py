@@ -11,7 +11,7 @@ import numpy as np
 
 from recordings import write_recording
 from vedette.live import LiveLoop, build_live_loop, encode_line
-from vedette.scenarios.of_recording import scenario_of_sensors
+from vedette.scenarios.from_recording import scenario_from_sensors
 
 REGION = "region: {x_min: -6000.0, x_max: 6000.0, y_min: -6000.0, y_max: 6000.0}\n"
 SYNCHRONOUS = """
@@ -49,7 +49,7 @@ def write_live(folder: Path, **options: Any) -> list[bytes]:
 def small(folder: Path, text: str = SYNCHRONOUS, **options: Any) -> LiveLoop:
     """A loop of two sensors that measure positions."""
     (folder / "small.yaml").write_text(text, "utf-8")
-    known = scenario_of_sensors(folder / "small.yaml", decide_every=options.get("decide_every"))
+    known = scenario_from_sensors(folder / "small.yaml", decide_every=options.get("decide_every"))
     return build_live_loop(known, num_threads=1, **options)
 
 

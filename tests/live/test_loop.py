@@ -17,13 +17,13 @@ from vedette.live import MAX_LINE_BYTES, LiveLoop, build_live_loop
 from vedette.recorded import Conventions, Origin, Site, parse_scans
 from vedette.recorded.tables import read_table
 from vedette.scenarios.build import build_experiment
-from vedette.scenarios.of_recording import scenario_of_sensors
+from vedette.scenarios.from_recording import scenario_from_sensors
 from vedette.tracking import OutOfSequenceTracker, SensorScan
 
 
 def test_the_estimates_are_those_of_the_same_scans_read_from_a_file(tmp_path: Path) -> None:
     lines = write_live(tmp_path, seconds=60.0)
-    known = scenario_of_sensors(tmp_path / "radars.yaml")
+    known = scenario_from_sensors(tmp_path / "radars.yaml")
     model = known.scenario.model
     experiment, origin = build_experiment(known.scenario), Origin(-1.1171, 50.7865)
     sites = [Site(s.name or "", s.measurement.kind, s.pose) for s in model.sensors]
@@ -247,10 +247,10 @@ def test_without_a_region_the_grid_covers_the_sensors_range(tmp_path: Path, old:
     found = answered(small(tmp_path, text), walk(8))
     assert found == answered(small(tmp_path, said), walk(8))
     assert len(json.loads(found[-1])["tracks"]) == 1
-    words = scenario_of_sensors(tmp_path / "small.yaml").assumed
+    words = scenario_from_sensors(tmp_path / "small.yaml").assumed
     assert "region" not in words  # it is given
     (tmp_path / "small.yaml").write_text(text, "utf-8")
-    words = scenario_of_sensors(tmp_path / "small.yaml").assumed
+    words = scenario_from_sensors(tmp_path / "small.yaml").assumed
     assert words["region"].startswith("x -600 to 700 m, y -600 to 600 m (as far as")
 
 

@@ -19,14 +19,16 @@ from vedette.reports import write_run_report
 from vedette.reports.groups import group_of_run
 from vedette.reports.replay import replay_data
 from vedette.scenarios import Scenario
-from vedette.scenarios.of_recording import OfRecording, scenario_of_recording
-from vedette.scenarios.overrides import with_fields
+from vedette.scenarios.from_recording import RecordingScenario, scenario_from_recording
+from vedette.scenarios.overrides import replace_fields
 from vedette.simulation.records import RunRecord
 
 
-def tracked(folder: Path, truth: bool) -> tuple[OfRecording, RunRecord]:
+def tracked(folder: Path, truth: bool) -> tuple[RecordingScenario, RunRecord]:
     write_recording(folder, seconds=60.0)
-    found = scenario_of_recording(folder / "radars.yaml", folder / "scans.csv", folder / "truth.csv" if truth else None)
+    found = scenario_from_recording(
+        folder / "radars.yaml", folder / "scans.csv", folder / "truth.csv" if truth else None
+    )
     return found, run_scenario(found.scenario, "still", seed=0)
 
 
@@ -95,7 +97,7 @@ def test_a_heading_that_nobody_gave_is_not_drawn(tmp_path: Path) -> None:
     data = data_of(record, scenario)
     for s, sensor in enumerate(data["sensors"]):
         assert {poses[s][2] for poses in data["poses"]} == {sensor["unturned"]}
-    turned = with_fields(
+    turned = replace_fields(
         scenario,
         {
             "sensors.0.detection": {

@@ -20,8 +20,8 @@ from vedette.campaigns.store import Store
 from vedette.cli import app
 from vedette.scenarios import Scenario, load_scenario
 from vedette.scenarios.dumping import dump_scenario
-from vedette.scenarios.overrides import with_fields
-from vedette.scenarios.trust import code_of, not_own
+from vedette.scenarios.overrides import replace_fields
+from vedette.scenarios.trust import custom_code, foreign_code_reason
 from vedette.simulation.serialization import encode_timings
 
 MODELS = """
@@ -44,7 +44,7 @@ def scenario(tmp_path: Path) -> Path:
     own = {"sensors.*.detection": {"kind": "custom", "function": "models.py:sees"}}
     path.write_text("")
     built_in = Scenario(load_scenario("paper-a").model, path)  # its paths are relative to the new file
-    path.write_text(dump_scenario(with_fields(built_in, own).model))
+    path.write_text(dump_scenario(replace_fields(built_in, own).model))
     return path
 
 
@@ -103,7 +103,7 @@ def test_a_module_that_a_manifest_names_is_not_run(results: Path, scenario: Path
 
 
 def test_a_run_says_whose_code_it_runs(scenario: Path) -> None:
-    assert code_of(load_scenario(scenario).model) == ("models.py:sees",)
+    assert custom_code(load_scenario(scenario).model) == ("models.py:sees",)
     assert "runs code of yours: models.py:sees" in call("show", scenario)
     assert "code of" not in call("show", "paper-a")
 
@@ -127,9 +127,9 @@ def test_code_that_others_may_have_written_needs_a_word(scenario: Path, what: st
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="files have no owners there")
 def test_code_of_another_user_is_not_ones_own(scenario: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     loaded = load_scenario(scenario)
-    assert not_own(loaded) == ""
+    assert foreign_code_reason(loaded) == ""
     if os.getuid() == 0:  # what the system's administrator owns is trusted
         os.chown(scenario.with_name("models.py"), 12345, -1)
     else:
         monkeypatch.setattr(os, "getuid", lambda: scenario.stat().st_uid + 1)
-    assert "belongs to another user" in not_own(loaded)
+    assert "belongs to another user" in foreign_code_reason(loaded)

@@ -16,7 +16,7 @@ from vedette.scenarios import parse_scenario
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_any_mistake_is_told_with_its_place(seed: int, tmp_path: Path) -> None:
+def test_any_error_is_reported_with_its_location(seed: int, tmp_path: Path) -> None:
     """Scenarios with a few of their values replaced, changed, left out, renamed or added to."""
     lay_beside(tmp_path)
     told = 0

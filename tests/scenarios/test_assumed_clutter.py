@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vedette.scenarios.assumed_clutter import Look, target_share
-from vedette.scenarios.of_recording import OfRecording, scenario_of_recording
+from vedette.scenarios.assumed_clutter import PlacedScan, target_share
+from vedette.scenarios.from_recording import RecordingScenario, scenario_from_recording
 
 NOISE, SIDE, PERIOD, SCANS, SPEED = 15.0, 5000.0, 2.5, 60, 10.0
 
 
-def drawn(targets: int, detection: float, clutter: float, seed: int = 0, scans: int = SCANS) -> list[Look]:
+def drawn(targets: int, detection: float, clutter: float, seed: int = 0, scans: int = SCANS) -> list[PlacedScan]:
     """Targets of 2 to 8 m/s and uniform clutter in a square."""
     rng = np.random.default_rng(seed)
     start, angles = rng.uniform(-SIDE, SIDE, (targets, 2)), rng.uniform(0.0, 2.0 * math.pi, targets)
@@ -24,16 +24,16 @@ def drawn(targets: int, detection: float, clutter: float, seed: int = 0, scans: 
         seen = (start + time * velocity)[rng.random(targets) < detection]
         false = rng.uniform(-SIDE, SIDE, (rng.poisson(clutter), 2))
         places = np.concatenate([seen + rng.normal(0.0, NOISE, seen.shape), false])
-        found.append(Look(time, places, np.full(len(places), NOISE), np.full(len(places), detection)))
+        found.append(PlacedScan(time, places, np.full(len(places), NOISE), np.full(len(places), detection)))
     return found
 
 
-def stated(looks: list[Look], detection: float) -> list[Look]:
+def stated(looks: list[PlacedScan], detection: float) -> list[PlacedScan]:
     """The same, with another probability of detection in the file."""
     return [look._replace(detection=np.full(len(look.places), detection)) for look in looks]
 
 
-def share_by_loops(looks: list[Look]) -> float:
+def share_by_loops(looks: list[PlacedScan]) -> float:
     """By the sums of one neighbour and of two, all written out."""
     one, two, given = [0.0, 0.0], [0.0, 0.0], 0.0
     for k, own in enumerate(looks):
@@ -54,7 +54,7 @@ def share_by_loops(looks: list[Look]) -> float:
 
 
 @pytest.mark.parametrize("given", [0.4, 0.95])
-def test_the_share_is_that_of_a_loop_over_all_pairs(given: float) -> None:
+def test_unexplained_fraction_equals_that_of_a_loop_over_all_pairs(given: float) -> None:
     looks = stated(drawn(8, 0.8, 20.0, scans=12), given)
     assert target_share(looks, SPEED) == pytest.approx(share_by_loops(looks), rel=1e-12)
 
@@ -63,7 +63,7 @@ def test_the_share_is_that_of_a_loop_over_all_pairs(given: float) -> None:
 @pytest.mark.parametrize(
     ("targets", "clutter"), [(1, 10.0), (3, 0.0), (5, 25.0), (8, 0.5), (30, 0.0), (30, 2.0), (30, 25.0)]
 )
-def test_the_rate_of_clutter_is_found(targets: int, clutter: float, detection: float) -> None:
+def test_clutter_rate_is_estimated(targets: int, clutter: float, detection: float) -> None:
     rates = []
     for seed in range(5):
         looks = drawn(targets, detection, clutter, seed)
@@ -83,11 +83,11 @@ def test_a_probability_of_detection_that_is_given_too_low_does_no_harm() -> None
 
 
 @pytest.mark.parametrize("looks", [[], drawn(5, 0.9, 10.0, scans=1), drawn(1, 0.9, 0.0, scans=2)])
-def test_a_short_recording_says_nothing(looks: list[Look]) -> None:
+def test_a_short_recording_gives_no_estimate(looks: list[PlacedScan]) -> None:
     assert math.isnan(target_share(looks, SPEED))
 
 
-def recorded(folder: Path, kind: str = "position", std: str = "[15.0, 15.0]", given: str = "") -> OfRecording:
+def recorded(folder: Path, kind: str = "position", std: str = "[15.0, 15.0]", given: str = "") -> RecordingScenario:
     """Two sensors of one scene, of clutter 25 and 2 a scan."""
     rows = [
         f"{look.time + 0.5 * s},{name},{x},{y}"
@@ -103,10 +103,10 @@ def recorded(folder: Path, kind: str = "position", std: str = "[15.0, 15.0]", gi
     text = "recording: {bearings: east}\nregion: {x_min: -6000, x_max: 6000, y_min: -6000, y_max: 6000}\nsensors:\n"
     text += f"  - {{name: A, position: [0, 0], {sensor}{given}}}\n  - {{name: B, position: [100, 0], {sensor}}}\n"
     (folder / "sensors.yaml").write_text(text if kind == "position" else f"birth: {sites}\n{text}", "utf-8")
-    return scenario_of_recording(folder / "sensors.yaml", folder / "scans.csv")
+    return scenario_from_recording(folder / "sensors.yaml", folder / "scans.csv")
 
 
-def test_each_sensor_has_its_own_rate_and_it_is_told(tmp_path: Path) -> None:
+def test_each_sensor_has_its_own_reported_rate(tmp_path: Path) -> None:
     found = recorded(tmp_path)
     rates = [sensor.clutter.rate for sensor in found.scenario.model.sensors]
     assert rates == pytest.approx([25.0, 2.0], rel=0.1, abs=0.3)
@@ -114,7 +114,7 @@ def test_each_sensor_has_its_own_rate_and_it_is_told(tmp_path: Path) -> None:
     assert found.assumed["clutter"] == f"A {rates[0]:g}, B {rates[1]:g} per scan ({how})"
 
 
-def test_a_rate_that_is_given_counts(tmp_path: Path) -> None:
+def test_a_given_rate_takes_precedence(tmp_path: Path) -> None:
     found = recorded(tmp_path, given=", clutter: {kind: region, rate: 7.0}")
     assert found.scenario.model.sensors[0].clutter.rate == 7.0
     assert found.assumed["clutter"].startswith("B ")
@@ -130,6 +130,6 @@ def test_of_sensors_that_measure_no_places_it_is_half(tmp_path: Path) -> None:
 def test_scans_between_which_targets_go_anywhere_show_nothing() -> None:
     rng = np.random.default_rng(0)
     places = [rng.uniform(0.0, 1000.0, (50, 2)) for _ in range(40)]
-    looks = [Look(float(k), own, np.full(50, 5.0), np.full(50, 0.9)) for k, own in enumerate(places)]
+    looks = [PlacedScan(float(k), own, np.full(50, 5.0), np.full(50, 0.9)) for k, own in enumerate(places)]
     assert np.isnan(target_share(looks, 1000.0))
     assert target_share(looks, 10.0) < 0.1

@@ -14,8 +14,8 @@ from vedette.densities import existence_probabilities
 from vedette.errors import ScenarioError
 from vedette.filters import DeltaGlmbFilter
 from vedette.scenarios import load_scenario, parse_scenario
-from vedette.scenarios.cautions import cautions
-from vedette.scenarios.sections.birth_labels import share_cut
+from vedette.scenarios.sections.birth_labels import cut_share
+from vedette.scenarios.warnings import scenario_warnings
 
 REGION = models.Region(-5e3, 5e3, -5e3, 5e3)
 FAST = (
@@ -53,19 +53,19 @@ def predicted(existence: float, dt: float, steps: int, sites: int, marginalised:
     ("existence", "dt", "steps", "sites"),
     [(0.06, 0.05, 60, 2), (0.05, 0.05, 20, 2), (0.2, 0.05, 60, 1), (0.1, 1.0, 5, 1)],
 )
-def test_the_share_that_is_cut_is_that_of_the_filter(
+def test_warning_states_the_fraction_of_hypotheses_the_filter_truncates(
     existence: float, dt: float, steps: int, sites: int, marginalised: bool
 ) -> None:
     each = 1.0 - (1.0 - existence) ** dt
     left = predicted(existence, dt, steps, sites, marginalised) / (steps * sites * each)
-    assert share_cut(steps * sites, each, 300) == pytest.approx(1.0 - left, abs=2e-3)
+    assert cut_share(steps * sites, each, 300) == pytest.approx(1.0 - left, abs=2e-3)
 
 
-def test_few_labels_or_many_hypotheses_cut_nothing() -> None:
-    assert share_cut(0, 0.1, 300) == 0.0
-    assert share_cut(8, 0.1, 300) == pytest.approx(0.0, abs=1e-12)
-    assert share_cut(120, 0.003, 10_000) < 0.05 < share_cut(120, 0.003, 300)
-    assert share_cut(100_000, 0.01, 300) == pytest.approx(1.0, abs=0.01)
+def test_few_labels_or_many_hypotheses_truncate_nothing() -> None:
+    assert cut_share(0, 0.1, 300) == 0.0
+    assert cut_share(8, 0.1, 300) == pytest.approx(0.0, abs=1e-12)
+    assert cut_share(120, 0.003, 10_000) < 0.05 < cut_share(120, 0.003, 300)
+    assert cut_share(100_000, 0.01, 300) == pytest.approx(1.0, abs=0.01)
 
 
 @pytest.mark.parametrize("kind", ["delta_glmb", "m_delta_glmb"])
@@ -87,14 +87,14 @@ def test_births_at_many_steps_between_scans_are_refused(kind: str) -> None:
         ("filter: {kind: m_delta_glmb}\nfusion: {kind: cm_delta_glmb", "filter: {kind: lmb}\nfusion: {kind: clmb"),
     ],
 )
-def test_what_cuts_few_births_is_accepted(cure: tuple[str, str]) -> None:
+def test_few_truncated_births_are_accepted(cure: tuple[str, str]) -> None:
     parse_scenario(changed(*FAST, SLOW_SCANS, ("existence: 0.1", "existence: 0.2"), cure))
 
 
-def test_sites_that_sensors_hardly_see_are_warned_of(tmp_path: Path) -> None:
+def test_birth_sites_with_low_detection_probability_warn(tmp_path: Path) -> None:
     file = tmp_path / "scene.yaml"
     for changes, is_warned in ((FAST, False), ((*FAST, FAR), True)):
         file.write_text(changed(*changes))
-        found = [line for line in cautions(load_scenario(file)) if "are detected late" in line]
+        found = [line for line in scenario_warnings(load_scenario(file)) if "are detected late" in line]
         assert len(found) == is_warned
         assert all("take filter.kind: factored_glmb or lmb" in line for line in found)

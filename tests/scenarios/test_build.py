@@ -34,12 +34,12 @@ from vedette.filters import (
     RankedAssignment,
 )
 from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb, LabelMatchedFusion, ParallelUpdate
-from vedette.scenarios import Scenario, build, list_builtin, load_scenario, parse_scenario, with_fields
-from vedette.scenarios.cautions import cautions
+from vedette.scenarios import Scenario, build, list_builtin, load_scenario, parse_scenario, replace_fields
 from vedette.scenarios.sections.fusion import Fusion
-from vedette.scenarios.sections.planners import Named
+from vedette.scenarios.sections.planners import NamedPlanner
 from vedette.scenarios.sections.scoring import MarginalEstimator
-from vedette.scenarios.summary import facts, one_line
+from vedette.scenarios.summary import summary_line, summary_rows
+from vedette.scenarios.warnings import scenario_warnings
 from vedette.simulation import ScriptedTargets, Truth, simulate_scans
 from vedette.tracking import Central
 
@@ -137,7 +137,7 @@ def test_clutter_of_the_region_and_of_measurement_space() -> None:
     assert (north.rate, south.rate) == (7.0, 25.0)
 
 
-def test_models_of_the_users_own_from_a_file_beside_the_scenario() -> None:
+def test_custom_models_from_a_file_next_to_the_scenario() -> None:
     own = {
         name: f"{{kind: custom, function: 'own_models.py:{name}'}}"
         for name in ("survival", "noise", "detection", "clutter")
@@ -179,7 +179,7 @@ def test_models_of_the_users_own_from_a_file_beside_the_scenario() -> None:
         ("json:dumps", "{obj: 1}", "to give a MotionModel; got a str"),
     ],
 )
-def test_models_that_cannot_be_had(function: str, arguments: str, message: str) -> None:
+def test_models_that_cannot_be_imported(function: str, arguments: str, message: str) -> None:
     text = f"{{kind: custom, function: '{function}', arguments: {arguments}, state_dim: 4}}"
     loaded = scenario(("{kind: constant_velocity, sigma_v: 1.0}", text))
     with pytest.raises(InputError, match=r"^motion\.function: ") as error:
@@ -249,7 +249,7 @@ def test_fusions_of_each_kind_have_weights_that_sum_to_one() -> None:
 
 
 @pytest.mark.parametrize("local", ["factored_glmb", "lmb", "delta_glmb"])
-def test_who_names_no_fusion_gets_all_scans_in_one_belief(local: str) -> None:
+def test_without_fusion_all_scans_update_one_belief(local: str) -> None:
     plain = changed(
         ("fusion: {kind: cm_delta_glmb, weights: [0.5, 0.5]}\n", ""), ("kind: m_delta_glmb", f"kind: {local}")
     )
@@ -297,8 +297,8 @@ def test_decisions_take_scans_in_full_or_go_by_plain_covariance_intersection(
         assert getattr(made, "by_views", False) == getattr(expected, "by_views", False)
     assert tracker.feedback == (kind == "parallel")
     assert isinstance(tracker.fusion, LabelMatchedFusion) == ("matching" in kind)
-    assert kind.split(",")[0] in dict(facts(loaded.model))["fusion"]
-    assert ("by views" in dict(facts(loaded.model))["fusion"]) == ("by_views" in kind)
+    assert kind.split(",")[0] in dict(summary_rows(loaded.model))["fusion"]
+    assert ("by views" in dict(summary_rows(loaded.model))["fusion"]) == ("by_views" in kind)
 
 
 CENTRAL = [
@@ -322,9 +322,9 @@ def test_one_filter_may_take_the_scans_of_all_sensors(kind: str, container: type
     planner: Any = build.build_planner(loaded, "jdm")
     assert planner.fusion == ParallelUpdate()
     assert {type(sensor.filter.initial()) for sensor in planner.sensors} == {type(tracker.initial().fused)}
-    assert f"2 sensors; filter {kind}, fusion central, " in one_line(loaded)
-    assert ("fusion", "central: one filter takes the scans of all sensors") in facts(loaded.model)
-    assert not any("GCI" in caution for caution in cautions(loaded))
+    assert f"2 sensors; filter {kind}, fusion central, " in summary_line(loaded)
+    assert ("fusion", "central: one filter takes the scans of all sensors") in summary_rows(loaded.model)
+    assert not any("GCI" in caution for caution in scenario_warnings(loaded))
 
 
 def test_the_marginal_estimator_has_its_threshold() -> None:
@@ -359,7 +359,9 @@ def test_named_strategies_replace_their_own_parts_alone() -> None:
     assert isinstance(plain, JointPlanner)
     found: dict[str, Any] = {name: build.build_planner(named, name) for name in named.model.planners}
     assert [planner.name for planner in found.values()] == ["ascent", "bhattacharyya", "alone", "as it is"]
-    inner: dict[str, Any] = {name: planner.planner for name, planner in found.items() if isinstance(planner, Named)}
+    inner: dict[str, Any] = {
+        name: planner.planner for name, planner in found.items() if isinstance(planner, NamedPlanner)
+    }
     assert [type(planner) for planner in inner.values()] == [
         JointPlanner,
         JointPlanner,
@@ -375,7 +377,7 @@ def test_named_strategies_replace_their_own_parts_alone() -> None:
 @pytest.mark.parametrize(("name", "presumed"), [("paper-a", "absent"), ("paper-e", "absent"), ("eight-mobile", "stay")])
 def test_only_in_the_paper_scenes_do_sensors_presume_that_there_are_no_others(name: str, presumed: str) -> None:
     planners = {"own": {"kind": "independent"}, "paper": {"kind": "independent", "others": "absent"}}
-    scenario = with_fields(load_scenario(name), {"planners": planners})
+    scenario = replace_fields(load_scenario(name), {"planners": planners})
     found: dict[str, Any] = {own: build.build_planner(scenario, own) for own in ("idm", "own", "paper")}
     assert [found["idm"].others, found["own"].planner.others, found["paper"].planner.others] == [
         presumed,
@@ -420,7 +422,7 @@ def targets_of(built: Scenario) -> ScriptedTargets:
         ("ospa: {cutoff: 5.0, order: 2.0, components: state,", ExpectedLossReward()),
     ],
 )
-def test_decisions_that_name_no_reward_go_by_the_error_that_is_scored(score: str, reward: ExpectedLossReward) -> None:
+def test_default_reward_is_the_scored_error(score: str, reward: ExpectedLossReward) -> None:
     """Where that is of positions."""
     text = changed(("ospa: {cutoff: 50.0,", score))
     for name in ("jdm", "idm", "lookahead"):

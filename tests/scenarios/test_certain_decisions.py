@@ -12,7 +12,7 @@ from vedette.evaluation import run_scenario
 from vedette.scenarios import Scenario, parse_scenario
 from vedette.scenarios.build import build_planner
 from vedette.scenarios.dumping import dump_scenario
-from vedette.scenarios.summary import facts
+from vedette.scenarios.summary import summary_rows
 
 SAMPLED = "reward: {kind: cauchy_schwarz}"
 SHORT = (("num_steps: 20", "num_steps: 6"), ("to_step: 20", "to_step: 6"), ("end_step: 18", "end_step: 6"))
@@ -27,15 +27,15 @@ def test_the_settings_reach_the_planner() -> None:
     planner: Any = build_planner(own, "jdm")
     told = planner.settings
     assert (told.confidence, told.indifference, told.max_samples, told.max_seconds) == (0.9, 0.02, 500, 3.0)
-    assert "samples until certain at 90 %, to 2 %, at most 500 or 3 s" in dict(facts(own.model))["objective"].replace(
-        ",", "", 0
-    )
+    assert "samples until certain at 90 %, to 2 %, at most 500 or 3 s" in dict(summary_rows(own.model))[
+        "objective"
+    ].replace(",", "", 0)
     again = parse_scenario(dump_scenario(own.model), "f.yaml")
     assert again == own.model
     plain: Any = build_planner(Scenario(parse_scenario(MINIMAL), Path("f.yaml")), "jdm")
     assert plain.settings.confidence is None
-    assert "40 samples" in dict(facts(scenario(SAMPLED).model))["objective"]
-    assert "no sampling" in dict(facts(parse_scenario(MINIMAL)))["objective"]
+    assert "40 samples" in dict(summary_rows(scenario(SAMPLED).model))["objective"]
+    assert "no sampling" in dict(summary_rows(parse_scenario(MINIMAL)))["objective"]
 
 
 @pytest.mark.parametrize("planner", ["jdm", "idm"])

@@ -17,7 +17,7 @@ from vedette.evaluation.runs import run_scenario
 from vedette.models import BirthModel
 from vedette.scenarios import Scenario, load_scenario, parse_scenario
 from vedette.scenarios.build import build_experiment, build_planner
-from vedette.scenarios.record_cautions import record_cautions
+from vedette.scenarios.recording_warnings import recording_warnings
 from vedette.scenarios.sections.planners import STRATEGIES
 
 TARGETS = MINIMAL[MINIMAL.index("targets:") : MINIMAL.index("sensor_defaults:")]
@@ -116,31 +116,31 @@ def test_scans_at_which_no_target_is_there_are_refused_by_the_check(tmp_path: Pa
     )
 
 
-def test_a_second_report_at_one_time_is_left_out_and_told(tmp_path: Path) -> None:
+def test_a_duplicate_report_is_skipped_and_reported(tmp_path: Path) -> None:
     repeated = SHIPS + SHIPS.split("\n")[1] + "\n4.0,2,-1.0,50.9\n"
     scenario, plain = load_scenario(written(tmp_path, repeated)), load_scenario(written(tmp_path, SHIPS))
     (tmp_path / "ships.csv").write_text(repeated)
-    ((path, line),) = record_cautions(scenario)
+    ((path, line),) = recording_warnings(scenario)
     assert path == ("targets", "path")
     assert line == (
         "targets.path: ships.csv, row 26: a second report of one target at the time of row 2; left out, as are 1 more"
     )
     kept = build_experiment(scenario).targets
     (tmp_path / "ships.csv").write_text(SHIPS)
-    assert list(record_cautions(plain)) == []
+    assert list(recording_warnings(plain)) == []
     for track, other in zip(kept.tracks, build_experiment(plain).targets.tracks, strict=True):  # type: ignore[attr-defined]
         assert (track.times == other.times).all()
 
 
-def test_a_position_in_degrees_and_one_far_away_are_told(tmp_path: Path) -> None:
+def test_positions_in_degrees_or_far_away_are_reported(tmp_path: Path) -> None:
     degrees = written(tmp_path, SHIPS, ("position: [0.0, 40.0]", "position: [-1.1, 50.78]"))
-    ((_, line),) = record_cautions(load_scenario(degrees))
+    ((_, line),) = recording_warnings(load_scenario(degrees))
     assert line == (
         "sensors[0].position: expected metres from the origin, got (-1.1, 50.78), which is a longitude and latitude "
         "among those of ships.csv"
     )
     far = written(tmp_path, SHIPS, ("position: [0.0, 40.0]", "position: [0.0, 400000.0]"))
-    ((_, line),) = record_cautions(load_scenario(far))
+    ((_, line),) = recording_warnings(load_scenario(far))
     assert line.startswith(
         "sensors[0].position: expected metres from the origin, got (0, 400000), 400 km from the nearest"
     )
@@ -158,7 +158,7 @@ def test_a_position_in_degrees_and_one_far_away_are_told(tmp_path: Path) -> None
         ("motion = print('run')\n", ""),
     ],
 )
-def test_a_model_of_ones_own_is_looked_for_but_not_run(
+def test_a_custom_model_is_located_but_not_run(
     code: str, wanted: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "own.py").write_text(code)

@@ -21,10 +21,10 @@ from vedette.errors import ScenarioError
 from vedette.evaluation.figures import build_scene, tracks_figure
 from vedette.evaluation.runs import run_scenario
 from vedette.scenarios import Scenario, load_scenario
-from vedette.scenarios.cautions import cautions
 from vedette.scenarios.dumping import dump_scenario
-from vedette.scenarios.overrides import with_fields
-from vedette.scenarios.views import COAST, zones
+from vedette.scenarios.overrides import replace_fields
+from vedette.scenarios.warnings import scenario_warnings
+from vedette.scenarios.zones import COAST, zones
 
 EDGE = [[-900.0, -3000.0], [-800.0, 0.0], [-900.0, 3000.0]]
 ISLAND = [[100.0, 100.0], [200.0, 100.0], [200.0, 200.0], [100.0, 100.0]]
@@ -73,7 +73,7 @@ def test_lines_and_polygons_are_lines_in_metres(tmp_path: Path, coast: Any) -> N
     np.testing.assert_allclose(island, ISLAND, atol=1e-6)
 
 
-def test_what_is_far_away_is_cut_off(tmp_path: Path) -> None:
+def test_distant_coastline_is_clipped(tmp_path: Path) -> None:
     """A coast round the world; what crosses the picture stays, even where no point of it lies in it."""
     meridian = [[-1.1171, 50.7865 + 0.01 * k] for k in range(-2000, 2000)]
     across = degrees([[-50_000.0, 40.0], [50_000.0, 40.0]])
@@ -86,7 +86,7 @@ def test_what_is_far_away_is_cut_off(tmp_path: Path) -> None:
     np.testing.assert_allclose(lines[1], [[-50_000.0, 40.0], [50_000.0, 40.0]], atol=0.2)
 
 
-def test_a_coast_that_is_too_fine_is_drawn_more_coarsely(tmp_path: Path) -> None:
+def test_a_fine_coastline_is_simplified(tmp_path: Path) -> None:
     angles = np.linspace(0.0, 2.0 * np.pi, 40_001)
     circle = 700.0 * np.column_stack([np.cos(angles), np.sin(angles)])
     islets = [(np.array(ISLAND) / 20.0 + [30.0 * k, -500.0]).tolist() for k in range(-20, 20)]
@@ -111,7 +111,7 @@ def test_a_coast_that_is_too_fine_is_drawn_more_coarsely(tmp_path: Path) -> None
         ('{"type": "LineString", "coordinates": [[0.0, 0.0], [NaN, 0.0]]}', "coast.geojson"),
     ],
 )
-def test_what_is_no_coast_is_told_at_the_field(tmp_path: Path, coast: Any, message: str) -> None:
+def test_invalid_coastlines_are_reported_at_the_field(tmp_path: Path, coast: Any, message: str) -> None:
     with pytest.raises(ScenarioError) as error:
         load_scenario(scene(tmp_path, coast))
     (fault,) = error.value.faults
@@ -119,10 +119,10 @@ def test_what_is_no_coast_is_told_at_the_field(tmp_path: Path, coast: Any, messa
     assert message in fault
 
 
-def test_a_coast_of_which_nothing_is_drawn_is_warned_of(tmp_path: Path) -> None:
+def test_a_coastline_outside_the_region_warns(tmp_path: Path) -> None:
     def told(places: Any) -> list[str]:
         scenario = load_scenario(scene(tmp_path, world(feature("LineString", places))))
-        return [text for text in cautions(scenario) if "coastline" in text]
+        return [text for text in scenario_warnings(scenario) if "coastline" in text]
 
     assert told(degrees(EDGE)) == []
     (text,) = told([[lat, lon] for lon, lat in degrees(EDGE)])
@@ -183,12 +183,12 @@ def test_tracked_scans_keep_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         ([180.0, 120.0], [{"kind": "keep_out", "geojson": "coast.geojson"}], "inside an area that control.constraints"),
     ],
 )
-def test_a_boat_that_starts_on_drawn_land_is_warned_of(
+def test_a_sensor_that_starts_on_drawn_land_warns(
     place: list[float], constraints: list[Any], told: str, tmp_path: Path
 ) -> None:
     """Also where no constraint keeps boats off it."""
     file = scene(tmp_path, world(feature("Polygon", [degrees(ISLAND)])))
-    given = with_fields(load_scenario(file), {"sensors.0.position": place, "control.constraints": constraints})
-    found = [line for line in cautions(given) if "position: expected a place where the sensor may be" in line]
+    given = replace_fields(load_scenario(file), {"sensors.0.position": place, "control.constraints": constraints})
+    found = [line for line in scenario_warnings(given) if "position: expected a place where the sensor may be" in line]
     assert len(found) == (told != "")
     assert all(told in line for line in found)

@@ -12,20 +12,20 @@ from recordings import write_recording
 from vedette.errors import InputError, ScenarioError
 from vedette.recorded import Conventions, Origin, Site, parse_scans, table_of
 from vedette.recorded.reports import parse_reports
-from vedette.scenarios.cautions import cautions
-from vedette.scenarios.of_recording import OfRecording, scenario_of_recording
+from vedette.scenarios.from_recording import RecordingScenario, scenario_from_recording
+from vedette.scenarios.warnings import scenario_warnings
 
 ALONE = (Site("R", "bearing_range", (0.0, 0.0, 0.0)),)
 SHIPS = {"time": [0.0, 10.0, 0.0, 10.0], "mmsi": [1, 1, 2, 2], "lon": [0.0, 0.01, 0.1, 0.1], "lat": [0.0] * 4}
 
 
-def made(folder: Path, more: str = "") -> OfRecording:
+def made(folder: Path, more: str = "") -> RecordingScenario:
     (folder / "radars.yaml").write_text((folder / "radars.yaml").read_text("utf-8") + more, "utf-8")
-    return scenario_of_recording(folder / "radars.yaml", folder / "scans.csv", folder / "truth.csv")
+    return scenario_from_recording(folder / "radars.yaml", folder / "scans.csv", folder / "truth.csv")
 
 
-def told(found: OfRecording, words: str) -> list[str]:
-    return [line.split("warning: ")[1] for line in cautions(found.scenario) if words in line]
+def told(found: RecordingScenario, words: str) -> list[str]:
+    return [line.split("warning: ")[1] for line in scenario_warnings(found.scenario) if words in line]
 
 
 def add_column(file: Path, name: str) -> None:
@@ -84,7 +84,7 @@ def test_reports_have_the_names_that_are_usual() -> None:
         parse_reports(table_of({name: cells for name, cells in SHIPS.items() if name != "mmsi"}))
 
 
-def test_columns_of_the_file_about_sensors_are_used_with_truth(tmp_path: Path) -> None:
+def test_columns_of_the_sensor_file_are_used_with_truth(tmp_path: Path) -> None:
     write_recording(tmp_path, seconds=40.0)
     text = (tmp_path / "truth.csv").read_text("utf-8").replace("time,id,", "when,ship,")
     (tmp_path / "truth.csv").write_text(text, "utf-8")

@@ -23,7 +23,7 @@ from vedette.control import (
     VoidProbability,
 )
 from vedette.evaluation import run_scenario
-from vedette.scenarios import Scenario, load_scenario, parse_scenario, with_fields
+from vedette.scenarios import Scenario, load_scenario, parse_scenario, replace_fields
 from vedette.scenarios.build import build_planner
 from vedette.scenarios.dumping import dump_scenario
 
@@ -75,11 +75,11 @@ def test_constraints_in_their_order(tmp_path: Path) -> None:
     assert load_scenario(again).model == scenario.model
 
 
-def test_no_constraints_unless_said(tmp_path: Path) -> None:
+def test_no_constraints_by_default(tmp_path: Path) -> None:
     assert written(tmp_path, "num_samples: 3").model.control.build_constraints(tmp_path) == ()
 
 
-def test_a_constraint_of_ones_own(tmp_path: Path) -> None:
+def test_a_custom_constraint(tmp_path: Path) -> None:
     shutil.copy(Path(__file__).with_name("own_parts.py"), tmp_path)
     scenario = written(
         tmp_path, "constraints: [{kind: custom, function: 'own_parts.py:OddOnes', arguments: {spared: 0}}]"
@@ -117,11 +117,9 @@ def test_a_run_with_a_search(tmp_path: Path, kind: str) -> None:
         ({"control.horizon_steps": 5, "control.horizon_period": 2.0}, (5, 2.0)),
     ],
 )
-def test_who_names_no_horizon_looks_to_the_next_decision_scan_by_scan(
-    fields: dict[str, Any], horizon: tuple[int, float]
-) -> None:
+def test_default_horizon_reaches_the_next_decision(fields: dict[str, Any], horizon: tuple[int, float]) -> None:
     given = {"time.num_steps": 27, "time.step_period": 0.5, "control.decision_steps": [10, 20], "ospa.to_step": None}
-    scenario = with_fields(Scenario(parse_scenario(MINIMAL)), given | fields)
+    scenario = replace_fields(Scenario(parse_scenario(MINIMAL)), given | fields)
     assert scenario.model.horizon == horizon
     planner: Any = build_planner(scenario, "jdm")
     assert (planner.settings.horizon_steps, planner.settings.horizon_period) == horizon

@@ -35,9 +35,9 @@ from vedette.platforms.base import options_at
 from vedette.recorded import Origin
 from vedette.scenarios import Scenario, load_scenario
 from vedette.scenarios.build import build_planner, build_sensors
+from vedette.scenarios.from_recording import scenario_from_sensors
 from vedette.scenarios.loading import parse_scenario
-from vedette.scenarios.of_recording import scenario_of_sensors
-from vedette.scenarios.overrides import with_fields
+from vedette.scenarios.overrides import replace_fields
 from vedette.simulation.decision_tables import decision_tables
 
 FAR = Origin(-1.05, 50.7)
@@ -69,7 +69,7 @@ filter: {kind: lmb}
 
 @pytest.mark.parametrize("platform", PLATFORMS, ids=lambda each: type(each).__name__)
 @pytest.mark.parametrize("compass", [FAR, Origin(179.0, -50.7), PlaneCompass()], ids=["east", "dateline", "plane"])
-def test_a_platform_goes_where_its_course_says(platform: Any, compass: Any) -> None:
+def test_a_platform_follows_its_course(platform: Any, compass: Any) -> None:
     """The first second of every action is a geodesic of that azimuth and speed."""
     found = options_at("x", ByCompass(platform, compass), POSE, np.array([0.1]))
     columns = found.actions.columns
@@ -118,7 +118,7 @@ class Own:
         return np.column_stack([pose[:2] + away, np.full(len(times), np.radians(action[0]))])
 
 
-def test_a_custom_platform_gets_its_own_rows_and_tells_courses() -> None:
+def test_a_custom_platform_gets_its_own_rows_and_reports_courses() -> None:
     found = options_at("x", ByCompass(Own(), FAR), POSE, np.array([1.0]))
     assert found.actions.columns == ("course_deg", "gear", "speed_mps")
     turned = math.degrees(float(FAR.angle(0.0, POSE))) - 90.0
@@ -132,7 +132,7 @@ def test_a_custom_platform_gets_its_own_rows_and_tells_courses() -> None:
 
 def boats(folder: Path, text: str = BOATS) -> Any:
     (folder / "boats.yaml").write_text(text, "utf-8")
-    return scenario_of_sensors(folder / "boats.yaml", decide_every=5.0)
+    return scenario_from_sensors(folder / "boats.yaml", decide_every=5.0)
 
 
 def test_the_course_of_a_plan_is_the_course_of_a_pose(tmp_path: Path) -> None:
@@ -232,10 +232,10 @@ def test_live_tracks_have_courses_and_speeds(tmp_path: Path) -> None:
 
 def on_earth(**changes: Any) -> Scenario:
     fields = {"origin": {"lon": -1.05, "lat": 50.7}, "time.num_steps": 12, "control.decision_steps": [2, 7]}
-    return with_fields(load_scenario("paper-a"), {**fields, "ospa.from_step": 1, "ospa.to_step": None, **changes})
+    return replace_fields(load_scenario("paper-a"), {**fields, "ospa.from_step": 1, "ospa.to_step": None, **changes})
 
 
-def test_tables_and_words_of_a_run_have_courses() -> None:
+def test_tables_and_texts_of_a_run_have_courses() -> None:
     scenario = on_earth()
     record = run_scenario(scenario, "idm", seed=1)
     plan = record.decisions[0].plan
@@ -267,7 +267,7 @@ def test_without_origin_or_compass_nothing_changes() -> None:
     np.testing.assert_allclose(compass.poses, record.poses, atol=1e-9)
 
 
-def test_a_scenario_may_say_courses(tmp_path: Path) -> None:
+def test_a_scenario_may_give_courses(tmp_path: Path) -> None:
     known = boats(tmp_path).scenario.model
     one, two = known.sensors
     assert two.heading_deg == pytest.approx(90.0 + 1.41 * math.sin(math.radians(50.7)), abs=0.005)
@@ -297,7 +297,7 @@ def test_a_scenario_may_say_courses(tmp_path: Path) -> None:
         ("[0, 60, 135, 270]", "north", r"platform.courses_deg: expected a list, got \"?north"),
     ],
 )
-def test_a_file_counts_directions_in_one_way(tmp_path: Path, old: str, new: str, fault: str) -> None:
+def test_a_file_has_one_direction_convention(tmp_path: Path, old: str, new: str, fault: str) -> None:
     with pytest.raises(ScenarioError, match=fault):
         boats(tmp_path, BOATS.replace(old, new))
 
@@ -310,9 +310,9 @@ def test_courses_need_a_north() -> None:
 
 def test_a_program_gets_the_scene_by_compass(tmp_path: Path) -> None:
     known = boats(tmp_path).scenario
-    from vedette.scenarios.build import told_of
+    from vedette.scenarios.build import scene_for_program
 
-    told = told_of(known)["sensors"]
+    told = scene_for_program(known)["sensors"]
     assert [sensor["course_deg"] for sensor in told] == [60.0, 0.0]
     assert told[0]["platform"]["courses_deg"] == (0.0, 60.0, 135.0, 270.0)
     assert "heading" not in json.dumps(told)

@@ -17,7 +17,7 @@ from vedette.campaigns import open_results, parse_spec, resolve, run_campaign
 from vedette.cli import app
 from vedette.errors import InputError
 from vedette.evaluation import run_scenario
-from vedette.scenarios import Scenario, load_scenario, with_fields
+from vedette.scenarios import Scenario, load_scenario, replace_fields
 from vedette.scenarios.sections.custom import Custom
 from vedette.simulation.journal import RunStopped
 
@@ -69,7 +69,7 @@ def test_all_kinds_in_one_run(scenario: Scenario) -> None:
 
 
 @pytest.mark.filterwarnings("ignore::vedette.errors.SlowRewardWarning")
-def test_a_joint_decision_with_reward_search_and_fusion_of_ones_own(scenario: Scenario) -> None:
+def test_a_joint_decision_with_custom_reward_search_and_fusion(scenario: Scenario) -> None:
     plan = run_scenario(scenario, "jdm", seed=1).decisions[0].plan
     assert plan.chosen == (0, 0)
     assert np.isfinite(plan.expected_rewards[0][0])
@@ -80,7 +80,7 @@ def test_a_reward_of_power_integrals(scenario: Scenario) -> None:
     powers = {"kind": "custom", "function": "own_parts.py:Powers", "arguments": {"order": 0.25}}
     twin = {"kind": "renyi", "order": 0.25}
     for reward in (powers, twin):
-        plan = run_scenario(with_fields(scenario, {"control.reward": reward}), "idm", seed=1).decisions[0].plan
+        plan = run_scenario(replace_fields(scenario, {"control.reward": reward}), "idm", seed=1).decisions[0].plan
         assert np.isfinite(plan.expected_rewards[0][0])
 
 
@@ -99,12 +99,12 @@ def test_a_campaign_with_workers_gives_the_same_bytes(folder: Path) -> None:
     assert {name for name in kept[0] if kept[0][name] != kept[1][name]} <= {"timings.parquet"}
 
 
-def test_what_breaks_in_the_middle_of_a_run_is_named(scenario: Scenario) -> None:
+def test_custom_code_that_fails_during_a_run_is_named(scenario: Scenario) -> None:
     with pytest.raises(RunStopped, match=r"in the planning: RuntimeError: no fuel \(own_parts\.py, line \d+, plan\)"):
         run_scenario(scenario, "breaks", seed=1)
 
 
-def test_a_planner_that_nobody_has_named(scenario: Scenario) -> None:
+def test_an_unknown_custom_planner(scenario: Scenario) -> None:
     with pytest.raises(
         InputError,
         match="planner: expected one of jdm, idm, lookahead, nearest, assigned, centroid, oracle, told, random, fixed, still, last, third, breaks; got 'x'",
@@ -155,7 +155,7 @@ def test_the_check_says_what_is_missing(folder: Path, old: str, new: str, fault:
     assert fault in text, text
 
 
-def test_code_that_others_may_have_written_is_said_and_not_imported(folder: Path) -> None:
+def test_untrusted_code_is_reported_and_not_imported(folder: Path) -> None:
     (folder / "own_parts.py").write_text(
         "raise SystemExit('run')\nHopper = Filter = fusion = sure = reward = 1\nFirstOfAll = OddOnes = Last = Breaks = count = 1\n"
     )
@@ -189,7 +189,7 @@ def test_files_import_those_beside_them_each_its_own(tmp_path: Path) -> None:
     assert not {str(tmp_path / "1"), str(tmp_path / "2")} & set(sys.path)
 
 
-def test_actions_of_ones_own_have_the_prices_of_a_column(tmp_path: Path) -> None:
+def test_custom_actions_take_prices_of_a_column(tmp_path: Path) -> None:
     shutil.copy(OWN, tmp_path)
     noise = "  noise: {kind: constant, std: [0.02, 3.0]}"
     path = tmp_path / "scene.yaml"
@@ -209,7 +209,7 @@ def test_actions_of_ones_own_have_the_prices_of_a_column(tmp_path: Path) -> None
     assert "own_parts.py:Ferry to have a column fee, as its price, got dx, fare" in " ".join(shown.output.split())
 
 
-def test_a_column_of_prices_is_a_custom_platforms(tmp_path: Path) -> None:
+def test_a_price_column_belongs_to_custom_platforms(tmp_path: Path) -> None:
     path, noise = tmp_path / "scene.yaml", "  noise: {kind: constant, std: [0.02, 3.0]}"
     path.write_text(changed((noise, f"{noise}\n  price: speed")))
     shown = CliRunner().invoke(app, ["check", str(path)])

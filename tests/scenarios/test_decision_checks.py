@@ -76,7 +76,7 @@ def test_sequences_of_decisions_are_sums_over_labels(settings: PlanningSettings,
     JointPlanner(sensors, fusion, settings, reward, SequentialGreedy())
 
 
-def test_a_strategy_that_a_scenario_has_no_part_for_is_named_before_the_run() -> None:
+def test_a_strategy_without_its_parts_is_reported_before_the_run() -> None:
     with pytest.raises(
         InputError, match=r"planner lookahead: expected joint or another, as with control.association full"
     ):
@@ -144,7 +144,7 @@ LABELS = ("{kind: cm_delta_glmb, weights: [0.5, 0.5]}", "{kind: clmb, matching: 
         ),
     ],
 )
-def test_code_of_ones_own_is_tried_with_the_parts_around_it(
+def test_custom_code_is_tried_with_the_parts_around_it(
     changes: tuple[tuple[str, str], ...], wanted: str, tmp_path: Path
 ) -> None:
     from vedette.scenarios import load_scenario

@@ -9,7 +9,7 @@ import pytest
 
 from vedette.control import Plan
 from vedette.densities import GLMB, LMB, FactoredGLMB, TrackTable, as_glmb
-from vedette.scenarios import Scenario, load_scenario, with_fields
+from vedette.scenarios import Scenario, load_scenario, replace_fields
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.tracking import State
 
@@ -46,7 +46,7 @@ def open_names() -> tuple[LMB, GLMB]:
 def planned(filters: str, fusion: str, planner: str, held: Any = None, **fields: Any) -> tuple[Scenario, Plan]:
     """A decision of `paper-a` on a belief; without one on that of three targets, as this filter would hold it."""
     changes = {"filter.kind": filters, "fusion.kind": fusion, **fields}
-    scenario = with_fields(load_scenario("paper-a"), changes)
+    scenario = replace_fields(load_scenario("paper-a"), changes)
     decides, held = build_planner(scenario, planner, 1), held or FILTERS[filters](belief())
     assert decides is not None
     poses = build_experiment(scenario).poses
@@ -82,7 +82,7 @@ def test_the_expected_loss_is_the_same_under_any_fusion_and_filter(fusion: str) 
 
 @pytest.mark.parametrize("reward", ["cauchy_schwarz", "expected_loss"])
 @pytest.mark.parametrize("filters", ["factored_glmb", "delta_glmb", "m_delta_glmb"])
-def test_open_names_are_settled_before_a_decision(filters: str, reward: str) -> None:
+def test_ambiguous_labels_are_resolved_before_a_decision(filters: str, reward: str) -> None:
     """Not half way between the two places where each may be."""
     settled, swapped = open_names()
     held = FactoredGLMB.from_glmb(swapped) if filters == "factored_glmb" else swapped
@@ -119,7 +119,7 @@ def test_two_scans_count_twice_under_any_filter() -> None:
         ("delta_glmb", "arithmetic_average", "cauchy_schwarz", "arithmetic_average"),
     ],
 )
-def test_plans_say_where_scans_count_in_full_and_tracks_are_fused_otherwise(
+def test_plans_warn_where_decisions_update_fully_and_tracks_are_fused_otherwise(
     filters: str, fusion: str, reward: str, said: str | None
 ) -> None:
     _, plan = planned(filters, fusion, "jdm", **{"control.reward": {"kind": reward}})
@@ -139,7 +139,7 @@ def test_greedy_searches_go_with_glmb_filters_whose_scans_count_in_full() -> Non
 
 
 @pytest.mark.parametrize("planner", ["jdm", "idm", "lookahead"])
-def test_plans_say_that_radio_does_not_hold_for_decisions(planner: str) -> None:
+def test_plans_warn_that_decisions_ignore_the_network(planner: str) -> None:
     said = "decided by one who hears every sensor at once, whatever the network lets through"
     for network, wanted in (({"radio_range": 300.0}, True), ({"delay": 2}, True), ({}, False), (None, False)):
         _, plan = planned("lmb", "sequential", planner, network=network)

@@ -54,13 +54,13 @@ sys.path.insert(0, {tools!r})
 from pathlib import Path
 from docs_fields import FieldPages
 from vedette.errors import ScenarioError
-from vedette.scenarios import json_schema, load_scenario, with_fields
+from vedette.scenarios import json_schema, load_scenario, replace_fields
 from vedette.scenarios.build import build_sensors
 
 scenario = load_scenario("two-searchers")
-changed = with_fields(scenario, {{"filter.limits.max_forgotten": 9}})
+changed = replace_fields(scenario, {{"filter.limits.max_forgotten": 9}})
 try:
-    with_fields(scenario, {{"filter.limits.max_forgotten": 0}})
+    replace_fields(scenario, {{"filter.limits.max_forgotten": 0}})
 except ScenarioError as error:
     refused = str(error)
 print(json.dumps({{
@@ -149,10 +149,10 @@ class LastSearch:
 
 AFTER_KIND = """
 import json
-from vedette.scenarios import json_schema, load_scenario, with_fields
+from vedette.scenarios import json_schema, load_scenario, replace_fields
 from vedette.scenarios.build import build_planner
 
-changed = with_fields(load_scenario("two-searchers"), {"control.search": {"kind": "last", "times": 4}})
+changed = replace_fields(load_scenario("two-searchers"), {"control.search": {"kind": "last", "times": 4}})
 search = build_planner(changed, "jdm").search
 print(json.dumps([type(search).__name__, search.times, json_schema()["$defs"]["LastSearch"]["properties"]["times"]]))
 """
@@ -211,15 +211,15 @@ AFTER_METHOD = """
 import json
 import numpy as np
 from vedette.errors import ScenarioError
-from vedette.scenarios import json_schema, load_scenario, with_fields
+from vedette.scenarios import json_schema, load_scenario, replace_fields
 from vedette.scenarios.build import build_sensors
 
 fields = {"filter.kind": "lmb", "filter.assignment": {"kind": "alone", "sharpness": 0.5}}
 try:
-    with_fields(load_scenario("two-searchers"), fields | {"filter.kind": "factored_glmb"})
+    replace_fields(load_scenario("two-searchers"), fields | {"filter.kind": "factored_glmb"})
 except ScenarioError as error:
     refused = str(error)
-local = build_sensors(with_fields(load_scenario("two-searchers"), fields))[0].filter
+local = build_sensors(replace_fields(load_scenario("two-searchers"), fields))[0].filter
 local.step(local.initial(), [], [0.0, 0.0, 0.0], 1.0, 1, rng=np.random.default_rng(0))
 default = json_schema()["$defs"]["AloneAssignment"]["properties"]["sharpness"]["default"]
 print(json.dumps([local.assignment.sharpness, default, refused]))

@@ -64,7 +64,7 @@ def test_every_section_is_on_one_page(monkeypatch: pytest.MonkeyPatch) -> None:
         assert all(f"\n| `{field}` |" in table for field in section["properties"]), name
 
 
-def test_a_section_without_a_page_is_a_fault(tmp_path: Path) -> None:
+def test_a_section_without_a_page_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "fields").mkdir()
     (tmp_path / "fields" / "one.md").write_text("<!-- fields: motion Time -->\n\n<!-- fields: Time -->\n", "utf-8")
     told = load("tools/docs_fields.py").FieldPages(tmp_path).faults()

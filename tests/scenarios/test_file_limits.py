@@ -13,8 +13,8 @@ from vedette.campaigns.spec import load_spec, parse_spec
 from vedette.errors import InputError, ScenarioError
 from vedette.models.arguments import reject
 from vedette.scenarios import load_scenario, parse_scenario
-from vedette.scenarios.overrides import with_fields
-from vedette.scenarios.yaml_reader import MOST_BYTES, read_yaml
+from vedette.scenarios.overrides import replace_fields
+from vedette.scenarios.yaml_reader import MAX_BYTES, read_yaml
 
 
 def faults(text: str) -> list[str]:
@@ -40,7 +40,7 @@ def test_the_halves_that_json_writes_are_one_letter() -> None:
     assert read_yaml(json.dumps({"a": "\U0001f6a2"}), "f").data == {"a": "\U0001f6a2"}
 
 
-def test_no_message_has_letters_that_no_screen_shows() -> None:
+def test_messages_have_printable_characters_alone() -> None:
     text = (
         MINIMAL
         + '"\\e[31m\\u202e": 1\n'
@@ -78,8 +78,8 @@ def test_work_grows_with_the_length_of_the_file(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_a_file_too_long_is_not_read() -> None:
-    assert faults("#" * (MOST_BYTES + 1)) == [
-        f"f:1:1: expected a file of at most {MOST_BYTES} letters, got {MOST_BYTES + 1}"
+    assert faults("#" * (MAX_BYTES + 1)) == [
+        f"f:1:1: expected a file of at most {MAX_BYTES} letters, got {MAX_BYTES + 1}"
     ]
 
 
@@ -90,14 +90,14 @@ def test_numbers_of_thousands_of_digits_are_words() -> None:
 
 
 @pytest.mark.parametrize("name", ["x" * 10_000, "a\x00b", "\udcff"])
-def test_a_name_that_no_file_can_have_is_a_file_that_is_not_there(name: str, tmp_path: Path) -> None:
+def test_an_impossible_file_name_is_a_missing_file(name: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="expected a YAML file or one of") as error:
         load_scenario(name)
     assert str(error.value).isprintable()
     assert len(str(error.value)) < 1000
     section = {"kind": "recorded", "path": f"{name}.csv"}
     with pytest.raises(ScenarioError, match=r"targets.*(no such file|string)"):
-        with_fields(parse(tmp_path), {"targets": section})
+        replace_fields(parse(tmp_path), {"targets": section})
 
 
 def parse(folder: Path):
@@ -109,7 +109,7 @@ def parse(folder: Path):
 @pytest.mark.parametrize("index", ["\u00b2", "\u0663", "9" * 5000, "-1"])
 def test_an_index_is_a_plain_number(index: str, tmp_path: Path) -> None:
     with pytest.raises(ScenarioError, match=r"expected \* or a number below 2 after sensors"):
-        with_fields(parse(tmp_path), {f"sensors.{index}.speed": 1.0})
+        replace_fields(parse(tmp_path), {f"sensors.{index}.speed": 1.0})
 
 
 @pytest.mark.parametrize("text", ["a = " + "[" * 5000, "a = " + "{b=" * 5000])
@@ -152,4 +152,4 @@ def test_numbers_of_any_kind_are_written_as_numbers(got: object, text: str) -> N
 
 def test_a_number_of_numpy_in_a_field_set_by_path_is_written_as_a_number(tmp_path: Path) -> None:
     with pytest.raises(ScenarioError, match=r"got -0\.9$"):
-        with_fields(parse(tmp_path), {"ospa.cutoff": np.float64(-0.9)})
+        replace_fields(parse(tmp_path), {"ospa.cutoff": np.float64(-0.9)})

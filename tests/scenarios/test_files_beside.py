@@ -52,7 +52,7 @@ def test_recorded_ships_with_longitude_and_latitude(ships: Path) -> None:
     np.testing.assert_allclose(truth.states[:, 2:], np.tile([1e-4 * east, 0.0], (40, 1)), rtol=5e-3, atol=1e-3)
 
 
-def test_recorded_targets_end_at_the_region_unless_told_otherwise(ships: Path) -> None:
+def test_recorded_targets_end_at_the_region_by_default(ships: Path) -> None:
     rows = "time,id,x,y\n" + "".join(f"{time},a,{30 * time - 150},0\n" for time in range(11))
     (ships / "straight.csv").write_text(rows, encoding="utf-8")
     cropped = load_scenario(written(ships, "  {kind: recorded, path: straight.csv}"))
@@ -86,21 +86,21 @@ def test_recorded_targets_of_a_parquet_file(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_columns_that_are_not_there(ships: Path, targets: str, fault: str) -> None:
+def test_missing_columns(ships: Path, targets: str, fault: str) -> None:
     file = written(ships, targets)
     with pytest.raises(ScenarioError) as error:
         load_scenario(file)
     assert error.value.faults == [f"{file}:{fault}"]
 
 
-def test_the_running_program_is_no_module_to_take_models_from(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_models_cannot_be_imported_from_main(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "typed_at_a_prompt", ModuleType("typed_at_a_prompt"))
     custom = "{kind: custom, function: 'typed_at_a_prompt:motion', state_dim: 4}"
     with pytest.raises(ScenarioError, match=r"motion\.function: expected a module that Python finds"):
         parse_scenario(changed(("{kind: constant_velocity, sigma_v: 1.0}", custom)))
 
 
-def test_a_recorded_file_that_is_no_table(ships: Path) -> None:
+def test_a_recorded_file_that_is_not_a_table(ships: Path) -> None:
     (ships / "broken.csv").write_text("time,id,x,y\n0,a,1\n", encoding="utf-8")
     with pytest.raises(ScenarioError, match=r"broken\.csv, row 2: expected 4 cells"):
         load_scenario(written(ships, "  {kind: recorded, path: broken.csv}"))

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from vedette.evaluation import custom_metrics, measure_run, run_scenario
-from vedette.scenarios import Scenario, parse_scenario, with_fields
+from vedette.scenarios import Scenario, parse_scenario, replace_fields
 from vedette.scenarios.build import build_targets
-from vedette.scenarios.cautions import cautions
 from vedette.scenarios.generated import PATTERNS, VIEWS, GeneratedScene, scene_text
 from vedette.scenarios.sections.tracking import Filter
+from vedette.scenarios.warnings import scenario_warnings
 
 
 def scenario(**settings: Any) -> Scenario:
@@ -28,7 +28,7 @@ def test_scenes_of_any_size_are_valid(num_sensors: int, pattern: str, view: str)
     assert model.name == f"{pattern}-{view}-{num_sensors}"
     assert (len(model.sensors), len(model.birth.sites)) == (num_sensors, 2 * num_sensors)
     assert model.decision_steps == tuple(range(1, 60))
-    assert cautions(found) == ()
+    assert scenario_warnings(found) == ()
     truth = build_targets(found).truth(model.time.build(), rng=np.random.default_rng(0))
     assert np.abs(truth.states[:, :2]).max() <= model.region.x_max + 100.0
 
@@ -40,15 +40,15 @@ def test_a_scene_has_labels_for_all_its_targets(settings: tuple[int, int | None]
     found = scenario(num_sensors=settings[0], num_targets=settings[1])
     assert isinstance(found.model.filter, Filter)
     assert found.model.filter.limits.max_labels == most
-    assert cautions(found) == ()
-    short = with_fields(found, {"filter.limits.max_labels": len(found.model.birth.sites) - 1})
-    assert "labels are kept" in cautions(short)[0]
+    assert scenario_warnings(found) == ()
+    short = replace_fields(found, {"filter.limits.max_labels": len(found.model.birth.sites) - 1})
+    assert "labels are kept" in scenario_warnings(short)[0]
 
 
 def test_more_targets_than_a_filter_keeps_by_default_are_all_tracked() -> None:
     """Four targets a sensor: 240, of which a cap of 200 would lose 40."""
     short = {"time.num_steps": 4, "control.decision_steps": []}
-    found = with_fields(scenario(num_sensors=60, num_targets=240), short)
+    found = replace_fields(scenario(num_sensors=60, num_targets=240), short)
     record = run_scenario(found, "still", seed=0)
     assert len(record.estimates[-1].labels) > 225
 
@@ -101,7 +101,7 @@ def test_sensors_are_spread_evenly_over_an_area_that_grows_with_their_number(num
 @pytest.mark.parametrize("view", VIEWS)
 def test_a_scene_runs_and_its_truth_is_drawn_anew_in_each_run(view: str) -> None:
     whole = scenario(num_sensors=2, view=view)
-    short = with_fields(whole, {"time.num_steps": 6, "control.decision_steps": [2, 4], "control.num_samples": 2})
+    short = replace_fields(whole, {"time.num_steps": 6, "control.decision_steps": [2, 4], "control.num_samples": 2})
     runs = {(name, run): run_scenario(short, name, seed=0, run=run) for name in ("jdm", "random") for run in (0, 1)}
     for run in (0, 1):
         np.testing.assert_array_equal(runs["jdm", run].truth.states, runs["random", run].truth.states)

@@ -9,11 +9,11 @@ import pytest
 
 from vedette.errors import ScenarioError
 from vedette.evaluation import run_scenario
-from vedette.scenarios import GeneratedCrowd, Scenario, crowd_text, list_builtin, parse_scenario, with_fields
+from vedette.scenarios import GeneratedCrowd, Scenario, crowd_text, list_builtin, parse_scenario, replace_fields
 from vedette.scenarios.build import build_targets
-from vedette.scenarios.cautions import cautions
 from vedette.scenarios.generated_crowd import MEASURED
 from vedette.scenarios.sections.tracking import Filter
+from vedette.scenarios.warnings import scenario_warnings
 
 
 def scenario(**settings: Any) -> Scenario:
@@ -25,7 +25,7 @@ def scenario(**settings: Any) -> Scenario:
 def test_crowds_of_any_size_are_valid_and_short(num_targets: int, measured: str) -> None:
     text = crowd_text(GeneratedCrowd(num_targets=num_targets, measured=measured))
     found = Scenario(parse_scenario(text))
-    assert cautions(found) == ()
+    assert scenario_warnings(found) == ()
     assert len(text) < 3000
     model = found.model
     region = model.region.build()
@@ -71,7 +71,7 @@ def test_components_that_do_not_fit_the_motion() -> None:
 @pytest.mark.parametrize("measured", MEASURED)
 @pytest.mark.parametrize("num_targets", [10, 1000])
 def test_crowds_are_tracked_from_a_few_scans_on(num_targets: int, measured: str) -> None:
-    short = with_fields(scenario(num_targets=num_targets, measured=measured), {"time.num_steps": 8})
+    short = replace_fields(scenario(num_targets=num_targets, measured=measured), {"time.num_steps": 8})
     record = run_scenario(short, "still", seed=0, run=0)
     assert record.ospa[-1, 0] < 0.4 * 25.0
     numbers = np.array([estimate.num_targets for estimate in record.estimates])

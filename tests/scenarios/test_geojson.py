@@ -16,7 +16,7 @@ from vedette.evaluation.runs import run_scenario
 from vedette.recorded import Origin
 from vedette.scenarios import load_scenario
 from vedette.scenarios.dumping import dump_scenario
-from vedette.scenarios.overrides import with_fields
+from vedette.scenarios.overrides import replace_fields
 
 ORIGIN = Origin(-1.1171, 50.7865)
 
@@ -68,7 +68,7 @@ def test_a_scenario_that_was_read_needs_the_file_no_more(tmp_path: Path) -> None
     (tmp_path / "coast.geojson").unlink()
     (tmp_path / "again.yaml").write_text(dump_scenario(loaded.model), "utf-8")
     assert load_scenario(tmp_path / "again.yaml").model == loaded.model
-    changed = with_fields(loaded, {"time.num_steps": 12, "ospa.from_step": None, "ospa.to_step": None,
+    changed = replace_fields(loaded, {"time.num_steps": 12, "ospa.from_step": None, "ospa.to_step": None,
                                    "control.decision_steps": [4]})  # fmt: skip
     record = run_scenario(changed, "jdm", seed=1, num_threads=1)
     ways = record.poses[:, :, :2]
@@ -104,7 +104,7 @@ def test_a_hole_may_be_entered_and_its_edge_not_crossed() -> None:
         ({"type": "Polygon", "coordinates": [[[170, 0], [171, 0], [170, 1], [170, 0]]]}, "side of the globe"),
     ],
 )
-def test_files_that_are_no_zones_are_told_at_the_field(tmp_path: Path, coast: Any, message: str) -> None:
+def test_invalid_zone_files_are_reported_at_the_field(tmp_path: Path, coast: Any, message: str) -> None:
     with pytest.raises(ScenarioError, match=message) as error:
         load_scenario(scene(tmp_path, coast))
     assert "control.constraints[0].geojson: expected a GeoJSON file of polygons" in str(error.value)

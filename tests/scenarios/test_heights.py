@@ -19,10 +19,10 @@ from vedette.live.messages import read_message
 from vedette.recorded import Conventions, parse_scans
 from vedette.recorded.tables import Table, read_table
 from vedette.scenarios import load_scenario
-from vedette.scenarios.calibrated import problem_of
+from vedette.scenarios.calibration import build_problem
+from vedette.scenarios.from_recording import scenario_from_recording, scenario_from_sensors
 from vedette.scenarios.loading import Scenario, parse_scenario
-from vedette.scenarios.of_recording import scenario_of_recording, scenario_of_sensors
-from vedette.scenarios.sections.recording import sites_of
+from vedette.scenarios.sections.recording import recorded_sensors
 from vedette.scenarios.sensors_file import check_sensors_file
 
 SOLID = [kind for kind in KINDS if kind != "bearing_range"]
@@ -106,7 +106,7 @@ def test_written_scans_are_read_again() -> None:
     assert set(table["own_height_m"]) == {100.0}
     read = parse_scans(
         Table(table, range(1, len(table["time"]) + 1), "scans"),
-        sites_of(scenario.model),
+        recorded_sensors(scenario.model),
         Conventions({}, {}, "east"),
         None,
     )
@@ -141,7 +141,7 @@ def test_flight_levels_and_feet_are_read_and_a_moving_height(tmp_path: Path) -> 
         "utf-8",
     )
     assert "altitude" in check_sensors_file(tmp_path / "radars.yaml").summary
-    recording = scenario_of_recording(tmp_path / "radars.yaml", tmp_path / "scans.csv").recording
+    recording = scenario_from_recording(tmp_path / "radars.yaml", tmp_path / "scans.csv").recording
     assert recording.unused == ()
     scan = recording.scans[0][0]
     assert scan is not None
@@ -154,9 +154,9 @@ def test_lines_of_a_radar_with_elevations(tmp_path: Path) -> None:
     sensors = tmp_path / "radars.yaml"
     region = "region: {x_min: -30000, x_max: 30000, y_min: -30000, y_max: 30000}\n"
     sensors.write_text(region + sensors.read_text("utf-8"), "utf-8")
-    told = scenario_of_sensors(sensors)
+    told = scenario_from_sensors(sensors)
     line = b'{"sensor": "R", "time": 1.0, "measurements": [[0.5, 10000.0, 0.25]]}'
-    found = read_message(line, "line 1", sites_of(told.scenario.model), told.conventions)
+    found = read_message(line, "line 1", recorded_sensors(told.scenario.model), told.conventions)
     np.testing.assert_allclose(found.scan.measurements, [[0.5, 1e4, 0.25]])
     assert found.scan.pose[OWN_HEIGHT] == 30.0
 
@@ -180,7 +180,7 @@ WANTED = [
 
 
 @pytest.mark.parametrize(("change", "wanted"), list(zip(FAULTS, WANTED, strict=True)))
-def test_what_does_not_fit_heights_is_named(change: tuple[str, str], wanted: str) -> None:
+def test_settings_incompatible_with_heights_are_reported(change: tuple[str, str], wanted: str) -> None:
     text = SIMULATED.replace(*change)
     assert text != SIMULATED
     with pytest.raises(ScenarioError) as error:
@@ -191,15 +191,15 @@ def test_what_does_not_fit_heights_is_named(change: tuple[str, str], wanted: str
 
 def test_calibration_refuses_heights(tmp_path: Path) -> None:
     write(tmp_path, Aircraft(np.random.default_rng(0)), "bearing_slant_range", 2)
-    found = scenario_of_recording(tmp_path / "radars.yaml", tmp_path / "scans.csv")
+    found = scenario_from_recording(tmp_path / "radars.yaml", tmp_path / "scans.csv")
     with pytest.raises(InputError, match="sensor R: expected measurements in the plane"):
-        problem_of(found.scenario)
+        build_problem(found.scenario)
 
 
 def test_a_recording_with_heights_has_them_in_its_record(tmp_path: Path) -> None:
     write(tmp_path, Aircraft(np.random.default_rng(3)), "bearing_range_altitude", 1)
     assert "altitude_m" in read_table(tmp_path / "scans.csv").columns
-    found = scenario_of_recording(tmp_path / "radars.yaml", tmp_path / "scans.csv", speed=250.0)
+    found = scenario_from_recording(tmp_path / "radars.yaml", tmp_path / "scans.csv", speed=250.0)
     assert "also in height" in found.assumed["motion"]
     record = track_recording(found.scenario, found.recording)
     assert table_of_run(record, found.scenario)["z_m"]

@@ -10,14 +10,14 @@ import pytest
 from vedette.control import BeamSearch, HorizonPlanner, TreeSearch
 from vedette.errors import ScenarioError
 from vedette.evaluation.runs import run_scenario
-from vedette.scenarios import Scenario, load_scenario, with_fields
+from vedette.scenarios import Scenario, load_scenario, replace_fields
 from vedette.scenarios.build import build_planner, build_targets
 
 
 @pytest.fixture(scope="module")
 def gap() -> Scenario:
     """The first scans of the scene across a gap."""
-    return with_fields(
+    return replace_fields(
         load_scenario("beyond-the-gap"), {"time.num_steps": 8, "control.decision_steps": [1, 2, 3, 4, 5]}
     )
 
@@ -25,11 +25,11 @@ def gap() -> Scenario:
 @pytest.fixture(scope="module")
 def plain(gap: Scenario) -> Scenario:
     """The same without a section of its own."""
-    return with_fields(gap, {"control.lookahead": None})
+    return replace_fields(gap, {"control.lookahead": None})
 
 
 def planner_of(scenario: Scenario, lookahead: Any) -> HorizonPlanner:
-    planner = build_planner(with_fields(scenario, {"control.lookahead": lookahead}), "lookahead")
+    planner = build_planner(replace_fields(scenario, {"control.lookahead": lookahead}), "lookahead")
     assert isinstance(planner, HorizonPlanner)
     return planner
 
@@ -44,7 +44,7 @@ def test_without_a_section_the_defaults_hold(plain: Scenario) -> None:
     assert planner.settings.end == 8.0
 
 
-def test_the_section_says_how(plain: Scenario) -> None:
+def test_the_section_sets_the_planner(plain: Scenario) -> None:
     beam = planner_of(plain, {"depth": 2, "beam_width": 3, "budget": 50, "discount": 0.5, "period": 4.0})
     assert (beam.depth, beam.period, beam.budget, beam.discount) == (2, 4.0, 50, 0.5)
     assert beam.search == BeamSearch(3)
@@ -56,7 +56,7 @@ def test_constraints_are_those_of_all_strategies(gap: Scenario) -> None:
     """A wall across the gap is gone round, or not passed."""
     wall = {"kind": "keep_out", "region": {"x_min": 70.0, "x_max": 80.0, "y_min": -290.0, "y_max": 5.0}}
     apart = {"kind": "separation", "distance": 12.0}
-    walled = with_fields(gap, {"control.constraints": [wall, apart]})
+    walled = replace_fields(gap, {"control.constraints": [wall, apart]})
     record = run_scenario(walled, "lookahead", seed=1, num_threads=1)
     first, second = record.poses[:, 0, :2], record.poses[:, 1, :2]
     assert first[:, 0].max() > 100.0 or second[:, 0].max() > 100.0
@@ -67,9 +67,9 @@ def test_constraints_are_those_of_all_strategies(gap: Scenario) -> None:
     assert np.sqrt((between**2).sum(axis=2)).min() >= 12.0
 
 
-def test_who_looks_ahead_crosses_the_gap(gap: Scenario) -> None:
+def test_lookahead_crosses_the_gap(gap: Scenario) -> None:
     """A single decision that ends with its horizon has nothing to gain there; one that looks on goes, too."""
-    ends = with_fields(gap, {"control.reward": {"kind": "kullback_leibler"}})
+    ends = replace_fields(gap, {"control.reward": {"kind": "kullback_leibler"}})
     ahead, single = run_scenario(gap, "lookahead", seed=1, num_threads=1), run_scenario(ends, "jdm", seed=1)
     assert run_scenario(gap, "jdm", seed=1, num_threads=1).poses[-1, :, 0].max() > 100.0
     assert {decision.plan.planner for decision in ahead.decisions} == {"lookahead"}
@@ -99,5 +99,5 @@ def test_the_searchers_targets_differ_from_run_to_run() -> None:
 )
 def test_faults_of_targets(field: str, value: Any, message: str) -> None:
     with pytest.raises(ScenarioError) as fault:
-        with_fields(load_scenario("two-searchers"), {field: value})
+        replace_fields(load_scenario("two-searchers"), {field: value})
     assert message in str(fault.value)

@@ -17,9 +17,9 @@ from vedette.live import LiveLoop, build_live_loop
 from vedette.platforms import PlaneCompass
 from vedette.recorded import Conventions, Origin, Site, parse_scans, table_of
 from vedette.scenarios import load_scenario
-from vedette.scenarios.of_recording import scenario_of_recording, scenario_of_sensors
-from vedette.scenarios.overrides import with_fields
-from vedette.scenarios.sections.recording import sites_of
+from vedette.scenarios.from_recording import scenario_from_recording, scenario_from_sensors
+from vedette.scenarios.overrides import replace_fields
+from vedette.scenarios.sections.recording import recorded_sensors
 
 FAR = Origin(-1.05, 50.7)
 RADARS = {"A": (-1.05, 50.7), "B": (0.35, 50.7)}  # 98.9 km apart on one latitude
@@ -104,7 +104,7 @@ def test_a_ship_between_two_far_radars_is_one_track(tmp_path: Path) -> None:
         lines.append(f"{2.5 * k},{name},{distance:.1f},{bearing:.4f}")
     (tmp_path / "scans.csv").write_text("\n".join(lines) + "\n", "utf-8")
     (tmp_path / "radars.yaml").write_text(SENSORS, "utf-8")
-    made = scenario_of_recording(tmp_path / "radars.yaml", tmp_path / "scans.csv")
+    made = scenario_from_recording(tmp_path / "radars.yaml", tmp_path / "scans.csv")
     record = run_scenario(made.scenario, "still", seed=0)
     last = record.estimates[-1]
     (truth,) = FAR.to_plane([ship[0]], [ship[1]])
@@ -117,7 +117,7 @@ def far_loop(folder: Path) -> LiveLoop:
     (folder / "live.yaml").write_text(
         text.replace("bearings: north", "bearings: north, units: {bearing: deg}"), "utf-8"
     )
-    return build_live_loop(scenario_of_sensors(folder / "live.yaml"), num_threads=1)
+    return build_live_loop(scenario_from_sensors(folder / "live.yaml"), num_threads=1)
 
 
 def test_lines_and_own_headings_are_from_true_north_at_the_sensor(tmp_path: Path) -> None:
@@ -143,12 +143,12 @@ def test_scans_are_written_from_true_north_and_read_back() -> None:
         "sensors.0.compass": True,
         "sensors.1.compass": True,
     }
-    scenario = with_fields(load_scenario("paper-a"), changes)
+    scenario = replace_fields(load_scenario("paper-a"), changes)
     record = run_scenario(scenario, "random", seed=3)
     table = scan_table(record, scenario)
     assert scenario.model.origin is not None
     origin = scenario.model.origin.build()
-    found = parse_scans(table_of(table), sites_of(scenario.model), Conventions({}, {}), origin)
+    found = parse_scans(table_of(table), recorded_sensors(scenario.model), Conventions({}, {}), origin)
     np.testing.assert_allclose(np.cos(found.poses[..., 2] - record.poses[..., 2]), 1.0)
     expected = float(np.degrees(origin.azimuth(record.poses[0, 0, 2], record.poses[0, 0])) % 360.0)
     assert table["own_heading_deg"][0] == pytest.approx(expected, abs=1e-9)

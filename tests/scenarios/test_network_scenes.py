@@ -9,7 +9,7 @@ import pytest
 
 from vedette.evaluation import custom_metrics, measure_run, run_scenario, targets_in_view
 from vedette.kernels.base.types import Floats
-from vedette.scenarios import load_scenario, with_fields
+from vedette.scenarios import load_scenario, replace_fields
 from vedette.scenarios.build import build_experiment, build_targets
 from vedette.scenarios.loading import Scenario
 from vedette.simulation import Truth
@@ -70,7 +70,7 @@ def test_targets_stay_in_the_region(name: str) -> None:
 
 
 @pytest.mark.parametrize(("scene", "place"), PLACES.items())
-def test_targets_go_where_they_are_said_to_go(scene: tuple[str, int, int], place: tuple[float, float]) -> None:
+def test_targets_follow_their_script(scene: tuple[str, int, int], place: tuple[float, float]) -> None:
     name, step, target = scene
     ids, states = truth_of(load_scenario(name)).at(step - 1)
     np.testing.assert_allclose(states[ids == target][0, :2], place)
@@ -119,7 +119,7 @@ def beginning(name: str) -> Scenario:
     fields: dict[str, Any] = {"time.num_steps": NUM_SCANS, "targets": targets}
     if scenario.model.decision_steps:
         fields["control.decision_steps"] = [2, 4]
-    return with_fields(scenario, fields)
+    return replace_fields(scenario, fields)
 
 
 @pytest.mark.parametrize("name", NUMBERS)
@@ -135,7 +135,7 @@ def test_their_beginning_runs_and_what_is_seen_is_tracked(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["eight-mobile", "six-cameras"])
-def test_sensors_that_may_move_do(name: str) -> None:
+def test_mobile_sensors_move(name: str) -> None:
     scenario = beginning(name)
     poses = run_scenario(scenario, "random", seed=1, num_threads=1).poses
     moved = np.abs(np.diff(poses, axis=0)).max(axis=2) > 0.0

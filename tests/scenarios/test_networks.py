@@ -15,8 +15,8 @@ from vedette.filters import LmbFilter, MultiSensorGlmbFilter, MultiSensorLmbFilt
 from vedette.fusion import Clmb, CmDeltaGlmb, LabelMatchedFusion, ParallelUpdate
 from vedette.scenarios import Scenario, load_scenario, parse_scenario
 from vedette.scenarios.build import build_experiment
-from vedette.scenarios.cautions import cautions
-from vedette.scenarios.summary import facts
+from vedette.scenarios.summary import summary_rows
+from vedette.scenarios.warnings import scenario_warnings
 from vedette.tracking import BeliefNetwork, Central, Distributed, ScanNetwork
 
 FILTER = "kind: m_delta_glmb"
@@ -88,16 +88,16 @@ def test_deletion_by_spread_is_a_limit_of_the_filters() -> None:
     assert math.isinf(tracker_of("lmb", "{kind: clmb}").filters[0].limits.max_position_std)
 
 
-def test_show_says_what_is_sent_and_where_targets_are_born() -> None:
+def test_show_lists_messages_and_births() -> None:
     text = changed(
         (FILTER, "kind: lmb"), (FUSION, "fusion: {kind: sequential}\nnetwork: {radio_range: 80.0}"), (SITES, MEASURED)
     )
-    told = dict(facts(parse_scenario(text, "f.yaml")))
+    told = dict(summary_rows(parse_scenario(text, "f.yaml")))
     assert told["network"] == "radio range 80 m, loss 0, delay 0"
     assert told["births"] == "no site; 0.4 per scan from measurements"
 
 
-def test_beliefs_that_are_late_and_births_that_are_later_are_warned_of(tmp_path: Path) -> None:
+def test_late_beliefs_and_late_births_warn(tmp_path: Path) -> None:
     file = tmp_path / "late.yaml"
     for fusion, warned in (("{kind: clmb, feedback: true}", True), ("{kind: sequential}", False)):
         file.write_text(
@@ -107,7 +107,7 @@ def test_beliefs_that_are_late_and_births_that_are_later_are_warned_of(tmp_path:
                 (FUSION, f"fusion: {fusion}\nnetwork: {{delay: 2}}"),
             )
         )
-        told = [line for line in cautions(load_scenario(file)) if "come 2 or more scans late" in line]
+        told = [line for line in scenario_warnings(load_scenario(file)) if "come 2 or more scans late" in line]
         assert bool(told) == warned
         assert all("take fusion: {kind: sequential}" in line for line in told)
 

@@ -10,7 +10,7 @@ import pytest
 from vedette.errors import ScenarioError
 from vedette.scenarios import Scenario, load_scenario
 from vedette.scenarios.dumping import dump_scenario
-from vedette.scenarios.overrides import with_fields
+from vedette.scenarios.overrides import replace_fields
 
 
 @pytest.fixture(scope="module")
@@ -19,11 +19,11 @@ def paper() -> Scenario:
 
 
 def test_nothing_set_is_the_same_scenario(paper: Scenario) -> None:
-    assert with_fields(paper, {}) is paper
+    assert replace_fields(paper, {}) is paper
 
 
 def test_a_field_of_a_section_of_every_sensor_and_of_one(paper: Scenario) -> None:
-    changed = with_fields(
+    changed = replace_fields(
         paper,
         {"control.num_samples": 7, "sensors.*.platform.speed": 30.0, "sensors.1.platform.speed": 20.0, "ospa.order": 2},
     )
@@ -35,33 +35,33 @@ def test_a_field_of_a_section_of_every_sensor_and_of_one(paper: Scenario) -> Non
 
 
 def test_a_whole_section(paper: Scenario) -> None:
-    changed = with_fields(paper, {"estimator": {"kind": "marginal", "threshold": 0.4}})
+    changed = replace_fields(paper, {"estimator": {"kind": "marginal", "threshold": 0.4}})
     assert changed.model.estimates_by.model_dump() == {"kind": "marginal", "threshold": 0.4}
 
 
 def test_a_section_may_leave_out_what_is_at_its_default(paper: Scenario) -> None:
-    changed = with_fields(paper, {"time": {"num_steps": 40, "step_period": 2.0}, "control.decision_times": None})
+    changed = replace_fields(paper, {"time": {"num_steps": 40, "step_period": 2.0}, "control.decision_times": None})
     assert (changed.model.time.num_steps, changed.model.time.start) == (40, paper.model.time.start)
     with pytest.raises(ScenarioError, match="expected the whole section, with step_period too"):
-        with_fields(with_fields(paper, {"time.step_period": 2.0}), {"time": {"num_steps": 30}})
+        replace_fields(replace_fields(paper, {"time.step_period": 2.0}), {"time": {"num_steps": 30}})
 
 
 def test_a_field_set_to_what_it_is_changes_nothing(paper: Scenario) -> None:
-    same = with_fields(paper, {"control.num_samples": paper.model.control.num_samples})
+    same = replace_fields(paper, {"control.num_samples": paper.model.control.num_samples})
     assert same.model == paper.model
     assert dump_scenario(same.model) == dump_scenario(paper.model)
 
 
-def test_files_beside_the_scenario_stay_beside_it(tmp_path: Path) -> None:
+def test_files_next_to_the_scenario_stay_next_to_it(tmp_path: Path) -> None:
     (tmp_path / "own.py").write_text("def motion():\n    raise RuntimeError\n")
     text = dump_scenario(load_scenario("paper-a").model)
     path = tmp_path / "mine.yaml"
     path.write_text(text)
     loaded = load_scenario(path)
     custom = {"kind": "custom", "function": "own.py:motion", "state_dim": 4}
-    assert with_fields(loaded, {"motion": custom}).folder == tmp_path
+    assert replace_fields(loaded, {"motion": custom}).folder == tmp_path
     with pytest.raises(ScenarioError, match=r"motion\.function: expected a file.*other\.py"):
-        with_fields(loaded, {"motion": {**custom, "function": "other.py:motion"}})
+        replace_fields(loaded, {"motion": {**custom, "function": "other.py:motion"}})
 
 
 @pytest.mark.parametrize(
@@ -85,14 +85,14 @@ def test_files_beside_the_scenario_stay_beside_it(tmp_path: Path) -> None:
         ({"control.num_samples": -3, "ospa.cutoff": 0}, r"(?s)control\.num_samples.*ospa\.cutoff"),
     ],
 )
-def test_what_is_wrong_is_named(paper: Scenario, fields: dict[str, Any], message: str) -> None:
+def test_invalid_overrides_are_reported(paper: Scenario, fields: dict[str, Any], message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
-        with_fields(paper, fields)
+        replace_fields(paper, fields)
 
 
-def test_a_file_beside_a_built_in_scenario_is_said_to_need_a_copy() -> None:
+def test_a_file_next_to_a_built_in_scenario_needs_a_copy() -> None:
     reward = {"kind": "custom", "function": "mine.py:Reward"}
     with pytest.raises(
         ScenarioError, match=r"relative to the scenario file \(a built-in one: copy it with `vedette init`\)"
     ):
-        with_fields(load_scenario("paper-a"), {"control.reward": reward})
+        replace_fields(load_scenario("paper-a"), {"control.reward": reward})

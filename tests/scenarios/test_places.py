@@ -85,7 +85,7 @@ def loaded(tmp_path: Path, text: str) -> ScenarioModel:
     return load_scenario(tmp_path / "bay.yaml").model
 
 
-def test_places_in_degrees_may_stand_wherever_metres_may(tmp_path: Path) -> None:
+def test_positions_in_degrees_are_accepted_wherever_metres_are(tmp_path: Path) -> None:
     model: Any = loaded(tmp_path, SCENE)
 
     def at(lon: float, lat: float) -> tuple[float, float]:
@@ -150,7 +150,7 @@ def test_places_in_degrees_may_stand_wherever_metres_may(tmp_path: Path) -> None
         ("{lon: -1.1171, lat: 50.7865}", "{lon: -1.1171, lat: 95}", "origin.lat: expected a number of at most 90"),
     ],
 )
-def test_what_is_no_place_is_told_by_field(tmp_path: Path, old: str, new: str, message: str) -> None:
+def test_invalid_positions_are_reported_by_field(tmp_path: Path, old: str, new: str, message: str) -> None:
     assert old in SCENE
     with pytest.raises(ScenarioError, match=message):
         loaded(tmp_path, SCENE.replace(old, new))

@@ -23,9 +23,9 @@ from vedette.recorded import Conventions, Site, parse_scans
 from vedette.recorded.tables import Table
 from vedette.scenarios import Scenario, parse_scenario
 from vedette.scenarios.build import build_experiment, build_planner
-from vedette.scenarios.calibrated import problem_of
-from vedette.scenarios.of_recording import scenario_of_recording, scenario_of_sensors
-from vedette.scenarios.sections.recording import sites_of
+from vedette.scenarios.calibration import build_problem
+from vedette.scenarios.from_recording import scenario_from_recording, scenario_from_sensors
+from vedette.scenarios.sections.recording import recorded_sensors
 from vedette.simulation import simulate
 
 KNOT = 1852.0 / 3600.0  # m/s
@@ -97,14 +97,16 @@ def test_scans_that_are_written_are_read_again(run: tuple[Any, Scenario]) -> Non
         *("own_x_m", "own_y_m", "own_heading_rad", "own_vx_mps", "own_vy_mps"),
     ]
     read = parse_scans(
-        Table(table, range(1, len(table["time"]) + 1), "scans"), sites_of(made.model), Conventions({}, {}, "east")
+        Table(table, range(1, len(table["time"]) + 1), "scans"),
+        recorded_sensors(made.model),
+        Conventions({}, {}, "east"),
     )
     np.testing.assert_array_equal(read.poses, record.poses)
     assert (read.unused, read.notes) == ((), ())
     assert {scan.shape[1] for scans in read.scans for scan in scans if scan is not None} == {3}
 
 
-def test_a_sensor_that_moves_without_a_velocity_is_told() -> None:
+def test_a_moving_sensor_without_velocity_is_reported() -> None:
     site = Site("a", "bearing_range_rate", (0.0,) * 8)
     cells = {"time": [0.0, 1.0], "bearing_rad": [0.1, 0.1], "range_m": [50.0, 51.0], "range_rate_kn": [1.0, -2.0]}
     cells |= {"own_x": [0.0, 3.0], "own_y": [0.0, 0.0]}
@@ -157,7 +159,7 @@ def test_lines_become_tracks_with_velocities(tmp_path: Path) -> None:
         "sensors:\n  - {name: a, position: [-900.0, 0.0]}\n",
         "utf-8",
     )
-    live = build_live_loop(scenario_of_sensors(tmp_path / "radars.yaml", speed=15.0))
+    live = build_live_loop(scenario_from_sensors(tmp_path / "radars.yaml", speed=15.0))
     state = live.initial()
     for k in range(4):
         rows = [[0.0, 900.0 - 14.0 * k, -7.0], [0.0, 5000.0, 0.0]]
@@ -194,10 +196,10 @@ def test_calibrate_finds_bias_and_noise_of_range_rates(tmp_path: Path) -> None:
         "sensors:\n  - {name: a, position: [-4000.0, 0.0]}\n  - {name: b, position: [0.0, -4000.0]}\n",
         "utf-8",
     )
-    made = scenario_of_recording(tmp_path / "radars.yaml", tmp_path / "scans.csv", speed=20.0)
+    made = scenario_from_recording(tmp_path / "radars.yaml", tmp_path / "scans.csv", speed=20.0)
     assert made.scenario.model.sensors[0].clutter.max_range_rate > 9.0
     found = {
-        (each.parameter.sensor, each.parameter.name): each for each in calibrate(problem_of(made.scenario)).estimates
+        (each.parameter.sensor, each.parameter.name): each for each in calibrate(build_problem(made.scenario)).estimates
     }
     for s, bias in enumerate(biases.values()):
         assert found[s, "range_rate"].reason == ""

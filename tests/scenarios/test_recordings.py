@@ -23,9 +23,9 @@ from vedette.recorded.reports import parse_reports
 from vedette.recorded.tables import Table, read_table
 from vedette.scenarios import load_scenario
 from vedette.scenarios.dumping import dump_scenario
-from vedette.scenarios.of_recording import scenario_of_recording
-from vedette.scenarios.overrides import with_fields
-from vedette.scenarios.sections.recording import sites_of
+from vedette.scenarios.from_recording import scenario_from_recording
+from vedette.scenarios.overrides import replace_fields
+from vedette.scenarios.sections.recording import recorded_sensors
 
 SITES = (Site("north", "bearing_range", (0.0, 0.0, 0.0)), Site("south", "bearing_range", (100.0, 0.0, 0.0)))
 ROWS = [
@@ -144,7 +144,7 @@ def test_places_in_degrees_are_measured_and_sensors_carry_their_own() -> None:
 
 
 @pytest.mark.parametrize("swapped", [{"lon": 50.79, "lat": -1.12}, {"own_lon": 50.78, "own_lat": -1.13}])
-def test_longitude_and_latitude_that_are_exchanged_are_told(swapped: dict[str, float]) -> None:
+def test_exchanged_longitude_and_latitude_are_reported(swapped: dict[str, float]) -> None:
     sites = [Site("drone", "position", (0.0, 0.0, 0.0))]
     row = {"time": 0, "sensor": "drone", "lon": -1.12, "lat": 50.79, "own_lon": -1.13, "own_lat": 50.78}
     lon, lat = swapped
@@ -206,13 +206,13 @@ def test_dates_are_utc() -> None:
         ),
     ],
 )
-def test_what_cannot_be_read_is_named(rows: Any, conventions: Any, message: str) -> None:
+def test_unreadable_values_are_reported(rows: Any, conventions: Any, message: str) -> None:
     with pytest.raises(InputError) as error:
         parsed(rows, **conventions)
     assert message in str(error.value)
 
 
-def test_bad_rows_are_left_out_and_named_where_that_is_asked_for() -> None:
+def test_bad_rows_are_skipped_and_reported_on_request() -> None:
     found = parsed(changed(3, range="far"), bad_rows="skip")
     assert found.num_measurements == 3
     assert found.skipped == ("scans.csv, row 5, column 'range': expected a finite number; got 'far'",)
@@ -226,8 +226,8 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_a_recording_is_tracked_by_what_is_known_of_its_sensors_alone(folder: Path) -> None:
-    made = scenario_of_recording(folder / "radars.yaml", folder / "scans.csv", folder / "truth.csv")
+def test_a_recording_is_tracked_from_its_sensor_models_alone(folder: Path) -> None:
+    made = scenario_from_recording(folder / "radars.yaml", folder / "scans.csv", folder / "truth.csv")
     assert list(made.assumed) == ["region", "motion", "survival", "birth", "clutter"]
     record = run_scenario(made.scenario, "still", seed=0)
     assert (record.planner, record.num_scans) == ("recorded", len(made.recording.times))
@@ -246,14 +246,14 @@ def test_a_recording_is_tracked_by_what_is_known_of_its_sensors_alone(folder: Pa
 
 def test_the_example_is_tracked() -> None:
     place = Path(__file__).parents[2] / "examples/recording"
-    made = scenario_of_recording(place / "radars.yaml", place / "scans.csv", place / "truth.csv")
+    made = scenario_from_recording(place / "radars.yaml", place / "scans.csv", place / "truth.csv")
     record = run_scenario(made.scenario, "still", seed=0)
     assert (record.num_scans, record.estimates[-1].num_targets) == (195, 3)
     assert record.ospa[:, 0].mean() < 40.0
 
 
-def test_a_sensor_that_moves_is_where_it_first_says_until_then(folder: Path) -> None:
-    made = scenario_of_recording(folder / "radars.yaml", folder / "scans.csv")
+def test_a_moving_sensor_is_at_its_first_position_until_then(folder: Path) -> None:
+    made = scenario_from_recording(folder / "radars.yaml", folder / "scans.csv")
     first = next(k for k, scans in enumerate(made.recording.scans) if scans[1] is not None)
     assert first > 0
     np.testing.assert_array_equal(made.recording.poses[0, 1], made.recording.poses[first, 1])
@@ -264,13 +264,13 @@ def test_zones_are_kept(folder: Path) -> None:
     zone = "control:\n  decision_steps: [3]\n  constraints: [{kind: keep_out, polygon: [[0, 0], [900, 0], [0, 900]]}]\n"
     text = (folder / "radars.yaml").read_text("utf-8")
     (folder / "radars.yaml").write_text(text + zone, "utf-8")
-    model: Any = scenario_of_recording(folder / "radars.yaml", folder / "scans.csv").scenario.model
+    model: Any = scenario_from_recording(folder / "radars.yaml", folder / "scans.csv").scenario.model
     assert [constraint.kind for constraint in model.control.constraints] == ["keep_out"]
     assert model.decision_steps == ()
 
 
 def test_without_the_targets_reports_nothing_is_scored(folder: Path) -> None:
-    made = scenario_of_recording(folder / "radars.yaml", folder / "scans.csv")
+    made = scenario_from_recording(folder / "radars.yaml", folder / "scans.csv")
     record = run_scenario(made.scenario, "still", seed=0)
     assert np.isnan(record.ospa).all()
     assert set(table_of_run(record, made.scenario)["target"]) == {None}
@@ -280,7 +280,7 @@ def test_without_the_targets_reports_nothing_is_scored(folder: Path) -> None:
         assert one.means.tobytes() == other.means.tobytes()
 
 
-def test_what_is_said_is_not_assumed(folder: Path) -> None:
+def test_given_sections_are_not_assumed(folder: Path) -> None:
     said = (
         "motion: {kind: constant_velocity, sigma_v: 0.2}\nregion: {x_min: -9e3, x_max: 9e3, y_min: -9e3, y_max: 9e3}\n"
     )
@@ -288,7 +288,7 @@ def test_what_is_said_is_not_assumed(folder: Path) -> None:
     (folder / "radars.yaml").write_text(
         text.replace("detection:", "clutter: {kind: region, rate: 2.0}\n  detection:") + said
     )
-    made = scenario_of_recording(folder / "radars.yaml", folder / "scans.csv")
+    made = scenario_from_recording(folder / "radars.yaml", folder / "scans.csv")
     assert list(made.assumed) == ["survival", "birth"]
     assert made.scenario.model.motion.sigma_v == 0.2
     assert made.scenario.model.sensors[0].clutter.rate == 2.0
@@ -307,16 +307,16 @@ def test_what_is_said_is_not_assumed(folder: Path) -> None:
         ),
     ],
 )
-def test_faults_of_the_file_about_sensors_are_told(folder: Path, old: str, new: str, message: str) -> None:
+def test_errors_in_the_sensor_file_are_reported(folder: Path, old: str, new: str, message: str) -> None:
     text = (folder / "radars.yaml").read_text("utf-8")
     assert old in text
     (folder / "radars.yaml").write_text(text.replace(old, new), "utf-8")
     with pytest.raises((ScenarioError, InputError), match=message):
-        scenario_of_recording(folder / "radars.yaml", folder / "scans.csv")
+        scenario_from_recording(folder / "radars.yaml", folder / "scans.csv")
 
 
 def test_a_recording_goes_with_no_decisions_and_no_invented_targets(folder: Path) -> None:
-    made = scenario_of_recording(folder / "radars.yaml", folder / "scans.csv")
+    made = scenario_from_recording(folder / "radars.yaml", folder / "scans.csv")
     text = dump_scenario(made.scenario.model, folder=folder)
     for old, new, message in (
         ("{kind: unknown}", "{kind: scripted, tracks: []}", "targets.kind: expected recorded or unknown"),
@@ -335,7 +335,7 @@ def test_tracks_are_written_as_others_read_them(folder: Path) -> None:
 
     from pyarrow import parquet
 
-    made = scenario_of_recording(folder / "radars.yaml", folder / "scans.csv", folder / "truth.csv")
+    made = scenario_from_recording(folder / "radars.yaml", folder / "scans.csv", folder / "truth.csv")
     columns = table_of_run(run_scenario(made.scenario, "still", seed=0), made.scenario)
     for ending in ("csv", "parquet", "geojson"):
         write_tracks(folder / "deep" / f"tracks.{ending}", columns)
@@ -361,7 +361,7 @@ def test_a_ship_keeps_its_track_over_a_gap(folder: Path) -> None:
     import json
 
     silence(folder / "scans.csv", 45.0, 75.0)
-    made = scenario_of_recording(folder / "radars.yaml", folder / "scans.csv", folder / "truth.csv")
+    made = scenario_from_recording(folder / "radars.yaml", folder / "scans.csv", folder / "truth.csv")
     record = run_scenario(made.scenario, "still", seed=0)
     joins = joins_of_run(record, made.scenario)
     tables = [table_of_run(record, made.scenario, own) for own in ((), joins)]
@@ -394,7 +394,7 @@ def test_a_globe_has_the_tracks_at_their_times(folder: Path) -> None:
     import datetime
     import json
 
-    made = scenario_of_recording(folder / "radars.yaml", folder / "scans.csv", folder / "truth.csv")
+    made = scenario_from_recording(folder / "radars.yaml", folder / "scans.csv", folder / "truth.csv")
     columns = table_of_run(run_scenario(made.scenario, "still", seed=0), made.scenario)
     write_tracks(folder / "tracks.czml", columns)
     head, *packets = json.loads((folder / "tracks.czml").read_text("utf-8"))
@@ -419,7 +419,7 @@ def test_a_log_has_the_tracks_at_their_times(folder: Path) -> None:
     import json
 
     reader = pytest.importorskip("mcap.reader")  # which is not there for the newest Python
-    made = scenario_of_recording(folder / "radars.yaml", folder / "scans.csv", folder / "truth.csv")
+    made = scenario_from_recording(folder / "radars.yaml", folder / "scans.csv", folder / "truth.csv")
     columns = table_of_run(run_scenario(made.scenario, "still", seed=0), made.scenario)
     write_tracks(folder / "tracks.mcap", columns)
     first = (folder / "tracks.mcap").read_bytes()
@@ -467,7 +467,7 @@ def test_biases_of_no_number_are_refused() -> None:
         Bias(clock=math.nan)
 
 
-def test_a_sensor_with_a_compass_tells_degrees_from_the_north() -> None:
+def test_a_compass_sensor_gives_degrees_from_north() -> None:
     site = Site("radar", "bearing_range", (0.0, 0.0, 0.0), compass=True)
     told = [[0.0, 10.0], [90.0, 20.0], [225.0, 30.0], [359.0, 40.0]]
     measured = site.measured(told)
@@ -488,7 +488,7 @@ def test_a_sensor_with_a_compass_tells_degrees_from_the_north() -> None:
         ("bearing", {"units": {"bearing": "rad"}}, math.degrees(math.pi / 2.0 - 0.5)),
     ],
 )
-def test_rows_of_a_compass_need_say_nothing(name: str, conventions: Any, bearing: float) -> None:
+def test_rows_of_a_compass_sensor_need_no_setting(name: str, conventions: Any, bearing: float) -> None:
     sites = [Site("radar", "bearing_range", (0.0, 0.0, 0.0), compass=True)]
     value = 0.5 if "units" in conventions else 30.0
     row = {"time": 0.0, "sensor": "radar", "range": 5.0, name: value}
@@ -498,7 +498,7 @@ def test_rows_of_a_compass_need_say_nothing(name: str, conventions: Any, bearing
     assert found.bearings == (conventions.get("bearings", "north"),)
 
 
-def test_each_sensor_tells_bearings_in_its_own_way() -> None:
+def test_each_sensor_has_its_own_bearing_convention() -> None:
     sites = [Site("a", "bearing_only", (0.0, 0.0, 0.0), compass=True), Site("b", "bearing_only", (0.0, 0.0, 0.0))]
     rows = [{"time": 0.0, "sensor": name, "bearing_deg": 30.0} for name in "ab"]
     with pytest.raises(InputError, match="column 'bearing_deg': expected bearings: north"):
@@ -521,7 +521,7 @@ def test_simulated_scans_are_written_as_they_are_read(tmp_path: Path, compass: s
         "ospa.to_step": 5,
     }
     changes |= {f"sensors.{s}.compass": True for s in {"all": (0, 1), "one": (1,), "none": ()}[compass]}
-    scenario = with_fields(load_scenario("paper-a"), changes)
+    scenario = replace_fields(load_scenario("paper-a"), changes)
     record = run_scenario(scenario, "random", seed=3)
     columns = scan_table(record, scenario)
     assert ("bearing_deg" in columns) == (compass == "all")
@@ -530,7 +530,7 @@ def test_simulated_scans_are_written_as_they_are_read(tmp_path: Path, compass: s
     told: Any = None if compass == "all" else "east"
     for name in ("scans.csv", "scans.parquet"):
         table = read_table(tmp_path / name)
-        found = parse_scans(table, sites_of(scenario.model), Conventions({}, {}, told))
+        found = parse_scans(table, recorded_sensors(scenario.model), Conventions({}, {}, told))
         np.testing.assert_allclose(found.times, record.times - record.times[0])
         np.testing.assert_allclose(found.poses[..., :2], record.poses[..., :2], atol=1e-9)
         np.testing.assert_allclose(np.cos(found.poses[..., 2] - record.poses[..., 2]), 1.0)
@@ -541,15 +541,15 @@ def test_simulated_scans_are_written_as_they_are_read(tmp_path: Path, compass: s
                 np.testing.assert_allclose(scan, drawn.measurements, rtol=1e-12, atol=1e-12)
 
 
-def test_a_scenario_says_that_its_sensors_have_a_compass(folder: Path) -> None:
+def test_a_scenario_sets_the_compass_convention(folder: Path) -> None:
     text = (folder / "radars.yaml").read_text("utf-8").replace("bearings: north", "gather: 0.0")
     text = text.replace("sensor_defaults:\n", "sensor_defaults:\n  compass: true\n")
     (folder / "radars.yaml").write_text(text, "utf-8")
-    made = scenario_of_recording(folder / "radars.yaml", folder / "scans.csv")
+    made = scenario_from_recording(folder / "radars.yaml", folder / "scans.csv")
     (folder / "north.yaml").write_text(
         text.replace("  compass: true\n", "").replace("gather: 0.0", "bearings: north"), "utf-8"
     )
-    said = scenario_of_recording(folder / "north.yaml", folder / "scans.csv")
+    said = scenario_from_recording(folder / "north.yaml", folder / "scans.csv")
     for one, other in zip(made.recording.scans, said.recording.scans, strict=True):
         for scan, expected in zip(one, other, strict=True):
             assert (scan is None) == (expected is None)
@@ -558,7 +558,7 @@ def test_a_scenario_says_that_its_sensors_have_a_compass(folder: Path) -> None:
     wrong = text.replace("{kind: bearing_range}", "{kind: custom, function: 'absent.py:f'}")
     (folder / "radars.yaml").write_text(wrong, "utf-8")
     with pytest.raises(ScenarioError, match=r"compass: expected false, as nobody knows which component"):
-        scenario_of_recording(folder / "radars.yaml", folder / "scans.csv")
+        scenario_from_recording(folder / "radars.yaml", folder / "scans.csv")
 
 
 def test_a_bias_of_a_compass_is_the_same_simulated_and_read(tmp_path: Path) -> None:
@@ -570,11 +570,11 @@ def test_a_bias_of_a_compass_is_the_same_simulated_and_read(tmp_path: Path) -> N
         "ospa.to_step": 3,
     }
     changes |= {"sensors.*.compass": True, "sensors.*.noise": {"kind": "constant", "std": [1e-9, 1e-6]}}
-    biased = with_fields(load_scenario("paper-a"), {**changes, "sensors.*.truth": {"bias": {"bearing_deg": 5.0}}})
-    honest = with_fields(load_scenario("paper-a"), changes)
+    biased = replace_fields(load_scenario("paper-a"), {**changes, "sensors.*.truth": {"bias": {"bearing_deg": 5.0}}})
+    honest = replace_fields(load_scenario("paper-a"), changes)
     write_tracks(tmp_path / "scans.csv", scan_table(run_scenario(biased, "still", seed=3), biased))
-    known = with_fields(honest, {"sensors.*.bias.bearing_deg": 5.0})
-    found = parse_scans(read_table(tmp_path / "scans.csv"), sites_of(known.model), Conventions({}, {}))
+    known = replace_fields(honest, {"sensors.*.bias.bearing_deg": 5.0})
+    found = parse_scans(read_table(tmp_path / "scans.csv"), recorded_sensors(known.model), Conventions({}, {}))
     drawn = scans_of_record(run_scenario(honest, "still", seed=3), honest)
     for scans, expected in zip(found.scans, drawn, strict=True):
         for scan, other in zip(scans, expected, strict=True):
@@ -586,7 +586,7 @@ def test_a_bias_of_a_compass_is_the_same_simulated_and_read(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize(("first", "last"), [("2016-01-12T13:02:21Z", 6.0), ("", 6.0), ("n/a", 6.0)])
-def test_one_bad_time_is_the_bad_one_wherever_it_stands(first: Any, last: float) -> None:
+def test_one_bad_time_is_located_in_any_row(first: Any, last: float) -> None:
     rows = [{**ROWS[0], "time": first}, *({**ROWS[0], "time": float(k)} for k in range(1, 7))]
     with pytest.raises(InputError, match=r"row 2, column 'time': expected a finite number of seconds; got"):
         parsed(rows)
@@ -622,12 +622,12 @@ POSITION = Site("radar", "position", (0.0, 0.0, 0.0))
         ),
     ],
 )
-def test_places_are_whole_and_say_one_thing(cells: dict[str, Any], words: str) -> None:
+def test_positions_are_complete_and_unambiguous(cells: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
         parsed([{"time": 0.0, "sensor": "radar", **cells}], [POSITION], ORIGIN)
 
 
-def test_places_that_agree_may_be_said_twice() -> None:
+def test_equal_positions_may_be_given_twice() -> None:
     lon, lat = ORIGIN.to_degrees([[2000.0, -900.0]])[0].tolist()
     row = {"time": 0.0, "sensor": "radar", "x": 2010.0, "y": -890.0, "lon": lon, "lat": lat}
     found = parsed([row, {**row, "time": 1.0, "x": "", "y": ""}], [POSITION], ORIGIN)
@@ -653,10 +653,10 @@ def test_places_that_agree_may_be_said_twice() -> None:
         ("bearings: north", "bearings: north, units: {range: [nmi]}", "recording.units"),
     ],
 )
-def test_what_is_wrong_with_a_recording_is_named(folder: Path, old: str, new: str, words: str) -> None:
+def test_invalid_recordings_are_reported(folder: Path, old: str, new: str, words: str) -> None:
     text = (folder / "radars.yaml").read_text("utf-8").replace("columns: {sensor: radar, bearing: brg_deg}, ", "")
     (folder / "radars.yaml").write_text(text.replace(old, new), "utf-8")
     with pytest.raises(ScenarioError, match=words):
-        scenario_of_recording(folder / "radars.yaml", folder / "scans.csv")
+        scenario_from_recording(folder / "radars.yaml", folder / "scans.csv")
     with pytest.raises(InputError, match="units: expected a mapping of quantities"):
         Conventions({}, 3)  # type: ignore[arg-type]

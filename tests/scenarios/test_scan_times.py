@@ -11,7 +11,7 @@ from vedette.errors import ScenarioError
 from vedette.evaluation.runs import run_scenario
 from vedette.scenarios import load_scenario
 from vedette.scenarios.build import build_experiment, build_scan_times
-from vedette.scenarios.overrides import with_fields
+from vedette.scenarios.overrides import replace_fields
 from vedette.simulation.loop import scan_flags_of_run
 from vedette.simulation.replay import scans_of
 
@@ -21,7 +21,7 @@ def of(**fields: Any) -> Any:
     whole: dict[str, Any] = {"every": 1, "first": 1, "period": None, "offset": None, "drop_out": None}
     given = {path: {**whole, **value} for path, value in fields.items()}
     short = {"time.num_steps": 12, "control.decision_steps": [4], "ospa.from_step": None, "ospa.to_step": None}
-    return with_fields(load_scenario("paper-e"), {**short, **given})
+    return replace_fields(load_scenario("paper-e"), {**short, **given})
 
 
 def test_periods_in_seconds_are_those_in_steps() -> None:
@@ -33,7 +33,7 @@ def test_periods_in_seconds_are_those_in_steps() -> None:
     assert all(a.means.tobytes() == b.means.tobytes() for a, b in zip(one.estimates, other.estimates, strict=True))
 
 
-def test_scans_drop_out_as_often_as_is_said_and_the_same_for_every_strategy() -> None:
+def test_scans_drop_out_at_the_given_probability_and_equally_for_every_strategy() -> None:
     shares = (0.0, 0.3)
     tables = [scan_flags_of_run(None, shares, 100, 5, run) for run in range(40)]
     there = np.array(tables)
@@ -51,7 +51,7 @@ def test_scans_drop_out_as_often_as_is_said_and_the_same_for_every_strategy() ->
     assert 0 < np.sum(dropped[0]) < np.size(dropped[0])
 
 
-def test_a_run_is_what_the_tracker_makes_of_the_scans_that_took_place() -> None:
+def test_a_run_equals_the_tracker_on_the_scans_that_took_place() -> None:
     scenario = of(**{"sensors.*.scans": {"drop_out": 0.4}})
     experiment, record = build_experiment(scenario), run_scenario(scenario, "still", seed=2)
     state = experiment.tracker.initial()
@@ -76,7 +76,7 @@ def test_a_run_is_what_the_tracker_makes_of_the_scans_that_took_place() -> None:
         ({"drop_out": 1.0}, r"scans.drop_out: expected a number below 1"),
     ],
 )
-def test_times_that_cannot_be_are_told(scans: Any, message: str) -> None:
+def test_impossible_times_are_reported(scans: Any, message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
         of(**{"sensors.0.scans": scans})
 
@@ -84,4 +84,6 @@ def test_times_that_cannot_be_are_told(scans: Any, message: str) -> None:
 def test_filters_that_go_on_from_each_scan_have_no_drop_outs() -> None:
     scenario = load_scenario("linear-10")
     with pytest.raises(ScenarioError, match="scans: expected every step, as phd filters go on from each scan"):
-        with_fields(scenario, {"filter": {"kind": "phd"}, "fusion": {"kind": "none"}, "sensors.*.scans.drop_out": 0.1})
+        replace_fields(
+            scenario, {"filter": {"kind": "phd"}, "fusion": {"kind": "none"}, "sensors.*.scans.drop_out": 0.1}
+        )

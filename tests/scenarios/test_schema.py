@@ -21,13 +21,13 @@ from vedette.fusion.powers import _MERGE_DISTANCE
 from vedette.recorded import Cleaning
 from vedette.recorded import RecordedTargets as RecordedSource
 from vedette.scenarios import json_schema
-from vedette.scenarios.diagnostics import kinds_of, options
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.control import Control
 from vedette.scenarios.sections.fusion import Fusion, FusionLimits
 from vedette.scenarios.sections.scoring import MarginalEstimator
 from vedette.scenarios.sections.targets import RecordedTargets
 from vedette.scenarios.sections.tracking import FilterLimits
+from vedette.scenarios.validation import known_kinds, union_members
 
 
 def sections(section: type[BaseModel] = ScenarioModel) -> Iterator[type[BaseModel]]:
@@ -40,7 +40,7 @@ def sections(section: type[BaseModel] = ScenarioModel) -> Iterator[type[BaseMode
 
 def held(annotation: Any) -> Iterator[type[BaseModel]]:
     """The sections in the type of a field."""
-    for option in options(annotation):
+    for option in union_members(annotation):
         if isinstance(option, type) and issubclass(option, BaseModel):
             yield option
         elif get_origin(option) in (tuple, dict):
@@ -58,7 +58,7 @@ def test_every_field_says_what_it_is_and_in_which_unit(section: type[BaseModel])
 
 def test_no_kind_is_also_a_key_of_its_section() -> None:
     for section in sections():
-        assert not set(kinds_of(section)) & section.model_fields.keys()
+        assert not set(known_kinds(section)) & section.model_fields.keys()
 
 
 def test_json_schema_describes_fields_and_forbids_others() -> None:

@@ -24,7 +24,7 @@ from vedette.evaluation.runs import build_score
 from vedette.scenarios import load_scenario
 from vedette.scenarios.build import build_experiment, build_tracking
 from vedette.scenarios.code_checks import code_faults
-from vedette.scenarios.of_recording import OfRecording, scenario_of_recording
+from vedette.scenarios.from_recording import RecordingScenario, scenario_from_recording
 from vedette.simulation import load_run, save_run
 from vedette.simulation.journal import RunInterrupted, RunStopped
 from vedette.simulation.records import ScansFile
@@ -60,15 +60,15 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def made(folder: Path) -> OfRecording:
-    return scenario_of_recording(folder / "radars.yaml", folder / "scans.csv", folder / "truth.csv")
+def made(folder: Path) -> RecordingScenario:
+    return scenario_from_recording(folder / "radars.yaml", folder / "scans.csv", folder / "truth.csv")
 
 
 def call(*words: str) -> Any:
     return CliRunner().invoke(app, words, env={"COLUMNS": "200"})
 
 
-def test_the_loop_is_steps_of_the_tracker_and_estimates(made: OfRecording) -> None:
+def test_the_loop_is_steps_of_the_tracker_and_estimates(made: RecordingScenario) -> None:
     parts, tracker = build_tracking(made.scenario), build_tracking(made.scenario).tracker
     record, state = track_recording(made.scenario, made.recording), tracker.initial()
     rngs = [np.random.default_rng(0)] * 2
@@ -87,7 +87,7 @@ def test_the_loop_is_steps_of_the_tracker_and_estimates(made: OfRecording) -> No
     np.testing.assert_array_equal(record.ospa, score(parts.truth, record.estimates))
 
 
-def test_a_scenario_of_a_recording_is_tracked_whatever_the_planner(made: OfRecording) -> None:
+def test_a_scenario_of_a_recording_is_tracked_whatever_the_planner(made: RecordingScenario) -> None:
     one, other = run_scenario(made.scenario, "jdm", seed=0), track_recording(made.scenario)
     assert (one.planner, one.recording) == (other.planner, other.recording)
     assert one.ospa.tobytes() == other.ospa.tobytes()
@@ -105,7 +105,7 @@ def test_every_file_is_opened_once(folder: Path, truth: bool) -> None:
     assert found["scans.csv"] <= 1
 
 
-def test_a_record_says_where_its_scans_come_from(folder: Path, made: OfRecording) -> None:
+def test_a_record_says_where_its_scans_come_from(folder: Path, made: RecordingScenario) -> None:
     record = track_recording(made.scenario, made.recording)
     assert record.recording == ScansFile("scans.csv", hashlib.sha256((folder / "scans.csv").read_bytes()).hexdigest())
     assert repr(record).startswith("RunRecord of scans from scans.csv: ")
@@ -123,7 +123,7 @@ def test_a_record_says_where_its_scans_come_from(folder: Path, made: OfRecording
         save_run(replace(record, decisions=(object(),)), folder / "other")  # type: ignore[arg-type]
 
 
-def test_results_of_before_are_read(folder: Path) -> None:
+def test_results_of_earlier_versions_are_read(folder: Path) -> None:
     """They name no file of scans, and have empty tables of decisions."""
     assert call("track", "scans.csv", "--sensors", "radars.yaml", "--out", "out").exit_code == 0
     now, record = call("results", "out"), load_run(folder / "out")
@@ -166,8 +166,8 @@ class Stopping:
     ("error", "stop", "cause"),
     [(KeyError("lost"), RunStopped, "KeyError: 'lost'"), (KeyboardInterrupt(), RunInterrupted, "interrupted")],
 )
-def test_a_run_that_stops_says_where_and_keeps_the_scans_before(
-    made: OfRecording, error: BaseException, stop: type[RunStopped | RunInterrupted], cause: str
+def test_an_interrupted_run_reports_the_scan_and_keeps_earlier_ones(
+    made: RecordingScenario, error: BaseException, stop: type[RunStopped | RunInterrupted], cause: str
 ) -> None:
     parts = build_tracking(made.scenario, made.recording)
     with pytest.raises(stop) as caught:
@@ -180,7 +180,7 @@ def test_a_run_that_stops_says_where_and_keeps_the_scans_before(
     assert record.ospa.tobytes() == whole.ospa[:3].tobytes()
 
 
-def test_every_scan_is_watched(made: OfRecording) -> None:
+def test_every_scan_is_recorded(made: RecordingScenario) -> None:
     steps = list[int]()
     track_recording(made.scenario, made.recording, progress=steps.append)
     assert steps == [*range(1, len(made.recording.times) + 1)]
@@ -199,7 +199,7 @@ class Rows:
         return np.array(self.scan, dtype)
 
 
-def test_scans_are_what_numpy_takes(made: OfRecording) -> None:
+def test_scans_are_what_numpy_takes(made: RecordingScenario) -> None:
     scans: Any = tuple(tuple(None if scan is None else Rows(scan) for scan in own) for own in made.recording.scans)
     one, other = (
         track_recording(made.scenario, each) for each in (made.recording, replace(made.recording, scans=scans))
@@ -207,7 +207,7 @@ def test_scans_are_what_numpy_takes(made: OfRecording) -> None:
     assert one.ospa.tobytes() == other.ospa.tobytes()
 
 
-def test_what_does_not_fit_together_is_refused(made: OfRecording) -> None:
+def test_inconsistent_arguments_are_refused(made: RecordingScenario) -> None:
     parts = build_tracking(made.scenario)
     one_sensor = replace(made.recording, poses=made.recording.poses[:, :1])
     with pytest.raises(InputError, match="tracker: expected the 1 sensors of the recording; got 2"):
@@ -222,7 +222,7 @@ def test_what_does_not_fit_together_is_refused(made: OfRecording) -> None:
         track_recording(load_scenario("paper-a"))
 
 
-def test_own_code_is_tried_on_the_first_scans(made: OfRecording) -> None:
+def test_custom_code_is_tried_on_the_first_scans(made: RecordingScenario) -> None:
     assert code_faults(made.scenario) == []
     parts = build_tracking(made.scenario)
     assert [parts.first(num).run(None).num_scans for num in (1, 3)] == [1, 3]

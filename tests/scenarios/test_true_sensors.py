@@ -44,7 +44,7 @@ def experiment_of(text: str) -> Any:
     return build_experiment(Scenario(parse_scenario(text), Path("x.yaml")))
 
 
-def test_what_is_simulated_and_what_the_filters_know() -> None:
+def test_simulated_and_assumed_sensors_differ() -> None:
     experiment = experiment_of(FILE)
     known, true = experiment.tracker.sensors[0], experiment.true_sensors[0]
     assert known.detection_at == "mean"
@@ -59,7 +59,7 @@ def test_what_is_simulated_and_what_the_filters_know() -> None:
     assert experiment.true_sensors[1].model is experiment.tracker.sensors[1]
 
 
-def test_a_published_detection_can_be_said_exactly() -> None:
+def test_a_published_detection_model_can_be_given_exactly() -> None:
     """.99 / (1 + exp(rho - R)) times .99 / (1 + exp(20 (|dtheta| - pi))) up to R, 0 beyond."""
     experiment = experiment_of(FILE)
     detection: DetectionModel = experiment.true_sensors[0].model.detection
@@ -82,7 +82,7 @@ def test_it_reads_back_as_it_is_written_and_defaults_are_shared() -> None:
     assert [sensor.model.detection.params[0] for sensor in true] == [0.5, 0.5]
 
 
-def test_a_measurement_of_ones_own_stands_in_for_the_filters(tmp_path: Path) -> None:
+def test_a_custom_measurement_replaces_that_of_the_filters(tmp_path: Path) -> None:
     (tmp_path / "own.py").write_text(
         "from vedette import models\n\n"
         '@models.model_function("measurement")\n'

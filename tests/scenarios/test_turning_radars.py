@@ -21,9 +21,9 @@ from vedette.recorded import Conventions, RecordedScans, Site, parse_scans
 from vedette.recorded.tables import Table
 from vedette.recorded.turns import found_turn, swept
 from vedette.scenarios import load_scenario
-from vedette.scenarios.of_recording import scenario_of_recording, scenario_of_sensors
-from vedette.scenarios.record_cautions import record_cautions
-from vedette.scenarios.sections.recording import sites_of
+from vedette.scenarios.from_recording import scenario_from_recording, scenario_from_sensors
+from vedette.scenarios.recording_warnings import recording_warnings
+from vedette.scenarios.sections.recording import recorded_sensors
 
 
 @pytest.mark.parametrize(("period", "clockwise", "num_radars"), [(2.5, True, 1), (4.0, False, 2), (12.0, True, 2)])
@@ -68,14 +68,14 @@ def test_no_turn_is_found_where_nothing_turns(seed: int) -> None:
 
 
 @pytest.mark.parametrize(("gather", "warned"), [(4.0, True), (0.0, False), (0.1, False)])
-def test_rows_that_are_gathered_too_far_apart_are_warned_of(tmp_path: Path, gather: float, warned: bool) -> None:
+def test_rows_grouped_over_too_long_a_time_warn(tmp_path: Path, gather: float, warned: bool) -> None:
     flights = Flights(np.random.default_rng(4), 6, 0.0)
     write(tmp_path, {"R": flights.rows((0.0, 0.0), Turn(4.0), 0.0, True)}, {"R": (0.0, 0.0)})
     sensors = tmp_path / "radars.yaml"
     text = sensors.read_text("utf-8").replace("east}", f"east, turns: none, gather: {gather}}}")
     sensors.write_text(text, "utf-8")
-    found = scenario_of_recording(sensors, tmp_path / "scans.csv", speed=250.0)
-    told = [words for path, words in record_cautions(found.scenario) if path == ("recording", "gather")]
+    found = scenario_from_recording(sensors, tmp_path / "scans.csv", speed=250.0)
+    told = [words for path, words in recording_warnings(found.scenario) if path == ("recording", "gather")]
     assert bool(told) is warned
     if warned:
         assert re.match(r"R: rows of one scan are [23]\.\d+ s apart \(median\), in which a target of 250 m/s", told[0])
@@ -87,9 +87,9 @@ def test_a_line_of_a_turning_radar_may_have_its_velocity(tmp_path: Path) -> None
         "  - {name: R, position: [0, 0], turn: {period: 4.0}, noise: {kind: constant, std: [0.01, 20]}}\n",
         "utf-8",
     )
-    told = scenario_of_sensors(tmp_path / "radars.yaml")
+    told = scenario_from_sensors(tmp_path / "radars.yaml")
     line = b'{"sensor": "R", "time": 10.0, "velocity": [3, -4], "times": [9.0], "measurements": [[0.5, 4000.0]]}'
-    pose = read_message(line, "line 1", sites_of(told.scenario.model), told.conventions).scan.pose
+    pose = read_message(line, "line 1", recorded_sensors(told.scenario.model), told.conventions).scan.pose
     np.testing.assert_array_equal(pose[6:8], [3.0, -4.0])
     assert is_turn(pose)
     np.testing.assert_allclose(lags(np.array([0.5]), pose), [-1.0], atol=1e-12)
@@ -128,7 +128,7 @@ def test_a_turn_that_is_given_needs_few_rows_and_none_can_be_ruled_out() -> None
     assert len(parsed(rows).times) < 60
 
 
-def test_a_line_tells_a_turn_by_the_times_of_its_measurements() -> None:
+def test_times_of_measurements_give_the_rotation_of_a_line() -> None:
     rows = np.array(Flights(np.random.default_rng(6), 8, 0.0).rows((0.0, 0.0), Turn(5.0), 1.0, True))
     recording, site = parsed(rows), Site("R", "bearing_range", (0.0, 0.0, 0.0), turn=Turn(5.0))
     still, how = [Site("R", "bearing_range", (0.0, 0.0, 0.0), turn="none")], Conventions({}, {"bearing": "rad"}, "east")
@@ -152,7 +152,7 @@ def test_a_sensors_file_gives_a_turn_of_any_period(tmp_path: Path) -> None:
     file = tmp_path / "radars.yaml"
     text = file.read_text("utf-8").replace("name: R,", "name: R, turn: {period: 5.0},")
     file.write_text(f"region: {{x_min: -60000, x_max: 60000, y_min: -60000, y_max: 60000}}\n{text}", "utf-8")
-    (site,) = sites_of(scenario_of_sensors(file, speed=250.0).scenario.model)
+    (site,) = recorded_sensors(scenario_from_sensors(file, speed=250.0).scenario.model)
     assert site.turn == Turn(5.0)
 
 
@@ -174,7 +174,7 @@ def test_a_radar_that_moves_in_its_turn(tmp_path: Path) -> None:
     (tmp_path / "scans.csv").write_text("\n".join(lines), "utf-8")
     text = (tmp_path / "radars.yaml").read_text("utf-8").replace(f"[{STD[0]}, {STD[1]}]", "[0.0026, 8.0]")
     (tmp_path / "radars.yaml").write_text(text, "utf-8")
-    found = scenario_of_recording(tmp_path / "radars.yaml", tmp_path / "scans.csv")
+    found = scenario_from_recording(tmp_path / "radars.yaml", tmp_path / "scans.csv")
     assert found.assumed["turn"] == "B once in 2.5 s, clockwise (found from bearings and times; a scan is one turn)"
     record = track_recording(found.scenario, found.recording)
     last = record.estimates[-2].means[:, :2]
@@ -233,7 +233,7 @@ def test_scans_of_a_simulated_radar_are_written_with_the_times_of_the_beam(tmp_p
     columns = scan_table(record, scenario)
     order = np.argsort(columns["time"])
     table = Table({name: [column[i] for i in order] for name, column in columns.items()}, range(len(order)), "scans")
-    read = parse_scans(table, sites_of(scenario.model), Conventions({}, {}, "east"))
+    read = parse_scans(table, recorded_sensors(scenario.model), Conventions({}, {}, "east"))
     drawn = [scan for (scan,) in scans_of_record(record, scenario) if scan is not None and len(scan.measurements)]
     assert sum(len(scan.measurements) for scan in drawn) == read.num_measurements
     for time, (scan,), poses in zip(read.start + read.times, read.scans, read.poses, strict=True):
@@ -255,7 +255,7 @@ def test_scans_of_a_simulated_radar_are_written_with_the_times_of_the_beam(tmp_p
         ("turn: {period: 5.0}", "turn: {period: 5.0}\n    measurement: {kind: range_only}", "turn: expected none"),
     ],
 )
-def test_mistakes_in_turns_are_told(tmp_path: Path, old: str, new: str, message: str) -> None:
+def test_invalid_rotations_are_reported(tmp_path: Path, old: str, new: str, message: str) -> None:
     (tmp_path / "s.yaml").write_text(SIMULATED.replace(old, new), "utf-8")
     with pytest.raises(ScenarioError, match=re.escape(message)):
         load_scenario(tmp_path / "s.yaml")

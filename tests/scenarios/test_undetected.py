@@ -17,10 +17,10 @@ from vedette.evaluation import run_scenario
 from vedette.models import CellGrid, Region, UndetectedModel
 from vedette.scenarios import Scenario, parse_scenario
 from vedette.scenarios.build import build_experiment
-from vedette.scenarios.cautions import cautions
 from vedette.scenarios.dumping import dump_scenario
 from vedette.scenarios.sections.undetected import MAX_CELLS, UndetectedSection
-from vedette.scenarios.summary import facts
+from vedette.scenarios.summary import summary_rows
+from vedette.scenarios.warnings import scenario_warnings
 from vedette.simulation.loop import run_stream
 from vedette.tracking import Central, Distributed, UndetectedTargetTracker
 
@@ -55,9 +55,9 @@ def test_a_region_of_their_own() -> None:
     tracker: Any = build_experiment(scenario(own)).tracker
     assert tracker.model.grid == CellGrid(Region(0.0, 40.0, 0.0, 50.0), 4, 5)
     assert (tracker.model.birth_rate, tracker.model.enters, tracker.model.survival) == (0.0, "anywhere", None)
-    told = dict(facts(scenario(own).model))["not yet found"]
+    told = dict(summary_rows(scenario(own).model))["not yet found"]
     assert told == ("cell 10 m, expected 1, enters anywhere, speed 0 m/s, in x 0 to 40 m, y 0 to 50 m")
-    assert "not yet found" not in dict(facts(parse_scenario(MINIMAL)))
+    assert "not yet found" not in dict(summary_rows(parse_scenario(MINIMAL)))
 
 
 def test_defaults_are_those_of_the_library() -> None:
@@ -78,12 +78,12 @@ def test_as_many_cells_as_are_allowed() -> None:
     assert 0.98 * MAX_CELLS < grid.num_cells <= MAX_CELLS
 
 
-def test_a_sensor_that_sees_less_than_half_a_cell_is_warned_of() -> None:
+def test_a_field_of_view_below_half_a_cell_warns() -> None:
     sees = ("{name: south,", "{detection: {kind: limited_range, probability: 0.9, max_range: 12.0}, name: south,")
-    found = [line for line in cautions(scenario(WHOLE, sees)) if "cells of" in line]
+    found = [line for line in scenario_warnings(scenario(WHOLE, sees)) if "cells of" in line]
     assert len(found) == 1
     assert "warning: cells of 30 m, and south sees as far as 12 m" in found[0]
-    assert not any("cells of" in line for line in cautions(scenario(WHOLE.replace("30.0", "24.0"), sees)))
+    assert not any("cells of" in line for line in scenario_warnings(scenario(WHOLE.replace("30.0", "24.0"), sees)))
 
 
 def test_a_run_is_the_same_with_and_without() -> None:
@@ -95,7 +95,7 @@ def test_a_run_is_the_same_with_and_without() -> None:
             assert estimate.means.tobytes() == another.means.tobytes()
 
 
-def test_what_is_looked_at_is_found_empty() -> None:
+def test_intensity_falls_where_sensors_look() -> None:
     experiment = build_experiment(scenario(WHOLE.replace("0.02", "0.0")))
     tracker, state = experiment.tracker, experiment.tracker.initial()
     assert state.undetected is not None
@@ -131,7 +131,7 @@ ONE = (
 BORN = ("birth:", "birth:\n  from_measurements: {expected: 0.2, std: [6.0, 6.0, 3.0, 3.0]}")
 
 
-def test_a_belief_with_an_intensity_has_them_itself() -> None:
+def test_beliefs_with_an_intensity_need_no_section() -> None:
     """The cells of the section, with the births from measurements where it gives no rate, and what came from sites."""
     tracker: Any = build_experiment(scenario(WHOLE, *ONE, BORN)).tracker
     assert isinstance(tracker, Central)
@@ -169,7 +169,9 @@ def test_planners_search_without_a_section() -> None:
 
     def anywhere(*changes: tuple[str, str]) -> Any:
         given = Scenario(parse_scenario(changed(*changes)), Path("f.yaml"))
-        return build_experiment(given).tracker.targets.birth.anywhere, "not yet found" in dict(facts(given.model))
+        return build_experiment(given).tracker.targets.birth.anywhere, "not yet found" in dict(
+            summary_rows(given.model)
+        )
 
     found, told = anywhere(*ONE, BORN)
     assert (found.birth_rate, found.prior_rate, found.expected, found.grid.num_cells) == (
@@ -191,7 +193,7 @@ def test_planners_search_without_a_section() -> None:
     record = run_scenario(given, "jdm", seed=1)
     assert any(decision.plan.explain().of_undetected for decision in record.decisions)
     wild = changed(*ONE, BORN, ("control: {", "control: {undetected_worth: 10000.0, "))
-    assert "a factor of that cost" in "".join(cautions(Scenario(parse_scenario(wild), Path("f.yaml"))))
+    assert "a factor of that cost" in "".join(scenario_warnings(Scenario(parse_scenario(wild), Path("f.yaml"))))
 
 
 def test_an_unexplained_measurement_starts_a_track_by_the_odds_of_the_intensity() -> None:
@@ -246,9 +248,9 @@ def test_a_birth_rate_is_learnt() -> None:
         pytest.approx(0.2),
         1.0,
     )  # a tenth of a target a scan
-    told = dict(facts(parse_scenario(changed(*ONE, born))))
+    told = dict(summary_rows(parse_scenario(changed(*ONE, born))))
     assert told["births"] == "1 site, steps 1, 5; at a learnt rate from measurements"
-    assert dict(facts(scenario(rate, *ONE, BORN).model))["not yet found"].startswith(
+    assert dict(summary_rows(scenario(rate, *ONE, BORN).model))["not yet found"].startswith(
         "cell 30 m, expected 1, birth rate learnt"
     )
     with pytest.raises(ScenarioError, match=r"from_measurements\.expected: expected a number, as only one belief"):

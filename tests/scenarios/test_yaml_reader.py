@@ -112,7 +112,7 @@ def test_aliases_repeat_data_and_take_its_places_inside() -> None:
         ),
     ],
 )
-def test_faults_of_the_text(text: str, messages: list[str]) -> None:
+def test_syntax_errors(text: str, messages: list[str]) -> None:
     assert [fault.message("f") for fault in read_yaml(text, "f").faults] == messages
 
 

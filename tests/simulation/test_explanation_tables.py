@@ -15,7 +15,7 @@ from simulation.test_storage import assert_same
 from vedette.control import Bound, Explanation, Plan, RunnerUp, TargetGains
 from vedette.errors import InputError
 from vedette.evaluation import run_scenario
-from vedette.scenarios import load_scenario, with_fields
+from vedette.scenarios import load_scenario, replace_fields
 from vedette.simulation.arrow import read_table, write_table
 from vedette.simulation.explanation_tables import EXPLANATION_TABLES
 from vedette.simulation.records import RunRecord
@@ -118,7 +118,7 @@ def test_a_scenario_says_whether_decisions_are_explained() -> None:
         "control.num_samples": 4,
     }
     local = {"filter.kind": "lmb", "fusion.kind": "clmb"}
-    few = with_fields(load_scenario("paper-a"), {**fields, **local})
+    few = replace_fields(load_scenario("paper-a"), {**fields, **local})
     record = run_scenario(few, "jdm", seed=1)
     for decision in record.decisions:
         plan, why = decision.plan, decision.plan.explain()
@@ -129,7 +129,7 @@ def test_a_scenario_says_whether_decisions_are_explained() -> None:
         np.testing.assert_allclose(why.baseline + why.of_sensors.sum(), why.reward, rtol=1e-9)
     again = decode_run(run_facts(record), encode_run(record), "run")
     assert str(again.decisions[1].plan.explain()) == str(record.decisions[1].plan.explain())
-    plain = run_scenario(with_fields(few, {"control.explain": False}), "jdm", seed=1)
+    plain = run_scenario(replace_fields(few, {"control.explain": False}), "jdm", seed=1)
     assert [decision.plan.explanation for decision in plain.decisions] == [None, None]
     files = encode_run(record)
     assert encode_run(plain) == {name: files[name] for name in files if name not in FILES}

@@ -17,8 +17,8 @@ from vedette.evaluation.runs import run_scenario
 from vedette.models import Bias
 from vedette.recorded import Conventions, Origin, RecordedTargets, Site, parse_scans
 from vedette.recorded.tables import read_table
-from vedette.scenarios.cautions import cautions
-from vedette.scenarios.of_recording import scenario_of_recording
+from vedette.scenarios.from_recording import scenario_from_recording
+from vedette.scenarios.warnings import scenario_warnings
 
 CATS: Any = manifest["CATS"]
 KNOT = 1852.0 / 3600.0  # m/s
@@ -243,8 +243,8 @@ def test_slant_ranges_are_warned_of(tmp_path: Path) -> None:
     (tmp_path / "radar.ast").write_bytes(b"".join(plot(5.0 * k, 5.0 + 0.1 * k, 45.0) for k in range(6)))
     text = "sensors:\n  - {name: 1/2, position: [0, 0], detection: {kind: constant, probability: .9}}\n"
     (tmp_path / "radar.yaml").write_text(text, "utf-8")
-    found = scenario_of_recording(tmp_path / "radar.yaml", tmp_path / "radar.ast")
-    assert any("6 of 6 plots have no flight level" in line for line in cautions(found.scenario))
+    found = scenario_from_recording(tmp_path / "radar.yaml", tmp_path / "radar.ast")
+    assert any("6 of 6 plots have no flight level" in line for line in scenario_warnings(found.scenario))
 
 
 def test_midnight_is_passed(tmp_path: Path) -> None:
@@ -305,7 +305,7 @@ def test_plots_are_tracked(tmp_path: Path) -> None:
         "clutter: {kind: region, rate: 0.5}}\n",
         "utf-8",
     )
-    made = scenario_of_recording(tmp_path / "radar.yaml", tmp_path / "radar.ast")
+    made = scenario_from_recording(tmp_path / "radar.yaml", tmp_path / "radar.ast")
     assert made.assumed["turn"].startswith("1/2 once in 4 s, clockwise")
     assert [len(scan) for scans in made.recording.scans for scan in scans if scan is not None][1:-1] == [3] * 24
     last = run_scenario(made.scenario, "still", seed=0).estimates[-2]

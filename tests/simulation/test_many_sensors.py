@@ -10,7 +10,7 @@ import pytest
 
 from vedette.errors import InputError
 from vedette.evaluation import run_scenario
-from vedette.scenarios import Scenario, parse_scenario, with_fields
+from vedette.scenarios import Scenario, parse_scenario, replace_fields
 from vedette.scenarios.generated import GeneratedScene, scene_text
 from vedette.simulation import decision_tables
 from vedette.simulation.arrow import read_table, write_table
@@ -24,7 +24,7 @@ from vedette.simulation.tables import run_facts
 def record(num_sensors: int, planner: str = "jdm") -> RunRecord:
     scene = Scenario(parse_scenario(scene_text(GeneratedScene(num_sensors=num_sensors))))
     short = {"time.num_steps": 3, "control.decision_steps": [1, 2]}
-    return run_scenario(with_fields(scene, short), planner, seed=0, num_threads=1)
+    return run_scenario(replace_fields(scene, short), planner, seed=0, num_threads=1)
 
 
 def read(files: dict[str, bytes], of: RunRecord) -> RunRecord:

@@ -16,7 +16,7 @@ from vedette.errors import InputError
 from vedette.recorded import RecordedTargets, table_of
 from vedette.recorded.reports import parse_reports
 from vedette.scenarios import load_scenario
-from vedette.scenarios.dumping import dump_kept
+from vedette.scenarios.dumping import dump_stored
 
 START = 1591570800
 # In the order of the tables of state vectors.
@@ -149,6 +149,6 @@ sensors: [{{position: [0, 0]}}]
     scenario = load_scenario(tmp_path / "air.yaml")
     model: Any = scenario.model
     assert len(model.targets.source(model, scenario.folder).tracks) == 2
-    (tmp_path / "kept.yaml").write_text(dump_kept(scenario), "utf-8")
+    (tmp_path / "kept.yaml").write_text(dump_stored(scenario), "utf-8")
     kept: Any = load_scenario(tmp_path / "kept.yaml").model.targets
     assert kept.sha256 == hashlib.sha256(file.read_bytes()).hexdigest()

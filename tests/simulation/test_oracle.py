@@ -16,7 +16,7 @@ from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.models import Region
 from vedette.platforms import Actions, HeadingPlatform, Operated
-from vedette.scenarios import load_scenario, with_fields
+from vedette.scenarios import load_scenario, replace_fields
 from vedette.scenarios.build import build_experiment, build_planner, build_sensors
 from vedette.simulation import OraclePlanner, RequiresTruth, Schedule, Truth, simulate
 from vedette.simulation.cramer_rao import scan_information, transition_jacobians
@@ -206,7 +206,7 @@ def test_it_keeps_to_constraints_and_wants_its_truth() -> None:
 
 
 def test_a_run_tells_it_its_truth() -> None:
-    scenario = with_fields(load_scenario("paper-a"), SHORT | {"planners": {"seer": {"kind": "oracle"}}})
+    scenario = replace_fields(load_scenario("paper-a"), SHORT | {"planners": {"seer": {"kind": "oracle"}}})
     for name in ("oracle", "seer"):
         record = simulate(build_experiment(scenario), build_planner(scenario, name), seed=1, run=0, score=no_score)
         assert [own.plan.planner for own in record.decisions] == [name]
@@ -226,7 +226,7 @@ def test_own_planners_may_be_told_it_too() -> None:
         def plan(self, state: State, poses: Any, *, rng: np.random.Generator) -> Plan:
             return FixedPlanner((Actions.of(heading_deg=0.0),) * 2).plan(state, poses, rng=rng)
 
-    scenario, plain, inside = with_fields(load_scenario("paper-a"), SHORT), Told(), Told()
+    scenario, plain, inside = replace_fields(load_scenario("paper-a"), SHORT), Told(), Told()
     sensors = build_sensors(scenario)
     watched = ConstraintReportingPlanner(
         inside, sensors, PlanningSettings(), (StayInside(Region(-9e3, 9e3, -9e3, 9e3)),)

@@ -8,7 +8,7 @@ import pytest
 
 from vedette.errors import InputError
 from vedette.evaluation import ospa_of_run, run_scenario
-from vedette.scenarios import Scenario, load_scenario, with_fields
+from vedette.scenarios import Scenario, load_scenario, replace_fields
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.simulation import SimulationRun
 from vedette.simulation.loop import PLANNER, run_stream
@@ -23,8 +23,8 @@ def of(scenario: Scenario) -> dict[str, Any]:
 @pytest.mark.parametrize("name", ["paper-a", "six-cameras"])
 def test_who_steps_it_as_the_loop_does_has_its_run(name: str) -> None:
     """Truth, poses, scans and estimates, bit for bit."""
-    scenario = with_fields(load_scenario(name), {"control.reward": {"kind": "expected_loss"}})
-    scenario = with_fields(scenario, {"control.explain": False, "control.search": {"kind": "coordinate_ascent"}})
+    scenario = replace_fields(load_scenario(name), {"control.reward": {"kind": "expected_loss"}})
+    scenario = replace_fields(scenario, {"control.explain": False, "control.search": {"kind": "coordinate_ascent"}})
     record = run_scenario(scenario, "jdm", seed=3, run=2, num_threads=1)
     experiment, planner = build_experiment(scenario), build_planner(scenario, "jdm", num_threads=1)
     assert planner is not None

@@ -14,7 +14,7 @@ from vedette.recorded import Site, without_biases
 from vedette.recorded.instants import Look, in_order
 from vedette.scenarios import load_scenario
 from vedette.scenarios.build import build_experiment
-from vedette.scenarios.overrides import with_fields
+from vedette.scenarios.overrides import replace_fields
 from vedette.simulation import CLUTTER, Experiment, TrueSensor, simulate_scan
 from vedette.simulation.loop import simulate
 from vedette.simulation.replay import scans_of
@@ -82,12 +82,12 @@ def test_what_filters_take_off_is_no_bias_any_more():
     scenario = load_scenario("paper-e")
     said: dict[str, Any] = {"sensors.0.bias.range": 20.0, "sensors.0.bias.clock": 0.5}
     said["sensors.1.bias.bearing_deg"] = 1.0
-    assert build_experiment(with_fields(scenario, said)).true_sensors == ()
+    assert build_experiment(replace_fields(scenario, said)).true_sensors == ()
     true = {"sensors.0.truth": {"bias": {"range": 50.0}}, "sensors.1.truth": {"bias": {"bearing_deg": 3.0}}}
-    first, second = build_experiment(with_fields(scenario, said | true)).true_sensors
+    first, second = build_experiment(replace_fields(scenario, said | true)).true_sensors
     assert first.bias == models.Bias(range=30.0, clock=-0.5)
     assert second.bias.bearing == pytest.approx(np.radians(2.0))
-    _, second = build_experiment(with_fields(scenario, said | true | {"sensors.1.compass": True})).true_sensors
+    _, second = build_experiment(replace_fields(scenario, said | true | {"sensors.1.compass": True})).true_sensors
     assert second.bias.bearing == pytest.approx(-np.radians(2.0))  # a compass says it clockwise
 
 

@@ -15,7 +15,7 @@ from vedette.errors import InputError
 from vedette.evaluation import run_scenario
 from vedette.models import BirthModel, CellGrid, MeasurementBirth, Region
 from vedette.platforms import Actions, HeadingPlatform
-from vedette.scenarios import load_scenario, with_fields
+from vedette.scenarios import load_scenario, replace_fields
 from vedette.scenarios.build import build_planner
 from vedette.simulation import TrueTargetsPlanner, Truth
 from vedette.tracking import State
@@ -119,7 +119,7 @@ def test_it_needs_its_truth_and_labels() -> None:
 def test_where_nothing_is_in_sight_it_goes_to_the_targets() -> None:
     """The oracle of one decision stays before the gap; `jdm` does not know in time where the targets are."""
     short = {"time.num_steps": 20, "control.decision_steps": list(range(1, 20))}
-    gap, errors = with_fields(load_scenario("beyond-the-gap"), short), {}
+    gap, errors = replace_fields(load_scenario("beyond-the-gap"), short), {}
     for name in ("told", "jdm", "oracle"):
         errors[name] = run_scenario(gap, name, seed=0, run=3).ospa[5:, 0].mean()
     assert errors["told"] < min(errors["jdm"], errors["oracle"]) - 1.0
@@ -127,7 +127,7 @@ def test_where_nothing_is_in_sight_it_goes_to_the_targets() -> None:
 
 def test_a_named_one_takes_a_reward_of_its_own_and_looks_for_nothing() -> None:
     named = {"planners": {"floor": {"kind": "told", "reward": {"kind": "peecs"}}}, "control.association": "known"}
-    scenario = with_fields(load_scenario("paper-a"), named)
+    scenario = replace_fields(load_scenario("paper-a"), named)
     built: Any = build_planner(scenario, "floor")
     assert built.name == "floor"
     assert type(built.planner.planner.reward).__name__ == "PeecsReward"

@@ -9,7 +9,7 @@ import pytest
 
 from vedette.errors import InputError
 from vedette.evaluation.runs import run_scenario
-from vedette.scenarios import load_scenario, with_fields
+from vedette.scenarios import load_scenario, replace_fields
 from vedette.simulation import RunRecord
 from vedette.simulation.tables import record_of, run_facts, tables_of
 from vedette.simulation.undetected_tables import with_undetected
@@ -19,7 +19,7 @@ SHORT = {"time.num_steps": 12, "control.decision_steps": [4, 8], "filter": {"kin
 
 @pytest.fixture(scope="module")
 def record() -> RunRecord:
-    return run_scenario(with_fields(load_scenario("two-searchers"), SHORT), "jdm", seed=0)
+    return run_scenario(replace_fields(load_scenario("two-searchers"), SHORT), "jdm", seed=0)
 
 
 def test_tables_give_back_what_was_expected_where(record: RunRecord) -> None:
@@ -36,7 +36,7 @@ def test_tables_give_back_what_was_expected_where(record: RunRecord) -> None:
 
 
 def test_runs_without_explanations_or_search_have_no_table() -> None:
-    scene = with_fields(load_scenario("two-searchers"), {**SHORT, "control.explain": False})
+    scene = replace_fields(load_scenario("two-searchers"), {**SHORT, "control.explain": False})
     assert "undetected" not in tables_of(run_scenario(scene, "jdm", seed=0))
     assert "undetected" not in tables_of(run_scenario(scene, "nearest", seed=0))
 

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tracking.test_late_scans import DRAW, TRACKERS, assert_equal_bits, tracker_of
 
 from tracking.scenes import rngs
+from tracking.test_out_of_sequence import DRAW, TRACKERS, assert_equal_bits, tracker_of
 from vedette.errors import InputError, ScenarioError
 from vedette.evaluation.runs import run_scenario
 from vedette.kernels.base.types import Floats
-from vedette.scenarios import load_scenario, with_fields
+from vedette.scenarios import load_scenario, replace_fields
 from vedette.scenarios.build import build_experiment
 from vedette.simulation import simulate_scans
 from vedette.tracking import (
@@ -94,7 +94,7 @@ def test_the_density_is_that_of_the_scans_that_have_arrived(name: str, window: f
 
 def scene(**late: Any) -> Any:
     changes = {"sensors.1.scans.late": {**LATE, **late}, "control.decision_steps": [6]}
-    return with_fields(load_scenario("paper-e"), changes)
+    return replace_fields(load_scenario("paper-e"), changes)
 
 
 def test_a_scenario_has_it_and_a_run_is_the_same_again() -> None:

@@ -15,7 +15,7 @@ from tracking.scenes import filters, sensor, targets
 from vedette.errors import InputError
 from vedette.scenarios import load_scenario
 from vedette.scenarios.build import build_experiment
-from vedette.scenarios.overrides import with_fields
+from vedette.scenarios.overrides import replace_fields
 from vedette.simulation import simulate_scan
 from vedette.tracking import (
     Distributed,
@@ -61,7 +61,7 @@ WINDOW = 6.0
 
 
 def tracker_of(changes: dict[str, Any]) -> tuple[Tracker, Any]:
-    experiment = build_experiment(with_fields(load_scenario("paper-e"), changes))
+    experiment = build_experiment(replace_fields(load_scenario("paper-e"), changes))
     return experiment.tracker, experiment
 
 

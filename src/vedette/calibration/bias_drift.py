@@ -107,8 +107,8 @@ class OnlineBiasEstimator:
     linearly through the estimate of the window before, with the change d shrunk by d^2 / (d^2 + var d).
 
     Attributes:
-        problem: the sensors and their parameters, see `vedette.scenarios.calibrated.problem_of`; its recording gives
-            the zero of the bearings.
+        problem: the sensors and their parameters, see `vedette.scenarios.calibration.build_problem`; its recording
+            gives the zero of the bearings.
         window: duration of the scans that an estimate uses, s.
         every: time between estimates, s.
 

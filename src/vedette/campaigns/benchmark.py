@@ -24,7 +24,7 @@ from vedette.campaigns.spec import CampaignSpec
 from vedette.errors import InputError, VedetteError
 from vedette.internal.programs import start_program
 from vedette.scenarios import GeneratedCrowd
-from vedette.scenarios.build import build_experiment, build_planner, told_of
+from vedette.scenarios.build import build_experiment, build_planner, scene_for_program
 from vedette.scenarios.generated import GeneratedScene, scene_text
 from vedette.scenarios.generated_crowd import crowd_text
 from vedette.scenarios.sections.base import sections_in
@@ -166,7 +166,7 @@ def check_entrant(own: Entrant, campaign: Campaign) -> None:
         for _, section in sections_in(scenario.model):
             if isinstance(section, ProgramSection):
                 asked = section.asked(scenario.folder)
-                scene, seconds = told_of(scenario), asked["start_seconds"]
+                scene, seconds = scene_for_program(scenario), asked["start_seconds"]
                 start_program(asked["command"], asked["folder"], own.role, scene, rng, seconds)
     except VedetteError as error:
         raise InputError(f"{own.role} {own.name}: expected one that can be started; {error}") from None

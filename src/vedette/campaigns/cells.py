@@ -17,10 +17,10 @@ from vedette.internal.representation import SummaryRepr
 from vedette.internal.text import pluralise, unique_name
 from vedette.scenarios import Scenario, list_builtin, load_scenario
 from vedette.scenarios.build import build_planner
-from vedette.scenarios.dumping import dump_scenario, files_of
-from vedette.scenarios.overrides import with_fields
+from vedette.scenarios.dumping import dump_scenario, scenario_files
+from vedette.scenarios.overrides import replace_fields
 from vedette.scenarios.sections import ScenarioModel
-from vedette.scenarios.sections.planners import strategy_words
+from vedette.scenarios.sections.planners import describe_strategy
 
 _LONGEST_NAME = 120
 _SECTIONS = {"filter": "filter.kind", "fusion": "fusion.kind"}
@@ -45,7 +45,7 @@ class Cell:
     @property
     def words(self) -> str:
         """Description of the strategy, such as `joint decisions, expected loss`."""
-        return strategy_words(self.scenario.model, self.planner)
+        return describe_strategy(self.scenario.model, self.planner)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -199,7 +199,7 @@ def _cell(
     key = json.dumps([settings["scenario"], fields])
     try:
         if key not in changed:
-            changed[key] = with_fields(scenario, fields)
+            changed[key] = replace_fields(scenario, fields)
         approve(changed[key])
         build_planner(changed[key], planner)
     except ScenarioError as error:
@@ -236,4 +236,6 @@ def safe_name(text: str) -> str:
 
 
 def _contents(scenario: Scenario) -> list[str]:
-    return [hashlib.sha256(file.read_bytes()).hexdigest() for file in files_of(_unmeasured(scenario), scenario.folder)]
+    return [
+        hashlib.sha256(file.read_bytes()).hexdigest() for file in scenario_files(_unmeasured(scenario), scenario.folder)
+    ]

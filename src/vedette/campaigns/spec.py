@@ -15,10 +15,10 @@ from pydantic import Field, JsonValue
 from vedette.errors import InputError, ScenarioError
 from vedette.internal.reading import read_text
 from vedette.internal.text import elided, printable
-from vedette.scenarios.diagnostics import read_section
-from vedette.scenarios.faults import Finding, describe, named
+from vedette.scenarios.diagnostics import Finding, describe, shown_key
 from vedette.scenarios.sections.base import Name, Section, Whole, check
 from vedette.scenarios.sections.planners import STRATEGIES
+from vedette.scenarios.validation import read_section
 
 BUILTIN_FOLDER = Path(__file__).parent / "builtin"
 _MOST_BYTES = 2_000_000
@@ -44,7 +44,7 @@ class CampaignSpec(Section):
     """Scenario x planner x filter x fusion x variant x every combination of the grid, each run `runs` times.
 
     At the same run number all of them meet the same truth and the same noise. An axis that is left out has one value:
-    what the scenario says. Paths of scenario fields are those of `vedette.scenarios.overrides.with_fields`.
+    what the scenario says. Paths of scenario fields are those of `vedette.scenarios.overrides.replace_fields`.
     """
 
     name: ShortName = Field(description="What the campaign is called [-].")
@@ -109,7 +109,7 @@ class CampaignSpec(Section):
         comparable = [axis for axis in self.axes() if axis != "scenario"]  # runs of two scenarios are not paired
         if self.compare is not None and self.compare not in comparable:
             why = ", as runs of two scenarios are no pairs" if self.compare == "scenario" else ""
-            yield ("compare",), f"one of {', '.join(map(named, comparable))}{why}", describe(self.compare)
+            yield ("compare",), f"one of {', '.join(map(shown_key, comparable))}{why}", describe(self.compare)
 
     def axes(self) -> dict[str, tuple[Any, ...]]:
         """Return every axis and its values, in the order in which cells are made; scenario and planner are always

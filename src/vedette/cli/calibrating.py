@@ -49,7 +49,7 @@ def calibrate(
     """
     from vedette.calibration.bias_drift import calibrate_windows
     from vedette.internal.files import unwritable, write_file
-    from vedette.scenarios.calibrated import calibrated_text, problem_of
+    from vedette.scenarios.calibration import build_problem, calibrated_text
 
     check_ending(out, "--out", "yaml", "yml")
     if out is not None and out.exists() and not overwrite:
@@ -59,7 +59,7 @@ def calibrate(
     recorded, warnings = read_recording(sensors, scans, None, speed=speed, bad_rows=bad_rows, trust=trust)
     scenario, recording, assumed = recorded
     with interruptible("nothing was written"):
-        problem = problem_of(scenario, position=position)
+        problem = build_problem(scenario, position=position)
         with compiling(), _pass_counter() as progress:
             windows = list(calibrate_windows(problem, window or math.inf, progress))
         if out is not None:

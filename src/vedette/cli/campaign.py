@@ -164,7 +164,7 @@ def report_failures(failed: tuple[FailedRun, ...]) -> None:
 
 
 def _print_plan(campaign: Campaign) -> None:
-    from vedette.scenarios.cautions import cautions
+    from vedette.scenarios.warnings import scenario_warnings
 
     share = f", shard {campaign.shard}" if campaign.shard.count > 1 else ""
     echo(
@@ -182,7 +182,7 @@ def _print_plan(campaign: Campaign) -> None:
     cell_of_warnings: dict[tuple[str, ...], str] = {}
     for cell in campaign.cells:
         echo(f"  - {cell.name}")
-        lines = cautions(cell.scenario)
+        lines = scenario_warnings(cell.scenario)
         if lines not in cell_of_warnings:  # once for all planners, filters and values with this warning
             cell_of_warnings[lines] = cell.name
             for line in lines:

@@ -49,15 +49,15 @@ def check(
 def _check_scenario(file: Path) -> dict[str, Any]:
     """Print a summary of a valid scenario, and return its part of the document."""
     from vedette.scenarios import load_scenario
-    from vedette.scenarios.strategy_cautions import strategy_cautions
-    from vedette.scenarios.summary import one_line
+    from vedette.scenarios.strategy_warnings import strategy_warnings
+    from vedette.scenarios.summary import summary_line
 
     scenario = load_scenario(file)
     if faults := code_faults(scenario):
         raise ScenarioError(faults)
-    summary = one_line(scenario)
+    summary = summary_line(scenario)
     echo(f"{file}: valid ({summary})")
-    return {"kind": "scenario", "summary": summary, "warnings": print_warnings(scenario, strategy_cautions(scenario))}
+    return {"kind": "scenario", "summary": summary, "warnings": print_warnings(scenario, strategy_warnings(scenario))}
 
 
 def _check_sensors(file: Path) -> dict[str, Any]:
@@ -74,12 +74,12 @@ def _check_sensors(file: Path) -> dict[str, Any]:
 
 def code_faults(scenario: Scenario) -> list[str]:
     """Return the faults of the code that a scenario names; print a warning if other users may have written it."""
-    from vedette.scenarios.trust import code_of, not_own
+    from vedette.scenarios.trust import custom_code, foreign_code_reason
 
-    code = code_of(scenario.model)
+    code = custom_code(scenario.model)
     if not code:
         return []
-    if reason := not_own(scenario):
+    if reason := foreign_code_reason(scenario):
         note(f"{scenario.path}: warning: {', '.join(code)} is not imported, as {reason}")
         return []
     from vedette.cli.compiling import compiling

@@ -117,7 +117,7 @@ def live(
     """
     from vedette.live import PersistentLoop, build_live_loop
     from vedette.live.server import check_address
-    from vedette.scenarios.of_recording import scenario_of_sensors
+    from vedette.scenarios.from_recording import scenario_from_sensors
 
     sources = [_parse_source(address) for address in listen or ["stdin"]]
     for source in sources:
@@ -125,7 +125,7 @@ def live(
             check_address(source.host, token)
     if any(source.kind == "ws" for source in sources):
         require_packages("vedette live --listen ws://", "websockets", "jinja2", "matplotlib", "pyarrow")
-    live_scenario = scenario_of_sensors(sensors, speed=speed, decide_every=decide_every, plan_within=planning_timeout)
+    live_scenario = scenario_from_sensors(sensors, speed=speed, decide_every=decide_every, plan_within=planning_timeout)
     check_planner(live_scenario.scenario, planner, "--planner")
     CodeTrust(trust)(live_scenario.scenario)
     print_warnings(live_scenario.scenario)

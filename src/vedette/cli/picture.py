@@ -32,7 +32,7 @@ from vedette.evaluation.figures.style import (
 )
 from vedette.kernels.base.types import Floats
 from vedette.scenarios import Scenario
-from vedette.scenarios.views import zones
+from vedette.scenarios.zones import zones
 from vedette.simulation import Truth
 
 _MARGIN = 0.04  # share of the drawn extent

@@ -61,12 +61,12 @@ class CodeTrust:
         self._reported: set[str] = set()
 
     def __call__(self, scenario: Scenario) -> None:
-        from vedette.scenarios.trust import code_of, not_own, others_may_change
+        from vedette.scenarios.trust import custom_code, foreign_code_reason, foreign_write_reason
 
-        code = code_of(scenario.model)
+        code = custom_code(scenario.model)
         if not code:
             return
-        reason = not_own(scenario) or (others_may_change(self._spec) if self._spec is not None else "")
+        reason = foreign_code_reason(scenario) or (foreign_write_reason(self._spec) if self._spec is not None else "")
         if reason and not self._trust:
             raise InputError(
                 f"scenario {scenario.path or scenario.name}: expected code of your own; it runs {', '.join(code)}, and "
@@ -110,7 +110,7 @@ def run(
     """Run a scenario once: tracks, decisions with their rewards, errors, figures."""
     from vedette.evaluation.runs import run_scenario
     from vedette.scenarios import load_scenario
-    from vedette.scenarios.dumping import dump_kept
+    from vedette.scenarios.dumping import dump_stored
     from vedette.simulation.journal import RunInterrupted, RunStopped
     from vedette.simulation.storage import check_target, save_run
 
@@ -136,7 +136,7 @@ def run(
         print_recording_warnings(record, loaded)
         saved_to = out if stop is None or not _has_complete_run(out) else None
         if saved_to is not None:
-            save_run(record, saved_to, scenario_text=dump_kept(loaded), overwrite=overwrite)
+            save_run(record, saved_to, scenario_text=dump_stored(loaded), overwrite=overwrite)
     emit_json({**run_document(record, loaded), "folder": saved_to})
     if stop is not None and saved_to is None:
         end_stopped(stop, "nothing was written" if out is None else f"{out} keeps the whole run that was there")

@@ -18,7 +18,7 @@ from vedette.errors import InputError
 
 if TYPE_CHECKING:
     from vedette.scenarios import Scenario
-    from vedette.scenarios.faults import Path as Place
+    from vedette.scenarios.diagnostics import Path as Place
 
 SCHEMA_FILE = "vedette.schema.json"
 
@@ -174,10 +174,10 @@ def _starting_files(scenario: Scenario, target: Path) -> dict[Path, str]:
 
 
 def print_warnings(scenario: Scenario, more: Iterable[tuple[Place, str]] = ()) -> list[str]:
-    """Print the warnings of a scenario (`cautions`) to standard error, and return them."""
-    from vedette.scenarios.cautions import cautions
+    """Print the warnings of a scenario (`scenario_warnings`) to standard error, and return them."""
+    from vedette.scenarios.warnings import scenario_warnings
 
-    lines = list(cautions(scenario, more))
+    lines = list(scenario_warnings(scenario, more))
     for line in lines:
         note(line)
     return lines

@@ -59,12 +59,12 @@ def show(
 
 
 def _print_tables(scenario: Scenario) -> None:
-    from vedette.scenarios.summary import facts
+    from vedette.scenarios.summary import summary_rows
 
     console = new_console()
     console.print(scenario.name, style="bold")
     console.print(scenario.model.description)
-    for table in (_grid(facts(scenario.model)), _sensors(scenario), _sensing(scenario), _targets(scenario)):
+    for table in (_grid(summary_rows(scenario.model)), _sensors(scenario), _sensing(scenario), _targets(scenario)):
         console.print()
         console.print(table)
 
@@ -128,10 +128,10 @@ def _with_rows(table: Table, rows: Sequence[tuple[str | Text, ...]]) -> Table:
 
 def _sensing(scenario: Scenario) -> Table:
     """Return a description of the sensors' measurements, once if it is the same for all."""
-    from vedette.scenarios.summary import sensing
+    from vedette.scenarios.summary import sensing_rows
 
     north = scenario.model.north() if scenario.model.by_compass else None
-    described = [sensing(sensor, north) for sensor in scenario.model.sensors]
+    described = [sensing_rows(sensor, north) for sensor in scenario.model.sensors]
     if all(rows == described[0] for rows in described):
         return _grid(described[0])
     names = scenario.model.sensor_names

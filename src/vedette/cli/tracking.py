@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from vedette.evaluation.joining import Join
     from vedette.recorded import RecordedScans
     from vedette.scenarios import Scenario
-    from vedette.scenarios.of_recording import OfRecording
+    from vedette.scenarios.from_recording import RecordingScenario
     from vedette.simulation.records import RunRecord
 
 FORMATS = ("csv", "geojson", "parquet", "czml", "mcap")
@@ -146,13 +146,13 @@ def _save(
 ) -> list[Path]:
     """Write the results folder and the tracks; return the files of tracks."""
     from vedette.evaluation.track_table import table_of_run, write_tracks
-    from vedette.scenarios.dumping import dump_kept
+    from vedette.scenarios.dumping import dump_stored
     from vedette.simulation.storage import save_run
 
     if missing_package := without("vedette track --out: a folder of results", "pyarrow"):
         note(f"{missing_package}; the tracks are written without it")
     else:
-        save_run(record, out, scenario_text=dump_kept(scenario), overwrite=overwrite)
+        save_run(record, out, scenario_text=dump_stored(scenario), overwrite=overwrite)
     default_formats = ("csv", "geojson") if scenario.model.origin is not None else ("csv",)
     written = [out / "tracks" / f"tracks.{name}" for name in dict.fromkeys(formats or default_formats)]
     table = table_of_run(record, scenario, joins)
@@ -163,13 +163,13 @@ def _save(
 
 def read_recording(
     sensors: Path, scans: Path, truth: Path | None, *, speed: float, bad_rows: str, trust: bool
-) -> tuple[OfRecording, list[str]]:
+) -> tuple[RecordingScenario, list[str]]:
     """Return the scenario of recorded scans and its warnings; print skipped rows, assumptions and code that runs."""
-    from vedette.scenarios.of_recording import scenario_of_recording
+    from vedette.scenarios.from_recording import scenario_from_recording
 
     if bad_rows not in BAD_ROWS:
         raise usage_error(f"expected one of {', '.join(BAD_ROWS)}; got {bad_rows!r}", "--bad-rows")
-    recorded = scenario_of_recording(sensors, scans, truth, speed=speed, bad_rows=bad_rows)
+    recorded = scenario_from_recording(sensors, scans, truth, speed=speed, bad_rows=bad_rows)
     CodeTrust(trust)(recorded.scenario)
     warnings = print_warnings(recorded.scenario)
     for text in recorded.recording.skipped[:_SHOWN_ROWS]:

@@ -15,7 +15,7 @@ from vedette.fusion import requires_common_prior
 from vedette.internal.processes import as_children, end_with_parent
 from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_experiment, build_planner
-from vedette.scenarios.sections.planners import Named
+from vedette.scenarios.sections.planners import NamedPlanner
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.loop import run_stream
 from vedette.tracking import State
@@ -56,7 +56,7 @@ def precompile(scenario: Scenario, planners: Sequence[str] = ("jdm",)) -> None:
 def _joint_planner(scenario: Scenario, name: str) -> JointPlanner | None:
     """Return the planner of that name; None if it is not a joint one."""
     planner = build_planner(scenario, name)
-    planner = planner.planner if isinstance(planner, Named) else planner
+    planner = planner.planner if isinstance(planner, NamedPlanner) else planner
     return planner if isinstance(planner, JointPlanner) else None
 
 

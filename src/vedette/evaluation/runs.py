@@ -66,7 +66,7 @@ def track_recording(
     """Track the recorded scans of a scenario.
 
     Args:
-        scenario: such as that of `vedette.scenarios.of_recording.scenario_of_recording`.
+        scenario: such as that of `vedette.scenarios.from_recording.scenario_from_recording`.
         recording: its scans; None: read from the file.
         seed, run, progress: see `vedette.recorded.Tracking.run`.
 

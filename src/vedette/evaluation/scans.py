@@ -19,8 +19,8 @@ from vedette.recorded.extents import places_of
 from vedette.recorded.turns import bearings_of
 from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_scan_times, build_true_sensors, drop_outs
-from vedette.scenarios.sections.recording import RecordingSection, sites_of
-from vedette.scenarios.trust import code_of
+from vedette.scenarios.sections.recording import RecordingSection, recorded_sensors
+from vedette.scenarios.trust import custom_code
 from vedette.simulation.loop import scan_flags_of_run
 from vedette.simulation.records import RunRecord
 from vedette.simulation.replay import scans_of_sensors
@@ -53,7 +53,7 @@ def measurement_code(scenario: Scenario) -> tuple[str, ...]:
             for sensor in scenario.model.sensors
             for section in (sensor.measurement, sensor.noise, sensor.detection, sensor.clutter, sensor.truth)
             if section is not None
-            for name in code_of(section)
+            for name in custom_code(section)
         )
     )
 
@@ -101,7 +101,7 @@ def scan_table(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
     Raises:
         VedetteError: like `scans_of_record`, or measurements of a kind that rows cannot represent.
     """
-    sites = sites_of(scenario.model)
+    sites = recorded_sensors(scenario.model)
     for site in sites:
         if site.kind not in COMPONENTS:
             raise reject(f"sensor {site.name}", f"measurements of kind {', '.join(COMPONENTS)}", site.kind)

@@ -11,14 +11,14 @@ from vedette.live.loop import LiveLoop
 from vedette.models.arguments import reject
 from vedette.recorded.extents import box_of
 from vedette.scenarios.build import build_experiment, build_planner
-from vedette.scenarios.of_recording import OfSensors
-from vedette.scenarios.sections.planners import Named
-from vedette.scenarios.sections.recording import sites_of
+from vedette.scenarios.from_recording import LiveScenario
+from vedette.scenarios.sections.planners import NamedPlanner
+from vedette.scenarios.sections.recording import recorded_sensors
 from vedette.tracking import OutOfSequenceTracker
 
 
 def build_live_loop(
-    live_scenario: OfSensors,
+    live_scenario: LiveScenario,
     planner: str = "jdm",
     *,
     max_delay: float = 30.0,
@@ -30,7 +30,7 @@ def build_live_loop(
     """Return the live loop of a scenario.
 
     Args:
-        live_scenario: scenario and conventions, see `vedette.scenarios.of_recording.scenario_of_sensors`.
+        live_scenario: scenario and conventions, see `vedette.scenarios.from_recording.scenario_from_sensors`.
         planner: name of the planner, used if there are decisions: at the scenario's times or every `decide_every`.
         max_delay: largest delay of a scan in s.
         max_lead: largest time in s by which a scan may be ahead of all others.
@@ -43,7 +43,7 @@ def build_live_loop(
             true targets.
     """
     model = live_scenario.scenario.model
-    sites = tuple(sites_of(model))
+    sites = tuple(recorded_sensors(model))
     for site in sites:
         if site.kind not in COMPONENTS:
             raise reject(f"sensor {site.name}", f"measurements of kind {', '.join(COMPONENTS)}", site.kind)
@@ -53,7 +53,7 @@ def build_live_loop(
         built = build_planner(live_scenario.scenario, planner, num_threads)
         inner: Any = built
         while isinstance(
-            inner, Named | ConstraintReportingPlanner
+            inner, NamedPlanner | ConstraintReportingPlanner
         ):  # these pass the truth on and do not need it themselves
             inner = inner.planner
         if isinstance(inner, RequiresTruth):

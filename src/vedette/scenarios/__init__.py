@@ -6,7 +6,7 @@
 from vedette.scenarios.generated import GeneratedScene, scene_text
 from vedette.scenarios.generated_crowd import GeneratedCrowd, crowd_text
 from vedette.scenarios.loading import Scenario, json_schema, list_builtin, load_scenario, parse_scenario
-from vedette.scenarios.overrides import with_fields
+from vedette.scenarios.overrides import replace_fields
 
 __all__ = [
     "GeneratedCrowd",
@@ -17,6 +17,6 @@ __all__ = [
     "list_builtin",
     "load_scenario",
     "parse_scenario",
+    "replace_fields",
     "scene_text",
-    "with_fields",
 ]

@@ -15,16 +15,16 @@ from vedette.recorded import RecordedScans
 from vedette.recorded.extents import places_of
 from vedette.scenarios.sections import ScenarioModel
 
-_FASTER = 1.5  # a neighbour may move at up to this number of times the speed that targets hardly exceed
-_NEAR = 2.5 * math.sqrt(2.0)  # noise stds between two measurements of a target that stands still
-_WIDER = 3.0  # radius of the ring in which chance neighbours are counted, in radii of a neighbourhood
-_WORST = 0.25  # standard error of the share of measurements that are of targets, at most
+_SPEED_FACTOR = 1.5  # a neighbour may move at up to this number of times the speed that targets hardly exceed
+_NOISE_RADIUS = 2.5 * math.sqrt(2.0)  # noise stds between two measurements of a target that stands still
+_RING_FACTOR = 3.0  # radius of the ring in which chance neighbours are counted, in radii of a neighbourhood
+_MAX_STANDARD_ERROR = 0.25  # standard error of the share of measurements that are of targets, at most
 _ESTIMATED = "estimated from the measurements without a neighbour in the scans before and after"
 _HALF = "half of the measurements, as the recording is too short, or has no positions, to estimate it"
-_LEAST = 0.1  # per scan; the lowest rate that is assumed
+_MIN_RATE = 0.1  # per scan; the lowest rate that is assumed
 
 
-class Look(NamedTuple):
+class PlacedScan(NamedTuple):
     """A scan as places.
 
     time: s. places: (num, 2) m. stds: (num,) noise of each place, m. detection: (num,) probability of detection there.
@@ -36,7 +36,7 @@ class Look(NamedTuple):
     detection: Floats
 
 
-def target_share(looks: Sequence[Look], speed: float) -> float:
+def target_share(scans: Sequence[PlacedScan], speed: float) -> float:
     """Return the share of a sensor's measurements that come from targets; NaN if the recording has too little evidence.
 
     A target that is detected at one scan has a neighbour at the next with the probability of detection; a false
@@ -49,23 +49,23 @@ def target_share(looks: Sequence[Look], speed: float) -> float:
     wider than the area of all measurements.
 
     Args:
-        looks: the sensor's scans, in order of time.
+        scans: the sensor's scans, in order of time.
         speed: m/s that targets hardly exceed.
     """
     from scipy.spatial import KDTree
 
-    trees, widest = [KDTree(look.places.reshape(-1, 2)) for look in looks], _widest(looks)
+    trees, max_radius = [KDTree(scan.places.reshape(-1, 2)) for scan in scans], _half_extent(scans)
     single, double = np.zeros(2), np.zeros(2)  # sums of a_i and q_i; of their products over both sides
     num, expected = 0, 0.0
-    for k, own in enumerate(looks):
-        sides = [j for j in (k - 1, k + 1) if 0 <= j < len(looks)] if len(own.places) else []
-        terms = [_terms(own, trees[j], speed * abs(looks[j].time - own.time), widest) for j in sides]
+    for k, scan_k in enumerate(scans):
+        sides = [j for j in (k - 1, k + 1) if 0 <= j < len(scans)] if len(scan_k.places) else []
+        terms = [_terms(scan_k, trees[j], speed * abs(scans[j].time - scan_k.time), max_radius) for j in sides]
         single += sum(each.sum(axis=1) for each in terms)
         if len(terms) == 2:
             double += (terms[0] * terms[1]).sum(axis=1)
-        expected += sum(float((each[1] * own.detection).sum()) for each in terms)
+        expected += sum(float((each[1] * scan_k.detection).sum()) for each in terms)
         num += sum(int(np.count_nonzero(each[1])) for each in terms)
-    if expected <= 0.0 or 0.5 * math.sqrt(num) > _WORST * expected:
+    if expected <= 0.0 or 0.5 * math.sqrt(num) > _MAX_STANDARD_ERROR * expected:
         return math.nan
     repeated = max(single[0] / single[1], 0.0)
     detection = expected / single[1]
@@ -74,21 +74,23 @@ def target_share(looks: Sequence[Look], speed: float) -> float:
     return float(min(repeated / detection, 1.0))
 
 
-def _widest(looks: Sequence[Look]) -> float:
+def _half_extent(scans: Sequence[PlacedScan]) -> float:
     """Half the side of the square that is as large as the box around all places, m."""
-    places = np.concatenate([np.empty((0, 2)), *(look.places.reshape(-1, 2) for look in looks)])
+    places = np.concatenate([np.empty((0, 2)), *(scan.places.reshape(-1, 2) for scan in scans)])
     return 0.5 * math.sqrt(np.prod(np.ptp(places, axis=0))) if len(places) else 0.0
 
 
-def _terms(own: Look, other: Any, moved: float, widest: float) -> Floats:
+def _terms(scan: PlacedScan, tree: Any, max_motion: float, max_radius: float) -> Floats:
     """Return a_i and q_i of each measurement, shape (2, num), with the places of an adjacent scan.
 
-    Zeros if the ring is wider than `widest`, m. moved: how far targets move between the two scans, m.
+    Zeros if the ring is wider than `max_radius`, m. max_motion: how far targets move between the two scans, m.
     """
-    radii = _NEAR * own.stds + _FASTER * moved
-    near, wide = (other.query_ball_point(own.places, scale * radii, return_length=True) for scale in (1.0, _WIDER))
-    alone = (1.0 - 1.0 / (_WIDER**2 - 1.0)) ** (wide - near)
-    return np.array([(near > 0) - 1.0 + alone, alone]) * (_WIDER * radii <= widest)
+    radii = _NOISE_RADIUS * scan.stds + _SPEED_FACTOR * max_motion
+    num_near, num_in_ring = (
+        tree.query_ball_point(scan.places, scale * radii, return_length=True) for scale in (1.0, _RING_FACTOR)
+    )
+    prob_alone = (1.0 - 1.0 / (_RING_FACTOR**2 - 1.0)) ** (num_in_ring - num_near)
+    return np.array([(num_near > 0) - 1.0 + prob_alone, prob_alone]) * (_RING_FACTOR * radii <= max_radius)
 
 
 def place_stds(kind: str, stds: Floats, scan: Floats) -> Floats:
@@ -101,31 +103,31 @@ def place_stds(kind: str, stds: Floats, scan: Floats) -> Floats:
 
 
 def assumed_clutter(
-    said: Mapping[str, Any],
+    given: Mapping[str, Any],
     model: ScenarioModel,
     recording: RecordedScans,
     folder: FilePath,
     speed: float,
-    words: dict[str, str],
+    descriptions: dict[str, str],
 ) -> dict[str, Any]:
-    """Return the section `sensors`, with a clutter rate where none is given; adds to `words` how it was estimated."""
-    defaults = said.get("sensor_defaults")
+    """Return the section `sensors`, with a clutter rate where none is given; adds its origin to `descriptions`."""
+    defaults = given.get("sensor_defaults")
     shared = isinstance(defaults, Mapping) and "clutter" in defaults
     sensors, rates = [], dict[str, list[str]]()
-    for s, sensor in enumerate(said["sensors"]):
+    for s, sensor in enumerate(given["sensors"]):
         if shared or "clutter" in sensor:
             sensors.append(sensor)
             continue
-        rate, why = _rate(model, recording, s, folder, speed)
-        clutter = {"kind": "region", "rate": rate, **_largest(model.sensors[s].measurement.kind, recording, s)}
+        rate, method = _rate(model, recording, s, folder, speed)
+        clutter = {"kind": "region", "rate": rate, **_clutter_limit(model.sensors[s].measurement.kind, recording, s)}
         sensors.append({**sensor, "clutter": clutter})
-        rates.setdefault(why, []).append(f"{model.sensor_names[s]} {rate:g}")
+        rates.setdefault(method, []).append(f"{model.sensor_names[s]} {rate:g}")
     if rates:
-        words["clutter"] = "; ".join(f"{', '.join(each)} per scan ({why})" for why, each in rates.items())
+        descriptions["clutter"] = "; ".join(f"{', '.join(each)} per scan ({method})" for method, each in rates.items())
     return {"sensors": sensors}
 
 
-def _largest(kind: str, recording: RecordedScans, s: int) -> dict[str, float]:
+def _clutter_limit(kind: str, recording: RecordedScans, s: int) -> dict[str, float]:
     """Return the limit of range rate or height of clutter: a tenth above the largest value in the recording."""
     component = next((name for name in COMPONENTS[kind] if name in ("range_rate", "altitude")), None)
     if component is None:
@@ -141,19 +143,19 @@ def _rate(model: ScenarioModel, recording: RecordedScans, s: int, folder: FilePa
     counts = [len(scan) for scans in recording.scans if (scan := scans[s]) is not None]
     if not counts:
         return 1.0, "no scan in the recording"
-    share, why = target_share(_looks(model, recording, s, folder), speed), _ESTIMATED
+    share, method = target_share(_placed_scans(model, recording, s, folder), speed), _ESTIMATED
     if math.isnan(share):
-        share, why = 0.5, _HALF
-    return max(_LEAST, round((1.0 - share) * float(np.mean(counts)), 2)), why
+        share, method = 0.5, _HALF
+    return max(_MIN_RATE, round((1.0 - share) * float(np.mean(counts)), 2)), method
 
 
-def _looks(model: ScenarioModel, recording: RecordedScans, s: int, folder: FilePath) -> list[Look]:
+def _placed_scans(model: ScenarioModel, recording: RecordedScans, s: int, folder: FilePath) -> list[PlacedScan]:
     """Return the scans of a sensor as places; none if it measures no places or its noise is unknown."""
     section = model.sensors[s]
     sensor = section.build(model.region.build(), model.filter.gaussian_method, folder, model.filter.detection_taken_at)
-    kind, stds, found = section.measurement.kind, sensor.noise.least_stds, list[Look]()
+    kind, stds, placed = section.measurement.kind, sensor.noise.least_stds, list[PlacedScan]()
     if kind not in PLACED or stds is None:
-        return found
+        return placed
     for time, scans, poses in zip(recording.times.tolist(), recording.scans, recording.poses, strict=True):
         if (scan := scans[s]) is None:
             continue
@@ -161,5 +163,5 @@ def _looks(model: ScenarioModel, recording: RecordedScans, s: int, folder: FileP
         states = np.zeros((len(places), model.motion.state_dim))
         states[:, :2] = places
         detection = sensor.detection.prob(states, poses[s]) if len(places) else np.empty(0)
-        found.append(Look(time, places, place_stds(kind, stds, scan), detection))
-    return found
+        placed.append(PlacedScan(time, places, place_stds(kind, stds, scan), detection))
+    return placed

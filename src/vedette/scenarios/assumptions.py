@@ -15,7 +15,7 @@ from vedette.models.heights import ASSUMED_HEIGHT
 from vedette.models.turns import is_turn
 from vedette.recorded import RecordedScans
 from vedette.scenarios.assumed_clutter import assumed_clutter, place_stds
-from vedette.scenarios.extents import measured_region, region_in_words
+from vedette.scenarios.region import describe_region, measured_region
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sensors_file import EXPECTED_BIRTHS, HEIGHT_STD, measured_birth, measures_heights
 
@@ -29,64 +29,70 @@ def assumed_sections(
     recording: RecordedScans,
     folder: FilePath,
     speed: float,
-    words: dict[str, str],
+    descriptions: dict[str, str],
 ) -> dict[str, Any]:
-    """Return the sections that are not given, from the scans; adds to `words` a description of each."""
-    found: dict[str, Any] = {"time": _time(recording)}
+    """Return the sections that are not given, from the scans; adds to `descriptions` a description of each."""
+    assumed: dict[str, Any] = {"time": _time(recording)}
     if "region" not in given:
-        found["region"] = region = measured_region(model, recording)
-        words["region"] = f"{region_in_words(region)} (box around all measurements and sensors)"
-    found |= assumed_motion(given, speed, words)
+        assumed["region"] = region = measured_region(model, recording)
+        descriptions["region"] = f"{describe_region(region)} (box around all measurements and sensors)"
+    assumed |= assumed_motion(given, speed, descriptions)
     if "birth" not in given:
         measured = [
             [scan for scans in recording.scans if (scan := scans[s]) is not None and len(scan)]
             for s in range(len(model.sensors))
         ]
-        found |= assumed_birth(model, measured, folder, speed, words)
+        assumed |= assumed_birth(model, measured, folder, speed, descriptions)
     if turns := _turns(model, recording):
-        words["turn"] = turns
-    return found | assumed_clutter(given, model, recording, folder, speed, words)
+        descriptions["turn"] = turns
+    return assumed | assumed_clutter(given, model, recording, folder, speed, descriptions)
 
 
 def _turns(model: ScenarioModel, recording: RecordedScans) -> str:
     """Describe the turns that were found from the rows and not given; empty if there are none."""
     texts = []
     for s, (name, sensor) in enumerate(zip(model.sensor_names, model.sensors, strict=True)):
-        own = [poses[s] for scans, poses in zip(recording.scans, recording.poses, strict=True) if scans[s] is not None]
-        rates = [pose[BEAM + 1] for pose in own if is_turn(pose)]
+        sensor_poses = [
+            poses[s] for scans, poses in zip(recording.scans, recording.poses, strict=True) if scans[s] is not None
+        ]
+        rates = [pose[BEAM + 1] for pose in sensor_poses if is_turn(pose)]
         if sensor.turn is None and rates:
             rate = float(np.median(rates))
-            way = "clockwise" if rate < 0.0 else "counter-clockwise"
-            texts.append(f"{name} once in {2.0 * np.pi / abs(rate):.4g} s, {way}")
+            direction = "clockwise" if rate < 0.0 else "counter-clockwise"
+            texts.append(f"{name} once in {2.0 * np.pi / abs(rate):.4g} s, {direction}")
     return f"{'; '.join(texts)} (found from bearings and times; a scan is one turn)" if texts else ""
 
 
-def assumed_motion(given: Mapping[str, Any], speed: float, words: dict[str, str]) -> dict[str, Any]:
+def assumed_motion(given: Mapping[str, Any], speed: float, descriptions: dict[str, str]) -> dict[str, Any]:
     """Return the motion and survival of targets, as far as they are not given."""
-    found: dict[str, Any] = {}
+    assumed: dict[str, Any] = {}
     if "motion" not in given:
         # Held over the times between scans of several sensors, it would spread targets less with more scans.
         has_height = measures_heights(given)
         kind = "constant_velocity_height" if has_height else "constant_velocity"
-        found["motion"] = {"kind": kind, "sigma_v": speed / 20.0}
+        assumed["motion"] = {"kind": kind, "sigma_v": speed / 20.0}
         if not has_height:
-            found["motion"]["acceleration"] = "continuous"
-        words["motion"] = (
+            assumed["motion"]["acceleration"] = "continuous"
+        descriptions["motion"] = (
             f"constant velocity{', also in height' if has_height else ''}, process noise {speed / 20.0:g} m/s^1.5 "
             f"(for speeds up to {speed:g} m/s; --max-target-speed)"
         )
     if "survival" not in given:
-        found["survival"] = {"kind": "constant", "probability": 1.0 - _LOST_PER_SECOND, "period": 1.0}
-        words["survival"] = f"{1.0 - _LOST_PER_SECOND:g} per second"
-    return found
+        assumed["survival"] = {"kind": "constant", "probability": 1.0 - _LOST_PER_SECOND, "period": 1.0}
+        descriptions["survival"] = f"{1.0 - _LOST_PER_SECOND:g} per second"
+    return assumed
 
 
 def assumed_birth(
-    model: ScenarioModel, measured: Sequence[Sequence[Floats]], folder: FilePath, speed: float, words: dict[str, str]
+    model: ScenarioModel,
+    measured: Sequence[Sequence[Floats]],
+    folder: FilePath,
+    speed: float,
+    descriptions: dict[str, str],
 ) -> dict[str, Any]:
     """Return births from measurements; measured: the scans of each sensor."""
-    std = _BIRTH_STDS * _spread(model, measured, folder)
-    words["birth"] = (
+    std = _BIRTH_STDS * _place_std(model, measured, folder)
+    descriptions["birth"] = (
         f"{EXPECTED_BIRTHS:g} new targets per scan, from measurements that no track explains "
         f"(std {std:.3g} m, {speed:g} m/s)"
     )
@@ -100,20 +106,20 @@ def _time(recording: RecordedScans) -> dict[str, Any]:
     return {"num_steps": len(recording.times), "step_period": period, "start": float(recording.times[0])}
 
 
-def _spread(model: ScenarioModel, measured: Sequence[Sequence[Floats]], folder: FilePath) -> float:
+def _place_std(model: ScenarioModel, measured: Sequence[Sequence[Floats]], folder: FilePath) -> float:
     """Return the standard deviation of measured places, m: the upper quartile over all measured places."""
     region, method = model.region.build(), model.filter.gaussian_method
-    found = list[Floats]()
+    stds_of_sensors = list[Floats]()
     for section, scans in zip(model.sensors, measured, strict=True):
         stds = section.build(region, method, folder, model.filter.detection_taken_at).noise.least_stds
         if stds is None or not scans:
             continue
         kind, scan = section.measurement.kind, np.concatenate(scans)
-        own = place_stds(kind, stds, scan)
+        place_std = place_stds(kind, stds, scan)
         if kind == "bearing_slant_range":  # the ground range depends on the height
-            up = np.minimum(ASSUMED_HEIGHT, scan[:, 1] * math.sqrt(0.5))
-            own = np.hypot(own, 0.5 * HEIGHT_STD * up / np.sqrt(scan[:, 1] ** 2 - up**2))
-        found.append(own)
-    if not sum(map(len, found)):
+            height = np.minimum(ASSUMED_HEIGHT, scan[:, 1] * math.sqrt(0.5))
+            place_std = np.hypot(place_std, 0.5 * HEIGHT_STD * height / np.sqrt(scan[:, 1] ** 2 - height**2))
+        stds_of_sensors.append(place_std)
+    if not sum(map(len, stds_of_sensors)):
         raise InputError("birth: expected in the sensors file, as its sensors measure no positions; got none")
-    return float(np.quantile(np.concatenate(found), 0.75))
+    return float(np.quantile(np.concatenate(stds_of_sensors), 0.75))

@@ -12,17 +12,17 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Floats
-from vedette.scenarios.faults import Finding, Path, describe
-from vedette.scenarios.geojson import geometries, listed
+from vedette.scenarios.diagnostics import Finding, Path, describe
+from vedette.scenarios.geojson import as_list, geometries
 from vedette.scenarios.sections import ScenarioModel
 
 if TYPE_CHECKING:  # importing it imports the filters, which a check does not need
     from vedette.recorded import Origin
 
 Line: TypeAlias = tuple[tuple[float, float], ...]
-_FINEST = 1e-4  # of the extent: points nearer than that are one
-_MOST_POINTS = 10_000  # of all lines; a finer coastline is drawn more coarsely
-_FARTHEST_DEG = 60.0  # from the origin: places beyond this do not lie in its plane
+_MIN_SPACING = 1e-4  # of the extent: points nearer than that are one
+_MAX_POINTS = 10_000  # of all lines; a finer coastline is drawn more coarsely
+_MAX_ANGLE_DEG = 60.0  # from the origin: places beyond this do not lie in its plane
 
 
 def coastline(model: ScenarioModel, folder: FilePath) -> tuple[Line, ...]:
@@ -54,14 +54,14 @@ def _read(
     name: str, folder: FilePath, changed: tuple[int, int], origin: Origin, box: tuple[float, ...]
 ) -> tuple[Line, ...]:
     low, high = np.array(box[:2]), np.array(box[2:])
-    given = [line for geometry in geometries(name, folder) for line in _lines(geometry)]
-    if not given:
+    raw_lines = [line for geometry in geometries(name, folder) for line in _lines(geometry)]
+    if not raw_lines:
         raise InputError(f"{describe(name)}: no line and no polygon in it")
-    lines = [part for line in given for part in _in_plane(_degrees(line, name), origin)]
-    lines = [part for line in lines for part in _runs(line, _near(line, low, high))]
-    least = _FINEST * float((high - low).max())
-    while sum(map(len, lines := [_thinned(line, least) for line in lines if _size(line) >= least])) > _MOST_POINTS:
-        least *= 2.0
+    lines = [part for line in raw_lines for part in _in_plane(_degrees(line, name), origin)]
+    lines = [part for line in lines for part in _retained_parts(line, _meets_box(line, low, high))]
+    spacing = _MIN_SPACING * float((high - low).max())
+    while sum(map(len, lines := [_thin(line, spacing) for line in lines if _size(line) >= spacing])) > _MAX_POINTS:
+        spacing *= 2.0
     return tuple(tuple(map(tuple, line.tolist())) for line in lines)
 
 
@@ -70,21 +70,21 @@ def _lines(geometry: Any) -> list[Any]:
     coordinates: list[Any] = geometry["coordinates"]
     several = {"LineString": [coordinates], "MultiLineString": coordinates, "Polygon": coordinates}
     if geometry["type"] == "MultiPolygon":
-        return [ring for polygon in coordinates for ring in listed(polygon)]
+        return [ring for polygon in coordinates for ring in as_list(polygon)]
     return several.get(geometry["type"], [])
 
 
 def _degrees(line: Any, name: str) -> Floats:
     """Longitudes and latitudes, shape (n, 2)."""
     try:
-        found = np.array([[float(place[0]), float(place[1])] for place in line], np.float64).reshape(-1, 2)
+        degrees = np.array([[float(place[0]), float(place[1])] for place in line], np.float64).reshape(-1, 2)
     except (TypeError, ValueError, IndexError, KeyError):
-        found = np.empty((0, 2))
-    if len(found) < 2:
+        degrees = np.empty((0, 2))
+    if len(degrees) < 2:
         raise InputError(f"{describe(name)}: a line whose places are not several [longitude, latitude]")
-    if not (np.abs(found) <= [360.0, 90.0]).all():  # also False for NaN
+    if not (np.abs(degrees) <= [360.0, 90.0]).all():  # also False for NaN
         raise InputError(f"{describe(name)}: places that are no degrees of longitude and latitude")
-    return found
+    return degrees
 
 
 def _in_plane(degrees: Floats, origin: Origin) -> Iterator[Floats]:
@@ -92,20 +92,20 @@ def _in_plane(degrees: Floats, origin: Origin) -> Iterator[Floats]:
     lon, lat = np.radians(degrees.T)
     lon0, lat0 = np.radians([origin.longitude_deg, origin.latitude_deg])
     cosines = np.sin(lat) * np.sin(lat0) + np.cos(lat) * np.cos(lat0) * np.cos(lon - lon0)
-    near = cosines > np.cos(np.radians(_FARTHEST_DEG))
-    for part in _runs(degrees, near[:-1] & near[1:]):
+    near = cosines > np.cos(np.radians(_MAX_ANGLE_DEG))
+    for part in _retained_parts(degrees, near[:-1] & near[1:]):
         yield origin.to_plane(*part.T)
 
 
-def _near(line: Floats, low: Floats, high: Floats) -> Bools:
+def _meets_box(line: Floats, low: Floats, high: Floats) -> Bools:
     """Return True for each segment whose bounding box meets the given box, shape (n - 1,)."""
-    least, most = np.minimum(line[:-1], line[1:]), np.maximum(line[:-1], line[1:])
-    return np.asarray((most >= low).all(axis=1) & (least <= high).all(axis=1))
+    lower, upper = np.minimum(line[:-1], line[1:]), np.maximum(line[:-1], line[1:])
+    return np.asarray((upper >= low).all(axis=1) & (lower <= high).all(axis=1))
 
 
-def _runs(points: Floats, kept: Bools) -> Iterator[Floats]:
+def _retained_parts(points: Floats, retained: Bools) -> Iterator[Floats]:
     """Yield the lines that the retained segments form."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], kept, [False]]).astype(np.int8)))
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], retained, [False]]).astype(np.int8)))
     for first, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         yield points[first : end + 1]
 
@@ -114,13 +114,13 @@ def _size(line: Floats) -> float:
     return float((line.max(axis=0) - line.min(axis=0)).max())
 
 
-def _thinned(line: Floats, least: float) -> Floats:
-    """Return a line without points nearer than `least` to the last retained one; its ends stay."""
-    kept = [0]
+def _thin(line: Floats, spacing: float) -> Floats:
+    """Return a line without points nearer than `spacing` to the last retained one; its ends stay."""
+    retained = [0]
     for i in range(1, len(line) - 1):
-        if np.abs(line[i] - line[kept[-1]]).max() >= least:
-            kept.append(i)
-    return line[[*kept, len(line) - 1]]
+        if np.abs(line[i] - line[retained[-1]]).max() >= spacing:
+            retained.append(i)
+    return line[[*retained, len(line) - 1]]
 
 
 def coastline_findings(model: ScenarioModel, folder: FilePath) -> Iterator[Finding]:
@@ -131,8 +131,8 @@ def coastline_findings(model: ScenarioModel, folder: FilePath) -> Iterator[Findi
         yield ("coastline",), "a GeoJSON file of lines or polygons", str(error)
 
 
-def coastline_cautions(model: ScenarioModel, folder: FilePath) -> Iterator[tuple[Path, str]]:
+def coastline_warnings(model: ScenarioModel, folder: FilePath) -> Iterator[tuple[Path, str]]:
     """Yield a warning if no line of the coastline is near the region, which is probably a mistake."""
     if model.coastline is not None and not coastline(model, folder):
-        meant = "are longitudes and latitudes exchanged?"
-        yield ("coastline",), f"coastline: nothing of it is near region and sensors, and none is drawn ({meant})"
+        hint = "are longitudes and latitudes exchanged?"
+        yield ("coastline",), f"coastline: nothing of it is near region and sensors, and none is drawn ({hint})"

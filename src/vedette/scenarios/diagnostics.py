@@ -1,226 +1,72 @@
-"""Faults of a configuration's data: the errors of its sections, with the words and paths of the file."""
+"""One fault of a scenario file, and how values are named in messages."""
 
 from __future__ import annotations
 
-import difflib
-import re
-import types
-from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
+import json
+from datetime import date, time
+from typing import Any, NamedTuple
 
-from pydantic import BaseModel, ValidationError
-from pydantic_core import ErrorDetails
+from vedette.internal.text import elided, plain, printable
 
-from vedette.scenarios.faults import MISSING, Path, Told, describe
-from vedette.scenarios.sections.base import IN_PART, Section, Unread
-from vedette.scenarios.sections.courses import COURSES
+Path = tuple[str | int, ...]
+Place = tuple[int, int]  # line and column, from 1
+Finding = tuple[Path, str, str]  # path, expected, got
 
-S = TypeVar("S", bound=Section)
-
-# What is expected, by pydantic's error type; `{}` takes a value of the error's context.
-_EXPECTED = {
-    "int_type": "a whole number",
-    "int_from_float": "a whole number",
-    "float_type": "a number",
-    "finite_number": "a finite number",
-    "string_type": "a word or text in quotes",
-    "bool_type": "true or false",
-    "greater_than": "a number above {gt}",
-    "greater_than_equal": "a number of at least {ge}",
-    "less_than": "a number below {lt}",
-    "less_than_equal": "a number of at most {le}",
-    "tuple_type": "a list",
-    "list_type": "a list",
-    "dict_type": "a mapping",
-    "model_type": "a mapping",
-    "model_attributes_type": "a mapping",
-    "string_too_short": "text of at least {min_length} character",
-    "invalid-json-value": "text, a number, true or false, a list or a mapping",
-    "expected": "{expected}",
-}
-
-UNKNOWN = "an unknown key"
-_LONGEST_WORD = 100  # comparing words takes the product of their lengths
+MISSING = "no such key"  # `got` of a fault if a required key is missing
+_MAX_LENGTH = 60
 
 
-def read_section(section: type[S], data: Mapping[str, Any]) -> tuple[S, list[Told]]:
-    """Return the section in the data and its faults; if there are any, the section is incomplete."""
-    data = section.in_metres(data)
-    try:
-        return section.model_validate(data), []
-    except ValidationError:
-        found = section.model_validate(data, context=IN_PART)
-        return found, list(_faults(found, section, data, ()))
+class Diagnostic(NamedTuple):
+    """A fault of the data: its path, the expected and the given value in words, and a hint on the correction or ""."""
+
+    path: Path
+    expected: str
+    got: str
+    hint: str = ""
+
+    @property
+    def message(self) -> str:
+        """`field: expected ..., got ... (hint)`, or `field: required key is missing`."""
+        field = f"{format_path(self.path)}: " if self.path else ""
+        what = "required key is missing" if self.got == MISSING else f"expected {self.expected}, got {self.got}"
+        return printable(f"{field}{what}" + (f" ({self.hint})" if self.hint else ""))
 
 
-def _faults(value: Any, annotation: Any, data: Any, path: Path) -> Iterator[Told]:
-    """Yield all faults of a value of an incomplete section, section by section."""
-    if isinstance(value, Unread):
-        errors = (error for error in value.errors if not _is_echo(error))
-        yield from _merge_alternatives([_translate(error, annotation, path) for error in errors])
-    elif isinstance(value, Section):
-        fields = type(value).model_fields
-        for name, field in fields.items():
-            inner = data.get(name) if isinstance(data, Mapping) else None
-            yield from _faults(getattr(value, name), field.annotation, inner, (*path, name))
-        if isinstance(data, Mapping):
-            yield from (_unknown_key(path, str(key), sorted(fields)) for key in data if key not in fields)
-        yield from (Told((*path, *at), wanted, got) for at, wanted, got in value.findings())
-    elif isinstance(value, tuple):
-        items = data if isinstance(data, list) and len(data) == len(value) else [None] * len(value)
-        for i, (item, inner) in enumerate(zip(value, items, strict=True)):
-            yield from _faults(item, _item(annotation, i), inner, (*path, i))
-    elif isinstance(value, dict):
-        for key, item in value.items():
-            inner = data.get(key) if isinstance(data, Mapping) else None
-            yield from _faults(item, _entry(annotation), inner, (*path, key))
+class Fault(NamedTuple):
+    """A fault of a file, and its place: line and column, from 1."""
+
+    place: Place
+    diagnostic: Diagnostic
+
+    def message(self, file: str) -> str:
+        """`file:line:column: field: expected ..., got ...`."""
+        return f"{printable(file)}:{self.place[0]}:{self.place[1]}: {self.diagnostic.message}"
 
 
-def options(annotation: Any) -> Iterator[Any]:
-    """Yield the types that an annotation allows, without `Annotated` and unions around them."""
-    origin = get_origin(annotation)
-    if origin is Annotated:
-        yield from options(get_args(annotation)[0])
-    elif origin in (Union, types.UnionType):
-        for option in get_args(annotation):
-            yield from options(option)
-    else:
-        yield annotation
+def format_path(path: Path) -> str:
+    """Return `("sensors", 0, "noise")` as `sensors[0].noise`; long or unprintable keys as by `shown_key`."""
+    text = ""
+    for part in path:
+        text += f"[{part}]" if isinstance(part, int) else f".{shown_key(part)}" if text else shown_key(part)
+    return text
 
 
-def kinds_of(model: type[BaseModel]) -> list[str]:
-    """Return the values of `kind` that select a model; none if it is not one of several."""
-    field = model.model_fields.get("kind")
-    return [] if field is None else _literals(field.annotation)
+def shown_key(word: str) -> str:
+    """Return a word of the file for a message: in printable letters, and shortened."""
+    return elided(printable(word), _MAX_LENGTH)
 
 
-def _item(annotation: Any, index: int) -> Any:
-    for option in options(annotation):
-        if get_origin(option) is tuple:
-            arguments = get_args(option)
-            return arguments[0] if arguments[-1] is Ellipsis else arguments[min(index, len(arguments) - 1)]
-    return None
-
-
-def _entry(annotation: Any) -> Any:
-    return next((get_args(option)[1] for option in options(annotation) if get_origin(option) is dict), None)
-
-
-def suggestion(word: str, known: list[str]) -> str:
-    """Return `did you mean ...?` with the closest known word; empty if none is close."""
-    if len(word) > _LONGEST_WORD:
-        return ""
-    near = difflib.get_close_matches(word, known, n=1, cutoff=0.66)
-    return f"did you mean {near[0]}?" if near else ""
-
-
-def _one_of(words: list[str]) -> str:
-    return words[0] if len(words) == 1 else "one of " + ", ".join(words)
-
-
-def _unknown_key(path: Path, key: str, known: list[str]) -> Told:
-    hint = suggestion(key, known)
-    if key == "<<":
-        hint = "YAML 1.2 has no merge keys; sensor_defaults holds what sensors share"
-    if key in ("lon_min", "lon_max", "lat_min", "lat_max"):
-        hint = "a box of degrees needs an `origin: {lon: , lat: }` of the scenario, and its four ends in order"
-    if key in ("speed", "actions_deg", "headings") and "platform" not in path:
-        hint = "the platform of a sensor has it: `platform: {kind: courses, speed: 50.0, headings_deg: [0, 90]}`"
-    if key in COURSES:
-        hint = (
-            "courses and azimuths count from true north, which needs an `origin` or a sensor with `compass: true`, "
-            "and no heading, direction or pointing beside them in the file"
-        )
-    return Told((*path, key), _one_of(known), UNKNOWN, hint)
-
-
-def _kind_fault(error: ErrorDetails, path: Path, annotation: Any) -> Told:
-    sections = (option for option in options(annotation) if isinstance(option, type) and issubclass(option, BaseModel))
-    kinds = [kind for section in sections for kind in kinds_of(section)]
-    if error["type"] == "union_tag_not_found":
-        return Told(path, f"a mapping with kind: {_one_of(kinds)}", "no kind")
-    tag = error["input"].get("kind")
-    hint = suggestion(tag, kinds) if isinstance(tag, str) else ""
-    return Told((*path, "kind"), _one_of(kinds), describe(tag), hint)
-
-
-def _literals(annotation: Any) -> list[str]:
-    literals = [option for option in options(annotation) if get_origin(option) is Literal]
-    return [describe(value).strip('"') for literal in literals for value in get_args(literal)]
-
-
-def _expected(error: ErrorDetails, annotation: Any) -> str:
-    if error["type"] == "literal_error":
-        return _one_of(_literals(annotation))
-    template = _EXPECTED.get(error["type"])
-    if template is None:
-        return re.sub(r"^Input should be ", "", error["msg"])
-    context = error.get("ctx", {})
-    return template.format(**{name: f"{x:g}" if isinstance(x, float) else x for name, x in context.items()})
-
-
-def _length_fault(error: ErrorDetails, annotation: Any) -> tuple[str, str]:
-    if isinstance(error["input"], str):
-        return f"text of at most {error['ctx']['max_length']} characters", describe(error["input"])
-    fixed = [get_args(option) for option in options(annotation) if get_origin(option) is tuple]
-    context = error.get("ctx", {})
-    if fixed and fixed[0][-1] is not Ellipsis:
-        wanted = str(len(fixed[0]))
-    else:
-        wanted = f"at least {context['min_length']}" if "min_length" in context else f"at most {context['max_length']}"
-    return f"a list of {wanted}", describe(error["input"])
-
-
-def _inside(loc: tuple[str | int, ...], annotation: Any) -> tuple[Path, Any]:
-    """Return the path in a field, and the type there, of a pydantic location, which also names members of unions."""
-    path: Path = ()
-    for part in loc:
-        if isinstance(part, int):
-            path, annotation = (*path, part), _item(annotation, part)
-        elif any(get_origin(option) is dict for option in options(annotation)):
-            path, annotation = (*path, part), _entry(annotation)
-    return path, annotation
-
-
-def _translate(error: ErrorDetails, annotation: Any, path: Path) -> Told:
-    """Return the fault for one of pydantic's errors in the field at `path`."""
-    inside, inner = _inside(error["loc"], annotation)
-    path = (*path, *inside)
-    match error["type"]:
-        case "union_tag_invalid" | "union_tag_not_found":
-            return _kind_fault(error, path, inner)
-        case "too_short" | "too_long":
-            return Told(path, *_length_fault(error, inner))
-        case "missing" if inside:
-            return Told(path[:-1], *_length_fault(error, _inside(error["loc"][:-1], annotation)[1]))
-        case "missing":
-            return Told(path, "a value", MISSING)
-        case "literal_error" if isinstance(error["input"], str):
-            return Told(
-                path,
-                _expected(error, inner),
-                describe(error["input"]),
-                suggestion(error["input"], _literals(inner)),
-            )
-    if isinstance(error["input"], Mapping) and {"lon", "lat"} & set(error["input"]):
-        hint = "places in degrees are `{lon: , lat: }`, both numbers, and need such an `origin` of the scenario"
-        came = ", ".join(f"{key}: {describe(value)}" for key, value in error["input"].items())
-        return Told(path, _expected(error, inner), f"{{{came}}}", hint)
-    return Told(path, _expected(error, inner), describe(error["input"]))
-
-
-def _is_echo(error: ErrorDetails) -> bool:
-    """Return True if pydantic reports a list as too short only because some of its items are faulty."""
-    return error["type"] == "too_short" and len(error["input"]) >= error["ctx"]["min_length"]
-
-
-def _merge_alternatives(found: list[Told]) -> list[Told]:
-    """Return one fault for each path; combines what the members of a union expected, unless one got further inside."""
-    around = {path[:length] for path, *_ in found for length in range(len(path))}
-    merged: dict[tuple[Path, str], tuple[list[str], str]] = {}
-    for path, wanted, got, hint in found:
-        if path in around:
-            continue
-        expectations, hints = merged.get((path, got), ([], ""))
-        merged[(path, got)] = ([*expectations, *([] if wanted in expectations else [wanted])], hints or hint)
-    return [Told(path, " or ".join(wanted), got, hint) for (path, got), (wanted, hint) in merged.items()]
+def describe(value: Any) -> str:
+    """Return a value of the file in a few words."""
+    if value is None:
+        return "nothing"
+    if isinstance(value, date | time):
+        return f"the date or time {value}"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, list | tuple):
+        return f"a list of {len(value)}" if value else "an empty list"
+    if isinstance(value, dict):
+        return "a mapping"
+    text = printable(json.dumps(value, ensure_ascii=False) if isinstance(value, str) else plain(value))
+    return text if len(text) <= _MAX_LENGTH else text[: _MAX_LENGTH - 3] + "..."

@@ -22,7 +22,7 @@ from vedette.scenarios.yaml_reader import plain_scalar
 if TYPE_CHECKING:
     from vedette.scenarios.loading import Scenario
 
-_LONGEST_LINE = 100
+_MAX_LINE_LENGTH = 100
 _NUMBERS = float | int | None
 # Text without quotes: words of letters, digits, dots and dashes that YAML 1.2 reads as nothing else.
 _PLAIN = re.compile(r"[A-Za-z][\w.-]*( [A-Za-z0-9][\w.-]*)*")
@@ -38,10 +38,10 @@ def dump_scenario(model: ScenarioModel, *, folder: Path | None = None) -> str:
     return dump_data(model.model_dump(mode="json"), folder)
 
 
-def dump_kept(scenario: Scenario) -> str:
+def dump_stored(scenario: Scenario) -> str:
     """Return the YAML text of a scenario that is stored with its run, with the SHA-256 of its recordings."""
     model, folder = scenario.model, scenario.folder
-    data = _anchored(model.model_dump(mode="json"), folder.resolve())
+    data = _with_absolute_paths(model.model_dump(mode="json"), folder.resolve())
     if model.recording is not None:
         data["recording"]["sha256"] = model.recording.build(model, folder).file.sha256
     if isinstance(model.targets, RecordedTargets):
@@ -55,15 +55,15 @@ def dump_data(data: Any, folder: Path | None = None) -> str:
     yaml.width = 10_000
     yaml.indent(mapping=2, sequence=4, offset=2)
     out = io.StringIO()
-    yaml.dump(_laid_out(data if folder is None else _anchored(data, folder.resolve())), out)
+    yaml.dump(_with_flow_style(data if folder is None else _with_absolute_paths(data, folder.resolve())), out)
     return out.getvalue()
 
 
-def files_of(model: ScenarioModel, folder: Path) -> tuple[Path, ...]:
+def scenario_files(model: ScenarioModel, folder: Path) -> tuple[Path, ...]:
     """Return the files that a scenario depends on: recorded targets and scans, custom Python files, programs."""
-    beside = folder.resolve()
-    found = [beside / name for _, section in sections_in(model) for name in _files(section, beside)]
-    return tuple(dict.fromkeys(found))
+    root = folder.resolve()
+    files = [root / name for _, section in sections_in(model) for name in _files(section, root)]
+    return tuple(dict.fromkeys(files))
 
 
 def _files(section: Section, folder: Path) -> tuple[str, ...]:
@@ -73,37 +73,41 @@ def _files(section: Section, folder: Path) -> tuple[str, ...]:
     return section.files(folder) if isinstance(section, Custom | ProgramSection) else ()
 
 
-def _anchored(value: dict[str, Any] | list[Any], folder: Path) -> Any:
+def _with_absolute_paths(value: dict[str, Any] | list[Any], folder: Path) -> Any:
     """Return the data with absolute paths of the files and folders that they name."""
     if isinstance(value, list):
-        return [_anchored(item, folder) if isinstance(item, dict | list) else item for item in value]
-    anchored = {key: _anchored(item, folder) if isinstance(item, dict | list) else item for key, item in value.items()}
+        return [_with_absolute_paths(item, folder) if isinstance(item, dict | list) else item for item in value]
+    result = {
+        key: _with_absolute_paths(item, folder) if isinstance(item, dict | list) else item
+        for key, item in value.items()
+    }
     if isinstance(value.get("coastline"), str):
-        anchored["coastline"] = str((folder / value["coastline"]).resolve())
+        result["coastline"] = str((folder / value["coastline"]).resolve())
     if value.get("kind") == "recorded" or {"path", "bad_rows"} <= set(value):
-        anchored["path"] = str((folder / value["path"]).resolve())
+        result["path"] = str((folder / value["path"]).resolve())
     elif value.get("kind") == "custom" and ".py:" in value["function"]:
-        anchored = {**value, "function": str(folder / value["function"])}
+        result = {**value, "function": str(folder / value["function"])}
     elif value.get("kind") == "program":
-        anchored = {**value, "folder": str((folder / value["folder"]).resolve())}
-    return anchored
+        result = {**value, "folder": str((folder / value["folder"]).resolve())}
+    return result
 
 
-def _laid_out(value: Any) -> Any:
+def _with_flow_style(value: Any) -> Any:
     """Return the data with small collections on one line."""
     if isinstance(value, str):
         return value if _PLAIN.fullmatch(value) and plain_scalar(value) == value else DoubleQuotedScalarString(value)
     if isinstance(value, dict):
         items = [
-            (_laid_out(key), item if isinstance(item, _NUMBERS) else _laid_out(item)) for key, item in value.items()
+            (_with_flow_style(key), item if isinstance(item, _NUMBERS) else _with_flow_style(item))
+            for key, item in value.items()
         ]
         mapping = CommentedMap(items)
         inner = [item for item in value.values() if isinstance(item, dict | list)]
-        if value and not inner and len(repr(value)) <= _LONGEST_LINE:
+        if value and not inner and len(repr(value)) <= _MAX_LINE_LENGTH:
             mapping.fa.set_flow_style()
         return mapping
     if isinstance(value, list):
-        row = CommentedSeq([item if isinstance(item, _NUMBERS) else _laid_out(item) for item in value])
+        row = CommentedSeq([item if isinstance(item, _NUMBERS) else _with_flow_style(item) for item in value])
         if not [item for item in value if isinstance(item, dict)]:
             row.fa.set_flow_style()
         return row

@@ -16,18 +16,18 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.internal.text import elided, printable
-from vedette.scenarios.faults import Finding, Path, describe, named
+from vedette.scenarios.diagnostics import Finding, Path, describe, shown_key
 from vedette.scenarios.sections import ScenarioModel
-from vedette.scenarios.sections.base import attempt, is_whole
-from vedette.scenarios.sections.custom import Custom, customs
+from vedette.scenarios.sections.base import is_complete, readable_findings
+from vedette.scenarios.sections.custom import Custom, custom_objects
 from vedette.scenarios.sections.targets import RecordedTargets
 
 BUILTIN_FOLDER = FilePath(__file__).parent / "builtin"
-_LONGEST_PATH = 200
+_MAX_PATH_LENGTH = 200
 
 
-def _absent(file: str) -> str:
-    return f'"{elided(printable(file), _LONGEST_PATH)}": no such file'
+def _missing_file(file: str) -> str:
+    return f'"{elided(printable(file), _MAX_PATH_LENGTH)}": no such file'
 
 
 def recorded_findings(model: ScenarioModel, folder: FilePath) -> Iterator[Finding]:
@@ -42,28 +42,28 @@ def recorded_findings(model: ScenarioModel, folder: FilePath) -> Iterator[Findin
         wanted = f"a file that ends with {', '.join(ENDINGS)}"
         yield ("targets", "path"), wanted, describe(recorded.path)
     elif not os.path.isfile(file):  # pathlib raises for a name that is too long or has forbidden characters
-        yield ("targets", "path"), "a file, relative to the scenario file", _absent(recorded.path)
+        yield ("targets", "path"), "a file, relative to the scenario file", _missing_file(recorded.path)
     else:
         if not any(recorded.columns.findings()):
-            yield from _content(recorded, model, folder)
+            yield from _content_findings(recorded, model, folder)
 
 
-def _content(recorded: RecordedTargets, model: ScenarioModel, folder: FilePath) -> Iterator[Finding]:
+def _content_findings(recorded: RecordedTargets, model: ScenarioModel, folder: FilePath) -> Iterator[Finding]:
     """Yield faults of the columns or rows, or of the scans or the region for them.
 
     If scans or region are faulty, only the columns are checked.
     """
     found = list[Finding]()
-    if all(map(is_whole, (recorded, model.region, model.time))):
+    if all(map(is_complete, (recorded, model.region, model.time))):
         try:
             recorded.source(model, folder).truth(model.time.build(), rng=np.random.default_rng(0))
             return
         except InputError as error:
             found = [(("targets", "path"), "a file of recorded targets that a run can use", str(error))]
-    yield from list(_columns(recorded, folder / recorded.path)) or found
+    yield from list(_column_findings(recorded, folder / recorded.path)) or found
 
 
-def _columns(recorded: RecordedTargets, file: FilePath) -> Iterator[Finding]:
+def _column_findings(recorded: RecordedTargets, file: FilePath) -> Iterator[Finding]:
     """Yield names of columns that a CSV file does not have."""
     if file.suffix.lower() != ".csv":
         return
@@ -86,7 +86,7 @@ def _columns(recorded: RecordedTargets, file: FilePath) -> Iterator[Finding]:
     given, shown = usual_names(header) | recorded.columns.given(), column_names(header)
     for key, name in given.items():
         if name not in header:
-            yield ("targets", "columns", key), f"a column of {named(recorded.path)}: {shown}", describe(name)
+            yield ("targets", "columns", key), f"a column of {shown_key(recorded.path)}: {shown}", describe(name)
     missing = [key for key in ("time", "id") if key not in given and key not in header]
     if "x" not in given and "longitude" not in given and not {"x", "y"} <= set(header):
         missing += [key for key in ("longitude", "latitude") if key not in header]
@@ -102,7 +102,7 @@ def _is_findable(package: str) -> bool:
         return False
 
 
-def _unnamed(file: FilePath, name: str) -> tuple[str, str] | None:
+def _undefined_name(file: FilePath, name: str) -> tuple[str, str] | None:
     """Return a fault if a file is not valid Python or does not define the name; the file is not run."""
     try:
         with warnings.catch_warnings(action="ignore"):  # warnings of the user's style; a run shows them
@@ -112,26 +112,26 @@ def _unnamed(file: FilePath, name: str) -> tuple[str, str] | None:
     except (OSError, SyntaxError, ValueError, RecursionError, MemoryError) as error:
         line = f", line {error.lineno}" if isinstance(error, SyntaxError) and error.lineno else ""
         return "a file of Python", f"{describe(file.name)}{line}, which is none"
-    known = {symbol.get_name() for symbol in symbols if symbol.is_assigned() or symbol.is_imported()}
-    hidden = any(isinstance(node, ast.ImportFrom) and node.names[0].name == "*" for node in ast.walk(tree))
-    if name in known or hidden or "__getattr__" in known or "globals" in code:
+    defined = {symbol.get_name() for symbol in symbols if symbol.is_assigned() or symbol.is_imported()}
+    has_star_import = any(isinstance(node, ast.ImportFrom) and node.names[0].name == "*" for node in ast.walk(tree))
+    if name in defined or has_star_import or "__getattr__" in defined or "globals" in code:
         return None
     return f"a name that {describe(file.name)} defines", describe(name)
 
 
 def reference_findings(model: ScenarioModel, folder: FilePath) -> Iterator[Finding]:
     """Yield faults of custom code that cannot be found. Nothing is imported."""
-    for path, custom in customs(model):
-        yield from attempt(_reference(path, custom, folder))
+    for path, custom in custom_objects(model):
+        yield from readable_findings(_reference_findings(path, custom, folder))
 
 
-def _reference(path: Path, custom: Custom, folder: FilePath) -> Iterator[Finding]:
+def _reference_findings(path: Path, custom: Custom, folder: FilePath) -> Iterator[Finding]:
     module, _, name = custom.function.rpartition(":")
     if module.endswith(".py"):
         if not os.path.isfile(folder / module):
             copied = " (a built-in one: copy it with `vedette init`)" if folder == BUILTIN_FOLDER else ""
-            yield (*path, "function"), f"a file, relative to the scenario file{copied}", _absent(module)
-        elif fault := _unnamed(folder / module, name.partition(".")[0]):
+            yield (*path, "function"), f"a file, relative to the scenario file{copied}", _missing_file(module)
+        elif fault := _undefined_name(folder / module, name.partition(".")[0]):
             yield (*path, "function"), *fault
     elif not _is_findable(module.partition(".")[0]):
         yield (*path, "function"), "a module that Python finds", describe(module)

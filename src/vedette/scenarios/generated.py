@@ -12,12 +12,12 @@ from vedette.errors import InputError
 
 PATTERNS = ("spread", "crowd")
 VIEWS = ("full", "limited")
-_MOST_SENSORS, _MOST_TARGETS = 1000, 2000
+_MAX_SENSORS, _MAX_TARGETS = 1000, 2000
 
 NUM_STEPS = 60
-_USUAL_LABELS = 200  # default of a filter whose file gives none
+_DEFAULT_MAX_LABELS = 200  # default of a filter whose file gives none
 _SIDE = 500.0  # m, side of the square that each sensor adds
-_GROUP = 4  # targets that start or end at one place
+_GROUP_SIZE = 4  # targets that start or end at one place
 _SPEEDS = (3.0, 8.0)  # m/s
 # Additive recurrence of least discrepancy in two dimensions (M. Roberts, 2018), the plastic number's first two powers.
 _PLASTIC = 1.3247179572447460
@@ -58,8 +58,8 @@ class GeneratedScene:
             if getattr(self, name) not in known:
                 raise InputError(f"{name}: expected one of {', '.join(known)}; got {getattr(self, name)!r}")
         bounds = {
-            "num_sensors": (1, _MOST_SENSORS),
-            "num_targets": (1, _MOST_TARGETS),
+            "num_sensors": (1, _MAX_SENSORS),
+            "num_targets": (1, _MAX_TARGETS),
             "decide_every": (1, NUM_STEPS - 1),
             "seed": (0, 2**63),
         }
@@ -79,7 +79,7 @@ class GeneratedScene:
     def max_labels(self) -> int | None:
         """Number of labels that a filter needs for targets and two scans of clutter; None if the default is enough."""
         needed = self.total_targets + 2 * self.num_sensors
-        return needed if needed > _USUAL_LABELS else None
+        return needed if needed > _DEFAULT_MAX_LABELS else None
 
     @property
     def side(self) -> float:
@@ -100,10 +100,10 @@ class GeneratedScene:
         rng = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(self.num_sensors, self.total_targets)))
         sensors = self._spread_out(self.num_sensors, rng)
         num = self.total_targets
-        groups = np.arange(num) // _GROUP
+        groups = np.arange(num) // _GROUP_SIZE
         centres = self._spread_out(int(groups[-1]) + 1, rng)
         first = rng.uniform(0.0, 2.0 * np.pi, len(centres))[groups]
-        courses = first + 2.0 * np.pi * (np.arange(num) % _GROUP + rng.uniform(-0.25, 0.25, num)) / _GROUP
+        courses = first + 2.0 * np.pi * (np.arange(num) % _GROUP_SIZE + rng.uniform(-0.25, 0.25, num)) / _GROUP_SIZE
         velocities = rng.uniform(*_SPEEDS, num)[:, None] * np.stack([np.cos(courses), np.sin(courses)], axis=1)
         if self.pattern == "spread":
             return sensors, np.hstack([centres[groups], velocities])
@@ -117,7 +117,7 @@ class GeneratedScene:
 
 _SENSOR_SPEED = 20.0  # m/s
 _MARGIN = 500.0  # m, from the square to the edge of the region: about as far as a target moves
-_NUMBERS_A_LINE = 25
+_NUMBERS_PER_LINE = 25
 
 
 def scene_text(scene: GeneratedScene) -> str:
@@ -139,7 +139,7 @@ def scene_text(scene: GeneratedScene) -> str:
         speed=f"{_SENSOR_SPEED:.1f}",
         sensing=_SENSING[scene.view],
         sensors="\n".join(f"  - {{position: {_row(place)}}}" for place in sensors),
-        decisions=_folded(range(scene.decide_every, NUM_STEPS, scene.decide_every)),
+        decisions=_wrap_list(range(scene.decide_every, NUM_STEPS, scene.decide_every)),
         limits="" if scene.max_labels is None else f", limits: {{max_labels: {scene.max_labels}}}",
     )
 
@@ -162,9 +162,9 @@ def _row(values: NDArray[np.float64]) -> str:
     return f"[{', '.join(f'{value:.2f}' for value in values)}]"
 
 
-def _folded(numbers: range) -> str:
+def _wrap_list(numbers: range) -> str:
     """Return a list as text, over as many lines as it needs."""
-    lines = [", ".join(map(str, numbers[i : i + _NUMBERS_A_LINE])) for i in range(0, len(numbers), _NUMBERS_A_LINE)]
+    lines = [", ".join(map(str, numbers[i : i + _NUMBERS_PER_LINE])) for i in range(0, len(numbers), _NUMBERS_PER_LINE)]
     return f"[{lines[0]}]" if len(lines) == 1 else "[\n    " + ",\n    ".join(lines) + "\n  ]"
 
 

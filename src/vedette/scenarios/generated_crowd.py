@@ -10,7 +10,7 @@ from vedette.errors import InputError
 from vedette.scenarios.generated import WORLD
 
 MEASURED = ("position", "bearing_range")
-MOST_TARGETS = 100_000
+MAX_TARGETS = 100_000
 DENSITIES = (1e-3, 1e6)  # targets per km^2
 _SQUARE_KM = 1e6  # m^2
 
@@ -44,7 +44,7 @@ class GeneratedCrowd:
     def __post_init__(self) -> None:
         if self.measured not in MEASURED:
             raise InputError(f"measured: expected one of {', '.join(MEASURED)}; got {self.measured!r}")
-        _whole("num_targets", self.num_targets, MOST_TARGETS)
+        _whole("num_targets", self.num_targets, MAX_TARGETS)
         _whole("num_steps", self.num_steps, 10_000)
         for name, (least, most) in (("density", DENSITIES), ("clutter", (0.0, 100.0))):
             value = getattr(self, name)
@@ -59,17 +59,17 @@ class GeneratedCrowd:
     @property
     def name(self) -> str:
         """Name such as `crowd-1000`; settings that are not the default are appended."""
-        usual, parts = GeneratedCrowd(), ["crowd", str(self.num_targets)]
-        parts += [] if self.density == usual.density else [f"density-{self.density:g}"]
-        parts += [] if self.clutter == usual.clutter else [f"clutter-{self.clutter:g}"]
-        parts += [] if self.measured == usual.measured else ["bearing-range"]
-        parts += [] if self.num_steps == usual.num_steps else [f"steps-{self.num_steps}"]
+        default, parts = GeneratedCrowd(), ["crowd", str(self.num_targets)]
+        parts += [] if self.density == default.density else [f"density-{self.density:g}"]
+        parts += [] if self.clutter == default.clutter else [f"clutter-{self.clutter:g}"]
+        parts += [] if self.measured == default.measured else ["bearing-range"]
+        parts += [] if self.num_steps == default.num_steps else [f"steps-{self.num_steps}"]
         return "-".join(parts)
 
 
-def _whole(name: str, value: Any, most: int) -> None:
-    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
-        raise InputError(f"{name}: expected a whole number from 1 to {most}; got {value!r}")
+def _whole(name: str, value: Any, largest: int) -> None:
+    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= largest:
+        raise InputError(f"{name}: expected a whole number from 1 to {largest}; got {value!r}")
 
 
 _STD = 5.0  # m, standard deviation of a measurement
@@ -108,10 +108,10 @@ def _summary(crowd: GeneratedCrowd) -> str:
 
 
 def _command(crowd: GeneratedCrowd) -> str:
-    usual, options = GeneratedCrowd(), [f"--targets {crowd.num_targets}", f"--density {crowd.density:g}"]
-    options += [] if crowd.clutter == usual.clutter else [f"--clutter {crowd.clutter:g}"]
-    options += [] if crowd.measured == usual.measured else [f"--measured {crowd.measured}"]
-    options += [] if crowd.num_steps == usual.num_steps else [f"--steps {crowd.num_steps}"]
+    default, options = GeneratedCrowd(), [f"--targets {crowd.num_targets}", f"--density {crowd.density:g}"]
+    options += [] if crowd.clutter == default.clutter else [f"--clutter {crowd.clutter:g}"]
+    options += [] if crowd.measured == default.measured else [f"--measured {crowd.measured}"]
+    options += [] if crowd.num_steps == default.num_steps else [f"--steps {crowd.num_steps}"]
     return f"vedette crowd {' '.join(options)}"
 
 

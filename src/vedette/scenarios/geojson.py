@@ -9,21 +9,21 @@ from typing import TYPE_CHECKING, Any
 
 from vedette.errors import InputError
 from vedette.internal.reading import parse_json, read_text
-from vedette.scenarios.faults import Path, Told, describe
+from vedette.scenarios.diagnostics import Diagnostic, Path, describe
 from vedette.scenarios.sections.places import OriginSection
 
 if TYPE_CHECKING:  # importing it imports the filters, which a check does not need
     from vedette.recorded import Origin
 
-_MOST_BYTES = 20_000_000
-_MOST_CORNERS = 50_000  # of all zones of a file: each corner is checked for every course of every sensor
+_MAX_BYTES = 20_000_000
+_MAX_CORNERS = 50_000  # of all zones of a file: each corner is checked for every course of every sensor
 
 _SIMPLE = ("Point", "MultiPoint", "LineString", "MultiLineString", "Polygon", "MultiPolygon")
 
 Ring = list[list[float]]
 
 
-def with_zones(data: Mapping[str, Any], folder: FilePath) -> tuple[Mapping[str, Any], list[Told]]:
+def with_zones(data: Mapping[str, Any], folder: FilePath) -> tuple[Mapping[str, Any], list[Diagnostic]]:
     """Return a scenario's data with the polygons of its zones' GeoJSON files, and the faults of these files.
 
     The first polygon of a file replaces the zone that named it; the others come after all constraints, so that every
@@ -33,21 +33,21 @@ def with_zones(data: Mapping[str, Any], folder: FilePath) -> tuple[Mapping[str, 
     constraints = control.get("constraints") if isinstance(control, Mapping) else None
     if not isinstance(constraints, list | tuple) or not any(map(_names_file, constraints)):
         return data, []
-    faults, here, after = list[Told](), list[Any](), list[Any]()
+    faults, in_place, appended = list[Diagnostic](), list[Any](), list[Any]()
     for i, constraint in enumerate(constraints):
         if not _names_file(constraint):
-            here.append(constraint)
+            in_place.append(constraint)
             continue
         path: Path = ("control", "constraints", i, "geojson")
         try:
             polygons = _read(constraint, _origin(data), folder)
         except InputError as error:
-            faults.append(Told(path, "a GeoJSON file of polygons", str(error)))
+            faults.append(Diagnostic(path, "a GeoJSON file of polygons", str(error)))
             polygons = [[[[0.0, 0.0], [1e3, 0.0], [0.0, 1e3]]]]
         zones = [{"kind": "keep_out", "polygon": rings[0], "holes": rings[1:]} for rings in polygons]
-        here.append(zones[0])
-        after += zones[1:]
-    return {**data, "control": {**control, "constraints": [*here, *after]}}, faults  # type: ignore[dict-item]
+        in_place.append(zones[0])
+        appended += zones[1:]
+    return {**data, "control": {**control, "constraints": [*in_place, *appended]}}, faults  # type: ignore[dict-item]
 
 
 def _names_file(constraint: Any) -> bool:
@@ -73,12 +73,14 @@ def _read(constraint: Mapping[str, Any], origin: Origin, folder: FilePath) -> li
         for polygon in (geometry["coordinates"] if geometry["type"] == "MultiPolygon" else [geometry["coordinates"]])
         if geometry["type"].endswith("Polygon")
     )
-    found = [[_in_metres(ring, origin, name) for ring in listed(polygon)] for polygon in polygons if polygon]
-    if not found:
+    rings_of_polygons = [
+        [_in_metres(ring, origin, name) for ring in as_list(polygon)] for polygon in polygons if polygon
+    ]
+    if not rings_of_polygons:
         raise InputError(f"{describe(name)}: no polygon in it")
-    if (number := sum(len(ring) for rings in found for ring in rings)) > _MOST_CORNERS:
-        raise InputError(f"{describe(name)}: {number} corners in it, above {_MOST_CORNERS} (simplify it)")
-    return found
+    if (number := sum(len(ring) for rings in rings_of_polygons for ring in rings)) > _MAX_CORNERS:
+        raise InputError(f"{describe(name)}: {number} corners in it, above {_MAX_CORNERS} (simplify it)")
+    return rings_of_polygons
 
 
 def geometries(name: Any, folder: FilePath) -> Iterator[Mapping[str, Any]]:
@@ -89,30 +91,30 @@ def geometries(name: Any, folder: FilePath) -> Iterator[Mapping[str, Any]]:
     if not isinstance(name, str) or not os.path.isfile(folder / name):
         raise InputError(f"{describe(name)}: no such file")
     try:
-        content = parse_json(read_text(folder / name, "GeoJSON file", _MOST_BYTES))
+        content = parse_json(read_text(folder / name, "GeoJSON file", _MAX_BYTES))
     except ValueError as error:
         raise InputError(f"{describe(name)}: {error}") from None
-    return _within(content, name)
+    return _geometries_in(content, name)
 
 
-def listed(value: Any) -> list[Any]:
+def as_list(value: Any) -> list[Any]:
     """Return the value if it is a list, else an empty list."""
     return value if isinstance(value, list) else []
 
 
-def _within(content: Any, name: str) -> Iterator[Mapping[str, Any]]:
+def _geometries_in(content: Any, name: str) -> Iterator[Mapping[str, Any]]:
     kind = content.get("type") if isinstance(content, Mapping) else None
     if kind == "FeatureCollection":
-        for feature in listed(content.get("features")):
-            yield from _within(feature, name)
+        for feature in as_list(content.get("features")):
+            yield from _geometries_in(feature, name)
     elif kind == "Feature":
         if content.get("geometry") is not None:
-            yield from _within(content["geometry"], name)
+            yield from _geometries_in(content["geometry"], name)
     elif kind == "GeometryCollection":
-        for geometry in listed(content.get("geometries")):
-            yield from _within(geometry, name)
+        for geometry in as_list(content.get("geometries")):
+            yield from _geometries_in(geometry, name)
     elif kind in _SIMPLE:
-        yield {"type": kind, "coordinates": listed(content.get("coordinates"))}
+        yield {"type": kind, "coordinates": as_list(content.get("coordinates"))}
     else:
         raise InputError(f"{describe(name)}: no GeoJSON: type {describe(kind)}")
 

@@ -13,17 +13,17 @@ from vedette.internal.reading import read_text
 from vedette.internal.representation import SummaryRepr
 from vedette.internal.text import elided, pluralise, printable
 from vedette.scenarios.coastline import coastline_findings
-from vedette.scenarios.diagnostics import UNKNOWN, read_section, suggestion
-from vedette.scenarios.faults import Fault, Path, Told, describe
+from vedette.scenarios.diagnostics import Diagnostic, Fault, Path, describe
 from vedette.scenarios.file_checks import BUILTIN_FOLDER, recorded_findings, reference_findings
 from vedette.scenarios.geojson import with_zones
 from vedette.scenarios.sections import ScenarioModel
-from vedette.scenarios.sections.base import attempt
-from vedette.scenarios.sections.courses import as_written
+from vedette.scenarios.sections.base import readable_findings
+from vedette.scenarios.sections.courses import path_in_file
 from vedette.scenarios.sections.recording import recording_findings
-from vedette.scenarios.yaml_reader import MOST_BYTES, Document, read_yaml
+from vedette.scenarios.validation import UNKNOWN_KEY, read_section, suggestion
+from vedette.scenarios.yaml_reader import MAX_BYTES, Document, read_yaml
 
-_LONGEST_NAME = 200
+_MAX_NAME_LENGTH = 200
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -61,12 +61,12 @@ def list_builtin() -> dict[str, FilePath]:
     return {file.stem: file for file in sorted(BUILTIN_FOLDER.glob("*.yaml"), key=lambda file: file.stem)}
 
 
-def place_fault(document: Document, told: Told) -> Fault:
+def locate_fault(document: Document, diagnostic: Diagnostic) -> Fault:
     """Return the fault with the place in the file where the value at its path is written."""
-    written = as_written(_written_path(told.path, document.data), document.data)
-    at_key = told.got == UNKNOWN or written not in document.value_places
-    place = document.place(written) if at_key else document.value_place(written)
-    return Fault(place, told._replace(path=written))
+    written_path = path_in_file(_written_path(diagnostic.path, document.data), document.data)
+    at_key = diagnostic.got == UNKNOWN_KEY or written_path not in document.value_places
+    place = document.place(written_path) if at_key else document.value_place(written_path)
+    return Fault(place, diagnostic._replace(path=written_path))
 
 
 def _written_path(path: Path, data: Any) -> Path:
@@ -91,17 +91,19 @@ def diagnose(document: Document, folder: FilePath | None) -> tuple[ScenarioModel
     if not isinstance(document.data, Mapping):
         if not faults:
             place = document.value_place(())
-            faults.append(Fault(place, Told((), "a mapping of the sections of a scenario", describe(document.data))))
+            faults.append(
+                Fault(place, Diagnostic((), "a mapping of the sections of a scenario", describe(document.data)))
+            )
         return None, _unique(faults)
-    beside = folder or FilePath()
-    data, unread = with_zones(document.data, beside)
-    model, told = read_section(ScenarioModel, data)
-    told += unread
-    beside_it = (recorded_findings, recording_findings, reference_findings, coastline_findings)
-    read = (findings(model, beside) for findings in beside_it)
-    for findings in read:
-        told += [Told(*finding) for finding in attempt(findings)]
-    faults += [place_fault(document, fault) for fault in told]
+    root = folder or FilePath()
+    data, zone_diagnostics = with_zones(document.data, root)
+    model, diagnostics = read_section(ScenarioModel, data)
+    diagnostics += zone_diagnostics
+    checks = (recorded_findings, recording_findings, reference_findings, coastline_findings)
+    all_findings = (findings(model, root) for findings in checks)
+    for findings in all_findings:
+        diagnostics += [Diagnostic(*finding) for finding in readable_findings(findings)]
+    faults += [locate_fault(document, fault) for fault in diagnostics]
     return (None if faults else model), _unique(faults)
 
 
@@ -119,10 +121,10 @@ def parse_scenario(text: str, file: str = "<text>", folder: FilePath | None = No
 
 def missing_scenario(name: str, more: str, builtin: list[str]) -> InputError:
     """Return the error for a name that is neither a file nor a built-in scenario, nor any of `more`."""
-    trouble = "a folder" if os.path.isdir(name) else "no such file"
-    near = suggestion(name, builtin)
-    expected = f"{more}a YAML file or one of {', '.join(builtin)}{f' ({near})' if near else ''}"
-    return InputError(f"{elided(printable(name), _LONGEST_NAME)}: {trouble}; expected {expected}")
+    problem = "a folder" if os.path.isdir(name) else "no such file"
+    hint = suggestion(name, builtin)
+    expected = f"{more}a YAML file or one of {', '.join(builtin)}{f' ({hint})' if hint else ''}"
+    return InputError(f"{elided(printable(name), _MAX_NAME_LENGTH)}: {problem}; expected {expected}")
 
 
 def load_scenario(name_or_path: str | FilePath) -> Scenario:
@@ -142,13 +144,13 @@ def load_scenario(name_or_path: str | FilePath) -> Scenario:
             f"{path}: expected a scenario file, which is YAML; a campaign file (TOML) and its scenarios are checked by "
             f"vedette campaign {path} --dry-run"
         )
-    return Scenario(parse_scenario(read_text(path, "scenario file", MOST_BYTES), str(path), path.parent), path)
+    return Scenario(parse_scenario(read_text(path, "scenario file", MAX_BYTES), str(path), path.parent), path)
 
 
-def document_of(scenario: Scenario) -> Document | None:
+def read_document(scenario: Scenario) -> Document | None:
     """Return the file that a scenario was read from, for places in it; None if there is none or it cannot be read."""
     try:
-        text = None if scenario.path is None else read_text(scenario.path, "scenario file", MOST_BYTES)
+        text = None if scenario.path is None else read_text(scenario.path, "scenario file", MAX_BYTES)
     except InputError:
         return None
     return None if text is None else read_yaml(text, str(scenario.path))

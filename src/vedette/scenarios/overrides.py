@@ -7,16 +7,16 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from vedette.errors import ScenarioError
-from vedette.scenarios.diagnostics import suggestion
-from vedette.scenarios.faults import Path, format_path, named
+from vedette.scenarios.diagnostics import Path, format_path, shown_key
 from vedette.scenarios.loading import Scenario, diagnose
+from vedette.scenarios.validation import suggestion
 from vedette.scenarios.yaml_reader import Document
 
-EVERY = "*"
+ALL_ITEMS = "*"
 _INDEX = re.compile(r"[0-9]{1,9}")
 
 
-def with_fields(scenario: Scenario, fields: Mapping[str, Any]) -> Scenario:
+def replace_fields(scenario: Scenario, fields: Mapping[str, Any]) -> Scenario:
     """Return the scenario with other values at some fields, checked as a whole like a file.
 
     Args:
@@ -31,18 +31,18 @@ def with_fields(scenario: Scenario, fields: Mapping[str, Any]) -> Scenario:
     if not fields:
         return scenario
     data = scenario.model.model_dump(mode="json")
-    said = scenario.model.model_dump(mode="json", exclude_defaults=True)
-    faults = [fault for path, value in fields.items() for fault in _set(data, said, path, value)]
+    explicit = scenario.model.model_dump(mode="json", exclude_defaults=True)
+    faults = [fault for path, value in fields.items() for fault in _set(data, explicit, path, value)]
     if faults:
         raise ScenarioError(faults)
-    model, found = diagnose(Document(scenario.name, data, {}, {}, []), scenario.folder)
+    model, remaining = diagnose(Document(scenario.name, data, {}, {}, []), scenario.folder)
     if model is None:
-        raise ScenarioError([fault.told.message for fault in found])
+        raise ScenarioError([fault.diagnostic.message for fault in remaining])
     return Scenario(model, scenario.path)
 
 
-def _set(data: Any, said: Any, path: str, value: Any) -> Iterator[str]:
-    """Set the value everywhere the path leads, in place; yields faults of the path. said: without defaults."""
+def _set(data: Any, explicit: Any, path: str, value: Any) -> Iterator[str]:
+    """Set the value everywhere the path leads, in place; yields faults of the path. explicit: without defaults."""
     *parents, last = path.split(".")
     places: list[tuple[Path, Any]] = [((), data)]
     for part in parents:
@@ -60,28 +60,32 @@ def _set(data: Any, said: Any, path: str, value: Any) -> Iterator[str]:
             yield fault
             return
         for key in keys:
-            missing = _left_out(_at((*place, key), said), value)
+            missing = _reset_keys(_value_at((*place, key), explicit), value)
             if missing:
-                one = f"{named(path)}.{named(str(next(iter(value), missing[0])))}"
+                example = f"{shown_key(path)}.{shown_key(str(next(iter(value), missing[0])))}"
                 yield (
-                    f"{named(path)}: expected the whole section, with {missing[0]} too, got a part of it "
-                    f'(a field is set by its path in quotes: "{one}")'
+                    f"{shown_key(path)}: expected the whole section, with {missing[0]} too, got a part of it "
+                    f'(a field is set by its path in quotes: "{example}")'
                 )
                 return
             holder[key] = value
 
 
-def _at(path: Path, said: Any) -> Any:
+def _value_at(path: Path, explicit: Any) -> Any:
     """Return the value at a path; None if it is the default."""
     for part in path:
-        if isinstance(said, dict):
-            said = said.get(part)
+        if isinstance(explicit, dict):
+            explicit = explicit.get(part)
         else:
-            said = said[part] if isinstance(said, list) and isinstance(part, int) and part < len(said) else None
-    return said
+            explicit = (
+                explicit[part]
+                if isinstance(explicit, list) and isinstance(part, int) and part < len(explicit)
+                else None
+            )
+    return explicit
 
 
-def _left_out(present: Any, value: Any) -> list[str]:
+def _reset_keys(present: Any, value: Any) -> list[str]:
     """Return the keys of a section that a new one would silently reset to defaults; none if the new one gives a kind.
 
     present: the section, without defaults. Keys with the value None are not counted.
@@ -95,16 +99,22 @@ def _keys(holder: Any, place: Path, part: str, path: str) -> tuple[list[Any], st
     """Return the keys or indices that one part of a path means in a mapping or list, or else the fault of the path."""
     where = format_path(place) or "the scenario"
     if isinstance(holder, list):
-        if part == EVERY:
+        if part == ALL_ITEMS:
             return list(range(len(holder))), ""
         if _INDEX.fullmatch(part) and int(part) < len(holder):
             return [int(part)], ""
-        return [], f"{named(path)}: expected * or a number below {len(holder)} after {where}, got '{named(part)}'"
+        return (
+            [],
+            f"{shown_key(path)}: expected * or a number below {len(holder)} after {where}, got '{shown_key(part)}'",
+        )
     if not isinstance(holder, dict):
-        return [], f"{named(path)}: expected a section at {where} for '{named(part)}' to be in, got a single value"
+        return (
+            [],
+            f"{shown_key(path)}: expected a section at {where} for '{shown_key(part)}' to be in, got a single value",
+        )
     if part not in holder:
         hint = "what sensors share is set by sensors.*" if part == "sensor_defaults" else suggestion(part, list(holder))
         known = ", ".join(sorted(holder))
-        found = f"expected one of {known} in {where}, got '{named(part)}'"
-        return [], f"{named(path)}: {found}" + (f" ({hint})" if hint else "")
+        fault = f"expected one of {known} in {where}, got '{shown_key(part)}'"
+        return [], f"{shown_key(path)}: {fault}" + (f" ({hint})" if hint else "")
     return [part], ""

@@ -11,25 +11,25 @@ from vedette.errors import InputError, ScenarioError
 from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT
 from vedette.internal.reading import read_text
 from vedette.internal.text import pluralise
-from vedette.scenarios.diagnostics import read_section
-from vedette.scenarios.faults import Fault, describe
-from vedette.scenarios.loading import diagnose, place_fault
+from vedette.scenarios.diagnostics import Fault, describe
+from vedette.scenarios.loading import diagnose, locate_fault
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.recording import RecordingSection
 from vedette.scenarios.sections.world import STATE_DIMS
-from vedette.scenarios.wording import in_words
-from vedette.scenarios.yaml_reader import MOST_BYTES, Document, read_yaml
+from vedette.scenarios.validation import read_section
+from vedette.scenarios.wording import name_in_words
+from vedette.scenarios.yaml_reader import MAX_BYTES, Document, read_yaml
 
 # Sections of a scenario that a sensors file need not give.
-_STAND_INS: dict[str, Any] = {
+_PLACEHOLDERS: dict[str, Any] = {
     "time": {"num_steps": 1},
     "region": {"x_min": -1e6, "x_max": 1e6, "y_min": -1e6, "y_max": 1e6},
 }
 EXPECTED_BIRTHS = 0.5  # expected births from measurements in the region between two scans
 _EXISTENCE = 0.03  # largest existence probability of a birth from a measurement
 HEIGHT_STD, _CLIMB_STD = 4000.0, 10.0  # m and m/s, standard deviations of a birth
-ENDLESS = 1_000_000  # steps, the maximum of a scenario
-_NAMED = 5  # sensors that a summary names
+MAX_STEPS = 1_000_000  # steps, the maximum of a scenario
+_MAX_NAMED = 5  # sensors that a summary names
 _ASSUMED = ("region", "motion", "survival", "birth")  # each is assumed from the scans unless it is given
 
 
@@ -47,7 +47,7 @@ class SensorsFile(NamedTuple):
     @property
     def summary(self) -> str:
         """Summary such as `2 sensors (Calshot, boat), bearing and range`."""
-        named = ", ".join(self.names[:_NAMED]) + (", ..." if len(self.names) > _NAMED else "")
+        named = ", ".join(self.names[:_MAX_NAMED]) + (", ..." if len(self.names) > _MAX_NAMED else "")
         return f"{pluralise(len(self.names), 'sensor')} ({named}), {' and '.join(self.quantities)}"
 
 
@@ -55,7 +55,7 @@ def is_sensors_file(path: FilePath) -> bool:
     """Return True if the file is YAML with `sensors`, but has neither `time` nor `targets`."""
     if not path.is_file() or path.suffix.lower() == ".toml":
         return False
-    data = read_yaml(read_text(path, "sensors file", MOST_BYTES), str(path)).data
+    data = read_yaml(read_text(path, "sensors file", MAX_BYTES), str(path)).data
     return isinstance(data, Mapping) and "sensors" in data and not data.keys() & {"time", "targets"}
 
 
@@ -68,28 +68,30 @@ def check_sensors_file(path: FilePath) -> SensorsFile:
     """
     document = read_sensors_file(path)
     given = {key: value for key, value in document.data.items() if key != "recording"}
-    data = {**stand_ins(given, 10.0), "name": path.stem, **given}
-    data |= {"time": {"num_steps": ENDLESS}, "targets": {"kind": "scripted", "tracks": []}}
+    data = {**placeholder_sections(given, 10.0), "name": path.stem, **given}
+    data |= {"time": {"num_steps": MAX_STEPS}, "targets": {"kind": "scripted", "tracks": []}}
     model, faults = diagnose(replace(document, data=data), path.parent)
     if "recording" in document.data:
-        own = document.data["recording"]
-        _, found = read_section(RecordingSection, {"path": "scans.csv", **own} if isinstance(own, Mapping) else {})
-        faults += [place_fault(document, each._replace(path=("recording", *each.path))) for each in found]
+        recording = document.data["recording"]
+        _, diagnostics = read_section(
+            RecordingSection, {"path": "scans.csv", **recording} if isinstance(recording, Mapping) else {}
+        )
+        faults += [locate_fault(document, each._replace(path=("recording", *each.path))) for each in diagnostics]
     if model is None or faults:
         faults.sort(key=lambda fault: fault.place)
-        raise ScenarioError([_in_words_of_user(fault, document, data, path) for fault in faults])
+        raise ScenarioError([_message_for_sensors_file(fault, document, data, path) for fault in faults])
     return SensorsFile(model.sensor_names, _quantities(model), _not_given(document.data))
 
 
-def stand_ins(given: Mapping[str, Any], speed: float) -> dict[str, Any]:
+def placeholder_sections(given: Mapping[str, Any], speed: float) -> dict[str, Any]:
     """Return sections that a sensors file does not give, before scans are read; speed: std of velocities, m/s."""
     has_height = measures_heights(given)
-    own = given.get("motion")
-    motion: Mapping[str, Any] = own if isinstance(own, Mapping) else {}
+    section = given.get("motion")
+    motion: Mapping[str, Any] = section if isinstance(section, Mapping) else {}
     kind = motion.get("kind", "constant_velocity_height" if has_height else "constant_velocity")
     dim = motion.get("state_dim", STATE_DIMS.get(kind) if isinstance(kind, str) else None)
     birth = measured_birth(100.0, speed, dim if isinstance(dim, int) else 4, has_height)
-    return {**_STAND_INS, "birth": birth, **({"motion": {"kind": "constant_velocity_height"}} if has_height else {})}
+    return {**_PLACEHOLDERS, "birth": birth, **({"motion": {"kind": "constant_velocity_height"}} if has_height else {})}
 
 
 def measures_heights(given: Mapping[str, Any]) -> bool:
@@ -109,14 +111,14 @@ def measured_birth(std: float, speed: float, state_dim: int, has_height: bool = 
         state_dim: of states.
         has_height: True if height and vertical velocity follow in them; else a turn rate may.
     """
-    rest = [HEIGHT_STD, _CLIMB_STD] if has_height and state_dim > 5 else []
-    stds = [std, std, speed, speed, *rest, *[0.1] * (state_dim - 4 - len(rest))]
+    height_stds = [HEIGHT_STD, _CLIMB_STD] if has_height and state_dim > 5 else []
+    stds = [std, std, speed, speed, *height_stds, *[0.1] * (state_dim - 4 - len(height_stds))]
     return {"sites": [], "from_measurements": {"expected": EXPECTED_BIRTHS, "max_existence": _EXISTENCE, "std": stds}}
 
 
 def _quantities(model: ScenarioModel) -> tuple[str, ...]:
     kinds = dict.fromkeys(sensor.measurement.kind for sensor in model.sensors)
-    return tuple(dict.fromkeys(in_words(name) for kind in kinds for name in COMPONENTS.get(kind, (kind,))))
+    return tuple(dict.fromkeys(name_in_words(name) for kind in kinds for name in COMPONENTS.get(kind, (kind,))))
 
 
 def _not_given(given: Mapping[str, Any]) -> tuple[str, ...]:
@@ -128,33 +130,33 @@ def _not_given(given: Mapping[str, Any]) -> tuple[str, ...]:
 
 def read_sensors_file(sensors: FilePath) -> Document:
     """Read a sensors file; raises `InputError` if it is not a mapping."""
-    document = read_yaml(read_text(sensors, "sensors file", MOST_BYTES), str(sensors))
+    document = read_yaml(read_text(sensors, "sensors file", MAX_BYTES), str(sensors))
     if not isinstance(document.data, Mapping):
         raise InputError(f"{sensors}: expected a mapping with `sensors`; got {describe(document.data)}")
     return document
 
 
-def model_of_sensors(document: Document, data: Mapping[str, Any], sensors: FilePath) -> ScenarioModel:
+def validated_model(document: Document, data: Mapping[str, Any], sensors: FilePath) -> ScenarioModel:
     """Return the scenario of a document with other data; raises `ScenarioError` for its faults."""
     model, faults = diagnose(replace(document, data=data), sensors.parent)
     if model is None:
-        raise ScenarioError([_in_words_of_user(fault, document, data, sensors) for fault in faults])
+        raise ScenarioError([_message_for_sensors_file(fault, document, data, sensors) for fault in faults])
     return model
 
 
-def _in_words_of_user(fault: Fault, document: Document, data: Mapping[str, Any], sensors: FilePath) -> str:
+def _message_for_sensors_file(fault: Fault, document: Document, data: Mapping[str, Any], sensors: FilePath) -> str:
     """Return the message of a fault, without fields and places that the sensors file does not have."""
-    path = fault.told.path
+    path = fault.diagnostic.path
     if path == ("recording",):
-        got = fault.told.got
+        got = fault.diagnostic.got
         return got if data["recording"]["path"] in got else f"{sensors}: recording.{got}"
     if path[:1] == ("targets",) and "targets" not in document.data:
-        file, got = data["targets"]["path"], fault.told.got
+        file, got = data["targets"]["path"], fault.diagnostic.got
         if path == ("targets", "path"):
             return got if file in got else f"{file}: {got}"
         where = ".".join(map(str, path))
-        return f"{file}: {where}: expected {fault.told.expected}, got {got} (it belongs in {sensors})"
+        return f"{file}: {where}: expected {fault.diagnostic.expected}, got {got} (it belongs in {sensors})"
     if path[:1] == ("sensors",) and path[-2:] == ("measurement", "kind") and "birth" not in document.data:
         wanted = "a measurement that says where a target is, or births at sites: give one wide site in birth.sites"
-        fault = Fault(fault.place, fault.told._replace(expected=wanted))
+        fault = Fault(fault.place, fault.diagnostic._replace(expected=wanted))
     return fault.message(str(sensors))

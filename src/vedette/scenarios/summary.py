@@ -13,21 +13,21 @@ from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.base import Section
 from vedette.scenarios.sections.birth import Birth
 from vedette.scenarios.sections.control import Control
-from vedette.scenarios.sections.courses import as_courses
+from vedette.scenarios.sections.courses import directions_as_courses
 from vedette.scenarios.sections.fusion import AnyFusion, CustomFusion
 from vedette.scenarios.sections.platforms import Steps
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.tracking import AnyFilter, Filter
 from vedette.scenarios.sections.true_sensors import BiasSection
-from vedette.scenarios.sections.undetected import UndetectedSection, searches
+from vedette.scenarios.sections.undetected import UndetectedSection, searches_by_default
 from vedette.scenarios.sections.world import RegionSection
-from vedette.scenarios.wording import in_words, plain_values, scans_in_words, settings, short
+from vedette.scenarios.wording import describe_settings, name_in_words, plain_values, scans_in_words, short_value
 
 if TYPE_CHECKING:
     from vedette.platforms import Compass
 
 
-def one_line(scenario: Scenario) -> str:
+def summary_line(scenario: Scenario) -> str:
     """Return the scenario on one line: `40 scans, 4 targets, 2 sensors; filter delta_glmb, fusion ...`."""
     model = scenario.model
     targets = model.targets
@@ -37,43 +37,43 @@ def one_line(scenario: Scenario) -> str:
     return f"{sizes}; filter {model.filter.kind}, fusion {model.fusion.kind}, {decisions}"
 
 
-def facts(model: ScenarioModel) -> list[tuple[str, str]]:
+def summary_rows(model: ScenarioModel) -> list[tuple[str, str]]:
     """Return the settings of the whole scenario: name of each section and its settings."""
     region, time, control = model.region, model.time, model.control
     end = time.start + (time.num_steps - 1) * time.step_period
     return [
         ("scans", f"{time.num_steps}, every {time.step_period:g} s from {time.start:g} to {end:g} s"),
-        *(() if model.origin is None else (("origin", settings(model.origin)),)),
+        *(() if model.origin is None else (("origin", describe_settings(model.origin)),)),
         ("region", _bounds(region)),
         ("motion", _motion(model.motion)),
-        ("survival", settings(model.survival)),
+        ("survival", describe_settings(model.survival)),
         ("births", _births(model.birth)),
         ("filter", _filter(model.filter)),
         ("fusion", _fusion(model.fusion)),
-        *(() if model.network is None else (("network", settings(model.network)),)),
+        *(() if model.network is None else (("network", describe_settings(model.network)),)),
         *(() if model.undetected is None else (("not yet found", _undetected(model.undetected)),)),
-        *((("not yet found", _searched(model)),) if searches(model) else ()),
-        ("estimate", settings(model.estimates_by)),
+        *((("not yet found", _searched(model)),) if searches_by_default(model) else ()),
+        ("estimate", describe_settings(model.estimates_by)),
         (
             "decisions",
             f"after {scans_in_words(model.decision_steps, time.num_steps)}" if model.decision_steps else "none",
         ),
         ("horizon", f"{pluralise(model.horizon[0], 'step')} of {model.horizon[1]:g} s"),
         ("objective", _objective(control)),
-        ("search", settings(control.search)),
+        ("search", describe_settings(control.search)),
         *(("constraint", _constraint(section)) for section in control.constraints),
         *((("sensors move", start),) if (start := moves_from(model)) else ()),
         ("pseudo-scans", f"{control.ideal_measurements} measurements"),
-        ("OSPA", settings(model.ospa)),
-        *((f"planner {name}", settings(section)) for name, section in model.planners.items()),
-        *((f"metric {name}", settings(section)) for name, section in model.metrics.items()),
+        ("OSPA", describe_settings(model.ospa)),
+        *((f"planner {name}", describe_settings(section)) for name, section in model.planners.items()),
+        *((f"metric {name}", describe_settings(section)) for name, section in model.metrics.items()),
     ]
 
 
 def _motion(section: Section) -> str:
     """Return its settings; the root of a spectral density has another unit than an acceleration."""
     continuous = getattr(section, "acceleration", "") == "continuous"
-    return settings(section).replace("m/s^2", "m/s^1.5") if continuous else settings(section)
+    return describe_settings(section).replace("m/s^2", "m/s^1.5") if continuous else describe_settings(section)
 
 
 def moves_from(model: ScenarioModel) -> str | None:
@@ -86,7 +86,7 @@ def moves_from(model: ScenarioModel) -> str | None:
 def _objective(control: Control) -> str:
     """Return the reward as `expected loss (cutoff 100 m, order 1; no sampling)`."""
     values = "; ".join(filter(None, (", ".join(plain_values(control.reward)), _samples(control))))
-    return f"{in_words(control.reward.kind)} ({values})"
+    return f"{name_in_words(control.reward.kind)} ({values})"
 
 
 def _samples(control: Control) -> str:
@@ -106,7 +106,7 @@ def _bounds(region: RegionSection) -> str:
 def _constraint(section: Section) -> str:
     """Return its settings; for an area its bounds, or its number of corners."""
     area, polygon = getattr(section, "region", None), getattr(section, "polygon", None)
-    words = settings(section if polygon is None else section.model_copy(update={"polygon": (), "holes": ()}))
+    words = describe_settings(section if polygon is None else section.model_copy(update={"polygon": (), "holes": ()}))
     if polygon is not None:
         words += f", polygon of {len(polygon)} corners"
         words += f", {pluralise(len(holes), 'hole')}" if (holes := getattr(section, "holes", ())) else ""
@@ -119,7 +119,7 @@ def _searched(model: ScenarioModel) -> str:
 
 
 def _undetected(section: UndetectedSection) -> str:
-    return settings(section) + ("" if section.region is None else f", in {_bounds(section.region)}")
+    return describe_settings(section) + ("" if section.region is None else f", in {_bounds(section.region)}")
 
 
 def _filter(section: AnyFilter) -> str:
@@ -136,7 +136,7 @@ def _births(section: Birth) -> str:
     return f"{sites}; {number} from measurements"
 
 
-_IN_WORDS = {
+_DESCRIPTIONS = {
     "none": "none",
     "central": "central: one filter takes the scans of all sensors",
     "sequential": "sequential: one belief takes the sensors' scans in turn",
@@ -146,10 +146,10 @@ _IN_WORDS = {
 
 def _fusion(section: AnyFusion) -> str:
     if isinstance(section, CustomFusion):
-        return settings(section)
-    if section.kind in _IN_WORDS:
-        return _IN_WORDS[section.kind]
-    words = [section.kind, "equal weights" if section.weights is None else f"weights {short(section.weights)}"]
+        return describe_settings(section)
+    if section.kind in _DESCRIPTIONS:
+        return _DESCRIPTIONS[section.kind]
+    words = [section.kind, "equal weights" if section.weights is None else f"weights {short_value(section.weights)}"]
     if section.by_views:
         words.append("by views")
     if section.kind != "arithmetic_average":
@@ -165,18 +165,21 @@ def _steps(steps: Literal["every"] | Sequence[int]) -> str:
     return ("step " if len(steps) == 1 else "steps ") + ", ".join(map(str, steps))
 
 
-def sensing(sensor: Sensor, north: Compass | None = None) -> list[tuple[str, str]]:
+def sensing_rows(sensor: Sensor, north: Compass | None = None) -> list[tuple[str, str]]:
     """Return a sensor's platform, measurement and models; directions are compass courses if `north` is given."""
     carriers = [section for section in (sensor.platform, getattr(sensor.platform, "carrier", None)) if section]
-    words = [_platform(one, None if north is None else as_courses(one, north, sensor.position)) for one in carriers]
-    truth = _in_truth(sensor)
+    words = [
+        _platform(one, None if north is None else directions_as_courses(one, north, sensor.position))
+        for one in carriers
+    ]
+    truth = _true_differences(sensor)
     assumed = "assumed: " if any(name.startswith("true ") and name.endswith("detection") for name, _ in truth) else ""
     return [
         ("platform", ", on: ".join(words)),
-        ("measures", in_words(sensor.measurement.kind)),
+        ("measures", name_in_words(sensor.measurement.kind)),
         ("noise", _noise(sensor.noise, sensor.measurement.kind)),
-        ("detection", assumed + settings(sensor.detection)),
-        ("clutter", settings(sensor.clutter)),
+        ("detection", assumed + describe_settings(sensor.detection)),
+        ("clutter", describe_settings(sensor.clutter)),
         *truth,
     ]
 
@@ -185,28 +188,28 @@ def _platform(section: Section, replaced: Mapping[str, tuple[str, object]] | Non
     if isinstance(section, Steps):
         way = f"steps of {section.length:g} m at {section.speed:g} m/s in {len(section.directions_deg)} directions"
         return f"{way}, or stay" if section.stay else way
-    return settings(section, replaced)
+    return describe_settings(section, replaced)
 
 
 def _noise(section: Section, measured: str) -> str:
     """Return its settings; a standard deviation for each component has the component's name and unit."""
     stds, components = getattr(section, "std", ()), COMPONENTS.get(measured, ())
     if not isinstance(stds, tuple) or len(stds) != len(components):
-        return settings(section)
+        return describe_settings(section)
     pairs = zip(components, stds, strict=True)
-    named = ", ".join(f"{in_words(name)} {std:g} {QUANTITIES[name].si}" for name, std in pairs)
+    named = ", ".join(f"{name_in_words(name)} {std:g} {QUANTITIES[name].si}" for name, std in pairs)
     return ", ".join(
-        [f"{in_words(getattr(section, 'kind', ''))}, std {named}", *plain_values(section, {"std": ("std", None)})]
+        [f"{name_in_words(getattr(section, 'kind', ''))}, std {named}", *plain_values(section, {"std": ("std", None)})]
     )
 
 
 def _bias(section: BiasSection) -> str:
     """Return its values other than 0."""
     none = [name for name in BiasSection.model_fields if getattr(section, name) == 0.0]
-    return settings(section, {name: (name, None) for name in none}) or "none"
+    return describe_settings(section, {name: (name, None) for name in none}) or "none"
 
 
-def _in_truth(sensor: Sensor) -> list[tuple[str, str]]:
+def _true_differences(sensor: Sensor) -> list[tuple[str, str]]:
     """Return its bias if not 0, its true models if given, and its scan times if it does not scan at every step."""
     found, truth = [], sensor.truth
     if sensor.bias != BiasSection():
@@ -219,7 +222,7 @@ def _in_truth(sensor: Sensor) -> list[tuple[str, str]]:
             "bias": _bias,
         }
         found += [
-            (f"true {in_words(name)}", special[name](value) if name in special else settings(value))
+            (f"true {name_in_words(name)}", special[name](value) if name in special else describe_settings(value))
             for name, value in sections
         ]
         found += [("detection of", "the measurement")] if truth.detection_of == "measurement" else []
@@ -231,5 +234,5 @@ def _in_truth(sensor: Sensor) -> list[tuple[str, str]]:
     if sensor.scans.drop_out:
         found.append(("drop-outs", f"{sensor.scans.drop_out:g} of its scans"))
     if sensor.scans.late is not None:
-        found.append(("late", settings(sensor.scans.late)))
+        found.append(("late", describe_settings(sensor.scans.late)))
     return found

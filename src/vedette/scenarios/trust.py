@@ -14,18 +14,18 @@ from vedette.scenarios.sections.custom import Custom
 from vedette.scenarios.sections.program import ProgramSection
 
 
-def code_of(section: Section) -> tuple[str, ...]:
+def custom_code(section: Section) -> tuple[str, ...]:
     """Return the custom code that a scenario or a section imports, calls or starts, each once, in order."""
-    return tuple(dict.fromkeys(own.code for own in _own(section)))
+    return tuple(dict.fromkeys(own.code for own in _custom_sections(section)))
 
 
-def _own(section: Section) -> Iterator[Custom | ProgramSection]:
+def _custom_sections(section: Section) -> Iterator[Custom | ProgramSection]:
     """Return the sections whose code does not belong to the library."""
-    found = (each for _, each in sections_in(section) if isinstance(each, Custom | ProgramSection))
-    return (each for each in found if not each.code.startswith("vedette."))
+    sections = (each for _, each in sections_in(section) if isinstance(each, Custom | ProgramSection))
+    return (each for each in sections if not each.code.startswith("vedette."))
 
 
-def not_own(scenario: Scenario) -> str:
+def foreign_code_reason(scenario: Scenario) -> str:
     """Return the reason why other users may have changed the code that a scenario names; empty if there is none.
 
     Code is trusted if the scenario file, the Python files and programs that it names, and their folders belong to the
@@ -33,23 +33,23 @@ def not_own(scenario: Scenario) -> str:
     reason.
     """
     files = [] if scenario.path is None else [scenario.path]
-    files += [scenario.folder / name for own in _own(scenario.model) for name in own.files(scenario.folder)]
+    files += [scenario.folder / name for own in _custom_sections(scenario.model) for name in own.files(scenario.folder)]
     files = [file for file in files if file.parent != BUILTIN_FOLDER]
-    return next(filter(None, map(others_may_change, files)), "")
+    return next(filter(None, map(foreign_write_reason, files)), "")
 
 
-def others_may_change(file: Path) -> str:
+def foreign_write_reason(file: Path) -> str:
     """Return the reason why other users may change a file; empty if there is none, or if the file does not exist."""
     if not hasattr(os, "getuid"):
         return ""
-    real = file.resolve()
-    for path in (real, real.parent):
+    resolved = file.resolve()
+    for path in (resolved, resolved.parent):
         try:
-            found = path.stat()
+            status = path.stat()
         except OSError:  # reported when it is opened
             return ""
-        if found.st_uid not in (os.getuid(), 0):
+        if status.st_uid not in (os.getuid(), 0):
             return f"{path} belongs to another user"
-        if found.st_mode & stat.S_IWOTH and not (path == real.parent and found.st_mode & stat.S_ISVTX):
+        if status.st_mode & stat.S_IWOTH and not (path == resolved.parent and status.st_mode & stat.S_ISVTX):
             return f"every user may write to {path}"
     return ""

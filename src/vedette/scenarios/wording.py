@@ -17,56 +17,60 @@ _LABELS = {
 _LISTED = 4  # values that are printed one by one
 
 
-def settings(section: Section, replaced: Mapping[str, tuple[str, object]] | None = None) -> str:
+def describe_settings(section: Section, replaced: Mapping[str, tuple[str, object]] | None = None) -> str:
     """Return a section's kind and its plain values with their units.
 
     replaced: other names and values of some of its fields.
     """
     kind = getattr(section, "kind", None)
     values = plain_values(section, replaced)
-    return ", ".join(values if kind is None else [in_words(kind), *values])
+    return ", ".join(values if kind is None else [name_in_words(kind), *values])
 
 
 def plain_values(section: Section, replaced: Mapping[str, tuple[str, object]] | None = None) -> list[str]:
     """Return each plain value of a section in words, without the kind; disabled and empty ones are left out."""
-    found = list[str]()
+    texts = list[str]()
     for name, field in type(section).model_fields.items():
         name, value = (replaced or {}).get(name, (name, getattr(section, name)))
         if name == "kind" or value is None or value is False or value == () or isinstance(value, Section | dict):
             continue
         unit = (field.description or "").rpartition("[")[2].rstrip("].")
-        found.append(_value_in_words(name, value, "" if unit in ("-", "") else f" {unit}"))
-    return found
+        texts.append(_value_in_words(name, value, "" if unit in ("-", "") else f" {unit}"))
+    return texts
 
 
 def _value_in_words(name: str, value: object, unit: str) -> str:
     """Return one value with its name and unit; the unit begins with a space."""
-    label = _LABELS.get(name, in_words(name.removesuffix("_deg")))
+    label = _LABELS.get(name, name_in_words(name.removesuffix("_deg")))
     if value is True:
         return label
     if isinstance(value, tuple) and len(value) > _LISTED:
         numbers = [each for each in value if isinstance(each, int | float)]
-        ends = f" from {short(min(numbers))} to {short(max(numbers))}{unit}" if len(numbers) == len(value) else ""
+        ends = (
+            f" from {short_value(min(numbers))} to {short_value(max(numbers))}{unit}"
+            if len(numbers) == len(value)
+            else ""
+        )
         return f"{len(value)} {label}{ends}"
     if name.startswith("num_"):
-        return f"{short(value)} {label.removeprefix('num ')}"
+        return f"{short_value(value)} {label.removeprefix('num ')}"
     if name.startswith("max_") and isinstance(value, int):
-        return f"at most {short(value)} {label.removeprefix('max ')}"
-    return f"{label} {short(value)}{unit}"
+        return f"at most {short_value(value)} {label.removeprefix('max ')}"
+    return f"{label} {short_value(value)}{unit}"
 
 
-def in_words(name: str) -> str:
+def name_in_words(name: str) -> str:
     """Return a name of the file as words."""
     return name.replace("_", " ")
 
 
-def short(value: object) -> str:
+def short_value(value: object) -> str:
     """Return a value without needless digits."""
     if isinstance(value, float):
         return f"{value:g}"
     if isinstance(value, tuple):
-        return ", ".join(short(item) for item in value)
-    return in_words(str(value))
+        return ", ".join(short_value(item) for item in value)
+    return name_in_words(str(value))
 
 
 def scans_in_words(steps: Sequence[int], num_steps: int) -> str:

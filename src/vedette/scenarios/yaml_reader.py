@@ -23,11 +23,11 @@ from ruamel.yaml.events import (
     StreamEndEvent,
 )
 
-from vedette.scenarios.faults import Fault, Path, Place, Told, describe
+from vedette.scenarios.diagnostics import Diagnostic, Fault, Path, Place, describe
 
 _MAX_DEPTH = 50
 _MAX_NODES = 100_000  # aliases of aliases can stand for any number of nodes
-MOST_BYTES = 2_000_000
+MAX_BYTES = 2_000_000
 _MAX_DIGITS = 300  # longer numbers are read as words; Python refuses to convert thousands of digits
 _CORE_TAGS = {f"tag:yaml.org,2002:{name}" for name in ("null", "bool", "int", "float", "str", "seq", "map")}
 _STR_TAGS = ("tag:yaml.org,2002:str", "!")
@@ -98,16 +98,18 @@ class _Reader:
     def record(self, path: Path, place: Place, *, is_key: bool) -> None:
         """Record the place of a key or value."""
         if len(self.read) >= 2 * _MAX_NODES:
-            raise _Unreadable(Fault(place, Told((), f"at most {_MAX_NODES} values", "more, aliases and keys counted")))
+            raise _Unreadable(
+                Fault(place, Diagnostic((), f"at most {_MAX_NODES} values", "more, aliases and keys counted"))
+            )
         self.read.append((path, place, is_key))
         (self.keys if is_key else self.values)[path] = place
 
     def fault(self, place: Place, path: Path, expected: str, got: str) -> None:
-        self.faults.append(Fault(place, Told(path, expected, got)))
+        self.faults.append(Fault(place, Diagnostic(path, expected, got)))
 
     def node(self, event: Any, path: Path) -> Any:
         if len(path) > _MAX_DEPTH:
-            raise _Unreadable(Fault(_place(event), Told((), f"at most {_MAX_DEPTH} levels of nesting", "more")))
+            raise _Unreadable(Fault(_place(event), Diagnostic((), f"at most {_MAX_DEPTH} levels of nesting", "more")))
         place = _place(event)
         self.record(path, place, is_key=False)
         if isinstance(event, AliasEvent):
@@ -195,7 +197,7 @@ def _place(event: Any) -> Place:
 
 def _syntax(place: Place, problem: str) -> Fault:
     hint = "indent with spaces, not tabs" if "\\t" in problem else ""
-    return Fault(place, Told((), "valid YAML 1.2", f"a syntax error: {problem}", hint))
+    return Fault(place, Diagnostic((), "valid YAML 1.2", f"a syntax error: {problem}", hint))
 
 
 def _document_start(events: Iterator[Any]) -> Any:
@@ -204,7 +206,7 @@ def _document_start(events: Iterator[Any]) -> Any:
         if isinstance(event, DocumentStartEvent):
             if event.version is not None and tuple(event.version) != (1, 2):
                 got = ".".join(map(str, event.version))
-                raise _Unreadable(Fault(_place(event), Told((), "YAML 1.2", f"a %YAML {got} directive")))
+                raise _Unreadable(Fault(_place(event), Diagnostic((), "YAML 1.2", f"a %YAML {got} directive")))
             return next(events)
         if isinstance(event, StreamEndEvent):
             return None
@@ -232,8 +234,8 @@ def _read(reader: _Reader) -> Any:
 
 def read_yaml(text: str, file: str) -> Document:
     """Read YAML 1.2 text. Never raises for faults of the text: they are in the result."""
-    if len(text) > MOST_BYTES:
-        fault = Fault((1, 1), Told((), f"a file of at most {MOST_BYTES} letters", f"{len(text)}"))
+    if len(text) > MAX_BYTES:
+        fault = Fault((1, 1), Diagnostic((), f"a file of at most {MAX_BYTES} letters", f"{len(text)}"))
         return Document(file, None, {}, {}, [fault])
     reader = _Reader(iter(YAML(typ="safe", pure=True).parse(text)))
     data: Any = None

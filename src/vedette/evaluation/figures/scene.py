@@ -22,7 +22,7 @@ from vedette.scenarios import Scenario
 from vedette.scenarios.sections.field_of_view import FieldOfView, field_of_view
 from vedette.scenarios.sections.planners import STRATEGIES, NamedIndependent, NamedJoint, NamedLookahead
 from vedette.scenarios.sections.sensors import Sensor
-from vedette.scenarios.views import COAST, HOLE, INSIDE, NO_GO, REGION, Zone, zones
+from vedette.scenarios.zones import COAST, HOLE, INSIDE, NO_GO, REGION, Zone, zones
 
 if TYPE_CHECKING:
     from vedette.recorded import Origin

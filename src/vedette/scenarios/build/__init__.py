@@ -12,7 +12,7 @@ from vedette.scenarios.build.sensors import (
     build_true_sensors,
     drop_outs,
 )
-from vedette.scenarios.build.trackers import told_of
+from vedette.scenarios.build.trackers import scene_for_program
 
 __all__ = [
     "build_experiment",
@@ -25,5 +25,5 @@ __all__ = [
     "build_tracking",
     "build_true_sensors",
     "drop_outs",
-    "told_of",
+    "scene_for_program",
 ]

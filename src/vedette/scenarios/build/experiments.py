@@ -29,11 +29,11 @@ def build_experiment(scenario: Scenario) -> Experiment:
     """
     model = scenario.model
     if model.recording is not None:
-        wanted = "simulated scans (`vedette.evaluation.track_recording` takes recorded ones)"
-        raise InputError(f"{model.name}: expected {wanted}; got those of {model.recording.path}")
+        expected = "simulated scans (`vedette.evaluation.track_recording` takes recorded ones)"
+        raise InputError(f"{model.name}: expected {expected}; got those of {model.recording.path}")
     sensors = build_sensors(scenario)
     tracker, times = build_tracker(scenario, tuple(sensor.filter for sensor in sensors)), build_scan_times(scenario)
-    known = tuple(sensor.filter.sensor for sensor in sensors)
+    assumed = tuple(sensor.filter.sensor for sensor in sensors)
     return Experiment(
         name=model.name,
         times=model.time.build(),
@@ -42,14 +42,14 @@ def build_experiment(scenario: Scenario) -> Experiment:
         platforms=tuple(sensor.platform for sensor in sensors),
         poses=build_poses(scenario),
         first_actions=tuple(
-            own.values[0] if section.moves_from == "start" else None
-            for own, section in zip(first_actions(scenario, sensors), model.sensors, strict=True)
+            actions.values[0] if section.moves_from == "start" else None
+            for actions, section in zip(first_actions(scenario, sensors), model.sensors, strict=True)
         ),
         estimate=model.estimates_by.build(scenario.folder),
         decision_steps=model.decision_steps,
         explain=model.control.explain,
         # Empty if all match the tracker's models, so that a tracker of other sensors may replace this one.
-        true_sensors=build_true_sensors(scenario, known) if any(sensor.truth for sensor in model.sensors) else (),
+        true_sensors=build_true_sensors(scenario, assumed) if any(sensor.truth for sensor in model.sensors) else (),
         scans_at=None if times.all() else times,
         drop_out=drop_outs(scenario),
     )

@@ -10,11 +10,11 @@ from vedette.errors import InputError
 from vedette.filters import Filter, has_labels
 from vedette.fusion import Fusion, ParallelUpdate
 from vedette.scenarios.build.sensors import build_scan_times, build_sensors, first_actions
-from vedette.scenarios.build.trackers import keeps_lmbs, told_of
+from vedette.scenarios.build.trackers import has_lmb_beliefs, scene_for_program
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections.deciding import Lookahead
-from vedette.scenarios.sections.fusion import IN_FULL, ONE_BELIEF, CustomFusion
-from vedette.scenarios.sections.planners import STRATEGIES, Named, NamedIndependent, strategy_of
+from vedette.scenarios.sections.fusion import FULL_INFORMATION_FUSIONS, SINGLE_BELIEF_FUSIONS, CustomFusion
+from vedette.scenarios.sections.planners import STRATEGIES, NamedIndependent, NamedPlanner, get_strategy
 from vedette.scenarios.sections.strategies import Parts, Strategy
 from vedette.simulation.oracle import Schedule
 from vedette.tracking import Network
@@ -41,12 +41,12 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
     if name not in (*STRATEGIES, *model.planners):
         raise InputError(f"planner: expected one of {', '.join((*STRATEGIES, *model.planners))}; got {name!r}")
     sensors = build_sensors(scenario)
-    strategy = strategy_of(model, name)
-    if wanted := strategy.misfit(model, labels=has_labels(sensors[0].filter)):
-        raise InputError(f"planner {name}: expected {wanted}; got {name}")
+    strategy = get_strategy(model, name)
+    if misfit := strategy.misfit(model, labels=has_labels(sensors[0].filter)):
+        raise InputError(f"planner {name}: expected {misfit}; got {name}")
     parts = build_parts(scenario, sensors, strategy, num_threads)
     if name in model.planners:
-        return Named(name, model.planners[name].planner(parts, folder))
+        return NamedPlanner(name, model.planners[name].planner(parts, folder))
     try:
         return strategy.planner(parts, folder)
     except InputError as error:
@@ -58,7 +58,7 @@ def build_parts(
 ) -> Parts:
     """Return the parts of a strategy's planner, with sensors from `build_sensors`; raises like `build_planner`."""
     model, folder = scenario.model, scenario.folder
-    control, fusion = model.control, _fusion_of_decisions(scenario, sensors[0].filter)
+    control, fusion = model.control, _decision_fusion(scenario, sensors[0].filter)
     return Parts(
         sensors,
         fusion,
@@ -68,11 +68,11 @@ def build_parts(
         control.others,
         first_actions(scenario, sensors),
         control.build_constraints(folder),
-        _notes_of_decisions(scenario, fusion, strategy),
+        _decision_notes(scenario, fusion, strategy),
         (control.lookahead or Lookahead()).build(),
         model.estimates_by.build(folder),
         {"schedule": _schedule(scenario), "cutoff": model.ospa.cutoff},
-        partial(told_of, scenario),
+        partial(scene_for_program, scenario),
     )
 
 
@@ -80,34 +80,34 @@ def _schedule(scenario: Scenario) -> Schedule:
     """Return when the sensors scan and decide, and how their scans are fused, for an oracle."""
     model, num = scenario.model, len(scenario.model.sensors)
     section, powers = model.fusion, (1.0,) * num
-    shared = section.kind in ONE_BELIEF or isinstance(section, CustomFusion) or section.feeds_back
+    is_shared = section.kind in SINGLE_BELIEF_FUSIONS or isinstance(section, CustomFusion) or section.feeds_back
     if not isinstance(section, CustomFusion) and section.kind in ("clmb", "cm_delta_glmb") and not section.by_views:
         powers = section.scaled_weights(num)
-    born, scans = model.birth, build_scan_times(scenario)
-    rebirths = born.from_measurements is not None or born.steps == "every"
+    birth, scans = model.birth, build_scan_times(scenario)
+    rebirths = birth.from_measurements is not None or birth.steps == "every"
     return Schedule(
-        model.time.build(), model.decision_steps, powers, shared or model.network is not None, rebirths, scans
+        model.time.build(), model.decision_steps, powers, is_shared or model.network is not None, rebirths, scans
     )
 
 
-def _notes_of_decisions(scenario: Scenario, fusion: Fusion, strategy: Strategy) -> tuple[str, ...]:
+def _decision_notes(scenario: Scenario, fusion: Fusion, strategy: Strategy) -> tuple[str, ...]:
     """Return notes on decisions that assume another fusion than the tracks', or ignore limits of the network."""
     model, section = scenario.model, scenario.model.fusion
     reward = getattr(strategy, "reward", None) or model.control.reward
-    alone = isinstance(strategy, NamedIndependent) and (strategy.others or model.control.others) == "absent"
-    found = []
+    ignores_others = isinstance(strategy, NamedIndependent) and (strategy.others or model.control.others) == "absent"
+    notes = []
     in_full = isinstance(fusion, ParallelUpdate) or reward.kind == "expected_loss"
-    if in_full and not alone and section.kind not in (*IN_FULL, "none"):
-        own = f"{section.kind} by views" if section.kind != "custom" and section.by_views else section.kind
-        found.append(f"joint rewards take all scans in full; tracks are fused by another rule ({own})")
+    if in_full and not ignores_others and section.kind not in (*FULL_INFORMATION_FUSIONS, "none"):
+        rule = f"{section.kind} by views" if section.kind != "custom" and section.by_views else section.kind
+        notes.append(f"joint rewards take all scans in full; tracks are fused by another rule ({rule})")
     if model.network is not None and model.network.build() != Network():
-        found.append("decided by one who hears every sensor at once, whatever the network lets through")
-    return tuple(found)
+        notes.append("decided by one who hears every sensor at once, whatever the network lets through")
+    return tuple(notes)
 
 
-def _fusion_of_decisions(scenario: Scenario, local: Filter) -> Fusion:
+def _decision_fusion(scenario: Scenario, local: Filter) -> Fusion:
     """Return the custom fusion if there is one; otherwise the fusion of decisions that the section gives."""
     section, num_sensors = scenario.model.fusion, len(scenario.model.sensors)
     if isinstance(section, CustomFusion):
         return section.build(num_sensors, scenario.folder)
-    return section.build_of_decisions(num_sensors, of_lmbs=keeps_lmbs(local))
+    return section.build_of_decisions(num_sensors, of_lmbs=has_lmb_beliefs(local))

@@ -19,8 +19,8 @@ from vedette.platforms.base import SWITCH, actions_at
 from vedette.platforms.patrolling import CLOCKS
 from vedette.platforms.velocity import WithVelocity
 from vedette.scenarios.loading import Scenario
-from vedette.scenarios.sections.control import revisited
-from vedette.scenarios.sections.custom import Custom, NotGiven
+from vedette.scenarios.sections.control import revisit_constraint
+from vedette.scenarios.sections.custom import Custom, MissingMember
 from vedette.scenarios.sections.deciding import Lookahead
 from vedette.scenarios.sections.platforms import CustomPlatform
 from vedette.scenarios.sections.scenario import ScenarioModel
@@ -44,13 +44,13 @@ def build_sensors(scenario: Scenario) -> tuple[MobileSensor, ...]:
         model.survival.build(folder),
         replace(birth, anywhere=undetected_anywhere(model, birth)),
     )
-    found = []
+    sensors = []
     for sensor in model.sensors:
-        known = sensor.build(region, method, folder, model.filter.detection_taken_at)
-        local = model.filter.build(targets, known, folder)
-        _check_own(scenario, sensor, known, local)
-        found.append(MobileSensor(local, _platform(model, sensor, folder), _scan_times(model, sensor)))
-    return tuple(found)
+        assumed = sensor.build(region, method, folder, model.filter.detection_taken_at)
+        local = model.filter.build(targets, assumed, folder)
+        _check_custom_parts(scenario, sensor, assumed, local)
+        sensors.append(MobileSensor(local, _platform(model, sensor, folder), _scan_times(model, sensor)))
+    return tuple(sensors)
 
 
 def _platform(model: ScenarioModel, sensor: Sensor, folder: Path) -> Platform:
@@ -63,11 +63,11 @@ def _platform(model: ScenarioModel, sensor: Sensor, folder: Path) -> Platform:
         platform = WithVelocity(platform)
     if isinstance(section, CustomPlatform) and isinstance(price, str) and price not in platform.columns:
         wanted = f"{section.function} to have a column {price}, as its price"
-        raise NotGiven(section, "function", wanted, ", ".join(platform.columns) or "no columns")
+        raise MissingMember(section, "function", wanted, ", ".join(platform.columns) or "no columns")
     if isinstance(section, CustomPlatform) and sensor.switchable and SWITCH in platform.columns:
         wanted = f"{section.function} to have no column {SWITCH}, as the sensor is switchable"
-        raise NotGiven(section, "function", wanted, ", ".join(platform.columns))
-    visits = revisited(model)
+        raise MissingMember(section, "function", wanted, ", ".join(platform.columns))
+    visits = revisit_constraint(model)
     if visits is not None and section.top_speed > 0.0:
         platform = Patrolling(platform, visits.places, visits.radius)
     if price is None and sensor.budget is None and not sensor.switchable:
@@ -82,34 +82,38 @@ def _scan_times(model: ScenarioModel, sensor: Sensor) -> Floats | None:
     if sensor.scans.steps(model.time.step_period)[0] == 1:
         return None
     lookahead, horizon = model.control.lookahead or Lookahead(), math.prod(model.horizon)
-    ahead = horizon + (lookahead.depth - 1) * (lookahead.period or horizon)
-    num = model.time.num_steps + math.ceil(ahead / model.time.step_period)
+    seconds_ahead = horizon + (lookahead.depth - 1) * (lookahead.period or horizon)
+    num = model.time.num_steps + math.ceil(seconds_ahead / model.time.step_period)
     time = model.time.model_copy(update={"num_steps": num})
-    found: Floats = time.build()[sensor.scans.build(time)]
-    return found
+    times: Floats = time.build()[sensor.scans.build(time)]
+    return times
 
 
-def _check_own(scenario: Scenario, section: Sensor, sensor: SensorModel, local: Filter) -> None:
-    """Raise `NotGiven` if a custom measurement or filter lacks a method or attribute that the scenario needs."""
+def _check_custom_parts(scenario: Scenario, section: Sensor, sensor: SensorModel, local: Filter) -> None:
+    """Raise `MissingMember` if a custom measurement or filter lacks a method or attribute that the scenario needs."""
     model, measured = scenario.model, section.measurement
-    born = model.birth.from_measurements is not None
-    if born and sensor.measurement.places is None and isinstance(measured, Custom):
-        wanted = f"{measured.function} to give a measurement with `places`, as targets are born of measurements"
-        raise NotGiven(measured, "function", wanted, "one without")
-    waits = section.scans.drop_out or section.scans.late or not section.scans.build(model.time).all()
-    waits = waits or section.switchable or (model.network is not None and model.network.delay)
-    if isinstance(model.filter, CustomFilter) and (born or waits) and not isinstance(local, PredictUpdateFilter):
-        why = "targets are born of measurements" if born else "it must predict without a scan"
-        wanted = f"{model.filter.function} to give a PredictUpdateFilter, with predict() and update(), as {why}"
-        raise NotGiven(model.filter, "function", wanted, f"a {type(local).__name__}")
+    has_measured_births = model.birth.from_measurements is not None
+    if has_measured_births and sensor.measurement.places is None and isinstance(measured, Custom):
+        expected = f"{measured.function} to give a measurement with `places`, as targets are born of measurements"
+        raise MissingMember(measured, "function", expected, "one without")
+    may_skip_scans = section.scans.drop_out or section.scans.late or not section.scans.build(model.time).all()
+    may_skip_scans = may_skip_scans or section.switchable or (model.network is not None and model.network.delay)
+    if (
+        isinstance(model.filter, CustomFilter)
+        and (has_measured_births or may_skip_scans)
+        and not isinstance(local, PredictUpdateFilter)
+    ):
+        reason = "targets are born of measurements" if has_measured_births else "it must predict without a scan"
+        expected = f"{model.filter.function} to give a PredictUpdateFilter, with predict() and update(), as {reason}"
+        raise MissingMember(model.filter, "function", expected, f"a {type(local).__name__}")
 
 
-def build_true_sensors(scenario: Scenario, known: Sequence[SensorModel]) -> tuple[TrueSensor, ...]:
+def build_true_sensors(scenario: Scenario, assumed: Sequence[SensorModel]) -> tuple[TrueSensor, ...]:
     """Return the true sensors for those that the filters assume; raises like `build_sensors`."""
     model = scenario.model
     region = model.region.build()
-    places = zip(model.sensors, known, strict=True)
-    return tuple(section.build_true(sensor, region, scenario.folder) for section, sensor in places)
+    pairs = zip(model.sensors, assumed, strict=True)
+    return tuple(section.build_true(sensor, region, scenario.folder) for section, sensor in pairs)
 
 
 def drop_outs(scenario: Scenario) -> tuple[float, ...]:
@@ -126,24 +130,24 @@ def build_scan_times(scenario: Scenario) -> Bools:
 
 def build_poses(scenario: Scenario) -> Floats:
     """Return the poses at the start, (num_sensors, pose_dim), padded with zeros to the longest."""
-    sensors, visits = scenario.model.sensors, revisited(scenario.model)
+    sensors, visits = scenario.model.sensors, revisit_constraint(scenario.model)
     poses = [sensor.pose if scenario.model.recording else sensor.turning_pose for sensor in sensors]
     longest = max(map(len, poses)) if visits is None else CLOCKS
-    found = np.array([(*pose, *(0.0,) * (longest - len(pose))) for pose in poses])
+    padded = np.array([(*pose, *(0.0,) * (longest - len(pose))) for pose in poses])
     if visits is None:
-        return found
+        return padded
     patrols = [[0.0 if sensor.platform.top_speed > 0.0 else -1.0] * len(visits.places) for sensor in sensors]
-    return np.hstack([found, patrols])
+    return np.hstack([padded, patrols])
 
 
 def first_actions(scenario: Scenario, sensors: tuple[MobileSensor, ...]) -> tuple[Actions, ...]:
     """Return the action of each sensor before any decision: its course at the start, or the first of its actions."""
-    found = []
+    result = []
     places = zip(scenario.model.sensors, sensors, build_poses(scenario), strict=True)
     for s, (section, sensor, pose) in enumerate(places):
         row = section.platform.first_action(section.heading_deg)
-        own = actions_at(f"sensors[{s}].platform", sensor.platform, pose)
-        rows = own.values[:1] if row is None else np.array([row])
+        actions = actions_at(f"sensors[{s}].platform", sensor.platform, pose)
+        rows = actions.values[:1] if row is None else np.array([row])
         platform: Any = sensor.platform
         while isinstance(platform, Operated | Patrolling | WithVelocity):
             platform = platform.platform
@@ -151,5 +155,5 @@ def first_actions(scenario: Scenario, sensors: tuple[MobileSensor, ...]) -> tupl
             rows = platform.of_plane(rows, pose)
         if row is not None and isinstance(sensor.platform, Operated):
             rows = sensor.platform.switched_on_and_off(rows)[:1]
-        found.append(Actions(own.columns, rows))
-    return tuple(found)
+        result.append(Actions(actions.columns, rows))
+    return tuple(result)

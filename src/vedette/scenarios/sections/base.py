@@ -26,15 +26,15 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from vedette.scenarios.faults import Finding, Path, describe
+from vedette.scenarios.diagnostics import Finding, Path, describe
 
 
-class NotRead(Exception):
+class UnreadableValueError(Exception):
     """A check used a value that could not be read."""
 
 
-class Unread:
-    """A value that could not be read; any use of it raises `NotRead`.
+class UnreadableValue:
+    """A value that could not be read; any use of it raises `UnreadableValueError`.
 
     Attributes:
         errors: pydantic's errors of the value.
@@ -46,7 +46,7 @@ class Unread:
         self.errors = errors
 
     def _refuse(self, *_: Any) -> Any:
-        raise NotRead
+        raise UnreadableValueError
 
     __getattr__ = __getitem__ = __call__ = __iter__ = __len__ = __contains__ = __bool__ = __float__ = __index__ = (
         _refuse
@@ -120,7 +120,7 @@ GaussianMethod = Literal["auto", "ekf", "ukf", "ckf"]
 DetectionAt = Literal["centre", "mean"]
 
 
-IN_PART = {"in_part": True}  # validation context in which an unreadable value becomes an `Unread`
+PARTIAL = {"in_part": True}  # validation context in which an unreadable value becomes an `UnreadableValue`
 
 Check = Callable[[Any], Iterator[Finding]]
 
@@ -131,43 +131,44 @@ def check(findings: Check) -> Check:
     return findings
 
 
-def attempt(findings: Iterator[Finding]) -> Iterator[Finding]:
+def readable_findings(findings: Iterator[Finding]) -> Iterator[Finding]:
     """Yield the findings up to the first that needs a value that could not be read."""
     try:
         yield from findings
-    except NotRead:
+    except UnreadableValueError:
         return
 
 
 def sections_in(value: Any) -> list[tuple[Path, Section]]:
     """Return a section and all sections in it, each with its path, from the outside in, in the order of the fields."""
-    found: list[tuple[Path, Section]] = []
-    left: list[tuple[Path, Any]] = [((), value)]
-    while left:
-        path, item = left.pop()
+    sections: list[tuple[Path, Section]] = []
+    pending: list[tuple[Path, Any]] = [((), value)]
+    while pending:
+        path, item = pending.pop()
         if isinstance(item, Section):
-            found.append((path, item))
+            sections.append((path, item))
             inner: Mapping[Any, Any] = {name: getattr(item, name) for name in type(item).model_fields}
         elif isinstance(item, tuple | dict):
             inner = dict(enumerate(item)) if isinstance(item, tuple) else item
         else:
             continue
-        left += [((*path, name), inner[name]) for name in reversed(inner)]
-    return found
+        pending += [((*path, name), inner[name]) for name in reversed(inner)]
+    return sections
 
 
-def is_whole(value: Any) -> bool:
+def is_complete(value: Any) -> bool:
     """Return True if all of a section could be read."""
     if isinstance(value, Section):
-        return all(is_whole(getattr(value, name)) for name in type(value).model_fields)
-    return all(map(is_whole, value)) if isinstance(value, tuple) else not isinstance(value, Unread)
+        return all(is_complete(getattr(value, name)) for name in type(value).model_fields)
+    return all(map(is_complete, value)) if isinstance(value, tuple) else not isinstance(value, UnreadableValue)
 
 
 class Section(BaseModel):
     """A mapping of a configuration file: no unknown keys, no silent conversion of types, nothing infinite.
 
-    A valid section is one whose fields are valid and whose `findings` are none. Read with the context `IN_PART`, a
-    faulty mapping is a section too, with `Unread` in place of what is faulty, so that all other checks can go on.
+    A valid section is one whose fields are valid and whose `findings` are none. Read with the context `PARTIAL`, a
+    faulty mapping is a section too, with `UnreadableValue` in place of what is faulty, so that all other checks can go
+    on.
     """
 
     # Validators are built at first use: parts are never read separately, and building each of them took twice as long.
@@ -184,16 +185,16 @@ class Section(BaseModel):
     def findings(self) -> Iterator[Finding]:
         """Yield the faults of the section that no single field has."""
         for method in self._checks:
-            yield from attempt(method(self))
+            yield from readable_findings(method(self))
 
     @check
     def _numbers_within_reason(self) -> Iterator[Finding]:
         for name in type(self).model_fields:
-            left: list[tuple[Path, Any]] = [((name,), getattr(self, name))]
-            while left:
-                path, value = left.pop()
+            pending: list[tuple[Path, Any]] = [((name,), getattr(self, name))]
+            while pending:
+                path, value = pending.pop()
                 if isinstance(value, tuple):
-                    left += [((*path, index), value[index]) for index in reversed(range(len(value)))]
+                    pending += [((*path, index), value[index]) for index in reversed(range(len(value)))]
                 elif isinstance(value, float | int) and abs(value) > _LARGEST:
                     yield path, f"a number from {-_LARGEST:g} to {_LARGEST:g}", describe(value)
                     break  # one fault for each field is enough
@@ -202,7 +203,7 @@ class Section(BaseModel):
 
     @model_validator(mode="after")
     def _checked(self, info: ValidationInfo) -> Self:
-        if info.context is not IN_PART:
+        if info.context is not PARTIAL:
             for path, wanted, got in self.findings():
                 raise expected(wanted, at=path, got=got)
         return self
@@ -222,28 +223,28 @@ class Section(BaseModel):
     def _read(cls, data: Any, handler: ModelWrapValidatorHandler[Self], info: ValidationInfo) -> Any:
         if isinstance(data, Mapping):
             data = cls.prepared(data)
-            if info.context is IN_PART:
-                return cls.model_construct(**{name: _field_in_part(cls, name, data) for name in cls.model_fields})
-        elif info.context is IN_PART and not isinstance(data, cls):
+            if info.context is PARTIAL:
+                return cls.model_construct(**{name: _read_field(cls, name, data) for name in cls.model_fields})
+        elif info.context is PARTIAL and not isinstance(data, cls):
             try:
                 return handler(data)
             except ValidationError as error:
-                return Unread(error.errors(include_url=False))
+                return UnreadableValue(error.errors(include_url=False))
         return handler(data)
 
 
-def _field_in_part(section: type[Section], name: str, data: Mapping[str, Any]) -> Any:
+def _read_field(section: type[Section], name: str, data: Mapping[str, Any]) -> Any:
     if name not in data and section.model_fields[name].is_required():
-        return Unread([ErrorDetails(type="missing", loc=(), msg="", input=None)])
+        return UnreadableValue([ErrorDetails(type="missing", loc=(), msg="", input=None)])
     given = {name: data[name]} if name in data else {}
     try:
-        return getattr(_alone(section, name).model_validate(given, context=IN_PART), name)
+        return getattr(_single_field_model(section, name).model_validate(given, context=PARTIAL), name)
     except ValidationError as error:
-        return Unread([{**detail, "loc": detail["loc"][1:]} for detail in error.errors(include_url=False)])
+        return UnreadableValue([{**detail, "loc": detail["loc"][1:]} for detail in error.errors(include_url=False)])
 
 
 @cache
-def _alone(section: type[Section], name: str) -> type[BaseModel]:
+def _single_field_model(section: type[Section], name: str) -> type[BaseModel]:
     """Return a model of one field of a section."""
     field = section.model_fields[name]
     return create_model("Alone", __config__=section.model_config, **{name: (field.annotation, field)})  # type: ignore[call-overload, no-any-return]

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from vedette.internal.covariances import SMALLEST_VARIANCE
-from vedette.scenarios.faults import Finding, describe
+from vedette.scenarios.diagnostics import Finding, describe
 from vedette.scenarios.sections.base import Chance, Positive, Reals, Section, Steps, check
 from vedette.scenarios.sections.world import Motion, RegionSection, grouped_order
 
@@ -104,11 +104,11 @@ class Birth(Section):
 
     @check
     def _each_once(self) -> Iterator[Finding]:
-        seen: set[int] = set()
+        earlier: set[int] = set()
         for i, step in enumerate(() if self.steps == "every" else self.steps):
-            if step in seen:
+            if step in earlier:
                 yield ("steps", i), "each step once", f"{step} again"
-            seen.add(step)
+            earlier.add(step)
 
     def build(self, motion: Motion, region: RegionSection) -> BirthModel:
         """Return the births, shared by all sensors. region: of births from measurements."""

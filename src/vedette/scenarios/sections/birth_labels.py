@@ -13,20 +13,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vedette.scenarios.faults import Finding, describe
-from vedette.scenarios.sections.fusion import ONE_BELIEF
+from vedette.scenarios.diagnostics import Finding, describe
+from vedette.scenarios.sections.fusion import SINGLE_BELIEF_FUSIONS
 
 if TYPE_CHECKING:
     from vedette.kernels.base.types import Floats
     from vedette.scenarios.sections.scenario import ScenarioModel
 
 # Share of the expected births above which a scenario is refused, or causes a warning.
-LARGEST_SHARE = 0.05
+MAX_CUT_SHARE = 0.05
 CAPPED = ("delta_glmb", "m_delta_glmb")
 
 
-def share_cut(num_labels: float, probability: float, most: int) -> float:
-    """Return the share of the expected births that is cut if the `most` heaviest sets of labels are retained.
+def cut_share(num_labels: float, probability: float, max_sets: int) -> float:
+    """Return the share of the expected births that is cut if the `max_sets` heaviest sets of labels are retained.
 
     For n labels of probability q each, the sets of k labels have the probability q^k (1 - q)^(n - k). Small sets are
     the heaviest, and the retained ones are normalised.
@@ -34,30 +34,32 @@ def share_cut(num_labels: float, probability: float, most: int) -> float:
     Args:
         num_labels: number of unconfirmed labels, at least 0.
         probability: of each, in (0, 0.5); for larger ones the result is 0.
-        most: number of hypotheses retained.
+        max_sets: number of hypotheses retained.
     """
     n, expected = math.floor(num_labels), math.floor(num_labels) * probability
     if n == 0 or probability >= 0.5:
         return 0.0
-    room, total, births = float(most), 0.0, 0.0
+    remaining, total, births = float(max_sets), 0.0, 0.0
     for k in range(min(n, math.ceil(expected + 10.0 * math.sqrt(expected) + 20.0)) + 1):
         log_sets = math.lgamma(n + 1) - math.lgamma(k + 1) - math.lgamma(n - k + 1)
-        kept = min(math.exp(min(log_sets, 700.0)), room)
-        weight = kept * math.exp(k * math.log(probability / (1.0 - probability)))  # relative to the set without births
-        room, total, births = room - kept, total + weight, births + k * weight
-        if room <= 0.5:
+        num_sets = min(math.exp(min(log_sets, 700.0)), remaining)
+        weight = num_sets * math.exp(
+            k * math.log(probability / (1.0 - probability))
+        )  # relative to the set without births
+        remaining, total, births = remaining - num_sets, total + weight, births + k * weight
+        if remaining <= 0.5:
             break
     return max(0.0, 1.0 - births / total / expected)
 
 
-def most_hypotheses(model: ScenarioModel) -> int | None:
+def max_label_sets(model: ScenarioModel) -> int | None:
     """Return the cap on label sets of a filter that enumerates them, if births have a period; None without a cap."""
-    birth, own = model.birth, model.filter
-    if own.kind == "custom" or own.kind not in CAPPED:
+    birth, section = model.birth, model.filter
+    if section.kind == "custom" or section.kind not in CAPPED:
         return None
     if birth.period is None or not birth.sites or model.recording is not None:
         return None
-    return int(own.limits.max_hypotheses)
+    return int(section.limits.max_hypotheses)
 
 
 def birth_probability(model: ScenarioModel) -> float:
@@ -81,7 +83,7 @@ def birth_steps(model: ScenarioModel) -> int:
 
 def has_one_belief(model: ScenarioModel) -> bool:
     """Return True if all scans update one belief."""
-    return model.fusion.kind in ONE_BELIEF
+    return model.fusion.kind in SINGLE_BELIEF_FUSIONS
 
 
 def labels_until_detection(model: ScenarioModel, chances: Floats) -> float:
@@ -93,12 +95,12 @@ def labels_until_detection(model: ScenarioModel, chances: Floats) -> float:
 
 def births_cut(model: ScenarioModel) -> Iterator[Finding]:
     """Yield a fault if a filter cuts its own births between scans, regardless of detections."""
-    most = most_hypotheses(model)
+    most = max_label_sets(model)
     if most is None:
         return
     steps, sites = birth_steps(model), len(model.birth.sites)
-    share = share_cut(steps * sites, birth_probability(model), most)
-    if share > LARGEST_SHARE:
+    share = cut_share(steps * sites, birth_probability(model), most)
+    if share > MAX_CUT_SHARE:
         wanted = (
             f"factored_glmb or lmb (or births at fewer birth.steps, or a longer time.step_period), as {steps} steps "
             f"with births from one scan to the next make {steps * sites} labels, and {most} hypotheses cut "

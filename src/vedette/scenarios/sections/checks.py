@@ -13,12 +13,12 @@ import numpy as np
 from vedette.internal.covariances import covariance_fault
 from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT
 from vedette.kernels.base.types import HEIGHT
-from vedette.scenarios.faults import Finding, Path, describe
-from vedette.scenarios.sections.base import attempt
+from vedette.scenarios.diagnostics import Finding, Path, describe
+from vedette.scenarios.sections.base import readable_findings
 from vedette.scenarios.sections.birth import BirthSite
 from vedette.scenarios.sections.birth_labels import births_cut
 from vedette.scenarios.sections.control import DECISION_CHECKS
-from vedette.scenarios.sections.fusion import OF_LMBS, OF_SCANS
+from vedette.scenarios.sections.fusion import LMB_FUSIONS, SCAN_FUSIONS
 from vedette.scenarios.sections.network import NETWORK_CHECKS
 from vedette.scenarios.sections.targets import RECORDED_DIM
 from vedette.scenarios.sections.tracking import LABELLING, UNLABELLED
@@ -99,18 +99,18 @@ def _fusion_of_kind(model: ScenarioModel) -> Iterator[Finding]:
     if kind == "parallel":
         wanted = f"sequential or another, as parallel is of lmb or factored_glmb filters, and these are {filters}"
         yield ("fusion", "kind"), wanted, describe(kind)
-    if kind in OF_LMBS and model.fusion.feedback:
+    if kind in LMB_FUSIONS and model.fusion.feedback:
         yield ("fusion", "feedback"), f"false, as {filters} filters cannot go on from an LMB", "true"
 
 
 def _one_belief(model: ScenarioModel) -> Iterator[Finding]:
-    if model.fusion.kind in OF_SCANS and model.fusion.feedback:
+    if model.fusion.kind in SCAN_FUSIONS and model.fusion.feedback:
         yield ("fusion", "feedback"), "false, as nothing is fused while tracking", "true"
 
 
 def _central(model: ScenarioModel) -> Iterator[Finding]:
     if model.filter.kind == "custom":
-        if model.fusion.kind in OF_SCANS:
+        if model.fusion.kind in SCAN_FUSIONS:
             wanted = "a fusion of densities, as each sensor has a filter of your own"
             yield ("fusion", "kind"), wanted, describe(model.fusion.kind)
     elif model.fusion.kind == "central" and model.filter.assignment.kind != "ranked":
@@ -153,9 +153,9 @@ def _birth_steps(model: ScenarioModel) -> Iterator[Finding]:
 def _birth_sites(model: ScenarioModel) -> Iterator[Finding]:
     for i, site in enumerate(model.birth.sites):
         path: Path = ("birth", "sites", i)
-        yield from attempt(_state_length((*path, "mean"), site, "mean", model))
-        yield from attempt(_state_length((*path, "std"), site, "std", model))
-        yield from attempt(_covariance((*path, "cov"), site, model))
+        yield from readable_findings(_state_length((*path, "mean"), site, "mean", model))
+        yield from readable_findings(_state_length((*path, "std"), site, "std", model))
+        yield from readable_findings(_covariance((*path, "cov"), site, model))
 
 
 def _state_length(path: Path, holder: Any, field: str, model: ScenarioModel) -> Iterator[Finding]:
@@ -179,7 +179,7 @@ def _covariance(path: Path, site: BirthSite, model: ScenarioModel) -> Iterator[F
 def _targets(model: ScenarioModel) -> Iterator[Finding]:
     if model.targets.kind == "poisson":
         for name in ("mean", "std"):
-            yield from attempt(_state_length(("targets", name), model.targets, name, model))
+            yield from readable_findings(_state_length(("targets", name), model.targets, name, model))
     if model.targets.kind == "crowd" and len(model.targets.std) != (rest := model.motion.state_dim - 2):
         wanted = f"{rest} numbers, as a state under motion has but the position"
         yield ("targets", "std"), wanted, describe(model.targets.std)
@@ -188,9 +188,9 @@ def _targets(model: ScenarioModel) -> Iterator[Finding]:
     for i, target in enumerate(model.targets.tracks):
         path: Path = ("targets", "tracks", i)
         for name in ("state", "std"):
-            yield from attempt(_state_length((*path, name), target, name, model))
+            yield from readable_findings(_state_length((*path, name), target, name, model))
         for name in ("start_step", "end_step"):
-            yield from attempt(_last_step((*path, name), target, name, model))
+            yield from readable_findings(_last_step((*path, name), target, name, model))
 
 
 def _last_step(path: Path, holder: Any, name: str, model: ScenarioModel) -> Iterator[Finding]:
@@ -200,7 +200,7 @@ def _last_step(path: Path, holder: Any, name: str, model: ScenarioModel) -> Iter
 def _sensor_names(model: ScenarioModel) -> Iterator[Finding]:
     names: set[str] = set()
     for i, sensor in enumerate(model.sensors):
-        yield from attempt(_name_once(("sensors", i, "name"), sensor, names))
+        yield from readable_findings(_name_once(("sensors", i, "name"), sensor, names))
 
 
 def _name_once(path: Path, sensor: Sensor, names: set[str]) -> Iterator[Finding]:
@@ -212,7 +212,7 @@ def _name_once(path: Path, sensor: Sensor, names: set[str]) -> Iterator[Finding]
 
 def _scan_steps(model: ScenarioModel) -> Iterator[Finding]:
     for i, sensor in enumerate(model.sensors):
-        yield from attempt(_first_scan(("sensors", i, "scans"), sensor, model))
+        yield from readable_findings(_first_scan(("sensors", i, "scans"), sensor, model))
 
 
 def _scans_of_unlabelled(model: ScenarioModel) -> Iterator[Finding]:
@@ -251,7 +251,7 @@ def _first_scan(path: Path, sensor: Sensor, model: ScenarioModel) -> Iterator[Fi
 
 def _score(model: ScenarioModel) -> Iterator[Finding]:
     for name in ("from_step", "to_step"):
-        yield from attempt(_last_step(("ospa", name), model.ospa, name, model))
+        yield from readable_findings(_last_step(("ospa", name), model.ospa, name, model))
     if model.ospa.components == "state" and model.targets.kind == "recorded" and model.motion.state_dim != RECORDED_DIM:
         wanted = f"position, as states have {model.motion.state_dim} components and recorded targets {RECORDED_DIM}"
         yield ("ospa", "components"), wanted, '"state"'

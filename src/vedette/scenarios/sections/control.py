@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import Field
 
 from vedette.internal.quantities import is_doppler
-from vedette.scenarios.faults import Finding, Path, describe
+from vedette.scenarios.diagnostics import Finding, Path, describe
 from vedette.scenarios.sections.base import (
     Count,
     Numbers,
@@ -208,7 +208,7 @@ def targets_of_rules(model: ScenarioModel) -> Iterator[Finding]:
             yield ("planners", name, "targets"), wanted, describe(list(own.targets))
 
 
-def revisited(model: ScenarioModel) -> Revisit | None:
+def revisit_constraint(model: ScenarioModel) -> Revisit | None:
     """Return the constraint on places to be visited repeatedly; None if there is none."""
     return next((own for own in model.control.constraints if isinstance(own, Revisit)), None)
 

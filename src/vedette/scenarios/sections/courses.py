@@ -10,21 +10,21 @@ import math
 from collections.abc import Collection, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, TypeGuard
 
-from vedette.scenarios.faults import Path
+from vedette.scenarios.diagnostics import Path
 from vedette.scenarios.sections.base import Section
-from vedette.scenarios.sections.places import origin_of
+from vedette.scenarios.sections.places import read_origin
 
 if TYPE_CHECKING:
     from vedette.platforms.compass import Compass
     from vedette.scenarios.sections.sensors import Sensor
 
-COURSES = ("course_deg", "courses_deg", "azimuth_deg", "azimuths_deg")
-_HEADINGS = {"heading_deg", "headings_deg", "directions_deg", "pointing_deg", "pointings_deg"}
+COURSE_KEYS = ("course_deg", "courses_deg", "azimuth_deg", "azimuths_deg")
+_HEADING_KEYS = {"heading_deg", "headings_deg", "directions_deg", "pointing_deg", "pointings_deg"}
 # New name of the key `courses_deg` of a platform, by its kind.
 _LISTS = {"courses": "headings_deg", "steps": "directions_deg"}
 
 
-def from_east(data: Mapping[str, Any]) -> Mapping[str, Any]:
+def courses_to_headings(data: Mapping[str, Any]) -> Mapping[str, Any]:
     """Return a scenario's data with its courses as headings, counter-clockwise from east.
 
     Data is unchanged if nothing counts from north, or if directions are counted in both ways; the keys are then unknown
@@ -33,50 +33,55 @@ def from_east(data: Mapping[str, Any]) -> Mapping[str, Any]:
     sensors, defaults = data.get("sensors"), data.get("sensor_defaults")
     parts = [part for part in (defaults, *(sensors if isinstance(sensors, list | tuple) else ())) if _is_mapping(part)]
     keys = {key for part in parts for key in _keys(part)}
-    if not keys & set(COURSES) or keys & _HEADINGS:
+    if not keys & set(COURSE_KEYS) or keys & _HEADING_KEYS:
         return data
-    origin = origin_of(data)
+    origin = read_origin(data)
     recording = data.get("recording")
-    is_told = _is_mapping(recording) and recording.get("bearings") == "north"
-    if origin is None and not is_told and not any(part.get("compass") is True for part in parts):
+    counts_from_north = _is_mapping(recording) and recording.get("bearings") == "north"
+    if origin is None and not counts_from_north and not any(part.get("compass") is True for part in parts):
         return data
     from vedette.platforms.compass import PlaneCompass
 
-    compass, shared = origin or PlaneCompass(), defaults if _is_mapping(defaults) else {}
-    directed = {key: shared[key] for key in ("course_deg", "platform") if key in shared}
-    found = {**data}
+    compass, shared_settings = origin or PlaneCompass(), defaults if _is_mapping(defaults) else {}
+    inherited = {key: shared_settings[key] for key in ("course_deg", "platform") if key in shared_settings}
+    converted = {**data}
     if isinstance(sensors, list | tuple):
-        found["sensors"] = [_sensor({**directed, **one}, compass) if _is_mapping(one) else one for one in sensors]
-    return {**found, "sensor_defaults": _sensor(shared, compass)} if shared else found
+        converted["sensors"] = [
+            _sensor({**inherited, **sensor}, compass) if _is_mapping(sensor) else sensor for sensor in sensors
+        ]
+    return {**converted, "sensor_defaults": _sensor(shared_settings, compass)} if shared_settings else converted
 
 
-def as_courses(platform: Section, compass: Compass, place: Any) -> dict[str, tuple[str, Any]]:
+def directions_as_courses(platform: Section, compass: Compass, place: Any) -> dict[str, tuple[str, Any]]:
     """Return the directions of a platform by compass, as in a file: name and value by the name of its field."""
-    found: dict[str, tuple[str, Any]] = {}
+    courses: dict[str, tuple[str, Any]] = {}
     lists = {"headings_deg": "courses_deg", "directions_deg": "courses_deg", "pointings_deg": "azimuths_deg"}
     for name, key in lists.items():
         if name in type(platform).model_fields:
-            turns = getattr(platform, "relative", False)
-            found[name] = key, tuple(-each if turns else (90.0 - each) % 360.0 for each in getattr(platform, name))
+            is_relative = getattr(platform, "relative", False)
+            courses[name] = (
+                key,
+                tuple(-each if is_relative else (90.0 - each) % 360.0 for each in getattr(platform, name)),
+            )
     if "pointing_deg" in type(platform).model_fields:
-        found["pointing_deg"] = "azimuth_deg", start_course(platform.pointing_deg, compass, place)  # type: ignore[attr-defined]
-    return found
+        courses["pointing_deg"] = "azimuth_deg", start_course(platform.pointing_deg, compass, place)  # type: ignore[attr-defined]
+    return courses
 
 
-def in_courses(data: Mapping[str, Any], sensor: Sensor, compass: Compass) -> dict[str, Any]:
+def sensor_as_courses(data: Mapping[str, Any], sensor: Sensor, compass: Compass) -> dict[str, Any]:
     """Return the plain data of a sensor with its directions by compass, as plans have them."""
-    found = {key: value for key, value in data.items() if key != "heading_deg"}
-    found["course_deg"] = start_course(sensor.heading_deg, compass, sensor.position)
-    found["platform"] = _told(data["platform"], sensor.platform, compass, sensor.position)
-    return found
+    converted = {key: value for key, value in data.items() if key != "heading_deg"}
+    converted["course_deg"] = start_course(sensor.heading_deg, compass, sensor.position)
+    converted["platform"] = _platform_as_courses(data["platform"], sensor.platform, compass, sensor.position)
+    return converted
 
 
-def _told(data: Mapping[str, Any], platform: Section, compass: Compass, place: Any) -> dict[str, Any]:
-    told = as_courses(platform, compass, place)
-    found = dict(told.get(key, (key, value)) for key, value in data.items())
+def _platform_as_courses(data: Mapping[str, Any], platform: Section, compass: Compass, place: Any) -> dict[str, Any]:
+    courses = directions_as_courses(platform, compass, place)
+    converted = dict(courses.get(key, (key, value)) for key, value in data.items())
     if isinstance(carrier := getattr(platform, "carrier", None), Section):
-        found["carrier"] = _told(data["carrier"], carrier, compass, place)
-    return found
+        converted["carrier"] = _platform_as_courses(data["carrier"], carrier, compass, place)
+    return converted
 
 
 def start_course(heading_deg: float, compass: Compass, place: Any) -> float:
@@ -84,24 +89,24 @@ def start_course(heading_deg: float, compass: Compass, place: Any) -> float:
     return round(math.degrees(float(compass.azimuth(math.radians(heading_deg), place))), 9) % 360.0
 
 
-def as_written(path: Path, data: Any) -> Path:
-    """Return the path in the file for a path after `from_east`."""
-    found: list[str | int] = []
+def path_in_file(path: Path, data: Any) -> Path:
+    """Return the path in the file for a path after `courses_to_headings`."""
+    written: list[str | int] = []
     for key in path:
         if _is_mapping(data) and key not in data:
-            key = next((name for name in COURSES if name in data and key in _names_of(name)), key)
-        found.append(key)
+            key = next((name for name in COURSE_KEYS if name in data and key in _heading_keys(name)), key)
+        written.append(key)
         try:
             data = data[key]
         except (KeyError, IndexError, TypeError):
             data = None
-    return tuple(found)
+    return tuple(written)
 
 
-def _names_of(key: str) -> Collection[str]:
+def _heading_keys(key: str) -> Collection[str]:
     """Return the possible new names of a key of courses."""
-    named = {"course_deg": "heading_deg", "azimuth_deg": "pointing_deg", "azimuths_deg": "pointings_deg"}
-    return (named[key],) if key in named else _LISTS.values()
+    single = {"course_deg": "heading_deg", "azimuth_deg": "pointing_deg", "azimuths_deg": "pointings_deg"}
+    return (single[key],) if key in single else _LISTS.values()
 
 
 def _keys(part: Mapping[str, Any]) -> Iterator[str]:
@@ -116,31 +121,33 @@ def _sensor(data: Mapping[str, Any], compass: Compass) -> dict[str, Any]:
     position = data.get("position")
     is_place = isinstance(position, list | tuple) and len(position) == 2 and all(map(_is_number, position))
     place = position if is_place else (0.0, 0.0)
-    found = _renamed(data, "course_deg", "heading_deg", lambda course: _angle(course, compass, place))
-    if _is_mapping(found.get("platform")):
-        found["platform"] = _platform(found["platform"], compass, place)
-    return found
+    converted = _convert_key(data, "course_deg", "heading_deg", lambda course: _angle(course, compass, place))
+    if _is_mapping(converted.get("platform")):
+        converted["platform"] = _platform(converted["platform"], compass, place)
+    return converted
 
 
 def _platform(data: Mapping[str, Any], compass: Compass, place: Any) -> dict[str, Any]:
-    turns = data.get("relative") is True
-    found = _renamed(data, "azimuth_deg", "pointing_deg", lambda azimuth: _angle(azimuth, compass, place))
+    is_relative = data.get("relative") is True
+    converted = _convert_key(data, "azimuth_deg", "pointing_deg", lambda azimuth: _angle(azimuth, compass, place))
     for key, name in (("courses_deg", _LISTS.get(str(data.get("kind")))), ("azimuths_deg", "pointings_deg")):
         if name is not None:
-            found = _renamed(found, key, name, lambda given: [-each if turns else _turned(each) for each in given])
-    if _is_mapping(found.get("carrier")):
-        found["carrier"] = _platform(found["carrier"], compass, place)
-    return found
+            converted = _convert_key(
+                converted, key, name, lambda given: [-each if is_relative else _heading(each) for each in given]
+            )
+    if _is_mapping(converted.get("carrier")):
+        converted["carrier"] = _platform(converted["carrier"], compass, place)
+    return converted
 
 
-def _renamed(data: Mapping[str, Any], key: str, name: str, change: Any) -> dict[str, Any]:
+def _convert_key(data: Mapping[str, Any], key: str, name: str, change: Any) -> dict[str, Any]:
     """Return a copy with one key renamed and its numbers changed; other values stay."""
-    found = dict(data)
-    if key in found:
-        value = found.pop(key)
-        listed = isinstance(value, list | tuple) and all(map(_is_number, value))
-        found[name] = change(value) if listed or _is_number(value) else value
-    return found
+    converted = dict(data)
+    if key in converted:
+        value = converted.pop(key)
+        is_list = isinstance(value, list | tuple) and all(map(_is_number, value))
+        converted[name] = change(value) if is_list or _is_number(value) else value
+    return converted
 
 
 def _angle(azimuth: float, compass: Compass, place: Any) -> float:
@@ -148,7 +155,7 @@ def _angle(azimuth: float, compass: Compass, place: Any) -> float:
     return math.degrees(float(compass.angle(math.radians(azimuth), place)))
 
 
-def _turned(course: float) -> float:
+def _heading(course: float) -> float:
     """Return the true direction of a course, deg counter-clockwise from east in [-180, 180)."""
     return (270.0 - course) % 360.0 - 180.0
 

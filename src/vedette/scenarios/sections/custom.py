@@ -18,7 +18,7 @@ from typing import Annotated, Any, ClassVar
 from pydantic import AfterValidator, Field, JsonValue
 
 from vedette.errors import InputError, VedetteError
-from vedette.scenarios.faults import Path as Places
+from vedette.scenarios.diagnostics import Path as Places
 from vedette.scenarios.sections.base import Section, expected, sections_in
 
 _REFERENCE = re.compile(r"([A-Za-z_]\w*(\.[A-Za-z_]\w*)*|[^:]+\.py):[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")
@@ -30,7 +30,7 @@ def _reference(value: str) -> str:
     return value
 
 
-class NotGiven(InputError):
+class MissingMember(InputError):
     """Custom code that does not return the expected object.
 
     Attributes:
@@ -83,7 +83,10 @@ class Custom(Section):
         return found
 
     def named(self, folder: Path) -> Any:
-        """Return the object that `function` names; importing it runs custom code. Raises `NotGiven` if that fails."""
+        """Return the object that `function` names; importing it runs custom code.
+
+        Raises `MissingMember` if that fails.
+        """
         name, _, attribute = self.function.rpartition(":")
         try:
             found: Any = _module(name, folder)
@@ -96,7 +99,7 @@ class Custom(Section):
         return found
 
     def made(self, folder: Path, **parts: Any) -> Any:
-        """Return the object, made from `parts` if necessary. Raises `NotGiven` for an object of another kind."""
+        """Return the object, made from `parts` if necessary. Raises `MissingMember` for an object of another kind."""
         found, wanted = self.named(folder), self.protocol()
         as_it_is = not isinstance(found, type) and (_is_function(wanted) or not self.lacking(found))
         try:
@@ -104,9 +107,9 @@ class Custom(Section):
                 found = partial(found, **self.arguments)
             elif as_it_is and self.arguments:
                 got = ", ".join(self.arguments)
-                raise NotGiven(self, "arguments", f"none, as {self.function} is no class and no function", got)
+                raise MissingMember(self, "arguments", f"none, as {self.function} is no class and no function", got)
             elif not as_it_is and callable(found):
-                found = found(**asked_for(found, parts), **self.arguments)
+                found = found(**matching_parts(found, parts), **self.arguments)
         except VedetteError:
             raise
         except Exception as error:
@@ -117,13 +120,13 @@ class Custom(Section):
 
     def lacking(self, found: object) -> str:
         """Return in words how an object fails its protocol; empty if it meets it."""
-        return lacks(found, self.protocol(), self.spared)
+        return missing_members(found, self.protocol(), self.spared)
 
-    def _not_given(self, got: str) -> NotGiven:
-        return NotGiven(self, "function", f"{self.function} to give a {self.protocol().__name__}", got)
+    def _not_given(self, got: str) -> MissingMember:
+        return MissingMember(self, "function", f"{self.function} to give a {self.protocol().__name__}", got)
 
 
-def customs(section: Section) -> Iterator[tuple[Places, Custom]]:
+def custom_objects(section: Section) -> Iterator[tuple[Places, Custom]]:
     """Return every custom object in a section, with its path."""
     return ((path, found) for path, found in sections_in(section) if isinstance(found, Custom))
 
@@ -132,7 +135,7 @@ def _is_function(wanted: type) -> bool:
     return "__call__" in vars(wanted)
 
 
-def asked_for(made: Any, parts: dict[str, Any]) -> dict[str, Any]:
+def matching_parts(made: Any, parts: dict[str, Any]) -> dict[str, Any]:
     """Return the parts for which a class or function has parameters."""
     try:
         parameters = inspect.signature(made).parameters
@@ -143,7 +146,7 @@ def asked_for(made: Any, parts: dict[str, Any]) -> dict[str, Any]:
     return {name: part for name, part in parts.items() if name in parameters}
 
 
-def lacks(found: Any, wanted: type, spared: Sequence[str] = ()) -> str:
+def missing_members(found: Any, wanted: type, spared: Sequence[str] = ()) -> str:
     """Return in words how an object fails a class or protocol, except in the members `spared`; empty if it does not."""
     if not getattr(wanted, "_is_protocol", False):
         return "" if isinstance(found, wanted) else f"a {type(found).__name__}"
@@ -155,10 +158,10 @@ def lacks(found: Any, wanted: type, spared: Sequence[str] = ()) -> str:
             continue
         member = inspect.getattr_static(wanted, name, None)  # an attribute without a default has none
         if not hasattr(found, name):
-            return f"{what} without {_shown(name, member)}"
+            return f"{what} without {_signature_text(name, member)}"
         own = found if name == "__call__" else getattr(found, name)
-        if inspect.isfunction(member) and not _takes(own, member):
-            return f"{what} that cannot be called as {_shown(name, member)}"
+        if inspect.isfunction(member) and not _accepts_call(own, member):
+            return f"{what} that cannot be called as {_signature_text(name, member)}"
     return ""
 
 
@@ -166,14 +169,14 @@ def _parameters(member: Any) -> list[inspect.Parameter]:
     return list(inspect.signature(member).parameters.values())[1:]
 
 
-def _shown(name: str, member: Any) -> str:
+def _signature_text(name: str, member: Any) -> str:
     if not inspect.isfunction(member):
         return name
     plain = [each.replace(annotation=inspect.Parameter.empty) for each in _parameters(member)]
     return f"{name.replace('__call__', '')}{inspect.Signature(plain)}"
 
 
-def _takes(own: Any, member: Any) -> bool:
+def _accepts_call(own: Any, member: Any) -> bool:
     """Return True if a method accepts the protocol's call: keyword-only arguments by name, the others in order."""
     if not callable(own):
         return False

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from vedette.errors import InputError
 from vedette.internal.unit_warnings import suppress_unit_warnings
-from vedette.scenarios.faults import Finding, describe
+from vedette.scenarios.diagnostics import Finding, describe
 from vedette.scenarios.sections.base import Count, Point, Positive, Probability, Section, check
 from vedette.scenarios.sections.custom import Custom
 from vedette.scenarios.sections.derived import Part, derived, one_of

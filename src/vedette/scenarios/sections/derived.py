@@ -25,7 +25,7 @@ from pydantic import Field, create_model
 from vedette.internal.unit_warnings import suppress_unit_warnings
 from vedette.scenarios.sections import base
 from vedette.scenarios.sections.base import Section
-from vedette.scenarios.sections.custom import Custom, asked_for
+from vedette.scenarios.sections.custom import Custom, matching_parts
 
 _ROOT = Path(__file__).parents[2]
 _ENTRY = re.compile(r"    (\w+(?:, \w+)*): (.*)")
@@ -72,7 +72,7 @@ class Part(Derived):
         module, _, name = self.of.partition(":")
         made = getattr(importlib.import_module(module), name)
         with suppress_unit_warnings():
-            return made(**self.given(), **asked_for(made, given))
+            return made(**self.given(), **matching_parts(made, given))
 
 
 class _OwnPart(Custom):

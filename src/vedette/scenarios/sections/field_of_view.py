@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from vedette.scenarios.sections.sensors import Sensor
 
-_FADED = 0.01  # share of the probability of a soft sector below which detection is neglected
+_MIN_DETECTION = 0.01  # share of the probability of a soft sector below which detection is neglected
 
 
 class FieldOfView(NamedTuple):
@@ -37,10 +37,10 @@ def field_of_view(sensor: Sensor, pose: Sequence[float] | None = None) -> FieldO
     return None
 
 
-def reach_of(sensor: Sensor) -> float:
+def max_range(sensor: Sensor) -> float:
     """Return the range beyond which a sensor measures nothing at any pose, m; inf if its detection has no such edge."""
     view, detection = field_of_view(sensor), sensor.detection
     if view is None or detection.kind == "camera" or getattr(detection, "outside", 0.0) > 0.0:  # a camera zooms
         return math.inf
-    faded = math.log(1.0 / _FADED - 1.0) / detection.range_slope if detection.kind == "soft_sector" else 0.0
+    faded = math.log(1.0 / _MIN_DETECTION - 1.0) / detection.range_slope if detection.kind == "soft_sector" else 0.0
     return view.reach + faded

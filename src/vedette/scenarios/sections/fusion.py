@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, TypeAlias
 
 from pydantic import Field
 
-from vedette.scenarios.faults import Finding, describe
+from vedette.scenarios.diagnostics import Finding, describe
 from vedette.scenarios.sections.base import Chance, Probability, Section, check
 from vedette.scenarios.sections.custom import Custom
 from vedette.scenarios.sections.derived import Derived, derived
@@ -26,14 +26,14 @@ FusionKind: TypeAlias = Literal[
     "sequential", "parallel", "clmb", "cm_delta_glmb", "arithmetic_average", "central", "none"
 ]
 # All scans update one belief: no fusion in tracking.
-OF_SCANS: tuple[FusionKind, ...] = ("sequential", "central")
-ONE_BELIEF: tuple[FusionKind, ...] = (*OF_SCANS, "none")
+SCAN_FUSIONS: tuple[FusionKind, ...] = ("sequential", "central")
+SINGLE_BELIEF_FUSIONS: tuple[FusionKind, ...] = (*SCAN_FUSIONS, "none")
 # Every sensor's scan counts in full.
-IN_FULL: tuple[FusionKind, ...] = (*OF_SCANS, "parallel")
+FULL_INFORMATION_FUSIONS: tuple[FusionKind, ...] = (*SCAN_FUSIONS, "parallel")
 # Fusion of local beliefs of the sensors, by their labels.
-BY_LABEL: tuple[FusionKind, ...] = ("clmb", "cm_delta_glmb", "arithmetic_average")
+LABEL_FUSIONS: tuple[FusionKind, ...] = ("clmb", "cm_delta_glmb", "arithmetic_average")
 # Those with an LMB as fused density, which may use views.
-OF_LMBS: tuple[FusionKind, ...] = ("clmb", "arithmetic_average")
+LMB_FUSIONS: tuple[FusionKind, ...] = ("clmb", "arithmetic_average")
 
 
 Weights = Annotated[tuple[Probability, ...], Field(strict=False, min_length=1)]
@@ -131,12 +131,12 @@ class Fusion(Section):
 
     @check
     def _views_of_lmbs(self) -> Iterator[Finding]:
-        if self.by_views and self.kind not in OF_LMBS:
-            yield ("by_views",), f"false, as {self.kind} does not weigh labels ({' and '.join(OF_LMBS)} do)", "true"
+        if self.by_views and self.kind not in LMB_FUSIONS:
+            yield ("by_views",), f"false, as {self.kind} does not weigh labels ({' and '.join(LMB_FUSIONS)} do)", "true"
 
     @check
     def _matching_of_own_labels(self) -> Iterator[Finding]:
-        if self.matching == "assignment" and self.kind not in BY_LABEL:
+        if self.matching == "assignment" and self.kind not in LABEL_FUSIONS:
             yield ("matching",), f"labels, as under {self.kind} all sensors share them", describe(self.matching)
 
     @property
@@ -147,7 +147,7 @@ class Fusion(Section):
     @property
     def decides_in_full(self) -> bool:
         """True if joint decisions count every sensor's scans in full, for any reward."""
-        return self.kind in (*IN_FULL, "arithmetic_average") or self.by_views
+        return self.kind in (*FULL_INFORMATION_FUSIONS, "arithmetic_average") or self.by_views
 
     def scaled_weights(self, num_sensors: int) -> tuple[float, ...]:
         """Return the weight of each sensor (default: equal), scaled to a sum of one beyond the rounding of the file."""
@@ -158,7 +158,7 @@ class Fusion(Section):
         """Return the fusion of the sensors' densities after each scan; None if all scans update one belief."""
         from vedette.fusion import LabelMatchedFusion, ParallelUpdate
 
-        if self.kind in ONE_BELIEF:
+        if self.kind in SINGLE_BELIEF_FUSIONS:
             return None
         if self.kind == "parallel":
             return ParallelUpdate(missing_existence=self.missing_existence, limits=self.limits.build())

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 from pydantic import Field
 
 from vedette.internal.quantities import PLACED
-from vedette.scenarios.faults import Finding, describe
+from vedette.scenarios.diagnostics import Finding, describe
 from vedette.scenarios.sections.base import Whole, check
 from vedette.scenarios.sections.derived import Part, derived
-from vedette.scenarios.sections.fusion import BY_LABEL, OF_SCANS, Fusion
+from vedette.scenarios.sections.fusion import LABEL_FUSIONS, SCAN_FUSIONS, Fusion
 from vedette.scenarios.sections.tracking import UNLABELLED
 
 if TYPE_CHECKING:  # importing these imports the compiler, which a check does not need
@@ -46,7 +46,7 @@ def network_of_fusion(model: ScenarioModel) -> Iterator[Finding]:
     network, fusion = model.network, model.fusion
     if network is None:
         return
-    if fusion.kind in OF_SCANS and network.consensus_rounds is not None:
+    if fusion.kind in SCAN_FUSIONS and network.consensus_rounds is not None:
         wanted = f"none, as under {fusion.kind} sensors send scans, of which there is no average"
         yield ("network", "consensus_rounds"), wanted, describe(network.consensus_rounds)
     if fusion.kind == "parallel" and model.filter.kind == "factored_glmb":
@@ -54,7 +54,7 @@ def network_of_fusion(model: ScenarioModel) -> Iterator[Finding]:
         yield ("filter", "kind"), wanted, describe(model.filter.kind)
     if fusion.kind == "parallel" and network.delay > 0:
         yield ("network", "delay"), "0, as parallel divides by the prediction of the same time", describe(network.delay)
-    if fusion.kind in (*BY_LABEL, "custom") and not fusion.feeds_back:
+    if fusion.kind in (*LABEL_FUSIONS, "custom") and not fusion.feeds_back:
         yield ("fusion", "feedback"), "true, as sensors of a network go on from what they have fused", "false"
 
 
@@ -72,7 +72,7 @@ def births_from_measurements(model: ScenarioModel) -> Iterator[Finding]:
         if sensor.measurement.kind not in (*PLACED, "custom"):
             wanted = "a measurement that says where a target is, for birth.from_measurements"
             yield ("sensors", i, "measurement", "kind"), wanted, describe(sensor.measurement.kind)
-    if len(model.sensors) > 1 and isinstance(fusion, Fusion) and fusion.kind in BY_LABEL:
+    if len(model.sensors) > 1 and isinstance(fusion, Fusion) and fusion.kind in LABEL_FUSIONS:
         when = "without feedback" if not fusion.feeds_back else None if model.network is None else "over a network"
         if when is not None and fusion.matching == "labels":
             wanted = f"assignment, as {when} sensors make labels of their own from their measurements"
@@ -82,7 +82,7 @@ def births_from_measurements(model: ScenarioModel) -> Iterator[Finding]:
 def matching_of_own_labels(model: ScenarioModel) -> Iterator[Finding]:
     """Yield a fault if labels are matched although all sensors share them."""
     fusion = model.fusion
-    if not isinstance(fusion, Fusion) or fusion.matching == "labels" or fusion.kind not in BY_LABEL:
+    if not isinstance(fusion, Fusion) or fusion.matching == "labels" or fusion.kind not in LABEL_FUSIONS:
         return
     if fusion.feedback and model.network is None:
         yield ("fusion", "matching"), "labels, as with feedback all sensors share them", describe(fusion.matching)

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from vedette.errors import InputError
-from vedette.scenarios.faults import Finding, Path, describe
+from vedette.scenarios.diagnostics import Finding, Path, describe
 from vedette.scenarios.sections.base import Section, sections_in
 from vedette.scenarios.sections.birth import BirthSite
 from vedette.scenarios.sections.deciding import KeepOut
@@ -51,13 +51,13 @@ def in_metres(data: Mapping[str, Any]) -> Mapping[str, Any]:
 
     An invalid place stays, and is reported by the section that reads it.
     """
-    origin = origin_of(data)
+    origin = read_origin(data)
     if origin is None:
         return data
     return {key: value if key == "origin" else _converted(value, origin) for key, value in data.items()}
 
 
-def origin_of(data: Mapping[str, Any]) -> Origin | None:
+def read_origin(data: Mapping[str, Any]) -> Origin | None:
     """Return the origin of a scenario's data; None if it has none, or one that cannot be read."""
     try:
         return OriginSection.model_validate(data.get("origin")).build()
@@ -118,7 +118,7 @@ def _region(box: Mapping[str, Any], origin: Origin) -> Any:
     return {"x_min": x_min, "x_max": x_max, "y_min": y_min, "y_max": y_max}
 
 
-def misplaced(model: ScenarioModel) -> Iterator[Finding]:
+def misplaced_findings(model: ScenarioModel) -> Iterator[Finding]:
     """Yield faults of places in metres that must be degrees, near the origin's degrees, and of places too far away."""
     origin = model.origin
     if origin is None:

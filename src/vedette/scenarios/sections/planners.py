@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from vedette.scenarios.faults import Finding, describe
+from vedette.scenarios.diagnostics import Finding, describe
 from vedette.scenarios.sections.base import Count, check
 from vedette.scenarios.sections.custom import Custom
 from vedette.scenarios.sections.deciding import AnySearch, Lookahead
@@ -21,8 +21,8 @@ from vedette.scenarios.sections.strategies import (
     Parts,
     Strategy,
     ValuedStrategy,
-    unknown_truth,
-    watched,
+    missing_truth,
+    with_reported_violations,
 )
 
 if TYPE_CHECKING:  # importing the planners imports the compiler, which a check does not need
@@ -56,7 +56,7 @@ class NamedTold(NamedJoint):
 
     def misfit(self, model: ScenarioModel, *, labels: bool | None = None) -> str:
         """Return what is required instead, also if true targets are unknown or lack components of a custom motion."""
-        return super().misfit(model, labels=labels) or unknown_truth(model)
+        return super().misfit(model, labels=labels) or missing_truth(model)
 
     def words(self, model: ScenarioModel) -> str:
         """Return a description: joint, with the true targets."""
@@ -88,7 +88,7 @@ class NamedIndependent(ValuedStrategy):
         from vedette.control import IndependentPlanner
 
         own = IndependentPlanner(**self.shared(parts, folder), others=self.others or parts.others)
-        return watched(own, parts)
+        return with_reported_violations(own, parts)
 
 
 class NamedLookahead(LookaheadStrategy, Lookahead):
@@ -143,7 +143,7 @@ class NamedOracle(Strategy, Derived):
 
     def misfit(self, model: ScenarioModel, *, labels: bool | None = None) -> str:
         """Return what is required instead if true targets are unknown or lack components of a custom motion."""
-        return unknown_truth(model)
+        return missing_truth(model)
 
     def words(self, model: ScenarioModel) -> str:
         """Return a description: with the true targets."""
@@ -172,7 +172,7 @@ class CustomPlanner(Strategy, Custom):
 
     def planner(self, parts: Parts, folder: Path) -> Planner:
         """Return the custom planner."""
-        return watched(self.made(folder, **parts._asdict()), parts)
+        return with_reported_violations(self.made(folder, **parts._asdict()), parts)
 
 
 class ProgramStrategy(Strategy, ProgramSection):
@@ -209,7 +209,7 @@ class _Fixed(Strategy):
     def planner(self, parts: Parts, folder: Path) -> Planner:
         from vedette.control import FixedPlanner
 
-        return watched(FixedPlanner(parts.first_actions), parts)
+        return with_reported_violations(FixedPlanner(parts.first_actions), parts)
 
 
 # The strategies of every scenario. Not validated: that would build the validators of rewards and searches at import.
@@ -228,19 +228,19 @@ STRATEGIES: dict[str, Strategy] = {
 }
 
 
-def strategy_of(model: ScenarioModel, name: str) -> Strategy:
+def get_strategy(model: ScenarioModel, name: str) -> Strategy:
     """Return the strategy of a scenario by its name. Raises `KeyError` for an unknown one."""
     return model.planners[name] if name in model.planners else STRATEGIES[name]
 
 
-def strategy_words(model: ScenarioModel, name: str) -> str:
+def describe_strategy(model: ScenarioModel, name: str) -> str:
     """Return the description of a strategy; empty for an unknown name, such as `recorded`."""
     known = name in model.planners or name in STRATEGIES
-    return strategy_of(model, name).words(model) if known else ""
+    return get_strategy(model, name).words(model) if known else ""
 
 
 @dataclass(frozen=True, slots=True)
-class Named:
+class NamedPlanner:
     """A planner with its name in the scenario."""
 
     name: str
@@ -250,7 +250,7 @@ class Named:
         """Return the planner's plan, under this name."""
         return replace(self.planner.plan(*situation, rng=rng), planner=self.name)
 
-    def with_truth(self, truth: Truth) -> Named:
+    def with_truth(self, truth: Truth) -> NamedPlanner:
         """Return the planner with the true targets, if it requires them; else unchanged."""
         from vedette.simulation import RequiresTruth
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
-from vedette.scenarios.faults import Finding
+from vedette.scenarios.diagnostics import Finding
 from vedette.scenarios.sections.base import HalfWidth, Numbers, Point, Positive, Reals, check
 from vedette.scenarios.sections.custom import Custom
 from vedette.scenarios.sections.derived import Part, derived, one_of

@@ -13,9 +13,9 @@ from pydantic import Field
 
 from vedette.errors import InputError
 from vedette.internal.quantities import COMPONENTS, QUANTITIES, in_file
-from vedette.scenarios.faults import Finding, describe
-from vedette.scenarios.sections.base import SHA256_FIELD, NonNegative, Section, Sha256, attempt, is_whole
-from vedette.scenarios.sections.field_of_view import reach_of
+from vedette.scenarios.diagnostics import Finding, describe
+from vedette.scenarios.sections.base import SHA256_FIELD, NonNegative, Section, Sha256, is_complete, readable_findings
+from vedette.scenarios.sections.field_of_view import max_range
 
 if TYPE_CHECKING:
     from vedette.recorded import Origin, RecordedScans, Site
@@ -83,7 +83,7 @@ class RecordingSection(Section):
 
         origin = None if world.origin is None else world.origin.build()
         changed = state and (state.st_mtime_ns, state.st_size)
-        sites = sites_of(world)
+        sites = recorded_sensors(world)
         if as_told:
             sites = [replace(site, bias=NO_BIAS) for site in sites]
         recording = _read(str(file), changed, self.model_dump_json(), tuple(sites), origin)
@@ -116,7 +116,7 @@ def noise_stds(sensor: Sensor) -> tuple[float, ...] | None:
     return tuple(noise.std) if noise.kind in ("constant", "by_axis") else None
 
 
-def sites_of(world: ScenarioModel) -> list[Site]:
+def recorded_sensors(world: ScenarioModel) -> list[Site]:
     """Return the sensors of a recording."""
     from vedette.recorded import Site
 
@@ -129,7 +129,7 @@ def sites_of(world: ScenarioModel) -> list[Site]:
             sensor.pose,
             sensor.bias.build(),
             sensor.compass,
-            reach_of(sensor),
+            max_range(sensor),
             north,
             shown_by_rows if sensor.turn is None else sensor.turn.build(),
             None if sensor.signal is None else sensor.signal.build(),
@@ -143,7 +143,7 @@ def recording_findings(world: ScenarioModel, folder: Path) -> Iterator[Finding]:
     section = world.recording
     if section is None:
         return
-    yield from attempt(_content(section, world, folder))
+    yield from readable_findings(_content(section, world, folder))
     if world.targets.kind not in ("recorded", "unknown"):
         yield ("targets", "kind"), "recorded or unknown, as the scans are recorded", describe(world.targets.kind)
     if world.decision_steps:
@@ -152,7 +152,7 @@ def recording_findings(world: ScenarioModel, folder: Path) -> Iterator[Finding]:
 
 
 def _content(section: RecordingSection, world: ScenarioModel, folder: Path) -> Iterator[Finding]:
-    if not is_whole(section):
+    if not is_complete(section):
         return
     try:
         section.build(world, folder)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pydantic import Field
 
-from vedette.scenarios.faults import Finding, describe
+from vedette.scenarios.diagnostics import Finding, describe
 from vedette.scenarios.sections.base import NonNegative, Positive, Probability, Section, Share, Step, check
 
 if TYPE_CHECKING:  # importing the models imports the compiler, which a check does not need

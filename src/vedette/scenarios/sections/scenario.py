@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import Field, field_validator
 
 from vedette.internal.quantities import HEIGHT_DEPENDENT
-from vedette.scenarios.faults import Finding, describe
-from vedette.scenarios.sections.base import Name, Section, attempt, check
+from vedette.scenarios.diagnostics import Finding, describe
+from vedette.scenarios.sections.base import Name, Section, check, readable_findings
 from vedette.scenarios.sections.birth import Birth
 from vedette.scenarios.sections.checks import CHECKS, step_of_time
 from vedette.scenarios.sections.control import Control
-from vedette.scenarios.sections.courses import from_east
+from vedette.scenarios.sections.courses import courses_to_headings
 from vedette.scenarios.sections.derived import of_kind
 from vedette.scenarios.sections.fusion import AnyFusion, Fusion
 from vedette.scenarios.sections.network import NetworkSection
-from vedette.scenarios.sections.places import OriginSection, in_metres, misplaced
+from vedette.scenarios.sections.places import OriginSection, in_metres, misplaced_findings
 from vedette.scenarios.sections.planners import STRATEGIES, AnyPlanner
 from vedette.scenarios.sections.recording import RecordingSection
 from vedette.scenarios.sections.scoring import AnyEstimator, AnyMetric, LeastOspaEstimator, MapEstimator, Ospa
@@ -39,7 +39,7 @@ if TYPE_CHECKING:  # importing it imports the models, which a check does not nee
     from vedette.platforms.compass import Compass
 
 # Largest number of steps of a horizon that ends at the next decision.
-_MOST_STEPS = 100
+_MAX_STEPS = 100
 
 
 def merge_sensor_defaults(data: Mapping[str, Any]) -> dict[str, Any]:
@@ -134,7 +134,7 @@ class ScenarioModel(Section):
     @classmethod
     def in_metres(cls, data: Mapping[str, Any]) -> Mapping[str, Any]:
         """Return the mapping with places in degrees converted to metres, by its origin, and courses to headings."""
-        return from_east(in_metres(data))
+        return courses_to_headings(in_metres(data))
 
     @classmethod
     def prepared(cls, data: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -148,8 +148,8 @@ class ScenarioModel(Section):
 
     @check
     def _across_sections(self) -> Iterator[Finding]:
-        for across in (*CHECKS, misplaced):
-            yield from attempt(across(self))
+        for across in (*CHECKS, misplaced_findings):
+            yield from readable_findings(across(self))
 
     @property
     def sensor_names(self) -> tuple[str, ...]:
@@ -202,4 +202,4 @@ class ScenarioModel(Section):
             return control.horizon_steps, period
         gaps = Counter(after - before for before, after in pairwise((*self.decision_steps, self.time.num_steps)))
         gap = max(gaps, key=lambda scans: (gaps[scans], scans), default=1)
-        return round(min(max(gap * scan / period, 1.0), _MOST_STEPS)), period
+        return round(min(max(gap * scan / period, 1.0), _MAX_STEPS)), period

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field
 
-from vedette.scenarios.faults import Finding, describe
+from vedette.scenarios.diagnostics import Finding, describe
 from vedette.scenarios.sections.base import Chance, Count, Positive, Section, check
 from vedette.scenarios.sections.derived import Part, derived, one_of
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from pydantic import Field
 
 from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT, PLACED, angles, in_file
-from vedette.scenarios.faults import Finding, Path, describe
+from vedette.scenarios.diagnostics import Finding, Path, describe
 from vedette.scenarios.sections.base import Positive, Section, check
 from vedette.scenarios.sections.derived import Part, derived, one_of
 

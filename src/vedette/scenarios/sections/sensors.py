@@ -13,7 +13,7 @@ from pydantic import Field, create_model
 from vedette.internal.quantities import HEIGHT_DEPENDENT, is_doppler
 from vedette.internal.unit_warnings import suppress_unit_warnings
 from vedette.kernels.base.types import BEAM, OWN_HEIGHT
-from vedette.scenarios.faults import Finding, describe
+from vedette.scenarios.diagnostics import Finding, describe
 from vedette.scenarios.sections.base import (
     DetectionAt,
     GaussianMethod,

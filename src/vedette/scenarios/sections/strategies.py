@@ -123,7 +123,7 @@ class LookaheadStrategy(ValuedStrategy):
         return HorizonPlanner(**self.shared(parts, folder), **self.ahead(parts))
 
 
-def unknown_truth(model: ScenarioModel) -> str:
+def missing_truth(model: ScenarioModel) -> str:
     """Return what is required instead of a planner that uses true targets; "" if these are known completely."""
     motion = model.motion
     if model.targets.kind == "unknown":
@@ -136,7 +136,7 @@ def unknown_truth(model: ScenarioModel) -> str:
     )
 
 
-def watched(decides: Planner, parts: Parts) -> Planner:
+def with_reported_violations(decides: Planner, parts: Parts) -> Planner:
     """Return a planner whose plans report violated constraints, for one that does not observe all of them."""
     from vedette.control import ConstraintReportingPlanner
 

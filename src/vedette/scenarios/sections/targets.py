@@ -14,7 +14,7 @@ from pydantic import Field
 
 from vedette.errors import InputError
 from vedette.internal.quantities import HEIGHT_DEPENDENT
-from vedette.scenarios.faults import Finding, describe
+from vedette.scenarios.diagnostics import Finding, describe
 from vedette.scenarios.sections.base import (
     SHA256_FIELD,
     Point,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, get_args
 
 from pydantic import Field
 
-from vedette.scenarios.faults import Finding, describe
+from vedette.scenarios.diagnostics import Finding, describe
 from vedette.scenarios.sections.base import (
     DetectionAt,
     GaussianMethod,
@@ -42,7 +42,7 @@ LABELLING = "delta_glmb, m_delta_glmb, lmb and factored_glmb"
 # Kinds of assignment that a filter supports, if not all.
 _ASKED = {"delta_glmb": "choices", "m_delta_glmb": "choices", "lmb": "marginals"}
 # Filters with a number of targets limited by `max_labels`.
-LABELS_CAPPED = ("lmb", "factored_glmb", "cb_member")
+LABEL_LIMITED = ("lmb", "factored_glmb", "cb_member")
 
 
 class _Sensing(Section):

@@ -12,7 +12,7 @@ from pydantic import Field
 
 from vedette.internal.quantities import COMPONENTS, ONLY_MEASURED, PLACED, in_file
 from vedette.internal.unit_warnings import suppress_unit_warnings
-from vedette.scenarios.faults import Finding, describe
+from vedette.scenarios.diagnostics import Finding, describe
 from vedette.scenarios.sections.base import Section
 from vedette.scenarios.sections.sensing import (
     Clutter,

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field
 
-from vedette.scenarios.faults import Finding, describe
+from vedette.scenarios.diagnostics import Finding, describe
 from vedette.scenarios.sections.base import NonNegative, Positive, check
 from vedette.scenarios.sections.derived import Derived, derived
-from vedette.scenarios.sections.field_of_view import field_of_view, reach_of
-from vedette.scenarios.sections.fusion import ONE_BELIEF
+from vedette.scenarios.sections.field_of_view import field_of_view, max_range
+from vedette.scenarios.sections.fusion import SINGLE_BELIEF_FUSIONS
 from vedette.scenarios.sections.tracking import Filter
 from vedette.scenarios.sections.world import RegionSection
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:  # importing the models imports the compiler, which a check do
 MAX_CELLS = 250_000
 # Without a section: fewest and most cells along each side of the region, and cells along the range of a sensor.
 _LEAST_CELLS, _MOST_CELLS, _CELLS_A_REACH = 16, 64, 2.0
-_PRIOR_A_SCAN = 0.1  # births per scan if their rate is learnt and no prior is given
+_PRIOR_PER_SCAN = 0.1  # births per scan if their rate is learnt and no prior is given
 
 
 @derived("vedette.models.undetected:UndetectedModel", first=("cell",))
@@ -79,8 +79,8 @@ def undetected_anywhere(model: ScenarioModel, birth: BirthModel) -> UndetectedMo
         if section.birth_rate is None and measured is not None:
             found = replace(found, birth_rate="learnt")
     elif measured is None:
-        return _cells_alone(model) if searches(model) else None
-    elif not (measured.is_learnt or searches(model)):
+        return _cells_alone(model) if searches_by_default(model) else None
+    elif not (measured.is_learnt or searches_by_default(model)):
         return None
     elif (uniform := replace(measured, expected="learnt").uniform(_cells_a_side(model))) is not None:
         found = uniform
@@ -88,7 +88,7 @@ def undetected_anywhere(model: ScenarioModel, birth: BirthModel) -> UndetectedMo
         return None
     if section is not None and section.prior_rate is not None:
         return found
-    expected = _PRIOR_A_SCAN if measured is None or isinstance(measured.expected, str) else measured.expected
+    expected = _PRIOR_PER_SCAN if measured is None or isinstance(measured.expected, str) else measured.expected
     return replace(found, prior_rate=expected / (birth.period or scan))
 
 
@@ -100,7 +100,7 @@ def _cells_alone(model: ScenarioModel) -> UndetectedModel:
     return UndetectedModel(CellGrid(model.region.build(), num, num), 0.0)
 
 
-def searches(model: ScenarioModel) -> bool:
+def searches_by_default(model: ScenarioModel) -> bool:
     """Return True if planners search for undetected targets without a section that gives their number."""
     if model.undetected is not None or not _may_be_found(model):
         return False
@@ -117,7 +117,7 @@ def _may_be_found(model: ScenarioModel) -> bool:
 
 def _cells_a_side(model: ScenarioModel) -> int:
     """Return the number of cells along each side of the region: a few within the shortest range of a sensor."""
-    region, reach = model.region, min(map(reach_of, model.sensors))
+    region, reach = model.region, min(map(max_range, model.sensors))
     side: float = max(region.x_max - region.x_min, region.y_max - region.y_min)
     return min(max(math.ceil(_CELLS_A_REACH * side / reach), _LEAST_CELLS), _MOST_CELLS)
 
@@ -137,7 +137,11 @@ def learnt_births(model: ScenarioModel) -> Iterator[Finding]:
 def _has_intensity(model: ScenarioModel) -> bool:
     """Return True if undetected targets are an intensity of the single belief of all scans."""
     filters, fusion = model.filter, model.fusion
-    if fusion.kind not in ONE_BELIEF or model.network is not None or getattr(fusion, "filter", None) is not None:
+    if (
+        fusion.kind not in SINGLE_BELIEF_FUSIONS
+        or model.network is not None
+        or getattr(fusion, "filter", None) is not None
+    ):
         return False
     return isinstance(filters, Filter) and filters.kind == "factored_glmb" and filters.births == "poisson"
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from vedette.scenarios.faults import Finding, describe
+from vedette.scenarios.diagnostics import Finding, describe
 from vedette.scenarios.sections.base import (
     GaussianMethod,
     Positive,
@@ -19,7 +19,7 @@ from vedette.scenarios.sections.base import (
     Whole,
     check,
 )
-from vedette.scenarios.sections.custom import Custom, NotGiven
+from vedette.scenarios.sections.custom import Custom, MissingMember
 from vedette.scenarios.sections.derived import Part, derived, one_of
 
 if TYPE_CHECKING:  # importing the models imports the compiler, which a check does not need
@@ -100,7 +100,7 @@ class CustomMotion(Custom):
         """Return the motion model. Raises `InputError` if its state dimension differs from the given one."""
         motion: MotionModel = self.made(folder)
         if motion.state_dim != self.state_dim:
-            raise NotGiven(self, "state_dim", f"that of {self.function}, {motion.state_dim}", str(self.state_dim))
+            raise MissingMember(self, "state_dim", f"that of {self.function}, {motion.state_dim}", str(self.state_dim))
         return motion if method == "auto" else replace(motion, method=method)
 
 

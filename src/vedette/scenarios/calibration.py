@@ -23,21 +23,25 @@ from vedette.recorded.instants import Bearings, bias_of
 from vedette.scenarios.build import build_sensors
 from vedette.scenarios.dumping import dump_data
 from vedette.scenarios.loading import Scenario
-from vedette.scenarios.sections.recording import sites_of
+from vedette.scenarios.sections.recording import recorded_sensors
 from vedette.scenarios.sections.sensors import Sensor
-from vedette.scenarios.yaml_reader import MOST_BYTES, read_yaml
+from vedette.scenarios.yaml_reader import MAX_BYTES, read_yaml
 from vedette.tracking import Central, Tracker
 
 _LIMITS = Limits(min_existence=1e-3)
 # Standard deviations at and above which a parameter counts as unknown: of clocks, s; of logarithms, of log-odds.
 _UNKNOWN_CLOCK, _UNKNOWN_LOG, _UNKNOWN_ODDS = 5.0, 1.0, 4.0
-_WIDER = 3.0  # times the region, along each axis: noise at its edge stays in it
-_BUILT_IN = ("region", "around_sensor", "measurement_space")  # clutter that can be evaluated at the raw measurement
+_WIDENING = 3.0  # times the region, along each axis: noise at its edge stays in it
+_SUPPORTED_CLUTTER = (
+    "region",
+    "around_sensor",
+    "measurement_space",
+)  # clutter that can be evaluated at the raw measurement
 _NOT_CONVERGED = "# The optimiser stopped before it converged: these values may be inaccurate."
-_LEAST_RATE, _SUREST = 0.01, 0.98  # to start from
+_MIN_RATE, _MAX_PROBABILITY = 0.01, 0.98  # to start from
 
 
-def problem_of(scenario: Scenario, *, position: bool = False, bearings: Bearings | None = None) -> Problem:
+def build_problem(scenario: Scenario, *, position: bool = False, bearings: Bearings | None = None) -> Problem:
     """Return the calibration problem of a recording: its sensors' parameters, to be estimated.
 
     The parameters are biases of range, bearing and clock, noise, probability of detection and clutter rate, as far as
@@ -46,16 +50,16 @@ def problem_of(scenario: Scenario, *, position: bool = False, bearings: Bearings
     of an LMB filter with sequential updates, with the motion, survival and births of the scenario.
 
     Args:
-        scenario: from `vedette.scenarios.of_recording`; one of sensors alone, for future scans, has no recording.
+        scenario: from `vedette.scenarios.from_recording`; one of sensors alone, for future scans, has no recording.
         position: True to estimate biases of the other sensors' own places, too.
         bearings: in which direction the biases of bearings count if there is no recording.
     """
     model, folder = scenario.model, scenario.folder
-    sites = tuple(sites_of(model))
+    sites = tuple(recorded_sensors(model))
     for site in sites:
         if site.kind in HEIGHT_DEPENDENT:
-            wanted = "measurements in the plane, as calibration knows no heights"
-            raise reject(f"sensor {site.name}", wanted, site.kind)
+            expected = "measurements in the plane, as calibration knows no heights"
+            raise reject(f"sensor {site.name}", expected, site.kind)
     recording = RecordedScans(np.empty(0), 0.0, False, (), np.empty((0, len(sites), 3)), (), (bearings,) * len(sites))
     if model.recording is not None:
         recording = model.recording.build(model, folder, as_told=True)
@@ -63,33 +67,35 @@ def problem_of(scenario: Scenario, *, position: bool = False, bearings: Bearings
     for s, sensor in enumerate(model.sensors):
         if not recording.scans or any(scans[s] is not None for scans in recording.scans):
             clockwise = recording.bearings[s] == "north"
-            parameters += _biases(s, sensor, sites[s].bias, clockwise, position, only_positions)
-            parameters += _of_models(s, sensor)
-    targets = _born_at_once(common_target_model([sensor.filter for sensor in build_sensors(scenario)]), recording.times)
+            parameters += _bias_parameters(s, sensor, sites[s].bias, clockwise, position, only_positions)
+            parameters += _model_parameters(s, sensor)
+    targets = _births_per_scan(
+        common_target_model([sensor.filter for sensor in build_sensors(scenario)]), recording.times
+    )
     region, method = model.region.build(), model.filter.gaussian_method
 
-    wide = _widened(region)
+    wide_region = _widen_region(region)
 
     def tracker(values: Floats) -> tuple[Tracker, Floats]:
-        known, more = list[SensorModel](), np.zeros(len(model.sensors))
+        models, added_rates = list[SensorModel](), np.zeros(len(model.sensors))
         biased = with_biases(sites, parameters, values)
         with suppress_unit_warnings():
             for s, sensor in enumerate(_with_values(model.sensors, parameters, values.tolist())):
-                changes = _wider_clutter(sensor)
-                within = wide if sensor.clutter.kind == "region" else region
-                more[s] = changes.get("rate", 0.0) - sensor.clutter.rate if changes else 0.0
+                changes = _widen_clutter(sensor)
+                area = wide_region if sensor.clutter.kind == "region" else region
+                added_rates[s] = changes.get("rate", 0.0) - sensor.clutter.rate if changes else 0.0
                 sensor = sensor.model_copy(update={"clutter": sensor.clutter.model_copy(update=changes)})
-                built = sensor.build(within, method, folder, model.filter.detection_taken_at)
-                if sensor.clutter.kind in _BUILT_IN:
+                built = sensor.build(area, method, folder, model.filter.detection_taken_at)
+                if sensor.clutter.kind in _SUPPORTED_CLUTTER:
                     raw = at_raw_measurements(built.clutter, *bias_of(biased[s], recording.bearings[s]))
                     built = replace(built, clutter=raw)
-                known.append(built)
-        return Central(SequentialLmbFilter(targets, tuple(known), _LIMITS)), more
+                models.append(built)
+        return Central(SequentialLmbFilter(targets, tuple(models), _LIMITS)), added_rates
 
     return Problem(recording, sites, tuple(parameters), tracker)
 
 
-def _born_at_once(targets: TargetModel, times: Floats) -> TargetModel:
+def _births_per_scan(targets: TargetModel, times: Floats) -> TargetModel:
     """Return the targets with the expected births of an average scan interval at every scan, whenever it comes.
 
     Births that count per period become more the later a scan comes, which would make later clocks more likely.
@@ -103,7 +109,7 @@ def _born_at_once(targets: TargetModel, times: Floats) -> TargetModel:
     return replace(targets, birth=replace(birth, period=None, from_measurements=measured))
 
 
-def _wider_clutter(sensor: Sensor) -> dict[str, float]:
+def _widen_clutter(sensor: Sensor) -> dict[str, float]:
     """Return fields that make the clutter of a sensor reach farther, at the same density.
 
     Clutter must not end where noise at the edge of the view may take a measurement: no clutter would be possible there,
@@ -111,65 +117,65 @@ def _wider_clutter(sensor: Sensor) -> dict[str, float]:
     """
     clutter = sensor.clutter
     if clutter.kind == "region":
-        return {"rate": _WIDER**2 * clutter.rate}
+        return {"rate": _WIDENING**2 * clutter.rate}
     if clutter.kind != "around_sensor":
         return {}
     size = "radius" if clutter.radius is not None else "half_side"
-    wider = {"rate": _WIDER**2 * clutter.rate, size: _WIDER * getattr(clutter, size)}
+    wider = {"rate": _WIDENING**2 * clutter.rate, size: _WIDENING * getattr(clutter, size)}
     if size == "radius":  # the area of a sector of a square depends on the heading
         wider |= {"rate": wider["rate"] * 180.0 / clutter.half_width_deg, "half_width_deg": 180.0}
     return wider
 
 
-def _widened(region: Region) -> Region:
+def _widen_region(region: Region) -> Region:
     """Return the region widened about its middle."""
     sides = []
     for low, high in ((region.x_min, region.x_max), (region.y_min, region.y_max)):
-        middle, reach = 0.5 * (low + high), 0.5 * _WIDER * (high - low)
-        sides += [middle - reach, middle + reach]
+        middle, half_side = 0.5 * (low + high), 0.5 * _WIDENING * (high - low)
+        sides += [middle - half_side, middle + half_side]
     return Region(*sides)
 
 
-def _biases(
-    s: int, sensor: Sensor, said: Bias, clockwise: bool, position: bool, only_positions: bool
+def _bias_parameters(
+    s: int, sensor: Sensor, given: Bias, clockwise: bool, position: bool, only_positions: bool
 ) -> Iterator[Parameter]:
     """Return the biases of a sensor: of its measurement, its clock and, with `position`, its place."""
     components = COMPONENTS[sensor.measurement.kind]
-    asked = [*components]
+    names = [*components]
     if s > 0:  # a common shift in time, shift in space or turn of all sensors changes nothing
-        asked += ["clock", *(("x", "y") if position and "x" not in components else ())]
+        names += ["clock", *(("x", "y") if position and "x" not in components else ())]
     elif only_positions:
-        asked = []
+        names = []
     elif position and "bearing" in components:
-        asked.remove("bearing")
-    for name in asked:
+        names.remove("bearing")
+    for name in names:
         if name == "clock":
-            yield Parameter(s, "bias", name, name, "s", said.clock, 1.0, "plain", _UNKNOWN_CLOCK)
+            yield Parameter(s, "bias", name, name, "s", given.clock, 1.0, "plain", _UNKNOWN_CLOCK)
             continue
-        known = QUANTITIES[name]
-        start, per_si = getattr(said, name) * known.per_si, known.per_si
-        per_si = -per_si if clockwise and known.is_angle else per_si
-        yield Parameter(s, "bias", name, in_file(name), known.unit, start, per_si, "plain", known.unknown)
+        quantity = QUANTITIES[name]
+        start, per_si = getattr(given, name) * quantity.per_si, quantity.per_si
+        per_si = -per_si if clockwise and quantity.is_angle else per_si
+        yield Parameter(s, "bias", name, in_file(name), quantity.unit, start, per_si, "plain", quantity.unknown)
 
 
-def _of_models(s: int, sensor: Sensor) -> Iterator[Parameter]:
+def _model_parameters(s: int, sensor: Sensor) -> Iterator[Parameter]:
     """Return the parameters of noise, detection and clutter that the sections give as numbers."""
     noise, components = sensor.noise, COMPONENTS[sensor.measurement.kind]
     for i, component in enumerate(components):
-        known = QUANTITIES[component]
-        unit, per_si, name = known.si, 1.0, ""
+        quantity = QUANTITIES[component]
+        unit, per_si, name = quantity.si, 1.0, ""
         if noise.kind == "range_dependent":
-            name, unit, per_si = f"sigma_{in_file(component)}", known.unit, known.per_si
+            name, unit, per_si = f"sigma_{in_file(component)}", quantity.unit, quantity.per_si
             start = getattr(noise, name)
         elif noise.kind in ("constant", "by_axis"):
             name, start = f"std.{i}", noise.std[i]
         if name:
             yield Parameter(s, "noise", component, f"noise.{name}", unit, start, per_si, "log", _UNKNOWN_LOG)
     if (probability := getattr(sensor.detection, "probability", None)) is not None:
-        start = min(max(probability, 1.0 - _SUREST), _SUREST)
+        start = min(max(probability, 1.0 - _MAX_PROBABILITY), _MAX_PROBABILITY)
         yield Parameter(s, "detection", "", "detection.probability", "", start, 1.0, "logit", _UNKNOWN_ODDS)
     if (rate := getattr(sensor.clutter, "rate", None)) is not None:
-        start = max(rate, _LEAST_RATE)
+        start = max(rate, _MIN_RATE)
         yield Parameter(s, "clutter", "", "clutter.rate", "per scan", start, 1.0, "log", _UNKNOWN_LOG)
 
 
@@ -177,16 +183,16 @@ def _with_values(
     sensors: Sequence[Sensor], parameters: Sequence[Parameter], values: Sequence[float]
 ) -> tuple[Sensor, ...]:
     """Return the sections of the sensors with these values of the parameters that are not biases."""
-    found = list(sensors)
-    for each, value in zip(parameters, values, strict=True):
-        if each.kind != "bias":
-            part = getattr(found[each.sensor], each.kind)
-            _, name, *at = each.name.split(".")
-            own = getattr(part, name)
-            items = [value if str(i) in at else item for i, item in enumerate(own)] if at else value
-            part = part.model_copy(update={name: items})
-            found[each.sensor] = found[each.sensor].model_copy(update={each.kind: part})
-    return tuple(found)
+    updated = list(sensors)
+    for parameter, value in zip(parameters, values, strict=True):
+        if parameter.kind != "bias":
+            section = getattr(updated[parameter.sensor], parameter.kind)
+            _, name, *indices = parameter.name.split(".")
+            current = getattr(section, name)
+            items = [value if str(i) in indices else item for i, item in enumerate(current)] if indices else value
+            section = section.model_copy(update={name: items})
+            updated[parameter.sensor] = updated[parameter.sensor].model_copy(update={parameter.kind: section})
+    return tuple(updated)
 
 
 def calibrated_text(scenario: Scenario, sensors: FilePath, calibration: Calibration, folder: FilePath) -> str:
@@ -201,7 +207,7 @@ def calibrated_text(scenario: Scenario, sensors: FilePath, calibration: Calibrat
         calibration: the estimates.
         folder: of the new file; if it is not that of the old one, files that it names get absolute paths.
     """
-    said = dict(read_yaml(read_text(sensors, "sensors file", MOST_BYTES), str(sensors)).data)
+    data = dict(read_yaml(read_text(sensors, "sensors file", MAX_BYTES), str(sensors)).data)
     biases = [sensor.bias.model_dump(exclude_defaults=True) for sensor in scenario.model.sensors]
     parameters = [each.parameter for each in calibration.estimates]
     values = [float(f"{each.value:.7g}") for each in calibration.estimates]  # far more digits than are accurate
@@ -209,12 +215,12 @@ def calibrated_text(scenario: Scenario, sensors: FilePath, calibration: Calibrat
         if each.parameter.kind == "bias" and not each.reason:
             biases[each.parameter.sensor][each.parameter.name] = value
     sections = _with_values(scenario.model.sensors, parameters, values)
-    said["sensors"] = [
+    data["sensors"] = [
         {
-            **{**own, "bias": bias},
+            **{**given, "bias": bias},
             **{kind: getattr(section, kind).model_dump(mode="json") for kind in ("noise", "detection", "clutter")},
         }
-        for own, section, bias in zip(said["sensors"], sections, biases, strict=True)
+        for given, section, bias in zip(data["sensors"], sections, biases, strict=True)
     ]
-    text = dump_data(said, None if folder.resolve() == sensors.parent.resolve() else sensors.parent)
+    text = dump_data(data, None if folder.resolve() == sensors.parent.resolve() else sensors.parent)
     return text if calibration.converged else f"{_NOT_CONVERGED}\n{text}"

@@ -462,7 +462,7 @@ CASES = [
 
 
 @pytest.mark.parametrize(("changes", "faults"), CASES, ids=[changes[-1][:60] for changes, _ in CASES])
-def test_faults_are_named_with_their_places(changes: list[str], faults: list[str]) -> None:
+def test_errors_are_reported_with_their_locations(changes: list[str], faults: list[str]) -> None:
     pairs = [change.replace("\\n", "\n").split(" -> ") for change in changes]
     with pytest.raises(ScenarioError) as error:
         parse_scenario(changed(*((old, new) for old, new in pairs)), "f.yaml")

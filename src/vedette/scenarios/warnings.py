@@ -9,111 +9,121 @@ from itertools import combinations
 import numpy as np
 
 from vedette.kernels.base.types import Bools, Floats
-from vedette.scenarios.coastline import coastline_cautions
-from vedette.scenarios.coverage import coverage_cautions
-from vedette.scenarios.cures import accepted, fusions_instead, with_own_labels
-from vedette.scenarios.faults import Path, Told
-from vedette.scenarios.loading import Scenario, document_of, place_fault
-from vedette.scenarios.plausibility import implausible
+from vedette.scenarios.coastline import coastline_warnings
+from vedette.scenarios.coverage_warnings import coverage_warnings
+from vedette.scenarios.diagnostics import Diagnostic, Path
+from vedette.scenarios.loading import Scenario, locate_fault, read_document
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.birth_labels import (
-    LARGEST_SHARE,
+    MAX_CUT_SHARE,
     birth_probability,
+    cut_share,
     has_one_belief,
     labels_until_detection,
-    most_hypotheses,
-    share_cut,
+    max_label_sets,
 )
 from vedette.scenarios.sections.field_of_view import field_of_view
-from vedette.scenarios.sections.fusion import BY_LABEL, Fusion
+from vedette.scenarios.sections.fusion import LABEL_FUSIONS, Fusion
 from vedette.scenarios.sections.sensing import Detection
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.targets import RecordedTargets
-from vedette.scenarios.sections.tracking import LABELS_CAPPED, Filter
+from vedette.scenarios.sections.tracking import LABEL_LIMITED, Filter
 from vedette.scenarios.sections.world import grouped_order
-from vedette.scenarios.start_cautions import start_cautions
+from vedette.scenarios.start_warnings import start_warnings
+from vedette.scenarios.suggestions import is_valid_with, suggest_fusions, suggest_label_settings
+from vedette.scenarios.unit_checks import implausible_settings
 
 # Sensors have different views if their probabilities of detection of one place differ by more than this.
 MAX_DIFFERENCE = 0.5
 # With more sensors than this, rules that send densities lose much information (docs/networks.md).
-HANDFUL = 4
+MAX_GCI_SENSORS = 4
 # Birth sites that are nearer to each other than this number of standard deviations of their difference may be confused.
 # Of 40 random layouts, GCI lost 5 m and more to cardinality in 7 of the 17 below this distance and in one of the 23
 # above.
-NEAR_SITES = 4.0
-_POINTS_A_SIDE = 21
-_MOST_WORTH = 20.0  # largest plausible worth of an undetected target, in costs of a missed one
+MIN_SITE_DISTANCE = 4.0
+_POINTS_PER_SIDE = 21
+_MAX_WORTH = 20.0  # largest plausible worth of an undetected target, in costs of a missed one
 
 
-def cautions(scenario: Scenario, further: Iterable[tuple[Path, str]] = ()) -> tuple[str, ...]:
+def scenario_warnings(scenario: Scenario, more: Iterable[tuple[Path, str]] = ()) -> tuple[str, ...]:
     """Return warnings of a valid scenario, one line each, with file, line and column if it was read from a file.
 
-    further: places and texts of other warnings, which come last.
+    more: places and texts of other warnings, which come last.
     """
-    found = [*_records(scenario), *_views(scenario), *_births(scenario), *_late_beliefs(scenario)]
-    found += [*_many_sensors(scenario), *_cells(scenario.model), *_labels(scenario.model), *_worth(scenario.model)]
-    found += coverage_cautions(scenario.model)
-    found += [*_undetected_births(scenario.model), *start_cautions(scenario)]
-    found += [*implausible(scenario.model), *coastline_cautions(scenario.model, scenario.folder), *further]
-    if not found:
+    warnings = [
+        *_recording_warnings(scenario),
+        *_different_views(scenario),
+        *_birth_warnings(scenario),
+        *_delayed_beliefs(scenario),
+    ]
+    warnings += [
+        *_many_sensors(scenario),
+        *_large_cells(scenario.model),
+        *_label_limit(scenario.model),
+        *_undetected_value(scenario.model),
+    ]
+    warnings += coverage_warnings(scenario.model)
+    warnings += [*_undetected_births(scenario.model), *start_warnings(scenario)]
+    warnings += [*implausible_settings(scenario.model), *coastline_warnings(scenario.model, scenario.folder), *more]
+    if not warnings:
         return ()
-    document = document_of(scenario)
+    document = read_document(scenario)
     lines = []
-    for path, text in found:
-        place = None if document is None else place_fault(document, Told(path, "", "")).place
+    for path, text in warnings:
+        place = None if document is None else locate_fault(document, Diagnostic(path, "", "")).place
         where = scenario.name if place is None else f"{scenario.path}:{place[0]}:{place[1]}"
         lines.append(f"{where}: warning: {text}")
     return tuple(lines)
 
 
-def _records(scenario: Scenario) -> Iterator[tuple[Path, str]]:
+def _recording_warnings(scenario: Scenario) -> Iterator[tuple[Path, str]]:
     if isinstance(scenario.model.targets, RecordedTargets) or scenario.model.recording is not None:
-        from vedette.scenarios.record_cautions import record_cautions  # slow to import
+        from vedette.scenarios.recording_warnings import recording_warnings  # slow to import
 
-        yield from record_cautions(scenario)
+        yield from recording_warnings(scenario)
 
 
 def _fusion_by_label(model: ScenarioModel) -> Fusion | None:
     """Return the fusion by label of several sensors' local beliefs; None if the scenario has none."""
     fusion = model.fusion
-    return fusion if isinstance(fusion, Fusion) and fusion.kind in BY_LABEL and len(model.sensors) > 1 else None
+    return fusion if isinstance(fusion, Fusion) and fusion.kind in LABEL_FUSIONS and len(model.sensors) > 1 else None
 
 
-def _births(scenario: Scenario) -> Iterator[tuple[Path, str]]:
+def _birth_warnings(scenario: Scenario) -> Iterator[tuple[Path, str]]:
     model = scenario.model
     steps, fusion = model.birth.steps, _fusion_by_label(model)
     if fusion is None or fusion.feedback or fusion.matching == "assignment":
         return
     if steps != "every" and max(steps, default=1) <= 1:
-        yield from _near_births(scenario, fusion)
+        yield from _near_sites(scenario, fusion)
         return
-    when = "at every step" if steps == "every" else f"up to step {max(steps)}"
+    times = "at every step" if steps == "every" else f"up to step {max(steps)}"
     yield (
         ("birth", "steps"),
-        f"births {when} without feedback: sensors may take one target up at different steps, under different labels, "
-        f"and {_rule(fusion)}, which fuses by label, then loses it{with_own_labels(scenario, fusion)} (births at step "
-        "1 alone avoid this too)",
+        f"births {times} without feedback: sensors may take one target up at different steps, under different labels, "
+        f"and {_rule_name(fusion)}, which fuses by label, then loses it{suggest_label_settings(scenario, fusion)} "
+        "(births at step 1 alone avoid this too)",
     )
 
 
-def _near_births(scenario: Scenario, fusion: Fusion) -> Iterator[tuple[Path, str]]:
+def _near_sites(scenario: Scenario, fusion: Fusion) -> Iterator[tuple[Path, str]]:
     """Yield a warning of the first two sites so close that a sensor may confuse their targets."""
     order = grouped_order(scenario.model.motion)[:2]
     for (i, one), (j, other) in combinations(enumerate(scenario.model.birth.sites), 2):
-        between = (np.array(one.mean) - other.mean)[order]
-        spread = (one.covariance() + other.covariance())[np.ix_(order, order)]
-        distance = math.sqrt(between @ np.linalg.solve(spread, between))
-        if distance < NEAR_SITES:
+        difference = (np.array(one.mean) - other.mean)[order]
+        covariance = (one.covariance() + other.covariance())[np.ix_(order, order)]
+        distance = math.sqrt(difference @ np.linalg.solve(covariance, difference))
+        if distance < MIN_SITE_DISTANCE:
             yield (
                 ("birth", "sites", j),
                 f"sites {i} and {j} are {distance:.1f} standard deviations apart: a sensor that misses a "
                 "target at first, or measures clutter near it, may take it up under the label of the other site, and "
-                f"{_rule(fusion)}, which fuses by label, then loses it{with_own_labels(scenario, fusion)}",
+                f"{_rule_name(fusion)}, which fuses by label, then loses it{suggest_label_settings(scenario, fusion)}",
             )
             return
 
 
-def _late_beliefs(scenario: Scenario) -> Iterator[tuple[Path, str]]:
+def _delayed_beliefs(scenario: Scenario) -> Iterator[tuple[Path, str]]:
     model = scenario.model
     fusion, network = _fusion_by_label(model), model.network
     born_later = model.birth.from_measurements is not None or model.birth.steps == "every"
@@ -122,19 +132,19 @@ def _late_beliefs(scenario: Scenario) -> Iterator[tuple[Path, str]]:
     yield (
         ("network", "delay"),
         f"beliefs come {network.delay} or more scans late: a target that is new to one sensor is unlikely to those "
-        f"whose beliefs are older, and {_rule(fusion)} then keeps it down, while late scans can be put in their place"
-        f"{fusions_instead(scenario, fusion, by_views=False)}",
+        f"whose beliefs are older, and {_rule_name(fusion)} then keeps it down, while late scans can be put in "
+        f"their place{suggest_fusions(scenario, fusion, by_views=False)}",
     )
 
 
 def _many_sensors(scenario: Scenario) -> Iterator[tuple[Path, str]]:
-    """Yield a warning if densities of more than `HANDFUL` sensors are fused by a rule that then loses much."""
+    """Yield a warning if densities of more than `MAX_GCI_SENSORS` sensors are fused by a rule that then loses much."""
     model = scenario.model
     fusion, num = model.fusion, len(model.sensors)
-    if not isinstance(fusion, Fusion) or num <= HANDFUL:
+    if not isinstance(fusion, Fusion) or num <= MAX_GCI_SENSORS:
         return
     if fusion.kind == "parallel" and model.filter.kind == "lmb":
-        if model.birth.from_measurements is not None and accepted(scenario, {"filter.kind": "factored_glmb"}):
+        if model.birth.from_measurements is not None and is_valid_with(scenario, {"filter.kind": "factored_glmb"}):
             yield (
                 ("filter", "kind"),
                 f"{num} sensors each say of every label by itself what their scans say: of labels that contend for one "
@@ -142,7 +152,7 @@ def _many_sensors(scenario: Scenario) -> Iterator[tuple[Path, str]]:
                 "it of both together",
             )
         return
-    if fusion.kind not in BY_LABEL:
+    if fusion.kind not in LABEL_FUSIONS:
         return
     why = (
         "a target that several see becomes no surer than the mean of what each says, and is found later"
@@ -151,12 +161,12 @@ def _many_sensors(scenario: Scenario) -> Iterator[tuple[Path, str]]:
     )
     yield (
         ("fusion", "kind"),
-        f"{num} sensors fuse densities by {_rule(fusion)}, which makes no use of what they have in common: {why}"
-        f"{fusions_instead(scenario, fusion, by_views=False)}",
+        f"{num} sensors fuse densities by {_rule_name(fusion)}, which makes no use of what they have in common: {why}"
+        f"{suggest_fusions(scenario, fusion, by_views=False)}",
     )
 
 
-def _cells(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
+def _large_cells(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     if model.undetected is None:
         return
     for name, sensor in zip(model.sensor_names, model.sensors, strict=True):
@@ -170,10 +180,10 @@ def _cells(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
             return
 
 
-def _worth(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
+def _undetected_value(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     """Yield a warning if the worth of undetected targets was probably given in metres."""
     worth = model.control.undetected_worth
-    if worth is not None and worth > _MOST_WORTH and model.control.reward.kind in ("expected_loss", "expected_gospa"):
+    if worth is not None and worth > _MAX_WORTH and model.control.reward.kind in ("expected_loss", "expected_gospa"):
         yield (
             ("control", "undetected_worth"),
             f"finding a target is worth {worth:g} times what a missed one costs: sensors do little but search; it is a "
@@ -181,9 +191,9 @@ def _worth(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
         )
 
 
-def _labels(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
+def _label_limit(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     number = model.targets.expected_number(model.time.num_steps)
-    if not isinstance(model.filter, Filter) or model.filter.kind not in LABELS_CAPPED or number is None:
+    if not isinstance(model.filter, Filter) or model.filter.kind not in LABEL_LIMITED or number is None:
         return
     if number > model.filter.limits.max_labels:
         yield (
@@ -196,82 +206,88 @@ def _labels(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
 
 def _undetected_births(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     """Yield a warning if a cap on hypotheses cuts births because sensors hardly see the sites."""
-    most, order = most_hypotheses(model), grouped_order(model.motion)[:2]
-    if most is None:
+    max_hypotheses, order = max_label_sets(model), grouped_order(model.motion)[:2]
+    if max_hypotheses is None:
         return
     places = np.array([site.mean for site in model.birth.sites])[:, order]
-    chances = [found for sensor in model.sensors if (found := prob_detection(sensor, places)) is not None]
-    if len(chances) < len(model.sensors):
+    detection = [
+        probabilities for sensor in model.sensors if (probabilities := prob_detection(sensor, places)) is not None
+    ]
+    if len(detection) < len(model.sensors):
         return
-    detected = 1.0 - np.prod(1.0 - np.array(chances), axis=0) if has_one_belief(model) else np.min(chances, axis=0)
+    detected = 1.0 - np.prod(1.0 - np.array(detection), axis=0) if has_one_belief(model) else np.min(detection, axis=0)
     number = labels_until_detection(model, detected)
-    share = share_cut(number, birth_probability(model), most)
-    if share > LARGEST_SHARE:
+    share = cut_share(number, birth_probability(model), max_hypotheses)
+    if share > MAX_CUT_SHARE:
         yield (
             ("filter", "kind"),
             f"targets born at the sites are detected late from where the sensors start: some {number:.0f} labels are "
-            f"unconfirmed at a time, and {most} hypotheses cut {100.0 * share:.0f} % of the expected births; take "
-            "filter.kind: factored_glmb or lmb, or births at fewer birth.steps",
+            f"unconfirmed at a time, and {max_hypotheses} hypotheses cut {100.0 * share:.0f} % of the expected births; "
+            "take filter.kind: factored_glmb or lmb, or births at fewer birth.steps",
         )
 
 
-def _views(scenario: Scenario) -> Iterator[tuple[Path, str]]:
+def _different_views(scenario: Scenario) -> Iterator[tuple[Path, str]]:
     model = scenario.model
     fusion = _fusion_by_label(model)
     if fusion is None or fusion.by_views:
         return
     region = model.region
     axes = (
-        np.linspace(region.x_min, region.x_max, _POINTS_A_SIDE),
-        np.linspace(region.y_min, region.y_max, _POINTS_A_SIDE),
+        np.linspace(region.x_min, region.x_max, _POINTS_PER_SIDE),
+        np.linspace(region.y_min, region.y_max, _POINTS_PER_SIDE),
     )
     grid = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
-    chances = {
-        i: detected for i, sensor in enumerate(model.sensors) if (detected := prob_detection(sensor, grid)) is not None
+    detection = {
+        i: probabilities
+        for i, sensor in enumerate(model.sensors)
+        if (probabilities := prob_detection(sensor, grid)) is not None
     }
-    if len(chances) < 2:
+    if len(detection) < 2:
         return
-    table, names = np.stack(list(chances.values())), [model.sensor_names[i] for i in chances]
-    spread = table.max(axis=0) - table.min(axis=0)
-    worst = int(spread.argmax())
-    if spread[worst] > MAX_DIFFERENCE:
+    table, names = np.stack(list(detection.values())), [model.sensor_names[i] for i in detection]
+    difference = table.max(axis=0) - table.min(axis=0)
+    worst = int(difference.argmax())
+    if difference[worst] > MAX_DIFFERENCE:
         yield (
-            ("sensors", list(chances)[int(table[:, worst].argmin())], "detection"),
-            _unlike(names, table, grid, fusion) + fusions_instead(scenario, fusion, by_views=True),
+            ("sensors", list(detection)[int(table[:, worst].argmin())], "detection"),
+            _describe_difference(names, table, grid, fusion) + suggest_fusions(scenario, fusion, by_views=True),
         )
     elif model.decision_steps:
         yield from _limited_and_moving(scenario, fusion)
 
 
-def _rule(fusion: Fusion) -> str:
+def _rule_name(fusion: Fusion) -> str:
     return "the arithmetic average" if fusion.kind == "arithmetic_average" else "GCI"
 
 
-def _unlike(names: list[str], table: Floats, grid: Floats, fusion: Fusion) -> str:
+def _describe_difference(names: list[str], table: Floats, grid: Floats, fusion: Fusion) -> str:
     """Describe how much the probabilities of detection differ, and where most; table: (num_sensors, num_places)."""
-    spread = table.max(axis=0) - table.min(axis=0)
-    worst = int(spread.argmax())
-    chances = ", ".join(f"{name} {chance:.2g}" for name, chance in zip(names, table[:, worst], strict=True))
-    share = f"{(spread > MAX_DIFFERENCE).mean():.0%}".replace("%", " %")
+    difference = table.max(axis=0) - table.min(axis=0)
+    worst = int(difference.argmax())
+    probabilities = ", ".join(
+        f"{name} {probability:.2g}" for name, probability in zip(names, table[:, worst], strict=True)
+    )
+    share = f"{(difference > MAX_DIFFERENCE).mean():.0%}".replace("%", " %")
     return (
         f"sensors differ in what they see: in {share} of the region by more than {MAX_DIFFERENCE:g} in probability of "
-        f"detection ({chances} at x {grid[worst, 0]:g}, y {grid[worst, 1]:g} m); {_rule(fusion)} loses what one "
-        "sensor sees and another does not"
+        f"detection ({probabilities} at x {grid[worst, 0]:g}, y {grid[worst, 1]:g} m); {_rule_name(fusion)} loses what "
+        "one sensor sees and another does not"
     )
 
 
 def _limited_and_moving(scenario: Scenario, fusion: Fusion) -> Iterator[tuple[Path, str]]:
     """Yield a warning of sensors with equal views at the start that may differ once they have moved."""
     model, region = scenario.model, scenario.model.region
-    across = math.hypot(region.x_max - region.x_min, region.y_max - region.y_min)
+    diagonal = math.hypot(region.x_max - region.x_min, region.y_max - region.y_min)
     for i, sensor in enumerate(model.sensors):
         field = field_of_view(sensor)
-        limited = field is not None and field.reach < across
+        limited = field is not None and field.reach < diagonal
         if (limited and sensor.platform.top_speed > 0.0) or sensor.detection.kind == "camera":
             yield (
                 ("sensors", i, "detection"),
-                f"sensors that move or turn and see only so far will differ in what they see; {_rule(fusion)} loses "
-                f"what one sensor sees and another does not{fusions_instead(scenario, fusion, by_views=True)}",
+                f"sensors that move or turn and see only so far will differ in what they see; {_rule_name(fusion)} "
+                f"loses what one sensor sees and another does not{suggest_fusions(scenario, fusion, by_views=True)}",
             )
             return
 
@@ -282,35 +298,35 @@ def prob_detection(sensor: Sensor, points: Floats) -> Floats | None:
     In plain NumPy, so that a check compiles nothing: the models are those of `vedette.models.detection`.
     """
     section = sensor.detection
-    ahead = points - np.array(sensor.position)
-    distances = np.hypot(ahead[:, 0], ahead[:, 1])
+    offsets = points - np.array(sensor.position)
+    distances = np.hypot(offsets[:, 0], offsets[:, 1])
     if section.kind == "constant":
         return np.full(len(points), section.probability)
     if section.kind == "gaussian":
         return np.asarray(np.exp(-0.5 * (distances / section.sigma) ** 2))
     field = field_of_view(sensor)
     if field is not None:
-        off = np.arctan2(ahead[:, 1], ahead[:, 0]) - field.middle
-        off = np.where(distances == 0.0, 0.0, np.abs((off + math.pi) % (2.0 * math.pi) - math.pi))
-        seen = (distances <= field.reach) & (off <= field.half_width)
+        angles = np.arctan2(offsets[:, 1], offsets[:, 0]) - field.middle
+        angles = np.where(distances == 0.0, 0.0, np.abs((angles + math.pi) % (2.0 * math.pi) - math.pi))
+        in_view = (distances <= field.reach) & (angles <= field.half_width)
         if section.kind == "soft_sector":
-            return _soft(section, distances - field.reach, off - field.half_width, seen)
+            return _prob_soft_sector(section, distances - field.reach, angles - field.half_width, in_view)
         outside = section.outside if section.kind in ("limited_range", "limited_sector") else 0.0
-        return np.where(seen, field.probability, outside)
+        return np.where(in_view, field.probability, outside)
     return None
 
 
-def _soft(section: Detection, beyond_range: Floats, beyond_angle: Floats, seen: Bools) -> Floats:
+def _prob_soft_sector(section: Detection, beyond_range: Floats, beyond_angle: Floats, in_view: Bools) -> Floats:
     """Return the probabilities of detection of a soft sector, shape (n,).
 
     beyond_range, beyond_angle: how far each place lies beyond its edges, in m and rad.
     """
-    detected = section.probability * _logistic(section.range_slope * beyond_range)
+    prob = section.probability * _logistic(section.range_slope * beyond_range)
     if section.angle_slope is not None:
-        detected = detected * _logistic(section.angle_slope * beyond_angle)
+        prob = prob * _logistic(section.angle_slope * beyond_angle)
     elif not section.cut:
-        seen = beyond_angle <= 0.0
-    return detected if section.angle_slope is not None and not section.cut else np.where(seen, detected, 0.0)
+        in_view = beyond_angle <= 0.0
+    return prob if section.angle_slope is not None and not section.cut else np.where(in_view, prob, 0.0)
 
 
 def _logistic(exponent: Floats) -> Floats:

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from vedette.evaluation import run_scenario
-from vedette.scenarios import Scenario, load_scenario, with_fields
+from vedette.scenarios import Scenario, load_scenario, replace_fields
 
 HERE = Path(__file__).parent
 ZONE = {"kind": "keep_out", "region": {"x_min": -10_000.0, "x_max": -400.0, "y_min": -10_000.0, "y_max": 500.0}}
@@ -21,7 +21,7 @@ def paper_a(tmp_path: Path, *constraints: Any) -> Scenario:
     shutil.copy(HERE / "own_parts.py", tmp_path)
     own = {"kind": "custom", "function": f"{tmp_path / 'own_parts.py'}:Last"}
     fields = {"control.constraints": list(constraints), "planners": {"last": own}, "filter.kind": "lmb"}
-    return with_fields(load_scenario("paper-a"), {**fields, "fusion.kind": "clmb"})
+    return replace_fields(load_scenario("paper-a"), {**fields, "fusion.kind": "clmb"})
 
 
 @pytest.mark.parametrize("strategy", ["fixed", "last"])
@@ -40,7 +40,7 @@ def test_plans_name_the_sensors_and_constraints_that_they_violate(strategy: str,
     assert record.planner == strategy
 
 
-def test_independent_decisions_keep_to_zones_and_tell_of_pairs(tmp_path: Path) -> None:
+def test_independent_decisions_keep_to_zones_and_report_pair_violations(tmp_path: Path) -> None:
     notes = run_scenario(paper_a(tmp_path, APART), "idm", seed=0).decisions[0].plan.notes
     assert "sensors 1 and 2: their courses violate separation" in notes
     fence = {"kind": "keep_out", "region": {"x_min": -300.0, "x_max": 300.0, "y_min": -300.0, "y_max": 300.0}}
@@ -48,7 +48,7 @@ def test_independent_decisions_keep_to_zones_and_tell_of_pairs(tmp_path: Path) -
         assert not any("violate" in note for note in decision.plan.notes)
 
 
-def test_what_violates_nothing_is_not_told_of(tmp_path: Path) -> None:
+def test_satisfied_constraints_are_not_reported(tmp_path: Path) -> None:
     fence = {"kind": "stay_inside", "region": {"x_min": -1e4, "x_max": 1e4, "y_min": -1e4, "y_max": 1e4}}
     for strategy in ("fixed", "last"):
         assert run_scenario(paper_a(tmp_path, fence), strategy, seed=0).decisions[0].plan.notes == ()

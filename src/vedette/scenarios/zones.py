@@ -26,18 +26,18 @@ class Zone(NamedTuple):
 def zones(scenario: Scenario) -> tuple[Zone, ...]:
     """Return the coastline, the region, and the areas of the constraints on sensor positions."""
     model = scenario.model
-    found = [Zone(COAST, line) for line in coastline(model, scenario.folder)]
-    found.append(Zone(REGION, _corners(model.region)))
+    result = [Zone(COAST, line) for line in coastline(model, scenario.folder)]
+    result.append(Zone(REGION, _region_corners(model.region)))
     for section in model.control.constraints:
         if isinstance(section, StayInside):
-            found.append(Zone(INSIDE, _corners(section.region)))
+            result.append(Zone(INSIDE, _region_corners(section.region)))
         elif isinstance(section, KeepOut):
-            found += [Zone(NO_GO, section.polygon or _corners(section.region))]
-            found += [Zone(HOLE, hole) for hole in section.holes]
-    return tuple(found)
+            result += [Zone(NO_GO, section.polygon or _region_corners(section.region))]
+            result += [Zone(HOLE, hole) for hole in section.holes]
+    return tuple(result)
 
 
-def _corners(region: RegionSection | None) -> tuple[tuple[float, float], ...]:
+def _region_corners(region: RegionSection | None) -> tuple[tuple[float, float], ...]:
     if region is None:
         return ()
     west, east, south, north = region.x_min, region.x_max, region.y_min, region.y_max

@@ -43,7 +43,7 @@ def test_anchors_and_aliases_can_repeat_a_section() -> None:
     assert first.detection == second.detection
 
 
-def test_a_fault_behind_an_alias_is_told_where_it_is_written() -> None:
+def test_an_error_behind_an_alias_is_located_where_it_is_written() -> None:
     text = changed(
         ("heading_deg: 4.0", "detection: &limited {kind: limited_range, probability: 2, max_range: 80.0}"),
         ("position: [0.0, -40.0]", "position: [0.0, -40.0], detection: *limited"),
@@ -58,13 +58,13 @@ def test_loading_names_the_file(tmp_path: Path) -> None:
         load_scenario(file)
 
 
-def test_what_is_no_utf8_is_told(tmp_path: Path) -> None:
+def test_invalid_utf8_is_reported(tmp_path: Path) -> None:
     file = tmp_path / "latin.yaml"
     file.write_bytes("name: Zürich\n".encode("latin-1"))
     with pytest.raises(InputError, match="expected UTF-8 text; byte 7 is not"):
         load_scenario(file)
 
 
-def test_an_unknown_name_gets_the_nearest_one() -> None:
+def test_an_unknown_name_gets_the_nearest_suggestion() -> None:
     with pytest.raises(InputError, match=r"^papre-a: no such file; expected .* \(did you mean paper-a\?\)"):
         load_scenario("papre-a")

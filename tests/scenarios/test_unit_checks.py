@@ -20,9 +20,9 @@ from vedette.errors import ImplausibleWarning, InputError, ScenarioError
 from vedette.filters import LmbFilter, PhdFilter, SequentialLmbFilter
 from vedette.fusion import Clmb
 from vedette.platforms import HeadingPlatform, Pointing
-from vedette.scenarios import Scenario, list_builtin, load_scenario, parse_scenario, with_fields
+from vedette.scenarios import Scenario, list_builtin, load_scenario, parse_scenario, replace_fields
 from vedette.scenarios.build import build_experiment, build_planner
-from vedette.scenarios.plausibility import implausible
+from vedette.scenarios.unit_checks import implausible_settings
 from vedette.tracking import State
 
 BEARING, NOISE = "std: [0.02, 3.0]", "noise: {kind: constant, std: [0.02, 3.0]}"
@@ -50,7 +50,7 @@ def zone(area: str) -> tuple[str, str]:
         (NOISE, "noise: {kind: range_dependent, sigma_bearing_deg: 200}", "in degrees, up to 180, got 200"),
     ],
 )
-def test_noise_that_no_bearing_has_is_a_fault(old: str, new: str, wanted: str) -> None:
+def test_impossible_bearing_noise_is_an_error(old: str, new: str, wanted: str) -> None:
     with pytest.raises(ScenarioError) as error:
         parse_scenario(changed((old, new)), "f.yaml")
     (fault,) = error.value.faults
@@ -105,7 +105,7 @@ def test_noise_that_no_bearing_has_is_a_fault(old: str, new: str, wanted: str) -
         ),
     ],
 )
-def test_what_can_hardly_be_meant_is_told_by_the_check(
+def test_implausible_values_are_reported_by_check(
     changes: tuple[tuple[str, str], ...], place: str, wanted: str, tmp_path: Path
 ) -> None:
     file = tmp_path / "scenario.yaml"
@@ -116,20 +116,20 @@ def test_what_can_hardly_be_meant_is_told_by_the_check(
     assert line.startswith(f"{place}: warning: "), line
 
 
-def test_a_scenario_that_is_warned_of_is_built_and_run_without_further_ado() -> None:
+def test_a_scenario_with_warnings_is_built_and_run() -> None:
     text = changed((BEARING, "std: [2.0, 0.02]"), zone("polygon: [[-1.1, 50.78], [-1.08, 50.78], [-1.08, 50.8]]"))
     scenario = Scenario(parse_scenario(text))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         build_experiment(scenario)
         build_planner(scenario, "random")
-    assert len(list(implausible(scenario.model))) == 2
+    assert len(list(implausible_settings(scenario.model))) == 2
 
 
 @pytest.mark.parametrize("name", list_builtin())
-def test_nothing_of_a_built_in_scenario_is_told(name: str) -> None:
+def test_built_in_scenarios_have_no_implausible_values(name: str) -> None:
     scenario = load_scenario(name)
-    assert list(implausible(scenario.model)) == []
+    assert list(implausible_settings(scenario.model)) == []
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         build_experiment(scenario)
@@ -164,7 +164,7 @@ def test_a_bearing_with_noise_beyond_pi_is_refused(noise: models.NoiseModel) -> 
         sensor(noise)
 
 
-def test_a_bearing_with_much_noise_is_told() -> None:
+def test_a_bearing_with_much_noise_warns() -> None:
     with pytest.warns(
         ImplausibleWarning, match=r"SensorModel.noise: expected .* component 0, an angle, in radians; got 2 \("
     ):
@@ -172,7 +172,7 @@ def test_a_bearing_with_much_noise_is_told() -> None:
 
 
 @pytest.mark.parametrize("heading", [90.0, -135.0, 45.0])
-def test_a_heading_in_degrees_is_told(heading: float) -> None:
+def test_a_heading_in_degrees_warns(heading: float) -> None:
     pose = np.array([0.0, 0.0, heading])
     lmb, phd = LmbFilter(targets(), sensor(GOOD)), PhdFilter(targets(), sensor(GOOD))
     central = SequentialLmbFilter(targets(), (sensor(GOOD),))
@@ -191,7 +191,7 @@ def test_a_heading_in_degrees_is_told(heading: float) -> None:
 
 
 @pytest.mark.parametrize("heading", [0.0, 3.0, -6.0, 20.0 * math.pi, 1e3 * 0.371 + 0.2, 90.5, 9.0, 1e4])
-def test_headings_that_come_of_integration_are_not(heading: float) -> None:
+def test_accumulated_headings_do_not_warn(heading: float) -> None:
     models.bearing_range().measure(np.zeros(4), np.array([0.0, 0.0, heading]))
 
 
@@ -207,7 +207,7 @@ def test_a_camera_in_degrees_is_refused(half_width: float) -> None:
 
 
 @pytest.mark.parametrize("kind", [LmbFilter, PhdFilter])
-def test_a_negative_range_is_told_unless_noise_may_bring_it(kind: Any) -> None:
+def test_a_negative_range_warns_unless_noise_explains_it(kind: Any) -> None:
     for made, scan in (
         (kind(targets(), sensor(GOOD)), [[0.1, -300.0]]),
         (kind(targets(), sensor(models.constant_noise([3.0]), models.range_only())), [[-300.0]]),
@@ -218,7 +218,7 @@ def test_a_negative_range_is_told_unless_noise_may_bring_it(kind: Any) -> None:
         made.step(made.initial(), np.array(scan) / 30.0, **arguments)
 
 
-def test_areas_in_degrees_are_told() -> None:
+def test_areas_in_degrees_warn() -> None:
     corners = np.array([[-1.10, 50.78], [-1.08, 50.78], [-1.08, 50.80]])
     wanted = r"expected metres from the origin; got an area of 0.02 by 0.02 m at \(-1.1, 50.78\) \(are these longitudes"
     with pytest.warns(ImplausibleWarning, match=f"area: {wanted}"):
@@ -228,7 +228,7 @@ def test_areas_in_degrees_are_told() -> None:
 
 
 @pytest.mark.parametrize("scale", [1.0, 100.0, 1e6])
-def test_areas_in_metres_are_not(scale: float) -> None:
+def test_areas_in_metres_do_not_warn(scale: float) -> None:
     KeepOut(scale * np.array([[4.0, 3.0], [5.0, 3.0], [5.0, 4.0]]))
     KeepOut(scale * np.array([[0.0, 0.0], [0.02, 0.0], [0.02, 0.02]]))
 
@@ -244,6 +244,6 @@ def test_areas_in_metres_are_not(scale: float) -> None:
         ({"time.step_period": 0.1}, False),  # the horizon goes scan by scan
     ],
 )
-def test_pseudo_updates_far_apart_are_told(fields: dict[str, Any], told: bool) -> None:
-    scenario = with_fields(Scenario(parse_scenario(MINIMAL)), {"time.step_period": 1.0} | fields)
-    assert [path for path, _ in implausible(scenario.model)] == [("control", "horizon_period")] * told
+def test_pseudo_updates_far_apart_warn(fields: dict[str, Any], told: bool) -> None:
+    scenario = replace_fields(Scenario(parse_scenario(MINIMAL)), {"time.step_period": 1.0} | fields)
+    assert [path for path, _ in implausible_settings(scenario.model)] == [("control", "horizon_period")] * told

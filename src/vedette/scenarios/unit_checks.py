@@ -10,7 +10,7 @@ import numpy as np
 
 from vedette.internal.unit_warnings import LARGE_ANGLE, look_like_degrees
 from vedette.kernels.base.types import Floats
-from vedette.scenarios.faults import Path, format_path
+from vedette.scenarios.diagnostics import Path, format_path
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.birth import BirthSite
 from vedette.scenarios.sections.sensing import Measurement, Noise, components
@@ -18,55 +18,61 @@ from vedette.scenarios.sections.targets import ScriptedTargets
 from vedette.scenarios.sections.world import RegionSection, grouped_order
 
 # Filters never find a target that begins this number of standard deviations or more from every birth site.
-_FAR_FROM_SITES = 8.0
+_MAX_SITE_DISTANCE = 8.0
 # Largest plausible biases, by field; degrees, s.
-_MOST_BIAS = {"bearing_deg": 90.0, "clock": 3600.0}
+_MAX_BIAS = {"bearing_deg": 90.0, "clock": 3600.0}
 # Scans in a period of the horizon; the paper's scenarios have 2.
-_MANY_SCANS = 3.0
+_MAX_PERIOD_SCANS = 3.0
 
 
-def implausible(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
+def implausible_settings(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     """Yield places in the scenario and texts with what was expected, what was given and the probable mistake."""
     yield from _bearings(model)
     yield from _biases(model)
     yield from _areas(model)
     yield from _beyond_sites(model)
-    yield from _per_scan(model)
-    yield from _held(model)
+    yield from _probabilities_per_step(model)
+    yield from _held_acceleration(model)
 
 
 def _bearings(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     """Yield warnings of noise so large that bearings carry little information."""
-    told: list[Noise] = []  # noise that sensors share is reported once
+    reported: list[Noise] = []  # noise that sensors share is reported once
     for s, sensor in enumerate(model.sensors):
         true = None if sensor.truth is None else sensor.truth.noise
-        for where, noise in ((("noise",), sensor.noise), (("truth", "noise"), true)):
-            if noise is not None and noise not in told:
-                told.append(noise)
-                yield from _bearing_noise(("sensors", s, *where), sensor.measurement, noise)
+        for path, noise in ((("noise",), sensor.noise), (("truth", "noise"), true)):
+            if noise is not None and noise not in reported:
+                reported.append(noise)
+                yield from _bearing_noise(("sensors", s, *path), sensor.measurement, noise)
 
 
 def _biases(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     """Yield warnings of implausibly large biases."""
     for s, sensor in enumerate(model.sensors):
         true = None if sensor.truth is None else sensor.truth.bias
-        for where, bias in ((("bias",), sensor.bias), (("truth", "bias"), true)):
-            for name, most in _MOST_BIAS.items():
-                if bias is not None and abs(value := getattr(bias, name)) > most:
-                    at = ("sensors", s, *where, name)
-                    yield at, f"{format_path(at)}: expected at most {most:g} either way; got {value:g}"
+        for path, bias in ((("bias",), sensor.bias), (("truth", "bias"), true)):
+            for name, largest in _MAX_BIAS.items():
+                if bias is not None and abs(value := getattr(bias, name)) > largest:
+                    field_path = ("sensors", s, *path, name)
+                    yield (
+                        field_path,
+                        f"{format_path(field_path)}: expected at most {largest:g} either way; got {value:g}",
+                    )
 
 
 def _bearing_noise(path: Path, measurement: Measurement, noise: Noise) -> Iterator[tuple[Path, str]]:
     for component in components(measurement)[1]:
         if noise.kind == "range_dependent":
-            std, at = math.radians(noise.sigma_bearing_deg), (*path, "sigma_bearing_deg")
+            std, field_path = math.radians(noise.sigma_bearing_deg), (*path, "sigma_bearing_deg")
             if std > LARGE_ANGLE:
-                yield at, f"{format_path(at)}: {_degrees(std)} leave little of a bearing"
+                yield field_path, f"{format_path(field_path)}: {_degrees(std)} leave little of a bearing"
         elif noise.kind == "constant" and noise.std[component] > LARGE_ANGLE:
-            std, at = noise.std[component], (*path, "std", component)
-            meant = "are the numbers exchanged" if min(noise.std) < std else "is it in degrees"
-            yield at, f"{format_path(at)}: expected radians of a bearing; got {std:g}, {_degrees(std)} ({meant}?)"
+            std, field_path = noise.std[component], (*path, "std", component)
+            hint = "are the numbers exchanged" if min(noise.std) < std else "is it in degrees"
+            yield (
+                field_path,
+                f"{format_path(field_path)}: expected radians of a bearing; got {std:g}, {_degrees(std)} ({hint}?)",
+            )
 
 
 def _degrees(angle: float) -> str:
@@ -107,53 +113,55 @@ def _beyond_sites(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
         start = np.array(track.state)[order]
         distances = [_distance(start, site, order) for site in birth.sites]
         nearest = int(np.argmin(distances))
-        if distances[nearest] > _FAR_FROM_SITES:
+        if distances[nearest] > _MAX_SITE_DISTANCE:
             path: Path = ("targets", "tracks", i, "state")
-            far = f"begins {distances[nearest]:.0f} standard deviations from the nearest birth site"
+            finding = f"begins {distances[nearest]:.0f} standard deviations from the nearest birth site"
             hint = f" (are standard deviations in birth.sites[{nearest}].cov?)"
-            told = f"{format_path(path)}: {far}, and is hardly found"
-            yield path, told + (hint if birth.sites[nearest].cov is not None else "")
+            text = f"{format_path(path)}: {finding}, and is hardly found"
+            yield path, text + (hint if birth.sites[nearest].cov is not None else "")
 
 
 def _distance(start: Floats, site: BirthSite, order: list[int]) -> float:
     """Distance of a position from a site, in its standard deviations."""
-    off = start - np.array(site.mean)[order]
-    return math.sqrt(float(off @ np.linalg.solve(site.covariance()[np.ix_(order, order)], off)))
+    difference = start - np.array(site.mean)[order]
+    return math.sqrt(float(difference @ np.linalg.solve(site.covariance()[np.ix_(order, order)], difference)))
 
 
-def _per_scan(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
+def _probabilities_per_step(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     """Yield warnings of probabilities per step if a sensor does not scan at every step: they apply at every step."""
-    every, name = max(
-        (own.scans.steps(model.time.step_period)[0], name)
-        for own, name in zip(model.sensors, model.sensor_names, strict=True)
+    interval, name = max(
+        (sensor.scans.steps(model.time.step_period)[0], name)
+        for sensor, name in zip(model.sensors, model.sensor_names, strict=True)
     )
     survival, per_scan = model.survival, []
     if model.birth.period is None and model.birth.steps == "every":
         per_scan.append("birth")
     if survival.kind == "constant" and survival.period is None and survival.probability < 1.0:
         per_scan.append("survival")
-    for section in per_scan if every > 1 else ():
+    for section in per_scan if interval > 1 else ():
         yield (
             (section,),
-            f"its probabilities are those of a step of {model.time.step_period:g} s, and count {every} times from one "
-            f"scan of {name} to the next; say with {section}.period for what stretch of time they are meant",
+            f"its probabilities are those of a step of {model.time.step_period:g} s, and count {interval} times from "
+            f"one scan of {name} to the next; say with {section}.period for what stretch of time they are meant",
         )
 
 
-def _held(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
+def _held_acceleration(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     """Yield warnings of accelerations that are held over steps of varying length: shorter steps spread targets less."""
     motion, scans = model.motion, model.horizon[1] / model.time.step_period
     if getattr(motion, "acceleration", "continuous") != "held" or not getattr(motion, "sigma_v", 0.0):
         return
-    uneven = [name for name, sensor in zip(model.sensor_names, model.sensors, strict=True) if sensor.scans.late]
-    if model.recording is not None or uneven:
-        why = f"{uneven[0]} has late scans" if uneven else "scans are recorded"
+    with_late_scans = [
+        name for name, sensor in zip(model.sensor_names, model.sensors, strict=True) if sensor.scans.late
+    ]
+    if model.recording is not None or with_late_scans:
+        reason = f"{with_late_scans[0]} has late scans" if with_late_scans else "scans are recorded"
         yield (
             ("motion", "acceleration"),
-            f"it is held from one scan to the next of any sensor, and {why}: targets spread the less the more scans "
+            f"it is held from one scan to the next of any sensor, and {reason}: targets spread the less the more scans "
             "there are in between, and clocks cannot be found; say continuous",
         )
-    if model.decision_steps and scans >= _MANY_SCANS:
+    if model.decision_steps and scans >= _MAX_PERIOD_SCANS:
         yield (
             ("control", "horizon_period"),
             f"pseudo-updates are {scans:.3g} scans apart: motion.sigma_v is held over each such step, so that plans "

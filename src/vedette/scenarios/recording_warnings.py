@@ -12,34 +12,34 @@ from vedette.recorded import RecordedScans
 from vedette.recorded import RecordedTargets as RecordedSource
 from vedette.recorded.merging import crowded
 from vedette.recorded.tables import column_names
-from vedette.scenarios.extents import beyond_region
-from vedette.scenarios.faults import Path, format_path
+from vedette.scenarios.diagnostics import Path, format_path
 from vedette.scenarios.loading import Scenario
+from vedette.scenarios.region import beyond_region_warnings
 from vedette.scenarios.sections import ScenarioModel
-from vedette.scenarios.sections.recording import noise_stds, sites_of
+from vedette.scenarios.sections.recording import noise_stds, recorded_sensors
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.targets import RecordedTargets
 from vedette.scenarios.sections.world import Time
 
-_NEAR = 1000.0  # m; sensors nearer than this to the targets are not called far
+_MIN_DISTANCE = 1000.0  # m; sensors nearer than this to the targets are not called far
 
 
-def record_cautions(scenario: Scenario) -> Iterator[tuple[Path, str]]:
+def recording_warnings(scenario: Scenario) -> Iterator[tuple[Path, str]]:
     """Yield the places in the scenario and texts of warnings of recorded data that are probably mistakes."""
     model, folder = scenario.model, scenario.folder
     if model.recording is not None:
         recording = model.recording.build(model, folder)
-        yield from _unused(("recording", "path"), model.recording.path, recording.unused)
+        yield from _unused_columns(("recording", "path"), model.recording.path, recording.unused)
         yield from ((("recording", "path"), note) for note in recording.notes)
-        yield from beyond_region(model, recording)
-        yield from _several_a_target(model, recording)
-        yield from _far_apart(model, recording)
+        yield from beyond_region_warnings(model, recording)
+        yield from _several_measurements_per_target(model, recording)
+        yield from _large_scan_window(model, recording)
     if not isinstance(model.targets, RecordedTargets):
         return
     source = model.targets.source(model, folder)
-    yield from _repeats(model.targets, source)
+    yield from _repeated_reports(model.targets, source)
     yield from _single_reports(model.targets, source)
-    yield from _unused(("targets", "path"), model.targets.path, source.reports.unused)
+    yield from _unused_columns(("targets", "path"), model.targets.path, source.reports.unused)
     yield from ((("targets", "path"), f"targets.path: {model.targets.path}: {note}") for note in source.reports.notes)
     for index, sensor in enumerate(model.sensors):
         path: Path = ("sensors", index, "position")
@@ -51,7 +51,7 @@ def record_cautions(scenario: Scenario) -> Iterator[tuple[Path, str]]:
             yield path, f"{place}, got {at}, {distance / 1000.0:.3g} km from the nearest recorded position"
 
 
-def _unused(path: Path, file: str, columns: tuple[str, ...]) -> Iterator[tuple[Path, str]]:
+def _unused_columns(path: Path, file: str, columns: tuple[str, ...]) -> Iterator[tuple[Path, str]]:
     """Yield a warning of columns that are not read."""
     if columns:
         names = column_names(columns)
@@ -67,10 +67,10 @@ def _single_reports(section: RecordedTargets, source: RecordedSource) -> Iterato
         yield ("targets", "path"), f"targets.path: {section.path}: {which} left out, as a course needs two"
 
 
-def _several_a_target(model: ScenarioModel, recording: RecordedScans) -> Iterator[tuple[Path, str]]:
+def _several_measurements_per_target(model: ScenarioModel, recording: RecordedScans) -> Iterator[tuple[Path, str]]:
     """Yield warnings of measurements so close together that one target seems to give several."""
     stds = [noise_stds(sensor) for sensor in model.sensors]
-    for site, num, scans in crowded(recording, sites_of(model), stds):
+    for site, num, scans in crowded(recording, recorded_sensors(model), stds):
         yield (
             ("recording",),
             f"{site.name}: {num} of {scans} scans have measurements within 3 standard deviations of each other; "
@@ -79,25 +79,25 @@ def _several_a_target(model: ScenarioModel, recording: RecordedScans) -> Iterato
         )
 
 
-def _far_apart(model: ScenarioModel, recording: RecordedScans) -> Iterator[tuple[Path, str]]:
+def _large_scan_window(model: ScenarioModel, recording: RecordedScans) -> Iterator[tuple[Path, str]]:
     """Yield warnings of rows gathered into one scan although targets move by more than the noise between them."""
     births = model.birth.from_measurements
     if births is None or len(births.std) < 4:
         return
     speed = max(births.std[2:4])
-    for s, (sensor, apart) in enumerate(zip(model.sensors, recording.gathered, strict=False)):
+    for s, (sensor, window) in enumerate(zip(model.sensors, recording.gathered, strict=False)):
         stds = noise_stds(sensor)
-        if stds is None or sensor.measurement.kind not in PLACED or speed * apart <= stds[1]:
+        if stds is None or sensor.measurement.kind not in PLACED or speed * window <= stds[1]:
             continue
         yield (
             ("recording", "gather"),
-            f"{model.sensor_names[s]}: rows of one scan are {apart:.3g} s apart (median), in which a target of "
-            f"{speed:g} m/s moves {speed * apart:.3g} m, more than the noise ({stds[1]:.3g} m): if it is a turning "
+            f"{model.sensor_names[s]}: rows of one scan are {window:.3g} s apart (median), in which a target of "
+            f"{speed:g} m/s moves {speed * window:.3g} m, more than the noise ({stds[1]:.3g} m): if it is a turning "
             "radar, give the sensor `turn: {period: ...}`; else use a smaller `gather`",
         )
 
 
-def _repeats(section: RecordedTargets, source: RecordedSource) -> Iterator[tuple[Path, str]]:
+def _repeated_reports(section: RecordedTargets, source: RecordedSource) -> Iterator[tuple[Path, str]]:
     repeats = source.reports.repeats
     if repeats:
         first, second = repeats[0]
@@ -126,6 +126,6 @@ def _distance(sensor: Sensor, source: RecordedSource, time: Time) -> float | Non
     """
     positions = np.concatenate([track.positions for track in source.tracks])
     extent = float(np.hypot(*np.ptp(positions, axis=0)))
-    reach = max(extent, _NEAR) + sensor.platform.top_speed * time.step_period * time.num_steps
+    limit = max(extent, _MIN_DISTANCE) + sensor.platform.top_speed * time.step_period * time.num_steps
     nearest = float(np.hypot(*(positions - sensor.position).T).min())
-    return nearest if nearest > reach else None
+    return nearest if nearest > limit else None

@@ -7,23 +7,23 @@ from typing import Any
 
 from vedette.errors import ScenarioError
 from vedette.scenarios.loading import Scenario
-from vedette.scenarios.overrides import with_fields
+from vedette.scenarios.overrides import replace_fields
 from vedette.scenarios.sections.fusion import Fusion
 
 
-def fusions_instead(scenario: Scenario, fusion: Fusion, *, by_views: bool) -> str:
+def suggest_fusions(scenario: Scenario, fusion: Fusion, *, by_views: bool) -> str:
     """Return a text with fusions that lose less, as they are written in the file, and where each applies; may be empty.
 
     by_views: True to include fusion of the sensors' local densities by views.
     """
-    found = list(_fusions(scenario, fusion, by_views))
-    return f"; take {'; '.join(found)}" if found else ""
+    suggestions = list(_fusions(scenario, fusion, by_views))
+    return f"; take {'; '.join(suggestions)}" if suggestions else ""
 
 
-def accepted(scenario: Scenario, fields: Mapping[str, Any]) -> bool:
+def is_valid_with(scenario: Scenario, fields: Mapping[str, Any]) -> bool:
     """Return True if the scenario is valid with these fields changed."""
     try:
-        with_fields(scenario, fields)
+        replace_fields(scenario, fields)
     except ScenarioError:
         return False
     return True
@@ -33,19 +33,19 @@ def _fusions(scenario: Scenario, fusion: Fusion, by_views: bool) -> Iterator[str
     own_filter = scenario.model.filter.kind == "custom"  # takes one sensor; density unknown
     if not own_filter:
         for kind, where in (("sequential", "where scans can be sent"), ("parallel", "where only densities can")):
-            if kind != fusion.kind and accepted(scenario, {"fusion": {"kind": kind}}):
+            if kind != fusion.kind and is_valid_with(scenario, {"fusion": {"kind": kind}}):
                 yield f"fusion: {{kind: {kind}}} {where}"
     if by_views:
         kind = "arithmetic_average" if fusion.kind == "arithmetic_average" else "clmb"
-        for further in _ways(scenario, fusion):
-            section = {"kind": kind, "by_views": True, **further}
-            if accepted(scenario, {"fusion": section}):
+        for options in _option_sets(scenario, fusion):
+            section = {"kind": kind, "by_views": True, **options}
+            if is_valid_with(scenario, {"fusion": section}):
                 words = ", ".join(f"{key}: {str(value).lower()}" for key, value in section.items())
                 yield f"fusion: {{{words}}} where sensors do not share a prediction"
                 return
 
 
-def _ways(scenario: Scenario, fusion: Fusion) -> tuple[dict[str, Any], ...]:
+def _option_sets(scenario: Scenario, fusion: Fusion) -> tuple[dict[str, Any], ...]:
     """Return the options with or without feedback and matching, those nearest to the scenario first."""
     birth = scenario.model.birth
     later = birth.from_measurements is not None or birth.steps == "every" or max(birth.steps, default=1) > 1
@@ -56,15 +56,17 @@ def _ways(scenario: Scenario, fusion: Fusion) -> tuple[dict[str, Any], ...]:
     return (*shared, *own) if fusion.feedback else (*own, *shared)
 
 
-def with_own_labels(scenario: Scenario, fusion: Fusion) -> str:
+def suggest_label_settings(scenario: Scenario, fusion: Fusion) -> str:
     """Return a text with settings that keep a target that sensors start at different steps under different labels."""
-    found = [
+    settings = [
         f"{name}: {value}"
-        for name, value, given in (
+        for name, value, new_value in (
             ("fusion.matching", "assignment", "assignment"),
             ("fusion.feedback", "true", True),
         )
-        if accepted(scenario, {name: given})
+        if is_valid_with(scenario, {name: new_value})
     ]
-    other = fusions_instead(scenario, fusion, by_views=False)
-    return (f"; take {', or '.join(found)}" if found else "") + (other.replace("; take", ", or") if found else other)
+    other = suggest_fusions(scenario, fusion, by_views=False)
+    return (f"; take {', or '.join(settings)}" if settings else "") + (
+        other.replace("; take", ", or") if settings else other
+    )

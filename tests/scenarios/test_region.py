@@ -15,9 +15,9 @@ from vedette.evaluation.runs import run_scenario
 from vedette.kernels.base.types import Floats
 from vedette.live import build_live_loop
 from vedette.recorded.extents import box_of, wild
-from vedette.scenarios.calibrated import problem_of
-from vedette.scenarios.cautions import cautions
-from vedette.scenarios.of_recording import OfRecording, scenario_of_recording, scenario_of_sensors
+from vedette.scenarios.calibration import build_problem
+from vedette.scenarios.from_recording import RecordingScenario, scenario_from_recording, scenario_from_sensors
+from vedette.scenarios.warnings import scenario_warnings
 
 SENSORS = """recording: {bearings: north}
 sensor_defaults:
@@ -46,16 +46,16 @@ def rows() -> list[str]:
     return found
 
 
-def recorded(folder: Path, scans: list[str], detection: str = ENDLESS, more: str = "") -> OfRecording:
+def recorded(folder: Path, scans: list[str], detection: str = ENDLESS, more: str = "") -> RecordingScenario:
     (folder / "scans.csv").write_text("\n".join(["time,sensor,range_m,bearing_deg", *scans, ""]), "utf-8")
     (folder / "radar.yaml").write_text(SENSORS % detection + more, "utf-8")
     truth = [f"{t},{i},{s[0] + t * s[2]},{s[1] + t * s[3]}" for t in (0.0, 40.0, 80.0) for i, s in enumerate(SHIPS)]
     (folder / "truth.csv").write_text("\n".join(["time,id,x,y", *truth, ""]), "utf-8")
     own = "" if more else "truth.csv"
-    return scenario_of_recording(folder / "radar.yaml", folder / "scans.csv", folder / own if own else None)
+    return scenario_from_recording(folder / "radar.yaml", folder / "scans.csv", folder / own if own else None)
 
 
-def ospa(found: OfRecording) -> Floats:
+def ospa(found: RecordingScenario) -> Floats:
     """OSPA of each scan."""
     return run_scenario(found.scenario, "still", seed=0).ospa[:, 0]
 
@@ -64,7 +64,7 @@ WILD = [(6100.0, 45.0), (6700.0, 222.0), (7500.0, 45.0), (9000.0, 135.0), (12e3,
 
 
 @pytest.mark.parametrize("detection", [ENDLESS, LIMITED])
-def test_one_row_anywhere_changes_ospa_by_less_than_one_percent(tmp_path: Path, detection: str) -> None:
+def test_one_outlier_changes_ospa_by_less_than_one_percent(tmp_path: Path, detection: str) -> None:
     """At each scan; a candidate on the verge of being estimated may be on its other side at one scan of the thirty."""
     plain = ospa(recorded(tmp_path, rows(), detection))
     for place in WILD:
@@ -74,7 +74,7 @@ def test_one_row_anywhere_changes_ospa_by_less_than_one_percent(tmp_path: Path, 
             assert changed.sum() <= 1, (place, time)
 
 
-def test_it_is_named_with_its_row(tmp_path: Path) -> None:
+def test_an_outlier_is_reported_with_its_row(tmp_path: Path) -> None:
     found = recorded(tmp_path, [*rows(), "35.0,R,300000.0,12.0"])
     (text,) = found.recording.skipped
     assert text == (
@@ -85,20 +85,20 @@ def test_it_is_named_with_its_row(tmp_path: Path) -> None:
     assert "within its reach of 6000 m; got one 300000 m away" in text
 
 
-def test_a_scan_of_wild_rows_alone_found_nothing(tmp_path: Path) -> None:
+def test_a_scan_of_outliers_alone_is_empty(tmp_path: Path) -> None:
     scans = recorded(tmp_path, [*rows(), "80.0,R,300000.0,12.0"]).recording.scans
     assert scans[-1][0] is not None
     assert scans[-1][0].shape == (0, 2)
 
 
 def test_a_calibration_sees_the_same_recording(tmp_path: Path) -> None:
-    plain = problem_of(recorded(tmp_path, rows()).scenario)
-    wild_too = problem_of(recorded(tmp_path, [*rows(), "35.0,R,300000.0,12.0"]).scenario)
+    plain = build_problem(recorded(tmp_path, rows()).scenario)
+    wild_too = build_problem(recorded(tmp_path, [*rows(), "35.0,R,300000.0,12.0"]).scenario)
     start = plain.free([each.start for each in plain.parameters])
     np.testing.assert_array_equal(plain.log_likelihoods(start), wild_too.log_likelihoods(start))
 
 
-def test_a_fast_target_that_leaves_is_not_wild() -> None:
+def test_a_fast_leaving_target_is_no_outlier() -> None:
     rng = np.random.default_rng(0)
     times = np.repeat(TIMES, 11)
     places = rng.uniform(-6000.0, 6000.0, (len(times), 2))
@@ -108,7 +108,7 @@ def test_a_fast_target_that_leaves_is_not_wild() -> None:
     assert not found.any()
 
 
-def test_few_rows_have_no_wild_one() -> None:
+def test_few_rows_have_no_outlier() -> None:
     places = np.column_stack([np.append(np.arange(18.0), 1e6), np.zeros(19)])
     assert not wild(np.arange(19.0), places, np.zeros((19, 2)), np.full(19, np.inf)).any()
     assert wild(np.arange(19.0), places, np.zeros((19, 2)), np.full(19, 1e3)).tolist() == [False] * 18 + [True]
@@ -118,10 +118,10 @@ def test_a_box_has_its_margin() -> None:
     np.testing.assert_allclose(box_of(np.array([[0.0, 0.0], [100.0, 20.0]])), [[-5.0, -5.0], [105.0, 25.0]])
 
 
-def test_rows_beyond_a_region_that_is_given_are_counted_and_named(tmp_path: Path) -> None:
+def test_rows_outside_a_given_region_are_counted_and_reported(tmp_path: Path) -> None:
     region = "region: {x_min: -9000, x_max: 9000, y_min: -9000, y_max: 3000}\n"
     found = recorded(tmp_path, rows(), more=region)
-    (line,) = [line for line in cautions(found.scenario) if "beyond the region" in line]
+    (line,) = [line for line in scenario_warnings(found.scenario) if "beyond the region" in line]
     far = 0
     for row in rows():
         _, _, reach, bearing = row.split(",")
@@ -130,9 +130,9 @@ def test_rows_beyond_a_region_that_is_given_are_counted_and_named(tmp_path: Path
     assert f"and {far - 3} more" in line
 
 
-def test_a_live_loop_takes_nothing_from_beyond(tmp_path: Path) -> None:
+def test_a_live_loop_ignores_measurements_outside_the_region(tmp_path: Path) -> None:
     (tmp_path / "radar.yaml").write_text(SENSORS % LIMITED, "utf-8")
-    live = build_live_loop(scenario_of_sensors(tmp_path / "radar.yaml"))
+    live = build_live_loop(scenario_from_sensors(tmp_path / "radar.yaml"))
     told = []
     for has_wild in (False, True):
         state, answers = live.initial(), list[dict[str, Any]]()
@@ -150,14 +150,14 @@ def test_a_live_loop_takes_nothing_from_beyond(tmp_path: Path) -> None:
     assert len(told[0][-1]["tracks"]) == 3
 
 
-def test_ranges_of_another_unit_are_blamed_on_the_scans(tmp_path: Path) -> None:
+def test_ranges_in_another_unit_are_reported_at_the_scans(tmp_path: Path) -> None:
     """Not on a region that nobody wrote."""
     (tmp_path / "radar.yaml").write_text("origin: {lon: -1.1, lat: 50.8}\n" + SENSORS % ENDLESS, "utf-8")
     lines = [f"{time},{name},{bearing},{1852.0 * float(far)}" for time, name, far, bearing in map(_cells, rows())]
     (tmp_path / "scans.csv").write_text("time,sensor,bearing_deg,range_m\n" + "\n".join(lines), "utf-8")
     wanted = r"scans.csv: expected measurements within 1000 km of the origin; got one of R at t = 0 s, \d+ km away"
     with pytest.raises(InputError, match=wanted):
-        scenario_of_recording(tmp_path / "radar.yaml", tmp_path / "scans.csv")
+        scenario_from_recording(tmp_path / "radar.yaml", tmp_path / "scans.csv")
 
 
 def _cells(row: str) -> list[str]:

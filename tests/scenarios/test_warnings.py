@@ -16,11 +16,11 @@ from scenarios.minimal import MINIMAL, changed
 from vedette.cli import app
 from vedette.errors import ScenarioError
 from vedette.evaluation import run_scenario
-from vedette.scenarios import Scenario, list_builtin, load_scenario, with_fields
+from vedette.scenarios import Scenario, list_builtin, load_scenario, replace_fields
 from vedette.scenarios.build import build_targets
-from vedette.scenarios.cautions import cautions, prob_detection
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.sensors import Sensor
+from vedette.scenarios.warnings import prob_detection, scenario_warnings
 
 SOFT: dict[str, object] = {"kind": "soft_sector", "probability": 0.9, "max_range": 150.0, "range_slope": 0.05}
 
@@ -32,7 +32,7 @@ SECTOR = "detection: {kind: limited_sector, probability: 0.9, max_range: 60.0, h
 def of(folder: Path, *changes: tuple[str, str]) -> tuple[str, ...]:
     file = folder / "scene.yaml"
     file.write_text(changed(*changes))
-    return cautions(load_scenario(file))
+    return scenario_warnings(load_scenario(file))
 
 
 @pytest.mark.parametrize(
@@ -49,7 +49,7 @@ def of(folder: Path, *changes: tuple[str, str]) -> tuple[str, ...]:
         (COURSES, "{kind: stay_inside, region: {x_min: 0, x_max: 5, y_min: 40, y_max: 50}}", ""),
     ],
 )
-def test_a_boat_that_starts_on_land(platform: str, constraint: str, told: str, tmp_path: Path) -> None:
+def test_a_sensor_that_starts_on_land_warns(platform: str, constraint: str, told: str, tmp_path: Path) -> None:
     place = "position: [0.0, 40.0]"
     change = (place, f"{place}, platform: {platform}")
     found = [
@@ -65,11 +65,11 @@ def test_a_boat_that_starts_on_land(platform: str, constraint: str, told: str, t
 
 @pytest.mark.parametrize("name", list_builtin())
 def test_no_built_in_scenario_warns(name: str) -> None:
-    assert cautions(load_scenario(name)) == ()
+    assert scenario_warnings(load_scenario(name)) == ()
 
 
 def test_births_at_every_step_warn_under_covariance_intersection_alone() -> None:
-    (line,) = cautions(with_fields(load_scenario("solent"), {"fusion": {"kind": "cm_delta_glmb"}}))
+    (line,) = scenario_warnings(replace_fields(load_scenario("solent"), {"fusion": {"kind": "cm_delta_glmb"}}))
     assert "warning: births at every step without feedback" in line
 
 
@@ -82,18 +82,24 @@ def test_births_after_the_first_step_warn_with_their_line(tmp_path: Path) -> Non
 
 def test_probabilities_of_a_step_warn_where_a_sensor_scans_at_times_of_its_own() -> None:
     own = load_scenario("three-radars")
-    steps = with_fields(own, {"survival.period": None, "birth.period": None})
-    birth, survival = cautions(steps)
+    steps = replace_fields(own, {"survival.period": None, "birth.period": None})
+    birth, survival = scenario_warnings(steps)
     assert "count 3 times from one scan of south-west to the next; say with birth.period" in birth
     assert "those of a step of 1 s, and count 3 times" in survival
-    assert cautions(own) == cautions(with_fields(steps, {"survival.period": 1.0, "birth.period": 1.0})) == ()
-    assert len(cautions(with_fields(steps, {"survival.probability": 1.0}))) == 1  # nobody dies, however often asked
-    assert cautions(with_fields(steps, {"sensors.*.scans": {"every": 1, "first": 1}})) == ()
+    assert (
+        scenario_warnings(own)
+        == scenario_warnings(replace_fields(steps, {"survival.period": 1.0, "birth.period": 1.0}))
+        == ()
+    )
+    assert (
+        len(scenario_warnings(replace_fields(steps, {"survival.probability": 1.0}))) == 1
+    )  # nobody dies, however often asked
+    assert scenario_warnings(replace_fields(steps, {"sensors.*.scans": {"every": 1, "first": 1}})) == ()
 
 
 @pytest.mark.parametrize("kind", ["clmb", "arithmetic_average"])
 @pytest.mark.parametrize("filters", ["factored_glmb", "lmb", "m_delta_glmb"])
-def test_the_warning_about_views_names_what_to_take_instead(tmp_path: Path, kind: str, filters: str) -> None:
+def test_fields_of_view_warning_suggests_alternatives(tmp_path: Path, kind: str, filters: str) -> None:
     south, rule = "{name: south, position: [0.0, -40.0]", "{kind: cm_delta_glmb, weights: [0.5, 0.5]}"
     blind = (south, f"{south}, heading_deg: 90.0, {SECTOR}")
     own = "kind: m_delta_glmb", f"kind: {filters}"
@@ -127,12 +133,12 @@ def scene_of(filters: str, fusion: dict[str, Any], number: int, births: str, net
         "sensors": model["sensors"][:number],
         "birth": model["birth"] | ({} if births == "measured" else {"sites": sites, "from_measurements": None}),
     }
-    return with_fields(scene, fields | {"filter": {"kind": filters}, "fusion": fusion, "network": network})
+    return replace_fields(scene, fields | {"filter": {"kind": filters}, "fusion": fusion, "network": network})
 
 
 @pytest.mark.parametrize(("number", "births"), [(3, "sites"), (5, "measured")])
 @pytest.mark.parametrize("filters", ["factored_glmb", "lmb", "delta_glmb", "m_delta_glmb"])
-def test_every_cure_that_is_named_is_accepted_and_runs(filters: str, number: int, births: str) -> None:
+def test_every_suggestion_is_accepted_and_runs(filters: str, number: int, births: str) -> None:
     assert filters != "factored_glmb" or ScenarioModel.model_fields["filter"].default.kind == filters
     ways: list[tuple[dict[str, Any], Any]] = [
         ({"kind": "clmb", "matching": "assignment"}, None),
@@ -150,33 +156,33 @@ def test_every_cure_that_is_named_is_accepted_and_runs(filters: str, number: int
             scene = scene_of(filters, fusion, number, births, network)
         except ScenarioError:
             continue
-        for fields in cures(cautions(scene)):
+        for fields in cures(scenario_warnings(scene)):
             named += 1
-            run_scenario(with_fields(scene, fields), "still", seed=1, num_threads=1)
+            run_scenario(replace_fields(scene, fields), "still", seed=1, num_threads=1)
     assert named >= 4
 
 
-def test_more_than_a_handful_of_densities_warn_and_say_what_they_cost() -> None:
-    (line,) = cautions(
+def test_fusing_many_densities_warns_with_the_cost() -> None:
+    (line,) = scenario_warnings(
         scene_of("factored_glmb", {"kind": "clmb", "by_views": True, "feedback": True}, 5, "sites", None)
     )
     assert "5 sensors fuse densities by GCI, which makes no use of what they have in common" in line
     assert "take fusion: {kind: sequential} where scans can be sent; fusion: {kind: parallel} where only" in line
     own = {"kind": "arithmetic_average", "by_views": True, "matching": "assignment"}
-    (line,) = cautions(scene_of("factored_glmb", own, 5, "measured", None))
+    (line,) = scenario_warnings(scene_of("factored_glmb", own, 5, "measured", None))
     assert "each finds every target by itself, and anew where one comes into its view" in line
-    (line,) = cautions(scene_of("lmb", {"kind": "parallel"}, 5, "measured", None))
+    (line,) = scenario_warnings(scene_of("lmb", {"kind": "parallel"}, 5, "measured", None))
     assert "take filter.kind: factored_glmb" in line
     for filters, fusion, number in (
         ("factored_glmb", {"kind": "parallel"}, 5),
         ("lmb", {"kind": "parallel"}, 4),
         ("factored_glmb", {"kind": "clmb", "by_views": True, "feedback": True}, 4),
     ):
-        assert cautions(scene_of(filters, fusion, number, "measured", None)) == ()
+        assert scenario_warnings(scene_of(filters, fusion, number, "measured", None)) == ()
 
 
 @pytest.mark.parametrize("kind", ["sequential", "parallel"])
-def test_rules_that_divide_by_the_prediction_do_not_warn(tmp_path: Path, kind: str) -> None:
+def test_fusions_that_divide_by_the_prediction_do_not_warn(tmp_path: Path, kind: str) -> None:
     south = "{name: south, position: [0.0, -40.0]"
     changes = (south, f"{south}, heading_deg: 90.0, {SECTOR}"), ("kind: m_delta_glmb", "kind: lmb")
     assert of(tmp_path, *changes, ("{kind: cm_delta_glmb, weights: [0.5, 0.5]}", f"{{kind: {kind}}}")) == ()
@@ -200,7 +206,7 @@ def test_births_at_once_with_feedback_matched_or_of_one_sensor_do_not_warn(
     assert of(tmp_path, *changes) == ()
 
 
-def test_sensors_of_other_views_warn_at_the_one_that_does_not_see(tmp_path: Path) -> None:
+def test_different_fields_of_view_warn_at_the_sensor_that_does_not_see(tmp_path: Path) -> None:
     south = "{name: south, position: [0.0, -40.0]"
     (line,) = of(tmp_path, STEPS, (south, f"{south}, heading_deg: 90.0, {SECTOR}"))
     assert "warning: sensors differ in what they see: in " in line
@@ -211,7 +217,7 @@ def test_sensors_of_other_views_warn_at_the_one_that_does_not_see(tmp_path: Path
 
 
 @pytest.mark.parametrize(("decisions", "number"), [("[4, 8]", 1), ("[]", 0)])
-def test_sensors_of_one_limited_view_warn_if_they_will_move(tmp_path: Path, decisions: str, number: int) -> None:
+def test_limited_fields_of_view_warn_if_sensors_move(tmp_path: Path, decisions: str, number: int) -> None:
     same = "noise: {kind: constant, std: [0.02, 3.0]}"
     found = of(
         tmp_path,
@@ -240,7 +246,7 @@ def test_sensors_of_one_limited_view_warn_if_they_will_move(tmp_path: Path, deci
         SOFT,
     ],
 )
-def test_what_a_sensor_sees_is_what_its_model_says(detection: dict[str, object], tmp_path: Path) -> None:
+def test_field_of_view_is_that_of_the_detection_model(detection: dict[str, object], tmp_path: Path) -> None:
     sensor = Sensor.model_validate(
         {"position": [10.0, -20.0], "heading_deg": 130.0, "noise": {"kind": "constant", "std": [1.0, 1.0]}}
         | {"detection": detection}
@@ -253,7 +259,7 @@ def test_what_a_sensor_sees_is_what_its_model_says(detection: dict[str, object],
     np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
-def test_check_run_and_a_dry_run_warn_and_go_on(tmp_path: Path) -> None:
+def test_check_run_and_dry_run_warn_without_failing(tmp_path: Path) -> None:
     file, spec = tmp_path / "scene.yaml", tmp_path / "spec.toml"
     file.write_text(changed(("num_steps: 20", "num_steps: 8"), ("to_step: 20", "to_step: 8"), ("18", "8")))
     spec.write_text('name = "small"\nscenarios = ["scene.yaml"]\nplanners = ["still", "random"]\nruns = 1\n')
@@ -277,8 +283,10 @@ CAPPED = "at most 3 labels are kept, and {} targets are there at once: the other
         ("{kind: poisson, expected: 0.5, mean: [0, 0, 0, 0], std: [1, 1, 1, 1]}", None),
     ],
 )
-def test_a_cap_of_labels_that_cannot_suffice_warns(tmp_path: Path, kind: str, targets: str, number: int | None) -> None:
-    scene = with_fields(
+def test_a_label_cap_below_the_number_of_targets_warns(
+    tmp_path: Path, kind: str, targets: str, number: int | None
+) -> None:
+    scene = replace_fields(
         load_scenario("three-positions"),
         {
             "filter": {"kind": kind, "limits": {"max_labels": 3}},
@@ -287,7 +295,7 @@ def test_a_cap_of_labels_that_cannot_suffice_warns(tmp_path: Path, kind: str, ta
             "targets": YAML(typ="safe").load(targets),
         },
     )
-    found = [line for line in cautions(scene) if "labels are kept" in line]
+    found = [line for line in scenario_warnings(scene) if "labels are kept" in line]
     assert len(found) == (number is not None and kind != "m_delta_glmb")
     assert all(CAPPED.format(number) in line for line in found)
 
@@ -304,12 +312,12 @@ def test_near_births_warn_under_fusion_by_label_and_not_far_ones(tmp_path: Path)
     second = own.model.birth.sites[1].mean
     for apart, warns in ((200.0, True), (290.0, False)):  # m, of standard deviations of 50 m each
         place = (second[0], second[1] + apart, 0.0, 0.0)
-        near = with_fields(own, {"birth.sites.0.mean": place, "targets.tracks.0.state": place})
-        found = cautions(near)
+        near = replace_fields(own, {"birth.sites.0.mean": place, "targets.tracks.0.state": place})
+        found = scenario_warnings(near)
         assert len(found) == warns
         assert all("sites 0 and 1 are 2.8 standard deviations apart" in line for line in found)
         assert all(
             "take fusion.matching: assignment, or fusion.feedback: true, or fusion: {k" in line for line in found
         )
         for cure in ({"fusion.matching": "assignment"}, {"fusion.feedback": True}, {"fusion": {"kind": "sequential"}}):
-            assert cautions(with_fields(near, cure)) == ()
+            assert scenario_warnings(replace_fields(near, cure)) == ()

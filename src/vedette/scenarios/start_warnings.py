@@ -6,23 +6,23 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from vedette.scenarios.faults import Path
+from vedette.scenarios.diagnostics import Path
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections.sensors import Sensor
-from vedette.scenarios.views import COAST, HOLE, INSIDE, NO_GO, zones
+from vedette.scenarios.zones import COAST, HOLE, INSIDE, NO_GO, zones
 
 
-def start_cautions(scenario: Scenario) -> Iterator[tuple[Path, str]]:
+def start_warnings(scenario: Scenario) -> Iterator[tuple[Path, str]]:
     """A warning for each sensor that can move and starts inside `keep_out`, outside `stay_inside`, or on drawn land."""
     areas = [(zone.kind, zone.corners) for zone in zones(scenario)]
     for i, sensor in enumerate(scenario.model.sensors):
-        if _moves(sensor) and (where := _misplaced(sensor.position, areas)):
+        if _moves(sensor) and (where := _describe_fault(sensor.position, areas)):
             x, y = sensor.position
             place = f"sensors[{i}].position: expected a place where the sensor may be; ({x:g}, {y:g}) is {where}"
             yield ("sensors", i, "position"), place
 
 
-def _misplaced(place: tuple[float, float], areas: Sequence[tuple[str, Sequence[tuple[float, float]]]]) -> str:
+def _describe_fault(place: tuple[float, float], areas: Sequence[tuple[str, Sequence[tuple[float, float]]]]) -> str:
     """Describe where a place lies if a moving sensor should not start there, and the consequence; "" if it may.
 
     The edges of `keep_out` and of its holes are forbidden, that of `stay_inside` is not.

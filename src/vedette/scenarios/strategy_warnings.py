@@ -6,19 +6,19 @@ from collections.abc import Iterator
 
 from vedette.errors import InputError
 from vedette.internal.text import join_alternatives
-from vedette.scenarios.faults import Path
+from vedette.scenarios.diagnostics import Path
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections.planners import STRATEGIES
-from vedette.scenarios.trust import code_of, not_own
+from vedette.scenarios.trust import custom_code, foreign_code_reason
 
 
-def strategy_cautions(scenario: Scenario) -> Iterator[tuple[Path, str]]:
+def strategy_warnings(scenario: Scenario) -> Iterator[tuple[Path, str]]:
     """Yield a warning for each reason why strategies are refused, with their names and the requirement.
 
     If the scenario names custom code, planners are built as well, as nothing else can detect its faults.
     """
     refused: dict[str, list[str]] = {}
-    makes = bool(code_of(scenario.model)) and not not_own(scenario)
+    makes = bool(custom_code(scenario.model)) and not foreign_code_reason(scenario)
     for name, strategy in STRATEGIES.items() if scenario.model.decision_steps else ():
         if wanted := strategy.misfit(scenario.model) or (makes and _fault_of_planner(scenario, name)):
             refused.setdefault(wanted, []).append(name)
