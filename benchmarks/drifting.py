@@ -29,7 +29,7 @@ from vedette.calibration import OnlineBiasEstimator, Problem, calibrate, warm_st
 from vedette.evaluation import ospa
 from vedette.kernels.base.types import Floats
 from vedette.models import Bias
-from vedette.recorded.instants import Look, without_bias
+from vedette.recorded.scan_times import RecordedScan, remove_bias
 from vedette.scenarios.build import build_poses, build_tracking
 from vedette.scenarios.calibration import build_problem
 from vedette.scenarios.from_recording import scenario_from_recording
@@ -112,9 +112,9 @@ def without(scan: SensorScan, problem: Problem, bias: Bias) -> SensorScan:
     """A scan without a bias."""
     site, look = (
         replace(problem.sites[scan.sensor], bias=bias),
-        Look(scan.time, scan.sensor, scan.measurements, scan.pose),
+        RecordedScan(scan.time, scan.sensor, scan.measurements, scan.pose),
     )
-    found = without_bias(look, site, problem.recording.bearings[scan.sensor])
+    found = remove_bias(look, site, problem.recording.bearings[scan.sensor])
     return SensorScan(scan.sensor, found.time, found.scan, found.pose)
 
 

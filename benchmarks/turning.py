@@ -98,7 +98,7 @@ class Sweep:
         if not self.blind or self.last is None or abs(wrap_angles(pointings[self.last] - now)) < 1e-6:
             ahead = 2.0 * half_width if self.blind else 2.0 * np.pi / 3.0
             self.last = int(np.abs(wrap_angles(pointings - now - ahead)).argmin())
-        return replace(plan, chosen=(self.last,), questions=None, bound=None)
+        return replace(plan, chosen=(self.last,), analysis=None, bound=None)
 
 
 def errors(scenario: Scenario, planner: str, runs: int) -> Floats:

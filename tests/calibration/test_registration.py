@@ -9,13 +9,13 @@ import pytest
 
 from vedette.calibration.registration import BIASES, MatchedMeasurements, _linearised, _pieces, register
 from vedette.kernels.base.types import Floats
-from vedette.recorded import Site
+from vedette.recorded import RecordedSensor
 
 SITES = (
-    Site("a", "bearing_range", (-3000.0, -2000.0, 0.0)),
-    Site("b", "bearing_range", (2500.0, 0.0, 0.0)),
-    Site("c", "position", (0.0, 0.0, 0.0)),
-    Site("d", "bearing_only", (0.0, 4000.0, 0.0)),
+    RecordedSensor("a", "bearing_range", (-3000.0, -2000.0, 0.0)),
+    RecordedSensor("b", "bearing_range", (2500.0, 0.0, 0.0)),
+    RecordedSensor("c", "position", (0.0, 0.0, 0.0)),
+    RecordedSensor("d", "bearing_only", (0.0, 4000.0, 0.0)),
 )
 STATES = np.array([[0.0, 500.0, 30.0, -20.0], [1500.0, -2500.0, -10.0, 40.0], [-500.0, 2500.0, 25.0, 10.0]])
 TRUE = np.zeros((4, 5))

@@ -77,7 +77,7 @@ def test_names_that_no_column_can_have(name: str, got: str) -> None:
 )
 def test_metrics_without_one_number_per_scan_are_rejected(function: Any, message: str) -> None:
     with pytest.raises(VedetteError, match=message):
-        Metric("mine", function).of(make_record())
+        Metric("mine", function).evaluate(make_record())
 
 
 def test_a_new_metric_is_computed_for_an_old_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -88,7 +88,7 @@ def test_columns_and_back() -> None:
     metrics = measured(make_record("random"))
     columns = metrics.columns()
     again = RunMetrics.from_columns(dict(reversed(columns.items())))
-    assert [*columns, "own"] == [field.name for field in fields(RunMetrics)]
+    assert [*columns, "custom"] == [field.name for field in fields(RunMetrics)]
     for name, values in columns.items():
         assert values.shape == (metrics.num_scans,)
         assert values.dtype == (np.int64 if name in INTEGERS else np.float64)

@@ -190,7 +190,7 @@ def _trackers() -> Iterator[tuple[str, Made]]:
         (tracking.Central, {"filter": central}),
         (tracking.BeliefNetwork, {"filters": (local, local), "fusion": rule, "network": network, "merging": rule}),
         (tracking.ScanNetwork, {"filter": central, "network": network, "merging": rule}),
-        (tracking.Searching, {"tracker": tracking.Central(central), "model": undetected}),
+        (tracking.UndetectedTargetTracker, {"tracker": tracking.Central(central), "model": undetected}),
     ]
     for make, arguments in given:
         state = make(**arguments).initial()

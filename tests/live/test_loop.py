@@ -14,7 +14,7 @@ import pytest
 from live.examples import SYNCHRONOUS, answered, line, small, walk, write_live
 from vedette.errors import InputError
 from vedette.live import MAX_LINE_BYTES, LiveLoop, build_live_loop
-from vedette.recorded import Conventions, Origin, Site, parse_scans
+from vedette.recorded import Conventions, Origin, RecordedSensor, parse_scans
 from vedette.recorded.tables import read_table
 from vedette.scenarios.build import build_experiment
 from vedette.scenarios.from_recording import scenario_from_sensors
@@ -26,7 +26,7 @@ def test_the_estimates_are_those_of_the_same_scans_read_from_a_file(tmp_path: Pa
     known = scenario_from_sensors(tmp_path / "radars.yaml")
     model = known.scenario.model
     experiment, origin = build_experiment(known.scenario), Origin(-1.1171, 50.7865)
-    sites = [Site(s.name or "", s.measurement.kind, s.pose) for s in model.sensors]
+    sites = [RecordedSensor(s.name or "", s.measurement.kind, s.pose) for s in model.sensors]
     conventions = Conventions({"sensor": "radar", "bearing": "brg_deg"}, {}, "north")
     recorded = parse_scans(read_table(tmp_path / "scans.csv"), sites, conventions, origin)
     late = OutOfSequenceTracker(experiment.tracker, experiment.poses)
@@ -256,7 +256,7 @@ def test_without_a_region_the_grid_covers_the_sensors_range(tmp_path: Path, old:
 
 @pytest.mark.parametrize("num", [2_000, pytest.param(10_000, marks=pytest.mark.slow)])
 def test_memory_does_not_grow_with_the_number_of_scans(tmp_path: Path, num: int) -> None:
-    live = small(tmp_path, window=5.0)
+    live = small(tmp_path, max_delay=5.0)
     state, counts = live.initial(), []
     for k in range(num):
         state, _ = live.process(state, line(1 + k % 2, 0.5 * k, [[0.0, 50.0]] if k % 3 else []))

@@ -10,12 +10,12 @@ import pytest
 
 from recordings import write_recording
 from vedette.errors import InputError, ScenarioError
-from vedette.recorded import Conventions, Origin, Site, parse_scans, table_of
+from vedette.recorded import Conventions, Origin, RecordedSensor, as_table, parse_scans
 from vedette.recorded.reports import parse_reports
 from vedette.scenarios.from_recording import RecordingScenario, scenario_from_recording
 from vedette.scenarios.warnings import scenario_warnings
 
-ALONE = (Site("R", "bearing_range", (0.0, 0.0, 0.0)),)
+ALONE = (RecordedSensor("R", "bearing_range", (0.0, 0.0, 0.0)),)
 SHIPS = {"time": [0.0, 10.0, 0.0, 10.0], "mmsi": [1, 1, 2, 2], "lon": [0.0, 0.01, 0.1, 0.1], "lat": [0.0] * 4}
 
 
@@ -53,10 +53,10 @@ def test_a_target_of_one_report_is_named(tmp_path: Path) -> None:
 
 
 def test_one_sensor_needs_no_column_of_sensors() -> None:
-    table = table_of({"time": [0.0, 1.0], "range": [100.0, 101.0], "bearing_rad": [0.1, 0.2]})
+    table = as_table({"time": [0.0, 1.0], "range": [100.0, 101.0], "bearing_rad": [0.1, 0.2]})
     found = parse_scans(table, ALONE, Conventions({}, {}, "east"))
     assert [scans[0] is not None for scans in found.scans] == [True, True]
-    two = (*ALONE, Site("S", "bearing_range", (0.0, 0.0, 0.0)))
+    two = (*ALONE, RecordedSensor("S", "bearing_range", (0.0, 0.0, 0.0)))
     with pytest.raises(InputError, match="expected a column 'sensor'"):
         parse_scans(table, two, Conventions({}, {}, "east"))
     with pytest.raises(InputError, match="expected a column 'radar'"):
@@ -65,7 +65,7 @@ def test_one_sensor_needs_no_column_of_sensors() -> None:
 
 def test_bearings_may_be_a_little_more_than_a_turn() -> None:
     def bearing(value: float) -> float:
-        table = table_of({"time": [0.0], "range": [100.0], "bearing_deg": [value]})
+        table = as_table({"time": [0.0], "range": [100.0], "bearing_deg": [value]})
         (scan,) = parse_scans(table, ALONE, Conventions({}, {}, "east")).scans[0]
         assert scan is not None
         return float(scan[0, 0])
@@ -77,11 +77,11 @@ def test_bearings_may_be_a_little_more_than_a_turn() -> None:
 
 
 def test_reports_have_the_names_that_are_usual() -> None:
-    found = parse_reports(table_of(SHIPS), origin_deg=(0.0, 0.0))
+    found = parse_reports(as_table(SHIPS), origin_deg=(0.0, 0.0))
     assert found.names == ("1", "2")
     assert found.positions[1, 0] == pytest.approx(1113.2, abs=0.1)
     with pytest.raises(InputError, match="a column 'id'"):
-        parse_reports(table_of({name: cells for name, cells in SHIPS.items() if name != "mmsi"}))
+        parse_reports(as_table({name: cells for name, cells in SHIPS.items() if name != "mmsi"}))
 
 
 def test_columns_of_the_sensor_file_are_used_with_truth(tmp_path: Path) -> None:
@@ -113,7 +113,7 @@ def test_a_region_may_lie_across_180_degrees(tmp_path: Path) -> None:
 
 def test_the_middle_of_reports_across_180_degrees_is_between_them() -> None:
     ships = {**SHIPS, "lon": [179.98, 179.99, -179.98, -179.99]}
-    found = parse_reports(table_of(ships))
+    found = parse_reports(as_table(ships))
     assert found.origin_deg is not None
     assert found.origin_deg[0] == pytest.approx(180.0, abs=0.011)
     assert np.abs(found.positions).max() < 4000.0

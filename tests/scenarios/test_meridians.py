@@ -15,7 +15,7 @@ from vedette.evaluation.runs import run_scenario
 from vedette.evaluation.scans import scan_table, scans_of_record
 from vedette.live import LiveLoop, build_live_loop
 from vedette.platforms import PlaneCompass
-from vedette.recorded import Conventions, Origin, Site, parse_scans, table_of
+from vedette.recorded import Conventions, Origin, RecordedSensor, as_table, parse_scans
 from vedette.scenarios import load_scenario
 from vedette.scenarios.from_recording import scenario_from_recording, scenario_from_sensors
 from vedette.scenarios.overrides import replace_fields
@@ -77,12 +77,12 @@ def test_meridians_converge_by_the_sine_of_the_latitude(latitude: float, longitu
 def test_two_radars_far_apart_see_a_ship_in_one_place() -> None:
     """Without convergence the places are 915 m apart."""
     sites = [
-        Site(name, "bearing_range", (*FAR.to_plane([lon], [lat])[0].tolist(), 0.0))
+        RecordedSensor(name, "bearing_range", (*FAR.to_plane([lon], [lat])[0].tolist(), 0.0))
         for name, (lon, lat) in RADARS.items()
     ]
     rows: dict[str, list[Any]] = {"time": [0.0, 1.0], "sensor": list(RADARS)}
     rows["bearing_deg"], rows["range"] = map(list, zip(*(seen(name, SHIP) for name in RADARS), strict=True))
-    found = parse_scans(table_of(rows), sites, Conventions({}, {}, "north"), FAR)
+    found = parse_scans(as_table(rows), sites, Conventions({}, {}, "north"), FAR)
     (truth,) = FAR.to_plane([SHIP[0]], [SHIP[1]])
     for s, site in enumerate(sites):
         scan = found.scans[s][s]
@@ -91,9 +91,9 @@ def test_two_radars_far_apart_see_a_ship_in_one_place() -> None:
         place = np.array(site.pose[:2]) + distance * np.array([math.cos(angle), math.sin(angle)])
         assert np.hypot(*(place - truth)) < 5.0
         # What a sensor tells of its measurement is the row that was read.
-        own = Site(site.name, site.kind, site.pose, compass=True, north=FAR)
-        assert own.told(scan)[0] == pytest.approx(seen(site.name, SHIP), abs=1e-9)
-        np.testing.assert_allclose(own.measured(own.told(scan)), scan, atol=1e-9)
+        own = RecordedSensor(site.name, site.kind, site.pose, compass=True, north=FAR)
+        assert own.to_raw(scan)[0] == pytest.approx(seen(site.name, SHIP), abs=1e-9)
+        np.testing.assert_allclose(own.from_raw(own.to_raw(scan)), scan, atol=1e-9)
 
 
 def test_a_ship_between_two_far_radars_is_one_track(tmp_path: Path) -> None:
@@ -148,7 +148,7 @@ def test_scans_are_written_from_true_north_and_read_back() -> None:
     table = scan_table(record, scenario)
     assert scenario.model.origin is not None
     origin = scenario.model.origin.build()
-    found = parse_scans(table_of(table), recorded_sensors(scenario.model), Conventions({}, {}), origin)
+    found = parse_scans(as_table(table), recorded_sensors(scenario.model), Conventions({}, {}), origin)
     np.testing.assert_allclose(np.cos(found.poses[..., 2] - record.poses[..., 2]), 1.0)
     expected = float(np.degrees(origin.azimuth(record.poses[0, 0, 2], record.poses[0, 0])) % 360.0)
     assert table["own_heading_deg"][0] == pytest.approx(expected, abs=1e-9)
@@ -161,12 +161,12 @@ def test_scans_are_written_from_true_north_and_read_back() -> None:
 
 def test_without_an_origin_north_is_along_y() -> None:
     angles = np.linspace(-3.0, 3.0, 13)
-    for compass in (PlaneCompass(), Site("a", "bearing_only", (9e4, 0.0, 0.0)).north):
+    for compass in (PlaneCompass(), RecordedSensor("a", "bearing_only", (9e4, 0.0, 0.0)).north):
         found = compass.angle(angles, [9e4, 0.0])
         expected = math.pi / 2.0 - angles
         np.testing.assert_array_equal(found, expected - 2.0 * math.pi * np.rint(expected / (2.0 * math.pi)))
-    site = Site("a", "bearing_only", (9e4, 0.0, 0.0))
+    site = RecordedSensor("a", "bearing_only", (9e4, 0.0, 0.0))
     rows = {"time": [0.0], "sensor": ["a"], "bearing_deg": [30.0]}
-    found_scans = parse_scans(table_of(rows), [site], Conventions({}, {}, "north"))
+    found_scans = parse_scans(as_table(rows), [site], Conventions({}, {}, "north"))
     assert found_scans.scans[0][0] is not None
     assert found_scans.scans[0][0][0, 0] == math.pi / 2.0 - 30.0 * (math.pi / 180.0)

@@ -19,7 +19,7 @@ from vedette.evaluation.scans import scan_table
 from vedette.kernels.base.types import OWN_VELOCITY
 from vedette.live import build_live_loop
 from vedette.live.messages import read_message
-from vedette.recorded import Conventions, Site, parse_scans
+from vedette.recorded import Conventions, RecordedSensor, parse_scans
 from vedette.recorded.tables import Table
 from vedette.scenarios import Scenario, parse_scenario
 from vedette.scenarios.build import build_experiment, build_planner
@@ -107,7 +107,7 @@ def test_scans_that_are_written_are_read_again(run: tuple[Any, Scenario]) -> Non
 
 
 def test_a_moving_sensor_without_velocity_is_reported() -> None:
-    site = Site("a", "bearing_range_rate", (0.0,) * 8)
+    site = RecordedSensor("a", "bearing_range_rate", (0.0,) * 8)
     cells = {"time": [0.0, 1.0], "bearing_rad": [0.1, 0.1], "range_m": [50.0, 51.0], "range_rate_kn": [1.0, -2.0]}
     cells |= {"own_x": [0.0, 3.0], "own_y": [0.0, 0.0]}
     read = parse_scans(Table(cells, [1, 2], "scans"), [site], Conventions({}, {}, "east"))
@@ -128,7 +128,10 @@ def test_a_moving_sensor_without_velocity_is_reported() -> None:
 
 
 def test_a_line_has_a_range_rate_and_the_velocity_of_its_sensor() -> None:
-    sites = [Site("a", "bearing_range_rate", (0.0,) * 8), Site("b", "bearing_range", (0.0, 0.0, 0.0))]
+    sites = [
+        RecordedSensor("a", "bearing_range_rate", (0.0,) * 8),
+        RecordedSensor("b", "bearing_range", (0.0, 0.0, 0.0)),
+    ]
     said = {
         "sensor": "a",
         "time": 3.0,

@@ -18,7 +18,7 @@ from vedette.evaluation.runs import measure_run, run_scenario
 from vedette.evaluation.scans import scan_table, scans_of_record
 from vedette.evaluation.track_table import table_of_run, write_tracks
 from vedette.models import Bias
-from vedette.recorded import Conventions, Origin, RecordedScans, RecordedTargets, Site, parse_scans, table_of
+from vedette.recorded import Conventions, Origin, RecordedScans, RecordedSensor, RecordedTargets, as_table, parse_scans
 from vedette.recorded.reports import parse_reports
 from vedette.recorded.tables import Table, read_table
 from vedette.scenarios import load_scenario
@@ -27,7 +27,10 @@ from vedette.scenarios.from_recording import scenario_from_recording
 from vedette.scenarios.overrides import replace_fields
 from vedette.scenarios.sections.recording import recorded_sensors
 
-SITES = (Site("north", "bearing_range", (0.0, 0.0, 0.0)), Site("south", "bearing_range", (100.0, 0.0, 0.0)))
+SITES = (
+    RecordedSensor("north", "bearing_range", (0.0, 0.0, 0.0)),
+    RecordedSensor("south", "bearing_range", (100.0, 0.0, 0.0)),
+)
 ROWS = [
     {"time": "0.0", "sensor": "north", "range": "1000", "bearing_rad": "0.5"},
     {"time": "0.0", "sensor": "2", "range": "500", "bearing_rad": "-0.5"},
@@ -84,16 +87,16 @@ def test_frames_are_tables() -> None:
             empty = {"range": [math.nan], "bearing_rad": [math.nan]}
             return [*[row[name] for row in ROWS[:4]], *empty.get(name, [ROWS[4][name]])]
 
-    found, expected = parse_scans(table_of(Frame()), SITES, Conventions({}, {}, "east")), parsed()
+    found, expected = parse_scans(as_table(Frame()), SITES, Conventions({}, {}, "east")), parsed()
     assert found.times.tolist() == expected.times.tolist()
     scans = list(found.arrivals())
     assert [(scan.sensor, scan.time, len(scan.measurements)) for scan in scans] == [
         (0, 0.0, 1), (1, 0.0, 1), (0, 2.5, 2), (1, 5.0, 0),
     ]  # fmt: skip
     with pytest.raises(InputError, match="table: expected columns by name, or a data frame; got int"):
-        table_of(3)
+        as_table(3)
     with pytest.raises(InputError, match="table: expected columns of one length"):
-        table_of({"time": [1.0], "sensor": []})
+        as_table({"time": [1.0], "sensor": []})
 
 
 def test_rows_may_come_in_any_order() -> None:
@@ -132,7 +135,7 @@ def test_a_compass_counts_clockwise_from_north_in_degrees() -> None:
 
 
 def test_places_in_degrees_are_measured_and_sensors_carry_their_own() -> None:
-    sites = [Site("drone", "position", (0.0, 0.0, 0.0))]
+    sites = [RecordedSensor("drone", "position", (0.0, 0.0, 0.0))]
     row = {"time": 0, "sensor": "drone", "lon": -1.12, "lat": 50.79, "own_lon": -1.13, "own_lat": 50.78}
     found = parsed([row], sites, ORIGIN)
     assert found.scans[0][0] is not None
@@ -145,7 +148,7 @@ def test_places_in_degrees_are_measured_and_sensors_carry_their_own() -> None:
 
 @pytest.mark.parametrize("swapped", [{"lon": 50.79, "lat": -1.12}, {"own_lon": 50.78, "own_lat": -1.13}])
 def test_exchanged_longitude_and_latitude_are_reported(swapped: dict[str, float]) -> None:
-    sites = [Site("drone", "position", (0.0, 0.0, 0.0))]
+    sites = [RecordedSensor("drone", "position", (0.0, 0.0, 0.0))]
     row = {"time": 0, "sensor": "drone", "lon": -1.12, "lat": 50.79, "own_lon": -1.13, "own_lat": 50.78}
     lon, lat = swapped
     wanted = f"expected with latitude {swapped[lat]:g} a longitude within 1000 km of the origin .are they exchanged"
@@ -468,15 +471,15 @@ def test_biases_of_no_number_are_refused() -> None:
 
 
 def test_a_compass_sensor_gives_degrees_from_north() -> None:
-    site = Site("radar", "bearing_range", (0.0, 0.0, 0.0), compass=True)
+    site = RecordedSensor("radar", "bearing_range", (0.0, 0.0, 0.0), compass=True)
     told = [[0.0, 10.0], [90.0, 20.0], [225.0, 30.0], [359.0, 40.0]]
-    measured = site.measured(told)
+    measured = site.from_raw(told)
     np.testing.assert_allclose(measured[:, 0], np.radians([90.0, 0.0, -135.0, 91.0]), atol=1e-15)
-    np.testing.assert_allclose(site.told(measured), told, atol=1e-12)
-    plain = Site("radar", "bearing_range", (0.0, 0.0, 0.0))
-    np.testing.assert_array_equal(plain.told(plain.measured(told)), told)
+    np.testing.assert_allclose(site.to_raw(measured), told, atol=1e-12)
+    plain = RecordedSensor("radar", "bearing_range", (0.0, 0.0, 0.0))
+    np.testing.assert_array_equal(plain.to_raw(plain.from_raw(told)), told)
     with pytest.raises(InputError, match="told: expected"):
-        site.measured([[1.0]])
+        site.from_raw([[1.0]])
 
 
 @pytest.mark.parametrize(
@@ -489,7 +492,7 @@ def test_a_compass_sensor_gives_degrees_from_north() -> None:
     ],
 )
 def test_rows_of_a_compass_sensor_need_no_setting(name: str, conventions: Any, bearing: float) -> None:
-    sites = [Site("radar", "bearing_range", (0.0, 0.0, 0.0), compass=True)]
+    sites = [RecordedSensor("radar", "bearing_range", (0.0, 0.0, 0.0), compass=True)]
     value = 0.5 if "units" in conventions else 30.0
     row = {"time": 0.0, "sensor": "radar", "range": 5.0, name: value}
     found = parsed([row], sites, **{"bearings": None, **conventions})
@@ -499,13 +502,16 @@ def test_rows_of_a_compass_sensor_need_no_setting(name: str, conventions: Any, b
 
 
 def test_each_sensor_has_its_own_bearing_convention() -> None:
-    sites = [Site("a", "bearing_only", (0.0, 0.0, 0.0), compass=True), Site("b", "bearing_only", (0.0, 0.0, 0.0))]
+    sites = [
+        RecordedSensor("a", "bearing_only", (0.0, 0.0, 0.0), compass=True),
+        RecordedSensor("b", "bearing_only", (0.0, 0.0, 0.0)),
+    ]
     rows = [{"time": 0.0, "sensor": name, "bearing_deg": 30.0} for name in "ab"]
     with pytest.raises(InputError, match="column 'bearing_deg': expected bearings: north"):
         parsed(rows, sites, bearings=None)
     with pytest.raises(InputError, match="expected a unit of bearing"):
         parsed([{"time": 0.0, "sensor": name, "bearing": 30.0} for name in "ab"], sites, bearings=None)
-    biased = [Site("a", "bearing_only", (0.0, 0.0, 0.0), Bias(bearing=0.1), compass=True)]
+    biased = [RecordedSensor("a", "bearing_only", (0.0, 0.0, 0.0), Bias(bearing=0.1), compass=True)]
     found = parsed(rows[:1], biased, bearings=None)
     assert found.scans[0][0] is not None  # clockwise, as it tells them
     assert found.scans[0][0][0, 0] == pytest.approx(math.radians(60.0) + 0.1, abs=1e-12)
@@ -601,7 +607,7 @@ def test_one_bad_time_is_located_in_any_row(first: Any, last: float) -> None:
         RecordedTargets.from_columns(reports)
 
 
-POSITION = Site("radar", "position", (0.0, 0.0, 0.0))
+POSITION = RecordedSensor("radar", "position", (0.0, 0.0, 0.0))
 
 
 @pytest.mark.parametrize(
@@ -637,10 +643,10 @@ def test_equal_positions_may_be_given_twice() -> None:
     assert parsed([{**ROWS[0], "x": 5.0}]).num_measurements == 1
     reports = {"time": [0.0, 1.0], "id": ["a", "a"], "x": [2010.0, 2015.0], "y": [-890.0] * 2}
     reports |= {"longitude": [lon] * 2, "latitude": [lat] * 2}
-    parse_reports(table_of(reports), usual_origin_deg=(ORIGIN.longitude_deg, ORIGIN.latitude_deg))
+    parse_reports(as_table(reports), usual_origin_deg=(ORIGIN.longitude_deg, ORIGIN.latitude_deg))
     reports["x"] = [9000.0, 2015.0]
     with pytest.raises(InputError, match=r"row 1, column 'x': expected x, y at the place .*, not 7000 m away"):
-        parse_reports(table_of(reports), usual_origin_deg=(ORIGIN.longitude_deg, ORIGIN.latitude_deg))
+        parse_reports(as_table(reports), usual_origin_deg=(ORIGIN.longitude_deg, ORIGIN.latitude_deg))
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import pytest
 from vedette.errors import ScenarioError
 from vedette.evaluation.runs import run_scenario
 from vedette.evaluation.unexplained_courses import unexplained_course_warnings
-from vedette.recorded import RecordedScans, Site
+from vedette.recorded import RecordedScans, RecordedSensor
 from vedette.recorded.merging import merged
 from vedette.scenarios.from_recording import RecordingScenario, scenario_from_recording
 from vedette.scenarios.warnings import scenario_warnings
@@ -76,7 +76,7 @@ def test_a_cluster_is_its_mean_across_the_end_of_bearings() -> None:
     scan = np.array([[math.pi - 0.001, 100.0], [-math.pi + 0.003, 104.0], [0.5, 100.0]])
     poses = np.zeros((1, 1, 3))
     recording = RecordedScans(np.zeros(1), 0.0, False, ((scan,),), poses, (), ("east",))
-    found = merged(recording, [Site("R", "bearing_range", (0.0, 0.0, 0.0))], [(0.01, 2.0)], 4.0)
+    found = merged(recording, [RecordedSensor("R", "bearing_range", (0.0, 0.0, 0.0))], [(0.01, 2.0)], 4.0)
     (own,) = found.scans[0]
     assert own is not None
     np.testing.assert_allclose(own, [[-math.pi + 0.001, 102.0], [0.5, 100.0]])

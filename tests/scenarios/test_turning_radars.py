@@ -17,7 +17,7 @@ from vedette.evaluation.scans import scan_table, scans_of_record
 from vedette.kernels.base.types import Floats
 from vedette.live.messages import read_message
 from vedette.models.turns import Turn, is_turn, lags
-from vedette.recorded import Conventions, RecordedScans, Site, parse_scans
+from vedette.recorded import Conventions, RecordedScans, RecordedSensor, parse_scans
 from vedette.recorded.tables import Table
 from vedette.recorded.turns import found_turn, swept
 from vedette.scenarios import load_scenario
@@ -115,7 +115,7 @@ def test_every_row_is_in_one_turn_and_its_time_that_of_the_beam() -> None:
 def parsed(rows: Floats, **site: object) -> RecordedScans:
     columns = {"time": rows[:, 0].tolist(), "bearing": rows[:, 1].tolist(), "range": rows[:, 2].tolist()}
     table = Table(columns, range(1, len(rows) + 1), "scans.csv")
-    given = Site("R", "bearing_range", (0.0, 0.0, 0.0), **site)  # type: ignore[arg-type]
+    given = RecordedSensor("R", "bearing_range", (0.0, 0.0, 0.0), **site)  # type: ignore[arg-type]
     return parse_scans(table, [given], Conventions({}, {"bearing": "rad"}, "east"))
 
 
@@ -130,8 +130,11 @@ def test_a_turn_that_is_given_needs_few_rows_and_none_can_be_ruled_out() -> None
 
 def test_times_of_measurements_give_the_rotation_of_a_line() -> None:
     rows = np.array(Flights(np.random.default_rng(6), 8, 0.0).rows((0.0, 0.0), Turn(5.0), 1.0, True))
-    recording, site = parsed(rows), Site("R", "bearing_range", (0.0, 0.0, 0.0), turn=Turn(5.0))
-    still, how = [Site("R", "bearing_range", (0.0, 0.0, 0.0), turn="none")], Conventions({}, {"bearing": "rad"}, "east")
+    recording, site = parsed(rows), RecordedSensor("R", "bearing_range", (0.0, 0.0, 0.0), turn=Turn(5.0))
+    still, how = (
+        [RecordedSensor("R", "bearing_range", (0.0, 0.0, 0.0), turn="none")],
+        Conventions({}, {"bearing": "rad"}, "east"),
+    )
     for k in range(5, 20):
         time, scan, poses = recording.times[k] + recording.start, recording.scans[k][0], recording.poses[k]
         assert scan is not None

@@ -12,7 +12,7 @@ import pytest
 
 from recordings import ORIGIN
 from vedette.errors import InputError
-from vedette.recorded import Conventions, RecordedTargets, Site, parse_scans
+from vedette.recorded import Conventions, RecordedSensor, RecordedTargets, parse_scans
 from vedette.recorded.tables import read_table
 
 pytest.importorskip("rosbags")  # which is not there for the newest Python
@@ -23,7 +23,7 @@ from rosbags.typesys import Stores, get_typestore
 STORE = get_typestore(Stores.ROS2_HUMBLE)
 TYPES: Any = STORE.types
 START = 1452603741
-SITES = [Site("/radar", "position", (0.0, 0.0, 0.0)), Site("/camera", "position", (5.0, 0.0, 0.0))]
+SITES = [RecordedSensor("/radar", "position", (0.0, 0.0, 0.0)), RecordedSensor("/camera", "position", (5.0, 0.0, 0.0))]
 
 
 def header(time: float) -> Any:
@@ -109,7 +109,7 @@ def test_what_is_not_there_or_no_number_is_named(tmp_path: Path) -> None:
     found = parse_scans(read_table(file), SITES, Conventions({}, {}, bad_rows="skip"))
     assert (found.num_measurements, len(found.skipped)) == (1, 1)
     with pytest.raises(InputError, match=r"column 'sensor': expected a sensor among 'north'"):
-        parse_scans(read_table(file), [Site("north", "position", (0.0, 0.0, 0.0))], Conventions({}, {}))
+        parse_scans(read_table(file), [RecordedSensor("north", "position", (0.0, 0.0, 0.0))], Conventions({}, {}))
     with pytest.raises(InputError, match=r"bag.db3: expected messages sensor_msgs/msg/NavSatFix; got none"):
         read_table(file, reports=True)
 

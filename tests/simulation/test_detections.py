@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from vedette.errors import InputError
-from vedette.recorded import Conventions, RecordedScans, Site, parse_scans, table_of_detections
+from vedette.recorded import Conventions, RecordedScans, RecordedSensor, parse_scans, table_of_detections
 
 START = datetime.datetime(2020, 1, 1, 12)
 TARGETS = np.array([[500.0, 300.0], [-800.0, 20.0]])
@@ -67,7 +67,7 @@ def places(found: RecordedScans, k: int) -> Any:
 def test_a_turned_sensor_that_moves_sees_targets_where_they_are() -> None:
     reader = ((after(k), polar((100.0 * k, -50.0), 0.7) if k not in (0, 2) else set()) for k in range(4))
     table = table_of_detections(reader, ("bearing", "range"), sensor="radar")
-    found = parse_scans(table, [Site("radar", "bearing_range", (0.0, 0.0, 0.0))], Conventions({}, {}))
+    found = parse_scans(table, [RecordedSensor("radar", "bearing_range", (0.0, 0.0, 0.0))], Conventions({}, {}))
     assert (found.is_utc, found.times.tolist(), found.start) == (True, [0.0, 1.0, 2.0, 3.0], 1577880000.0)
     np.testing.assert_array_equal(found.poses[:, 0, 0], [100.0, 100.0, 100.0, 300.0])  # where it says, or last did
     for k in (1, 3):
@@ -84,7 +84,7 @@ def test_positions_of_several_sensors_name_them() -> None:
     found = [Detection(np.array([[3.0 * k], [4.0], [9.0]]), None, {"sensor": name}) for k, name in enumerate("ab")]
     table = table_of_detections([(after(0), found), (after(1), [])], ("x", "y", None))
     assert table.columns == {"time": [START, START], "sensor": ["a", "b"], "x_m": [0.0, 3.0], "y_m": [4.0, 4.0]}
-    sites = [Site(name, "position", (0.0, 0.0, 0.0)) for name in "ab"]
+    sites = [RecordedSensor(name, "position", (0.0, 0.0, 0.0)) for name in "ab"]
     scans = parse_scans(table, sites, Conventions({}, {})).scans
     np.testing.assert_array_equal(np.asarray(scans[0][1]), [[3.0, 4.0]])
 
@@ -124,4 +124,4 @@ def test_a_sensor_must_be_named_somewhere() -> None:
         table_of_detections([(START, [Detection([[1.0], [2.0]])])], ("x", "y"))
     table = table_of_detections([("soon", [Detection([[1.0], [2.0]])])], ("x", "y"), sensor="a")
     with pytest.raises(InputError, match="detections, row 1, column 'time': expected an ISO 8601 time; got 'soon'"):
-        parse_scans(table, [Site("a", "position", (0.0, 0.0, 0.0))], Conventions({}, {}))
+        parse_scans(table, [RecordedSensor("a", "position", (0.0, 0.0, 0.0))], Conventions({}, {}))

@@ -15,7 +15,7 @@ from recordings import ORIGIN, SHIPS
 from vedette.errors import InputError
 from vedette.evaluation.runs import run_scenario
 from vedette.models import Bias
-from vedette.recorded import Conventions, Origin, RecordedTargets, Site, parse_scans
+from vedette.recorded import Conventions, Origin, RecordedSensor, RecordedTargets, parse_scans
 from vedette.recorded.tables import read_table
 from vedette.scenarios.from_recording import scenario_from_recording
 from vedette.scenarios.warnings import scenario_warnings
@@ -216,7 +216,7 @@ def test_radars_say_what_they_see(tmp_path: Path) -> None:
 def test_biases_of_a_radar_count_as_its_bearings_do(tmp_path: Path) -> None:
     """Clockwise, as the format says without the conventions."""
     (tmp_path / "radar.ast").write_bytes(plot(0.0, 5.0, 92.0))
-    site = Site("1/2", "bearing_range", (0.0, 0.0, 0.0), Bias(bearing=np.radians(2.0)))
+    site = RecordedSensor("1/2", "bearing_range", (0.0, 0.0, 0.0), Bias(bearing=np.radians(2.0)))
     found = parse_scans(read_table(tmp_path / "radar.ast"), [site], Conventions({}, {}))
     assert found.scans[0][0] is not None
     np.testing.assert_allclose(found.scans[0][0][0, 0], 0.0, atol=2.0 * np.pi / 2**16)
@@ -270,7 +270,7 @@ def test_tracks_of_a_system_are_scans_of_positions_and_reports(tmp_path: Path) -
     lon, lat = ORIGIN.to_degrees([[300.0, -400.0]])[0].tolist()
     content = b"".join(track(86399.0 + k - 86400.0 * (k > 0), lon, lat, 7, (4.0, -3.0)) for k in range(2))
     (tmp_path / "system.ast").write_bytes(content)
-    site = Site("1/9", "position", (0.0, 0.0, 0.0))
+    site = RecordedSensor("1/9", "position", (0.0, 0.0, 0.0))
     found = parse_scans(read_table(tmp_path / "system.ast"), [site], Conventions({}, {}), ORIGIN)
     assert found.times.tolist() == [0.0, 1.0]
     assert found.scans[1][0] is not None

@@ -13,7 +13,7 @@ import pytest
 
 from recordings import ORIGIN
 from vedette.errors import InputError
-from vedette.recorded import RecordedTargets, table_of
+from vedette.recorded import RecordedTargets, as_table
 from vedette.recorded.reports import parse_reports
 from vedette.scenarios import load_scenario
 from vedette.scenarios.dumping import dump_stored
@@ -105,12 +105,12 @@ def test_files_and_frames_say_the_same(tmp_path: Path) -> None:
 def test_what_is_not_said_everywhere_is_not_used() -> None:
     rows = vectors()
     rows[0]["velocity"] = None
-    found = parse_reports(table_of(columns(rows)))
+    found = parse_reports(as_table(columns(rows)))
     assert found.velocities is None
     rows = [{**row, "lastposupdate": None if k == 2 else row["lastposupdate"]} for k, row in enumerate(vectors())]
-    found = parse_reports(table_of(columns(rows)))
+    found = parse_reports(as_table(columns(rows)))
     assert len(found.times) == 12  # the times are those of the rows then
-    named = parse_reports(table_of(columns(vectors())), columns={"id": "icao24", "longitude": "lon", "latitude": "lat"})
+    named = parse_reports(as_table(columns(vectors())), columns={"id": "icao24", "longitude": "lon", "latitude": "lat"})
     assert named.velocities is None  # as was asked for
 
 

@@ -10,8 +10,8 @@ import pytest
 
 from vedette import models
 from vedette.errors import InputError
-from vedette.recorded import Site, without_biases
-from vedette.recorded.instants import Look, in_order
+from vedette.recorded import RecordedSensor, remove_biases
+from vedette.recorded.scan_times import RecordedScan, group_by_time
 from vedette.scenarios import load_scenario
 from vedette.scenarios.build import build_experiment
 from vedette.scenarios.overrides import replace_fields
@@ -66,8 +66,10 @@ def test_what_a_bias_adds_is_what_reading_takes_off(kind):
     bias = models.Bias(clock=0.5, x=20.0, y=-10.0, **measured)
     model = sensor(kind, detection=models.limited_range(1.0, 250.0))
     scan = simulate_scan(states, POSE, TrueSensor(model, bias=bias), rng=np.random.default_rng(1))
-    recording = in_order([Look(7.0, 0, scan.measurements, POSE)], POSE[np.newaxis], 0.0, False, (), ("east",))
-    read = without_biases(recording, [Site("radar", kind, tuple(POSE), bias)])
+    recording = group_by_time(
+        [RecordedScan(7.0, 0, scan.measurements, POSE)], POSE[np.newaxis], 0.0, False, (), ("east",)
+    )
+    read = remove_biases(recording, [RecordedSensor("radar", kind, tuple(POSE), bias)])
     earlier, true_pose = states.copy(), read.poses[0, 0]
     earlier[:, :2] -= 0.5 * states[:, 2:]
     plain = simulate_scan(earlier, true_pose, model, rng=np.random.default_rng(1))

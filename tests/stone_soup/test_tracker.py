@@ -35,7 +35,7 @@ from vedette.evaluation import ospa
 from vedette.filters import LmbFilter
 from vedette.fusion import ParallelUpdate
 from vedette.models import BirthModel, measurement_space_clutter
-from vedette.recorded import Conventions, Site, parse_scans, table_of_detections
+from vedette.recorded import Conventions, RecordedSensor, parse_scans, table_of_detections
 from vedette.stonesoup import LabelledTracker, ScanConverter, convert, convert_truth
 from vedette.tracking import Distributed
 
@@ -196,7 +196,7 @@ def test_scans_are_those_of_the_table_of_detections() -> None:
     clutter = measurement_space_clutter(1.0, [-math.pi, 0.0], [math.pi, 3e3], angular=[True, False])
     reader = ScanConverter(convert(MOTION, {"radar": radar}, births=PRIOR, clutter=clutter))
     table = table_of_detections(given, ("bearing", "range"), sensor="radar")
-    recording = parse_scans(table, [Site("radar", "bearing_range", (0.0, 0.0, 0.0))], Conventions({}, {}))
+    recording = parse_scans(table, [RecordedSensor("radar", "bearing_range", (0.0, 0.0, 0.0))], Conventions({}, {}))
     for k, (time, found) in enumerate(given):
         scan = reader.at(time, found)
         assert scan.time == recording.times[k]

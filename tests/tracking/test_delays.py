@@ -78,7 +78,7 @@ def test_the_density_is_that_of_the_scans_that_have_arrived(name: str, window: f
     coming, waited, lost = list[tuple[float, SensorScan]](), 0, 0
     for k, (state, time) in enumerate(zip(states, loop.times, strict=True)):
         for s, scan in enumerate(loop.scans[k]):
-            by = delay.drawn(time, luck) if s == 0 and scan is not None else 0.0
+            by = delay.sample(time, luck) if s == 0 and scan is not None else 0.0
             lost, waited = lost + (by > window), waited + (0.0 < by <= window)
             assert by == 0.0 or (4.0 <= time <= 8.0 and by < 3.0)
             if scan is not None and by <= window:
@@ -111,7 +111,7 @@ def test_a_scenario_has_it_and_a_run_is_the_same_again() -> None:
 def test_a_loop_with_pending_scans_can_be_saved(tmp_path: Path) -> None:
     tracker, experiment = tracker_of({})
     [*_, state] = Loop(experiment).states(DelayedScanTracker(tracker, {0: Delay(1.0, 30.0)}))
-    assert len(state.memory.coming) > 5
+    assert len(state.memory.pending) > 5
     save_snapshot(tmp_path / "loop.npz", {"state": state})
     given: Any = ([None, None], experiment.poses, 30.0)
     states = (state, load_snapshot(tmp_path / "loop.npz")["state"])
@@ -119,7 +119,7 @@ def test_a_loop_with_pending_scans_can_be_saved(tmp_path: Path) -> None:
         DelayedScanTracker(tracker, {0: Delay(1.0, 30.0)}).step(own, *given, rngs=rngs(2))[0] for own in states
     )
     assert_equal_bits(one.memory.timeline.state, other.memory.timeline.state)
-    assert 0 < len(one.memory.coming) == len(other.memory.coming) < len(state.memory.coming)
+    assert 0 < len(one.memory.pending) == len(other.memory.pending) < len(state.memory.pending)
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from vedette.internal.quantities import COMPONENTS
 from vedette.kernels.base.types import Floats
 from vedette.kernels.gaussian.row_noise import row_length
 from vedette.models.arguments import float_array, instance, positive
-from vedette.recorded.instants import Look, in_order, without_bias
+from vedette.recorded.scan_times import RecordedScan, group_by_time, remove_bias
 from vedette.tracking import SensorScan
 from vedette.tracking.out_of_sequence import copy_scan, scan_name
 
@@ -156,8 +156,8 @@ class OnlineBiasEstimator:
         """Return the scan without the biases estimated for its time; raises as `take`."""
         own = self._checked(scan)
         site = self.problem.with_biases(self.biases(state, own.time))[own.sensor]
-        look = Look(own.time, own.sensor, own.measurements, own.pose)
-        without = without_bias(look, site, self.problem.recording.bearings[scan.sensor])
+        look = RecordedScan(own.time, own.sensor, own.measurements, own.pose)
+        without = remove_bias(look, site, self.problem.recording.bearings[scan.sensor])
         return SensorScan(scan.sensor, without.time, without.scan, without.pose)
 
     def _checked(self, scan: SensorScan) -> SensorScan:
@@ -190,12 +190,12 @@ class OnlineBiasEstimator:
         """Return the state with the estimates of the last window."""
         assert state.newest is not None
         recorded, start = self.problem.recording, min(scan.time for scan in state.scans)
-        looks = [Look(each.time - start, each.sensor, each.measurements, each.pose) for each in state.scans]
+        looks = [RecordedScan(each.time - start, each.sensor, each.measurements, each.pose) for each in state.scans]
         sites = self.problem.sites
         poses = np.zeros((len(sites), max(map(len, [*(site.pose for site in sites), *(look.pose for look in looks)]))))
         for s, site in enumerate(sites):
             poses[s, : len(site.pose)] = site.pose
-        window = in_order(looks, poses, start, recorded.is_utc, (), recorded.bearings)
+        window = group_by_time(looks, poses, start, recorded.is_utc, (), recorded.bearings)
         problem = replace(self.problem, recording=window, parameters=state.parameters)
         drifts = [each for each in state.parameters if each.kind == "bias" and each.component != "clock"]
         calibration = calibrate(problem, only=drifts)

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from vedette.kernels.base.types import Floats
-from vedette.recorded import RecordedScans, Site, without_biases
+from vedette.recorded import RecordedScans, RecordedSensor, remove_biases
 from vedette.tracking import Tracker
 
 Kind = Literal["bias", "noise", "detection", "clutter"]
@@ -66,7 +66,9 @@ class Parameter:
         return math.exp(bounded) if self.scale == "log" else 1.0 / (1.0 + math.exp(-bounded))
 
 
-def with_biases(sites: Sequence[Site], parameters: Sequence[Parameter], values: Floats) -> list[Site]:
+def with_biases(
+    sites: Sequence[RecordedSensor], parameters: Sequence[Parameter], values: Floats
+) -> list[RecordedSensor]:
     """Return the sensors with the biases among these values of the parameters."""
     found = list(sites)
     for each, value in zip(parameters, values.tolist(), strict=True):
@@ -90,7 +92,7 @@ class Problem:
     """
 
     recording: RecordedScans
-    sites: tuple[Site, ...]
+    sites: tuple[RecordedSensor, ...]
     parameters: tuple[Parameter, ...]
     tracker: Callable[[Floats], tuple[Tracker, Floats]]
 
@@ -104,9 +106,9 @@ class Problem:
 
     def without_biases(self, values: Floats) -> RecordedScans:
         """Return the recording as sensors without these biases would have made it."""
-        return without_biases(self.recording, self.with_biases(values))
+        return remove_biases(self.recording, self.with_biases(values))
 
-    def with_biases(self, values: Floats) -> list[Site]:
+    def with_biases(self, values: Floats) -> list[RecordedSensor]:
         """Return the sensors with the biases among these values of the parameters."""
         return with_biases(self.sites, self.parameters, values)
 

@@ -17,8 +17,8 @@ from vedette.densities import as_lmb, track_moments
 from vedette.internal.quantities import COMPONENTS
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models.row_noise import measured_part
-from vedette.recorded import RecordedScans, Site
-from vedette.recorded.instants import with_wrapped_angles
+from vedette.recorded import RecordedScans, RecordedSensor
+from vedette.recorded.scan_times import with_wrapped_angles
 from vedette.tracking import Tracker
 
 BIASES = ("range", "bearing", "clock", "x", "y")  # per sensor, in this order, SI units, bearings counter-clockwise
@@ -54,7 +54,7 @@ class MatchedMeasurements(NamedTuple):
 
 
 def match_measurements(
-    tracker: Tracker, recording: RecordedScans, sites: Sequence[Site], stds: Floats
+    tracker: Tracker, recording: RecordedScans, sites: Sequence[RecordedSensor], stds: Floats
 ) -> MatchedMeasurements:
     """Match measurements with the tracks of a tracker.
 
@@ -142,7 +142,12 @@ class Registration(NamedTuple):
 
 
 def register(
-    pairs: MatchedMeasurements, sites: Sequence[Site], asked: Bools, unknown: Floats, stds: Floats, period: float
+    pairs: MatchedMeasurements,
+    sites: Sequence[RecordedSensor],
+    asked: Bools,
+    unknown: Floats,
+    stds: Floats,
+    period: float,
 ) -> Registration:
     """Return the biases that fit best, jointly with straight pieces of the tracks.
 
@@ -200,7 +205,12 @@ def _pieces(pairs: MatchedMeasurements, length: float) -> tuple[Ints, Floats, Fl
 
 
 def _linearised(
-    pairs: MatchedMeasurements, sites: Sequence[Site], biases: Floats, pieces: Ints, middles: Floats, states: Floats
+    pairs: MatchedMeasurements,
+    sites: Sequence[RecordedSensor],
+    biases: Floats,
+    pieces: Ints,
+    middles: Floats,
+    states: Floats,
 ) -> tuple[Floats, Floats, Floats]:
     """Return (n, 2) residuals, and (n, 2, 4) and (n, 2, 5) derivatives of the predictions by piece states and
     biases.

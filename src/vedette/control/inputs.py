@@ -20,7 +20,7 @@ from vedette.kernels.base.types import Floats
 from vedette.kernels.labelled.validity import is_valid_glmb, is_valid_lmb
 from vedette.kernels.planning.ascent import Allowed
 from vedette.models import TargetModel
-from vedette.models.arguments import float_array, instance, reject, sequence, tell_degrees
+from vedette.models.arguments import float_array, instance, reject, sequence, warn_if_degrees
 from vedette.platforms import Options, options_at
 from vedette.platforms.camera import HALF_WIDTH, POINTING
 from vedette.platforms.operated import LEFT
@@ -59,7 +59,7 @@ def check_poses(poses: Any, num_sensors: int) -> Floats:
     if checked.shape[1] < 3:
         raise reject("poses", f"an array of shape ({num_sensors}, 3 or more)", f"shape {checked.shape}")
     for s in np.flatnonzero(np.abs(checked[:, 2]) >= 10.0).tolist():
-        tell_degrees(f"poses[{s}]", float(checked[s, 2]))
+        warn_if_degrees(f"poses[{s}]", float(checked[s, 2]))
     return checked
 
 

@@ -123,7 +123,7 @@ def scan_table(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
                 continue
             heading = float(course_deg(site.north, pose[2], pose)) if compass else float(pose[2])
             columns = [names[name] for name in COMPONENTS[site.kind]]
-            rows = (site.told(scan.measurements, pose) if compass else scan.measurements).tolist() or [()]
+            rows = (site.to_raw(scan.measurements, pose) if compass else scan.measurements).tolist() or [()]
             bearings = bearings_of(scan.measurements, pose, site.kind)
             beam_lags = lags(bearings, pose).tolist() if is_turn(pose) and len(bearings) else [0.0] * len(rows)
             for row, lag in zip(rows, beam_lags, strict=True):

@@ -19,7 +19,7 @@ from vedette.kernels.base.types import Floats
 from vedette.live.messages import Message, read_message
 from vedette.models.arguments import reject
 from vedette.platforms.compass import Compass, PlaneCompass, courses_of
-from vedette.recorded import Conventions, Origin, Site
+from vedette.recorded import Conventions, Origin, RecordedSensor
 from vedette.recorded.extents import beyond_reach, is_within, places_of
 from vedette.simulation.journal import error_cause
 from vedette.simulation.loop import PLANNER
@@ -84,7 +84,7 @@ class LiveLoop:
     """
 
     tracker: OutOfSequenceTracker
-    sites: tuple[Site, ...]
+    sites: tuple[RecordedSensor, ...]
     estimate: Estimator
     conventions: Conventions
     origin: Origin | None = None

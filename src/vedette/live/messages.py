@@ -16,7 +16,7 @@ from vedette.internal.text import pluralise, shown
 from vedette.kernels.base.types import BEAM, OWN_VELOCITY, Floats
 from vedette.models.arguments import reject
 from vedette.models.turns import Turn, with_beam
-from vedette.recorded import Conventions, Origin, Site, parse_scans
+from vedette.recorded import Conventions, Origin, RecordedSensor, parse_scans
 from vedette.recorded.conventions import GAPS
 from vedette.recorded.tables import Table, is_number, seconds
 from vedette.recorded.turns import bearings_of
@@ -44,7 +44,7 @@ class Message(NamedTuple):
 
 
 def read_message(
-    line: bytes, place: str, sites: Sequence[Site], conventions: Conventions, origin: Origin | None = None
+    line: bytes, place: str, sites: Sequence[RecordedSensor], conventions: Conventions, origin: Origin | None = None
 ) -> Message:
     """Return the scan of a line.
 
@@ -125,7 +125,7 @@ def _lags(given: Any, place: str, num: int, time: float, is_utc: bool) -> Floats
         raise reject(place, wanted, given) from None
 
 
-def _with_beam(pose: Floats, scan: Floats, lags: Floats, site: Site, place: str) -> Floats:
+def _with_beam(pose: Floats, scan: Floats, lags: Floats, site: RecordedSensor, place: str) -> Floats:
     """Return the pose with the bearing of the beam at the middle of the turn, from the measurements and their times."""
     if not isinstance(site.turn, Turn):
         raise reject(place, f"none, as the sensors file gives no `turn` of {site.name}", "some")
@@ -167,7 +167,7 @@ def _object(line: bytes, place: str) -> Mapping[str, Any]:
     return data
 
 
-def _sensor(given: Any, place: str, sites: Sequence[Site]) -> int:
+def _sensor(given: Any, place: str, sites: Sequence[RecordedSensor]) -> int:
     """Return the number of a sensor, from 0."""
     for number, site in enumerate(sites):
         if given == site.name or (type(given) is int and given == number + 1):
@@ -176,7 +176,7 @@ def _sensor(given: Any, place: str, sites: Sequence[Site]) -> int:
     raise InputError(f"{place}, sensor: expected one of {names}, or its number from 1; got {shown(given)}")
 
 
-def _rows(given: Any, field: str, site: Site) -> list[list[float]]:
+def _rows(given: Any, field: str, site: RecordedSensor) -> list[list[float]]:
     names = COMPONENTS[site.kind]
     if not isinstance(given, list):
         raise reject(field, f"a list of [{', '.join(names)}]", given)
@@ -212,7 +212,7 @@ def _accuracy(data: Mapping[str, Any], num: int, site: Site, place: str) -> dict
     return found
 
 
-def _pose(given: Any, field: str, site: Site) -> tuple[dict[str, float], list[float]]:
+def _pose(given: Any, field: str, site: RecordedSensor) -> tuple[dict[str, float], list[float]]:
     """Return the pose as columns of a table, and its components after the heading."""
     if given is None:
         return {}, []
@@ -233,7 +233,7 @@ def _pose(given: Any, field: str, site: Site) -> tuple[dict[str, float], list[fl
     return dict(zip(("pose.x", "pose.y", "pose.heading_rad"), given, strict=False)), given[3:]
 
 
-def _velocity(given: Any, field: str, site: Site) -> dict[str, float]:
+def _velocity(given: Any, field: str, site: RecordedSensor) -> dict[str, float]:
     """Return the velocity as columns of a table."""
     if given is None:
         return {}

@@ -234,11 +234,11 @@ def pose_vector(field: str, values: Any) -> Floats:
     if len(pose) < 3:
         raise reject(field, "an array of shape (3 or more,)", f"shape {pose.shape}")
     if abs(pose[2]) >= 10.0:
-        tell_degrees(field, float(pose[2]))
+        warn_if_degrees(field, float(pose[2]))
     return pose
 
 
-def tell_degrees(field: str, heading: float) -> None:
+def warn_if_degrees(field: str, heading: float) -> None:
     """Warn of a heading that looks like degrees: a whole number whose size is from 10 to 720."""
     if 10.0 <= abs(heading) <= 720.0 and heading == round(heading):
         degrees = f"{heading:g} degrees are {math.radians(heading):.4f} rad"

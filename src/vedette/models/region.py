@@ -13,7 +13,7 @@ from vedette.models.arguments import as_array, generator, real, reject
 from vedette.models.fields import Real
 
 
-def tell_degrees(field: str, corners: Floats) -> None:
+def warn_if_corners_in_degrees(field: str, corners: Floats) -> None:
     """Warn of an area whose corners look like longitudes and latitudes."""
     if look_like_degrees(corners):
         width, height = np.ptp(corners, axis=0)
@@ -43,7 +43,7 @@ class Region:
         for low, high in (("x_min", "x_max"), ("y_min", "y_max")):
             if getattr(self, high) <= getattr(self, low):
                 raise reject(f"Region.{high}", f"a number above {low} = {getattr(self, low)}", getattr(self, high))
-        tell_degrees("Region", self.corners)
+        warn_if_corners_in_degrees("Region", self.corners)
 
     @property
     def area(self) -> float:

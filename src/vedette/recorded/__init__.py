@@ -4,9 +4,9 @@ from vedette.recorded.cleaning import Cleaning, CleaningCounts, RecordedTrack
 from vedette.recorded.conventions import Conventions
 from vedette.recorded.detections import table_of_detections
 from vedette.recorded.geography import Origin
-from vedette.recorded.instants import RecordedScans, Site, without_biases
+from vedette.recorded.scan_times import RecordedScans, RecordedSensor, remove_biases
 from vedette.recorded.scans import parse_scans
-from vedette.recorded.tables import read_table, table_of
+from vedette.recorded.tables import as_table, read_table
 from vedette.recorded.targets import RecordedTargets
 from vedette.recorded.tracking import Tracking
 
@@ -16,13 +16,13 @@ __all__ = [
     "Conventions",
     "Origin",
     "RecordedScans",
+    "RecordedSensor",
     "RecordedTargets",
     "RecordedTrack",
-    "Site",
     "Tracking",
+    "as_table",
     "parse_scans",
     "read_table",
-    "table_of",
+    "remove_biases",
     "table_of_detections",
-    "without_biases",
 ]

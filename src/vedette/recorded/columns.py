@@ -14,7 +14,7 @@ from vedette.models.arguments import reject
 from vedette.platforms.compass import PlaneCompass
 from vedette.recorded.conventions import GAPS, OTHER_NAMES, OWN_SPEEDS, UNITS, Conventions
 from vedette.recorded.geography import Origin
-from vedette.recorded.instants import Site
+from vedette.recorded.scan_times import RecordedSensor
 from vedette.recorded.tables import Table, are_dates, column_names, is_empty
 from vedette.recorded.turns import RadarService
 
@@ -22,7 +22,9 @@ from vedette.recorded.turns import RadarService
 class ScanColumns:
     """The columns of a table as quantities; raises `InputError` for missing or inconsistent ones."""
 
-    def __init__(self, table: Table, sites: Sequence[Site], conventions: Conventions, origin: Origin | None) -> None:
+    def __init__(
+        self, table: Table, sites: Sequence[RecordedSensor], conventions: Conventions, origin: Origin | None
+    ) -> None:
         self.table, self.sites, self.conventions, self.origin = table, sites, conventions, origin
         self.compass = origin or PlaneCompass()
         self.bearings = tuple(conventions.bearings or ("north" if site.compass else table.bearings) for site in sites)

@@ -10,7 +10,7 @@ from typing import Literal
 from vedette.internal.quantities import ANGLES, HEIGHTS, LENGTHS, QUANTITIES, SPEEDS
 from vedette.models.arguments import reject
 from vedette.models.heights import ASSUMED_HEIGHT
-from vedette.recorded.instants import Bearings
+from vedette.recorded.scan_times import Bearings
 
 # Quantities of a row, and the units that may follow at the end of a column's name.
 UNITS: dict[str, Mapping[str, float]] = {

@@ -12,14 +12,14 @@ from vedette.internal.quantities import COMPONENTS, QUANTITIES
 from vedette.internal.text import pluralise, shown
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models.row_noise import measured_part
-from vedette.recorded.instants import RecordedScans, Site, with_wrapped_angles
+from vedette.recorded.scan_times import RecordedScans, RecordedSensor, with_wrapped_angles
 
 _CLOSE = 3.0  # noise standard deviations between two measurements of one target
 _FEWEST = 10  # fewest scans for a result
 
 
 def merged(
-    recording: RecordedScans, sites: Sequence[Site], stds: Sequence[Sequence[float] | None], distance: float
+    recording: RecordedScans, sites: Sequence[RecordedSensor], stds: Sequence[Sequence[float] | None], distance: float
 ) -> RecordedScans:
     """Return the recording with the measurements of each cluster of a scan replaced by their mean.
 
@@ -52,7 +52,7 @@ def merged(
     return replace(recording, scans=tuple(map(tuple, scans)), notes=(*recording.notes, *texts))
 
 
-def _told(site: Site, before: int, after: int, offsets: Floats) -> str:
+def _told(site: RecordedSensor, before: int, after: int, offsets: Floats) -> str:
     """Describe the numbers before and after merging, and the root mean square of the offsets from the means."""
     units = [(QUANTITIES[name].per_si, QUANTITIES[name].unit) for name in COMPONENTS[site.kind]]
     spread = np.sqrt((offsets**2).mean(axis=0)) if len(offsets) else np.zeros(len(units))
@@ -96,8 +96,8 @@ def _close(scan: Floats, kind: str, stds: Floats, distance: float) -> Bools:
 
 
 def crowded(
-    recording: RecordedScans, sites: Sequence[Site], stds: Sequence[Sequence[float] | None]
-) -> Iterator[tuple[Site, int, int]]:
+    recording: RecordedScans, sites: Sequence[RecordedSensor], stds: Sequence[Sequence[float] | None]
+) -> Iterator[tuple[RecordedSensor, int, int]]:
     """Yield sensors with two measurements within three standard deviations in most scans: number of these, and of all.
 
     The arguments are those of `merged`. Sensors with unknown noise, or fewer than ten scans, are left out.

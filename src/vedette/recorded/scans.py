@@ -37,13 +37,13 @@ from vedette.recorded.conventions import (
 )
 from vedette.recorded.extents import places_of, wild
 from vedette.recorded.geography import PLANE_REACH, Origin
-from vedette.recorded.instants import (
-    Look,
+from vedette.recorded.scan_times import (
+    RecordedScan,
     RecordedScans,
-    Site,
-    in_order,
+    RecordedSensor,
+    group_by_time,
+    remove_biases,
     turned,
-    without_biases,
 )
 from vedette.recorded.tables import (
     FARTHEST,
@@ -59,7 +59,7 @@ from vedette.simulation.records import ScansFile
 
 
 def parse_scans(
-    table: Table, sites: Sequence[Site], conventions: Conventions, origin: Origin | None = None
+    table: Table, sites: Sequence[RecordedSensor], conventions: Conventions, origin: Origin | None = None
 ) -> RecordedScans:
     """Return scans from rows of one measurement each: time, sensor, and the measured quantities.
 
@@ -84,7 +84,7 @@ def parse_scans(
     notes = (*table.notes, *rows.without_velocity(recording.poses))
     gathered, file = recording.gathered, ScansFile(Path(table.source).name, table.sha256)
     if any(site.bias != NO_BIAS for site in sites):
-        recording = without_biases(recording, sites)
+        recording = remove_biases(recording, sites)
     return replace(recording, unused=rows.unused, notes=notes, file=file, gathered=gathered)
 
 
@@ -262,7 +262,9 @@ class _Rows(ScanColumns):
         return place
 
 
-def _without_wild(rows: list[_Row], table: Table, sites: Sequence[Site]) -> tuple[list[_Row], tuple[str, ...]]:
+def _without_wild(
+    rows: list[_Row], table: Table, sites: Sequence[RecordedSensor]
+) -> tuple[list[_Row], tuple[str, ...]]:
     """Return the rows, wild ones first and without measurements, and the faults of the wild ones."""
     placed = [i for i, row in enumerate(rows) if row.measured is not None and sites[row.sensor].kind in PLACED]
     if not placed:
@@ -301,15 +303,17 @@ def _at_instants(rows: list[_Row], how: _Rows, skipped: tuple[str, ...]) -> Reco
             spans[s] = float(np.median(several))
         for group in groups:
             time = math.fsum(row.time for row in group) / len(group) if gather > 0.0 else group[0].time
-            looks.append(Look(time, s, _scan(group, site), np.array(group[-1].pose)))
+            looks.append(RecordedScan(time, s, _scan(group, site), np.array(group[-1].pose)))
     first = np.zeros((len(sites), max([*map(len, (site.pose for site in sites)), *(len(look.pose) for look in looks)])))
     for s, site in enumerate(sites):
         first[s, : len(site.pose)] = site.pose
-    found = in_order(looks, first, 0.0, how.is_utc, skipped, how.bearings)
+    found = group_by_time(looks, first, 0.0, how.is_utc, skipped, how.bearings)
     return replace(found, gathered=tuple(spans))
 
 
-def _looks_of_turns(rows: list[_Row], sensor: int, site: Site, service: RadarService | None) -> list[Look] | None:
+def _looks_of_turns(
+    rows: list[_Row], sensor: int, site: RecordedSensor, service: RadarService | None
+) -> list[RecordedScan] | None:
     """Return the scans of a turning radar; None without a turn."""
     own = [row for row in rows if row.measured is not None]
     if not own:
@@ -318,7 +322,7 @@ def _looks_of_turns(rows: list[_Row], sensor: int, site: Site, service: RadarSer
     scans = scans_of_turns(times, bearings_of(scan, poses, site.kind), poses, site.turn, service)
     if scans is None:
         return None
-    return [Look(each.time, sensor, scan[each.rows], each.pose) for each in scans]
+    return [RecordedScan(each.time, sensor, scan[each.rows], each.pose) for each in scans]
 
 
 def _groups(rows: list[_Row], gather: float) -> list[list[_Row]]:
@@ -331,7 +335,7 @@ def _groups(rows: list[_Row], gather: float) -> list[list[_Row]]:
     return groups
 
 
-def _scan(rows: list[_Row], site: Site) -> Floats:
+def _scan(rows: list[_Row], site: RecordedSensor) -> Floats:
     measured = [row.measured for row in rows if row.measured is not None]
     length = len(measured[0]) if measured else len(COMPONENTS[site.kind])
     return np.array(measured, np.float64).reshape(len(measured), length)

@@ -102,7 +102,7 @@ class Table:
         return labels
 
 
-def table_of(frame: Any, source: str = "table") -> Table:
+def as_table(frame: Any, source: str = "table") -> Table:
     """Return a table of columns in memory: a mapping, or a data frame of pandas or Polars; messages count rows from 1.
 
     Raises `InputError` for something else, or columns of different lengths.

@@ -16,7 +16,7 @@ from vedette.kernels.base.types import HEIGHT
 from vedette.models.arguments import real, reject
 from vedette.recorded.cleaning import Cleaning, CleaningCounts, RecordedTrack
 from vedette.recorded.reports import Reports, parse_reports
-from vedette.recorded.tables import read_table, seconds, table_of
+from vedette.recorded.tables import as_table, read_table, seconds
 from vedette.simulation.truth import TIME_TOLERANCE, Truth, scan_times
 
 _FIRST_DATE, _LAST_DATE = 1e8, 1e10  # s of the Unix epoch, 1973 and 2286
@@ -106,7 +106,7 @@ class RecordedTargets:
 
         Messages count rows from 1.
         """
-        reports = parse_reports(table_of(table), columns=columns, origin_deg=origin_deg)
+        reports = parse_reports(as_table(table), columns=columns, origin_deg=origin_deg)
         return cls(reports, time_origin, cleaning or Cleaning())
 
     def truth(self, times: ArrayLike, *, rng: np.random.Generator) -> Truth:

@@ -9,7 +9,7 @@ import numpy as np
 
 from vedette.densities import Estimator
 from vedette.errors import InputError
-from vedette.recorded.instants import RecordedScans
+from vedette.recorded.scan_times import RecordedScans
 from vedette.simulation.journal import Journal, Score
 from vedette.simulation.loop import FILTER, RunningTracker, sensor_streams
 from vedette.simulation.records import RunRecord

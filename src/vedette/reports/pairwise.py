@@ -28,7 +28,7 @@ class PairwiseComparison:
         sentence: the finding with its numbers.
         mean, low, high: paired difference in mean OSPA, second minus first, with its 95 % interval; NaN for one run.
         difference: the same as text: "+1.20 (+0.80 to +1.60)".
-        share_won: share of the runs in which `first` is better: "93 %"; "unknown" for one run.
+        win_rate: share of the runs in which `first` is better: "93 %"; "unknown" for one run.
     """
 
     verdict: Verdict
@@ -39,7 +39,7 @@ class PairwiseComparison:
     low: float
     high: float
     difference: str
-    share_won: str
+    win_rate: str
 
 
 def compare_with_first(comparison: Comparison) -> tuple[PairwiseComparison, ...]:

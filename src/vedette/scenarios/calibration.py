@@ -19,7 +19,7 @@ from vedette.models import Bias, Region, SensorModel, TargetModel
 from vedette.models.arguments import reject
 from vedette.models.clutter import at_raw_measurements
 from vedette.recorded import RecordedScans
-from vedette.recorded.instants import Bearings, bias_of
+from vedette.recorded.scan_times import Bearings, sensor_bias
 from vedette.scenarios.build import build_sensors
 from vedette.scenarios.dumping import dump_data
 from vedette.scenarios.loading import Scenario
@@ -87,7 +87,7 @@ def build_problem(scenario: Scenario, *, position: bool = False, bearings: Beari
                 sensor = sensor.model_copy(update={"clutter": sensor.clutter.model_copy(update=changes)})
                 built = sensor.build(area, method, folder, model.filter.detection_taken_at)
                 if sensor.clutter.kind in _SUPPORTED_CLUTTER:
-                    raw = at_raw_measurements(built.clutter, *bias_of(biased[s], recording.bearings[s]))
+                    raw = at_raw_measurements(built.clutter, *sensor_bias(biased[s], recording.bearings[s]))
                     built = replace(built, clutter=raw)
                 models.append(built)
         return Central(SequentialLmbFilter(targets, tuple(models), _LIMITS)), added_rates

@@ -102,7 +102,7 @@ class _Writer:
         self._kept.append(value)
         return number
 
-    def _made(self, value: Any, place: str) -> list[Any]:
+    def _new_node(self, value: Any, place: str) -> list[Any]:
         if isinstance(value, np.generic):
             value = np.asarray(value) if not isinstance(value, float | int | str) else value
         if type(value) in _PLAIN:
@@ -149,7 +149,7 @@ class _Reader:
 
     def __init__(self, arrays: Mapping[str, Any], nodes: list[list[Any]]) -> None:
         self._arrays, self._nodes = arrays, nodes
-        self._new_node: dict[int, Any] = {}
+        self._values: dict[int, Any] = {}
         self._makers: dict[str, Callable[..., Any]] = {
             "plain": self._plain,
             "float": float.fromhex,
@@ -163,10 +163,10 @@ class _Reader:
 
     def value(self, number: int) -> Any:
         """Return the value of a node. Nodes refer to earlier nodes only, so there are no cycles."""
-        if number not in self._new_node:
+        if number not in self._values:
             kind, *content = self._nodes[number]
-            self._new_node[number] = self._makers[kind](*content)
-        return self._new_node[number]
+            self._values[number] = self._makers[kind](*content)
+        return self._values[number]
 
     def _plain(self, value: Any) -> Any:
         if type(value) not in _PLAIN:

@@ -12,7 +12,7 @@ from vedette.control.constraints.protocol import ConstraintContext, PerSensorCon
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models import Region
 from vedette.models.arguments import float_array, reject
-from vedette.models.region import tell_degrees
+from vedette.models.region import warn_if_corners_in_degrees
 
 # m; distance from a fence to its zone, and width of the zone.
 _EDGE, _BEYOND = 1e-6, 1e7
@@ -82,7 +82,7 @@ class KeepOut(PerSensorConstraint):
     def __post_init__(self) -> None:
         corners = _polygon("area", self.area.corners if isinstance(self.area, Region) else self.area)
         if not isinstance(self.area, Region):
-            tell_degrees("area", corners)
+            warn_if_corners_in_degrees("area", corners)
             object.__setattr__(self, "area", corners)
         holes = tuple(_polygon(f"holes[{i}]", hole) for i, hole in enumerate(self.holes))
         object.__setattr__(self, "holes", holes)

@@ -18,7 +18,7 @@ from vedette.scenarios.sections.base import SHA256_FIELD, NonNegative, Section, 
 from vedette.scenarios.sections.field_of_view import max_range
 
 if TYPE_CHECKING:
-    from vedette.recorded import Origin, RecordedScans, Site
+    from vedette.recorded import Origin, RecordedScans, RecordedSensor
     from vedette.scenarios.sections.scenario import ScenarioModel
     from vedette.scenarios.sections.sensors import Sensor
 
@@ -96,7 +96,7 @@ class RecordingSection(Section):
 
 @lru_cache(maxsize=4)
 def _read(
-    file: str, changed: tuple[int, int] | None, section: str, sites: tuple[Site, ...], origin: Origin | None
+    file: str, changed: tuple[int, int] | None, section: str, sites: tuple[RecordedSensor, ...], origin: Origin | None
 ) -> RecordedScans:
     """Return the scans of a file with this time of change; the section is JSON, as mappings cannot be hashed."""
     from vedette.recorded import Conventions, parse_scans
@@ -116,14 +116,14 @@ def noise_stds(sensor: Sensor) -> tuple[float, ...] | None:
     return tuple(noise.std) if noise.kind in ("constant", "by_axis") else None
 
 
-def recorded_sensors(world: ScenarioModel) -> list[Site]:
+def recorded_sensors(world: ScenarioModel) -> list[RecordedSensor]:
     """Return the sensors of a recording."""
-    from vedette.recorded import Site
+    from vedette.recorded import RecordedSensor
 
     north = world.north()
     shown_by_rows = "none" if world.recording is None else world.recording.turns
     return [
-        Site(
+        RecordedSensor(
             name,
             sensor.measurement.kind,
             sensor.pose,

@@ -35,14 +35,14 @@ def turned(angles: ArrayLike, bearings: Bearings | None, compass: Compass, place
 
 def with_wrapped_angles(values: Floats, kind: str) -> Floats:
     """Return measurements of a kind, or their differences (..., meas_dim), with angles in [-pi, pi)."""
-    found = values.copy()
-    for place in angles(COMPONENTS[kind]):
-        found[..., place] = np.remainder(found[..., place] + math.pi, 2.0 * math.pi) - math.pi
-    return found
+    wrapped_values = values.copy()
+    for axis in angles(COMPONENTS[kind]):
+        wrapped_values[..., axis] = np.remainder(wrapped_values[..., axis] + math.pi, 2.0 * math.pi) - math.pi
+    return wrapped_values
 
 
 @dataclass(frozen=True, slots=True)
-class Site:
+class RecordedSensor:
     """A sensor of a recording.
 
     Attributes:
@@ -67,7 +67,7 @@ class Site:
     turn: Turning = "found"
     signal: SignalModel | None = None
 
-    def measured(self, told: ArrayLike, pose: ArrayLike | None = None) -> Floats:
+    def from_raw(self, raw: ArrayLike, pose: ArrayLike | None = None) -> Floats:
         """Return (num, meas_dim) measurements for filters, bias included, from the sensor's own measurements.
 
         pose: of the sensor then; None: the site's own.
@@ -75,23 +75,23 @@ class Site:
         Raises:
             InputError: another shape, or numbers that are not finite.
         """
-        found, at = float_array("told", told, (None, len(COMPONENTS[self.kind]))), self._place(pose)
-        return self._with_angles(found, lambda angles: self.north.angle(np.radians(angles), at), np.radians)
+        values, at = float_array("raw", raw, (None, len(COMPONENTS[self.kind]))), self._place(pose)
+        return self._with_angles(values, lambda angles: self.north.angle(np.radians(angles), at), np.radians)
 
-    def told(self, measured: ArrayLike, pose: ArrayLike | None = None) -> Floats:
-        """Return the inverse of `measured`; bearings from 0 to 360 degrees."""
-        found, at = float_array("measured", measured, (None, len(COMPONENTS[self.kind]))), self._place(pose)
-        return self._with_angles(found, lambda angles: course_deg(self.north, angles, at), np.degrees)
+    def to_raw(self, measurements: ArrayLike, pose: ArrayLike | None = None) -> Floats:
+        """Return the inverse of `from_raw`; bearings from 0 to 360 degrees."""
+        values, at = float_array("measurements", measurements, (None, len(COMPONENTS[self.kind]))), self._place(pose)
+        return self._with_angles(values, lambda angles: course_deg(self.north, angles, at), np.degrees)
 
     def _place(self, pose: ArrayLike | None) -> Floats:
         return np.asarray(self.pose if pose is None else pose, np.float64)[:2]
 
     def _with_angles(self, measurements: Floats, bearing: _Change, other: _Change) -> Floats:
         """Return the measurements with bearings and other angles converted, if the sensor has a compass."""
-        found, names = measurements.copy(), COMPONENTS[self.kind]
-        for place in angles(names) if self.compass else ():
-            found[:, place] = (bearing if names[place] == "bearing" else other)(found[:, place])
-        return found
+        converted, names = measurements.copy(), COMPONENTS[self.kind]
+        for axis in angles(names) if self.compass else ():
+            converted[:, axis] = (bearing if names[axis] == "bearing" else other)(converted[:, axis])
+        return converted
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -160,7 +160,7 @@ class RecordedScans(SummaryRepr):
         return sum(len(scan) for scans in self.scans for scan in scans if scan is not None)
 
 
-class Look(NamedTuple):
+class RecordedScan(NamedTuple):
     """A scan of one sensor: time, sensor, (num, meas_dim) measurements and (3 or more,) pose."""
 
     time: float
@@ -169,8 +169,8 @@ class Look(NamedTuple):
     pose: Floats
 
 
-def in_order(
-    looks: Iterable[Look],
+def group_by_time(
+    recorded_scans: Iterable[RecordedScan],
     poses: Floats,
     start: float,
     is_utc: bool,
@@ -180,55 +180,57 @@ def in_order(
     """Return the scans of a recording, those with equal times as one instant.
 
     Args:
-        looks: in any order, at most one of a sensor at a time.
+        recorded_scans: in any order, at most one of a sensor at a time.
         poses: (num_sensors, 3 or more) the sensors that never scan.
-        start: of the times of the looks, see `RecordedScans`.
+        start: of the times of the scans, see `RecordedScans`.
         is_utc, skipped, bearings: see `RecordedScans`.
     """
-    instants: dict[float, dict[int, Look]] = {}
-    for look in looks:
-        instants.setdefault(look.time, {})[look.sensor] = look
+    instants: dict[float, dict[int, RecordedScan]] = {}
+    for scan in recorded_scans:
+        instants.setdefault(scan.time, {})[scan.sensor] = scan
     times, at = np.array(sorted(instants)), poses.copy()
     for time in reversed(times.tolist()):  # before its first scan, a sensor has the pose of that scan
-        for s, look in instants[time].items():
-            at[s, : len(look.pose)] = look.pose
-    found, places = [], np.empty((len(times), *poses.shape))
+        for s, scan in instants[time].items():
+            at[s, : len(scan.pose)] = scan.pose
+    scans, poses_over_time = [], np.empty((len(times), *poses.shape))
     for k, time in enumerate(times.tolist()):
-        for s, look in instants[time].items():
-            at[s, : len(look.pose)] = look.pose
-        places[k] = at
-        found.append(tuple(instants[time][s].scan if s in instants[time] else None for s in range(len(poses))))
-    return RecordedScans(times - times[0], start + float(times[0]), is_utc, tuple(found), places, skipped, bearings)
+        for s, scan in instants[time].items():
+            at[s, : len(scan.pose)] = scan.pose
+        poses_over_time[k] = at
+        scans.append(tuple(instants[time][s].scan if s in instants[time] else None for s in range(len(poses))))
+    return RecordedScans(
+        times - times[0], start + float(times[0]), is_utc, tuple(scans), poses_over_time, skipped, bearings
+    )
 
 
-def without_biases(recording: RecordedScans, sites: Sequence[Site]) -> RecordedScans:
+def remove_biases(recording: RecordedScans, sensors: Sequence[RecordedSensor]) -> RecordedScans:
     """Return the recording as its sensors would have made it without their biases."""
-    looks = []
+    corrected = []
     for time, scans, poses in zip(recording.times.tolist(), recording.scans, recording.poses, strict=True):
         for s, scan in enumerate(scans):
             if scan is not None:
-                look = Look(time, s, scan, poses[s])
-                looks.append(without_bias(look, sites[s], recording.bearings[s]))
-    told = recording.start, recording.is_utc, recording.skipped, recording.bearings
-    return in_order(looks, recording.poses[0], *told)
+                recorded = RecordedScan(time, s, scan, poses[s])
+                corrected.append(remove_bias(recorded, sensors[s], recording.bearings[s]))
+    facts = recording.start, recording.is_utc, recording.skipped, recording.bearings
+    return group_by_time(corrected, recording.poses[0], *facts)
 
 
-def bias_of(site: Site, bearings: Bearings | None) -> tuple[Floats, Floats]:
+def sensor_bias(sensor: RecordedSensor, bearings: Bearings | None) -> tuple[Floats, Floats]:
     """Return a sensor's bias of measurements, (meas_dim,) in rad and m, and of its place, (2,) in m."""
-    bias, is_place = site.bias, is_position(site.kind)
-    measured = np.array([getattr(bias, component) for component in COMPONENTS[site.kind]])
-    if bearings == "north" and "bearing" in COMPONENTS[site.kind]:
-        measured[COMPONENTS[site.kind].index("bearing")] *= -1.0
+    bias, is_place = sensor.bias, is_position(sensor.kind)
+    measured = np.array([getattr(bias, component) for component in COMPONENTS[sensor.kind]])
+    if bearings == "north" and "bearing" in COMPONENTS[sensor.kind]:
+        measured[COMPONENTS[sensor.kind].index("bearing")] *= -1.0
     return measured, np.zeros(2) if is_place else np.array([bias.x, bias.y])
 
 
-def without_bias(look: Look, site: Site, bearings: Bearings | None) -> Look:
+def remove_bias(recorded: RecordedScan, sensor: RecordedSensor, bearings: Bearings | None) -> RecordedScan:
     """Return a scan as its sensor would have made it without its bias."""
-    if site.bias == NO_BIAS:
-        return look
-    measured, place = bias_of(site, bearings)
-    scan, pose = with_offsets(look.scan, -measured, COMPONENTS[site.kind]), look.pose.copy()
+    if sensor.bias == NO_BIAS:
+        return recorded
+    measured, place = sensor_bias(sensor, bearings)
+    scan, pose = with_offsets(recorded.scan, -measured, COMPONENTS[sensor.kind]), recorded.pose.copy()
     pose[:2] -= place
-    if is_turn(pose) and "bearing" in COMPONENTS[site.kind]:
+    if is_turn(pose) and "bearing" in COMPONENTS[sensor.kind]:
         pose[BEAM] -= measured[0]
-    return Look(look.time - site.bias.clock, look.sensor, scan, pose)
+    return RecordedScan(recorded.time - sensor.bias.clock, recorded.sensor, scan, pose)
