@@ -183,7 +183,7 @@ def test_files_import_those_beside_them_each_its_own(tmp_path: Path) -> None:
         place.mkdir()
         (place / "helper_beside.py").write_text(f"NUMBER = {number}\n")
         (place / "models.py").write_text("from helper_beside import NUMBER\n\n\nclass Last:\n    number = NUMBER\n")
-        made.append(Custom.model_construct(kind="custom", function="models.py:Last", arguments={}).named(place))
+        made.append(Custom.model_construct(kind="custom", function="models.py:Last", arguments={}).load_object(place))
     assert [found.number for found in made] == [1, 2]
     assert "helper_beside" not in sys.modules
     assert not {str(tmp_path / "1"), str(tmp_path / "2")} & set(sys.path)

@@ -151,5 +151,5 @@ class ConstraintReportingPlanner:
         courses, scans = tuple(courses_of(*way) for way in ways), tuple(scans_of(*way) for way in ways)
         fused = getattr(state, "fused", None)
         beliefs = predicted_beliefs(self.constraints, self.sensors, fused, settings, 1, settings.horizon_steps)
-        found = violation_notes(self.constraints, ConstraintContext(courses, times, beliefs, at, scans))
-        return replace(plan, notes=(*plan.notes, *found))
+        notes = violation_notes(self.constraints, ConstraintContext(courses, times, beliefs, at, scans))
+        return replace(plan, notes=(*plan.notes, *notes))

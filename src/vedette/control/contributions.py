@@ -43,9 +43,11 @@ def contributions_of(additive: AdditiveRewards, chosen: Ints, which: Ints) -> Co
     means = rewards.mean(axis=1)
     ahead, behind, without = np.split(means, [num + 1, 2 * num + 2])
     existence, localisation = _of_labels(additive, chosen, actions[0])
-    found = additive.found(chosen) - additive.found(actions[0])
+    total_gain = additive.found(chosen) - additive.found(actions[0])
     shares = 0.5 * (np.diff(ahead) - np.diff(behind))
-    return Contributions(float(means[0]), existence, localisation, found, shares, ahead[num] - without, rewards[num])
+    return Contributions(
+        float(means[0]), existence, localisation, total_gain, shares, ahead[num] - without, rewards[num]
+    )
 
 
 def _of_labels(additive: AdditiveRewards, chosen: Ints, rest: Ints) -> tuple[Floats, Floats] | tuple[None, None]:

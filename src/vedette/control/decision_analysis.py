@@ -98,24 +98,24 @@ class DecisionAnalysis:
     def _shares(self, missing: dict[str, str]) -> dict[str, Any]:
         """Return the fields of an `Explanation` with contributions; reasons for None are put in `missing`."""
         names = ("baseline", "of_targets", "of_undetected", "of_sensors", "without")
-        found: dict[str, Any] = dict.fromkeys(names)
+        contributions: dict[str, Any] = dict.fromkeys(names)
         each = [shares for shares in self._contributions if shares is not None]
         if len(each) < len(self.parts):
             missing.update(dict.fromkeys(names, _CASE_BY_CASE))
-            return found
+            return contributions
         if not all(_is_finite(shares) for shares in each):
             missing.update(dict.fromkeys(names, _NOT_FINITE))
-            return found
+            return contributions
         last = np.concatenate([shares.last for shares in each])
         reward = sum(part.evidence.mean_of(part.chosen) for part in self.parts)
-        found["baseline"] = sum(shares.baseline for shares in each)
-        found["of_undetected"] = sum(shares.found for shares in each)
-        found["of_sensors"] = np.concatenate([shares.sensors for shares in each])
-        found["without"] = reward - last
-        found["of_targets"] = self._targets(each)
-        if found["of_targets"] is None:
+        contributions["baseline"] = sum(shares.baseline for shares in each)
+        contributions["of_undetected"] = sum(shares.found for shares in each)
+        contributions["of_sensors"] = np.concatenate([shares.sensors for shares in each])
+        contributions["without"] = reward - last
+        contributions["of_targets"] = self._targets(each)
+        if contributions["of_targets"] is None:
             missing["of_targets"] = _NOT_LINEAR
-        return found
+        return contributions
 
     def _targets(self, each: Sequence[Contributions]) -> TargetGains | None:
         existence = [shares.existence for shares in each if shares.existence is not None]
@@ -127,14 +127,14 @@ class DecisionAnalysis:
 
     def _runner_up(self) -> RunnerUp | None:
         """Return the best other joint action; for an independent decision, one sensor's own second best."""
-        found = [
+        candidates = [
             (part.evidence.mean_of(part.chosen) - best[1], place, best[0])
             for place, part in enumerate(self.parts)
             if (best := part.evidence.best_other(part.chosen)) is not None
         ]
-        if not found:
+        if not candidates:
             return None
-        margin, place, other = min(found)
+        margin, place, other = min(candidates)
         part = self.parts[place]
         actions = list(self._chosen_actions)
         words = []

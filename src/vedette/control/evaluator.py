@@ -95,15 +95,15 @@ class Evaluator:
             beyond = BeyondHorizon.of(sensors, options, *attracting_targets(prediction), graph, state.undetected)
         if horizons is None:
             horizons = () if beyond is None else beyond.horizons(settings)
-        found = [first]
+        rewards = [first]
         for own in horizons:
             assert beyond is not None
             later = beyond.extrapolated(settings.horizon_times(), own.horizon_times())
-            found.append(lay_out(sensors, later, rule, own, reward, state, rng=rng)[0])
+            rewards.append(lay_out(sensors, later, rule, own, reward, state, rng=rng)[0])
         counts = {"filter_steps": 0, "rewards": 0}
-        for each, own in zip(found, (settings, *horizons), strict=True):
+        for each, own in zip(rewards, (settings, *horizons), strict=True):
             counts["filter_steps"] += len(each.table.labels) * each.num_samples * own.horizon_steps
-        source = mean_over_horizons(found) if horizons else found[0]
+        source = mean_over_horizons(rewards) if horizons else rewards[0]
         notes = dict.fromkeys(() if beyond is None else beyond.notes())
         return cls(settings, tuple(options), prediction, source, source, counts, notes, horizons=horizons)
 

@@ -147,8 +147,8 @@ class Evidence:
         at = int(np.argmax(others))
         return (tuple(actions[at].tolist()), float(others[at])) if others[at] > -math.inf else None
 
-    def top_actions(self, choice: Sequence[int], most: int) -> Ints:
-        """Return (num, num_sensors) up to `most` joint actions with the largest means, the choice first among equals.
+    def top_actions(self, choice: Sequence[int], max_actions: int) -> Ints:
+        """Return (num, num_sensors) up to `max_actions` best joint actions by mean, the choice first among equals.
 
         They are in printed order, without joint actions that have no finite mean, except the choice.
         """
@@ -157,7 +157,7 @@ class Evidence:
         means = means[places]
         own = (actions == np.array(choice)).all(axis=1)
         order = np.lexsort((~own, np.where(np.isnan(means), math.inf, -means)))
-        order = order[own[order] | np.isfinite(means[order])][:most]
+        order = order[own[order] | np.isfinite(means[order])][:max_actions]
         return np.ascontiguousarray(actions[np.sort(order)])
 
     def curve(self) -> SearchCurve:
@@ -188,11 +188,11 @@ class Evidence:
             return (self._table(self.which, actions, means, errors),)
         off = actions != np.array(choice, np.int64)
         num_off, first_off = off.sum(axis=1), off.argmax(axis=1)
-        found = []
+        tables = []
         for axis, s in enumerate(self.which):
             rows = (num_off == 0) | ((num_off == 1) & (first_off == axis))
-            found.append(self._table((s,), actions[rows, axis : axis + 1], means[rows], errors[rows]))
-        return tuple(found)
+            tables.append(self._table((s,), actions[rows, axis : axis + 1], means[rows], errors[rows]))
+        return tuple(tables)
 
     def _table(self, sensors: tuple[int, ...], actions: Ints, means: Floats, errors: Floats) -> RewardTable:
         """Return rewards of joint actions (num, num of `sensors`), as course indices, as a table over the actions."""

@@ -148,10 +148,10 @@ class Explanation:
     )
 
     @classmethod
-    def nothing(cls, planner: str, chosen: tuple[str, ...], why: str) -> Explanation:
+    def nothing(cls, planner: str, chosen: tuple[str, ...], reason: str) -> Explanation:
         """Return the explanation of a plan that was not made on rewards."""
         nothing = (None,) * 7
-        return cls(planner, chosen, None, None, 0, *nothing, dict.fromkeys(EXPLAINED, why))
+        return cls(planner, chosen, None, None, 0, *nothing, dict.fromkeys(EXPLAINED, reason))
 
     def counterfactual(self, sensor: int, action: int | None = None, **columns: float) -> Counterfactual:
         """Return the reward if one sensor had taken another action, given the other sensors' choices.
@@ -168,8 +168,8 @@ class Explanation:
             NumericalError: a reward that is not finite.
         """
         if self.answer is None:
-            why = self.missing.get("reward", "this plan has left its evidence behind, as it was kept or sent")
-            raise InputError(f"had: expected a plan as its planner returned it; {why}")
+            reason = self.missing.get("reward", "this plan has left its evidence behind, as it was kept or sent")
+            raise InputError(f"had: expected a plan as its planner returned it; {reason}")
         return self.answer(sensor, action, columns)
 
     def without_evidence(self) -> Explanation:
@@ -197,9 +197,9 @@ def text_of(explanation: Explanation) -> str:
     """Return a text of the reward, the margin to the runner-up, and the ten largest contributions."""
     lines = [*_of_choice(explanation), *_of_targets(explanation), *_of_sensors(explanation)]
     reasons: dict[str, list[str]] = {}
-    for name, why in explanation.missing.items():
-        reasons.setdefault(why, []).append(name)
-    lines += [f"no {', '.join(names)}: {why}" for why, names in reasons.items()]
+    for name, reason in explanation.missing.items():
+        reasons.setdefault(reason, []).append(name)
+    lines += [f"no {', '.join(names)}: {reason}" for reason, names in reasons.items()]
     return "\n".join(part for line in lines for part in _wrapped(line))
 
 
@@ -217,15 +217,21 @@ def number_text(value: float, scale: float) -> str:
     return "0" if abs(value) <= _SAME * abs(scale) else f"{value:.4g}"
 
 
-def _of_choice(found: Explanation) -> list[str]:
-    if found.reward is None:
-        return [f"{found.planner}: {'; '.join(found.chosen)}"]
-    start = "" if found.baseline is None else f"; {number_text(found.baseline, found.reward)} without any scan"
-    lines = [f"{found.planner}: reward {with_error(found.reward, found.standard_error)}{start}"]
-    bound = "" if found.bound is None else f"; {found.bound}"
-    lines.append(f"{pluralise(found.evaluations, 'choice')} evaluated{bound}")
-    if found.runner_up is not None:
-        lines.append(f"runner-up: {margin_text(found.runner_up, found.reward)}: {found.runner_up.text}")
+def _of_choice(explanation: Explanation) -> list[str]:
+    if explanation.reward is None:
+        return [f"{explanation.planner}: {'; '.join(explanation.chosen)}"]
+    start = (
+        ""
+        if explanation.baseline is None
+        else f"; {number_text(explanation.baseline, explanation.reward)} without any scan"
+    )
+    lines = [f"{explanation.planner}: reward {with_error(explanation.reward, explanation.standard_error)}{start}"]
+    bound = "" if explanation.bound is None else f"; {explanation.bound}"
+    lines.append(f"{pluralise(explanation.evaluations, 'choice')} evaluated{bound}")
+    if explanation.runner_up is not None:
+        lines.append(
+            f"runner-up: {margin_text(explanation.runner_up, explanation.reward)}: {explanation.runner_up.text}"
+        )
     return lines
 
 
@@ -238,8 +244,8 @@ def margin_text(runner_up: RunnerUp, reward: float) -> str:
     return f"less by {with_error(runner_up.margin, runner_up.standard_error)}{apart}"
 
 
-def _of_targets(found: Explanation) -> list[str]:
-    gains = found.of_targets
+def _of_targets(explanation: Explanation) -> list[str]:
+    gains = explanation.of_targets
     if gains is None:
         return []
     lines = [f"{'target':18s}{'gain':>12s}{'existence':>14s}{'localisation':>15s}"]
@@ -252,23 +258,23 @@ def _of_targets(found: Explanation) -> list[str]:
             number_text(float(part[which].sum()), scale) for part in (gains.total, gains.existence, gains.localisation)
         )
         lines.append(f"{name:18s}{total:>12s}{existence:>14s}{localisation:>15s}")
-    if found.of_undetected:
-        gained = float(gains.total.sum()) + found.of_undetected
-        share = f"  {found.of_undetected / gained:.0%} of what is gained" if gained > 0.0 else ""
-        lines.append(f"{'not found before':18s}{found.of_undetected:12.4g}{share}")
-    if found.price:
-        lines.append(f"{'price':18s}{-found.price:12.4g}")
+    if explanation.of_undetected:
+        gained = float(gains.total.sum()) + explanation.of_undetected
+        share = f"  {explanation.of_undetected / gained:.0%} of what is gained" if gained > 0.0 else ""
+        lines.append(f"{'not found before':18s}{explanation.of_undetected:12.4g}{share}")
+    if explanation.price:
+        lines.append(f"{'price':18s}{-explanation.price:12.4g}")
     return lines
 
 
-def _of_sensors(found: Explanation) -> list[str]:
-    shares, without = found.of_sensors, found.without
+def _of_sensors(explanation: Explanation) -> list[str]:
+    shares, without = explanation.of_sensors, explanation.without
     if shares is None or without is None:
         return []
     lines = [f"{'sensor':8s}{'share':>12s}{'without it':>14s}  action"]
     order, rest = _most(shares)
     for s in sorted(order):
-        row = f"{s + 1:<8d}{shares[s]:12.4g}{without[s]:14.4g}  {found.chosen[s]}"
+        row = f"{s + 1:<8d}{shares[s]:12.4g}{without[s]:14.4g}  {explanation.chosen[s]}"
         lines.append(row if len(row) <= _WIDTH else f"{row[: _WIDTH - 3]}...")
     if rest:
         lines.append(f"{f'{len(rest)} more':8s}{float(shares[rest].sum()):12.4g}")

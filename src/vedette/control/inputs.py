@@ -65,10 +65,10 @@ def check_poses(poses: Any, num_sensors: int) -> Floats:
 
 def options_of(sensors: Sequence[MobileSensor], poses: Any, settings: PlanningSettings) -> tuple[Options, ...]:
     """Return the options of each sensor of a planner over the horizon; `InputError` for invalid poses or platforms."""
-    at, times, found = check_poses(poses, len(sensors)), settings.horizon_times(), []
+    at, times, options = check_poses(poses, len(sensors)), settings.horizon_times(), []
     for s, sensor in enumerate(sensors):
-        found.append(options_at(f"sensors[{s}].platform", sensor.platform, at[s], times, sensor.abilities))
-    return tuple(found)
+        options.append(options_at(f"sensors[{s}].platform", sensor.platform, at[s], times, sensor.abilities))
+    return tuple(options)
 
 
 def check_state(sensors: Sequence[MobileSensor], state: State) -> None:
@@ -177,7 +177,7 @@ def stationary_courses(options: Sequence[Options], mask: Mask | None) -> tuple[i
     position, then of all else except the remaining seconds of scanning; means over the horizon. If only some sensors
     may scan, the sensor is off.
     """
-    found = []
+    stationary = []
     for s, own in enumerate(options):
         off = np.abs(own.courses - own.pose)
         camera = len(own.pose) > HALF_WIDTH and own.pose[HALF_WIDTH] > 0.0
@@ -189,8 +189,8 @@ def stationary_courses(options: Sequence[Options], mask: Mask | None) -> tuple[i
         for change in (*(off[:, :, angle] for angle in angles), np.hypot(off[:, :, 0], off[:, :, 1]), rest):
             means = change.mean(axis=1)[left]
             left = left[means <= means.min() + _SAME_CHANGE * max(1.0, means.max())]
-        found.append(int(left[0]))
-    return tuple(found) if mask is None or mask.active is None else _silent(found, mask.active)
+        stationary.append(int(left[0]))
+    return tuple(stationary) if mask is None or mask.active is None else _silent(stationary, mask.active)
 
 
 def _silent(joint: Sequence[int], active: Active) -> tuple[int, ...]:

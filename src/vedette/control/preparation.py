@@ -137,8 +137,8 @@ def state_notes(
     """
     notes = []
     if settings.undetected_worth and not (sums and state.undetected is not None):
-        why = "the state has no intensity of them" if state.undetected is None else "rewards are no sums over labels"
-        notes.append(f"targets not found yet are not looked for: {why}")
+        reason = "the state has no intensity of them" if state.undetected is None else "rewards are no sums over labels"
+        notes.append(f"targets not found yet are not looked for: {reason}")
     for s, sensor in enumerate(sensors):
         if sensor.scan_times is not None and not sensor.scans(state.time, settings).any():
             notes.append(f"sensor {s + 1}: no scan within the horizon; all of its courses are worth the same")
@@ -168,19 +168,19 @@ def planning_beliefs(
     settings: PlanningSettings,
     reward: AnyReward,
     state: State,
-    why: str = "",
+    reason: str = "",
 ) -> PlanningBeliefs:
     """Return the beliefs in the form that they are planned on.
 
-    why: reason to convert GLMBs to LMBs in any case. Raises `InputError` for an invalid state.
+    reason: reason to convert GLMBs to LMBs in any case. Raises `InputError` for an invalid state.
     """
     check_state(sensors, state)
     if isinstance(reward, ExpectedLossReward):
-        return _planned_on_loss(fusion, state, why or "the expected loss asks for no more")
+        return _planned_on_loss(fusion, state, reason or "the expected loss asks for no more")
     num_sensors, beliefs, notes = len(sensors), (*state.local, state.fused), tuple[str, ...]()
     # A fusion that divides by the common prediction needs beliefs that have one.
     from_one = requires_common_prior(fusion)
-    if _has_glmb(beliefs) and (why := why or _why_lmbs(num_sensors, fusion, settings, beliefs)):
+    if _has_glmb(beliefs) and (reason := reason or _why_lmbs(num_sensors, fusion, settings, beliefs)):
         # Ambiguous labels are resolved only in a single belief; several beliefs would resolve them differently.
         as_planned = resolve_labels if from_one or len(set(map(id, beliefs))) == 1 else as_lmb
         converted: dict[int, LMB] = {}
@@ -189,7 +189,7 @@ def planning_beliefs(
                 converted[id(belief)] = as_planned(belief)
         local = state.local if from_one else tuple([converted[id(belief)] for belief in state.local])
         state = replace(state, local=local, fused=converted[id(state.fused)])
-        notes = (_PLANNED_ON_LMBS.format(why),)
+        notes = (_PLANNED_ON_LMBS.format(reason),)
         fusion = _of_lmbs(fusion)
     if from_one:
         state = replace(state, local=(state.fused,) * num_sensors)
@@ -199,14 +199,14 @@ def planning_beliefs(
     )
 
 
-def _planned_on_loss(fusion: Fusion, state: State, why: str) -> PlanningBeliefs:
+def _planned_on_loss(fusion: Fusion, state: State, reason: str) -> PlanningBeliefs:
     """Return the fused belief for all sensors: an LMB with the heaviest Gaussian of each label.
 
-    why: text of the note.
+    reason: text of the note.
     """
     fused, num_sensors, notes = state.fused, len(state.local), tuple[str, ...]()
     if _has_glmb((*state.local, fused)):
-        fused, fusion, notes = resolve_labels(fused), _of_lmbs(fusion), (_PLANNED_ON_LMBS.format(why),)
+        fused, fusion, notes = resolve_labels(fused), _of_lmbs(fusion), (_PLANNED_ON_LMBS.format(reason),)
     fused = at_dominant_components(fused)
     state = replace(state, local=(fused,) * num_sensors, fused=fused)
     return PlanningBeliefs(state, fusion, _PARALLEL.log_linear_pool(num_sensors), notes)

@@ -75,8 +75,8 @@ def joint_problem(evidence: Evidence, mask: Mask | None) -> JointProblem:
         return tuple(chosen.tolist())
 
     def bound() -> float:
-        most = upper_bound_by_target(evidence)
-        return np.inf if most is None else most[0]
+        target_bounds = upper_bound_by_target(evidence)
+        return np.inf if target_bounds is None else target_bounds[0]
 
     compiled = additive.coefficients is not None and allowed is not None
     return plain._replace(line=line, ascend=ascend if compiled else None, bound=bound)
@@ -136,8 +136,8 @@ def upper_bound(evidence: Evidence, choice: Sequence[int]) -> Bound | None:
     reward = evidence.mean_of(choice)
     if evidence.is_complete():
         return Bound(evidence.best, reward, "exhaustive")
-    most = upper_bound_by_target(evidence)
-    return None if most is None else Bound(most[0], reward, "by target", most[1])
+    target_bounds = upper_bound_by_target(evidence)
+    return None if target_bounds is None else Bound(target_bounds[0], reward, "by target", target_bounds[1])
 
 
 def upper_bound_by_target(evidence: Evidence) -> tuple[float, int] | None:

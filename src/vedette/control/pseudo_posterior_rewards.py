@@ -177,10 +177,10 @@ def _name(thing: Any) -> str:
 
 
 @functools.cache
-def warn_slow(why: str) -> None:
+def warn_slow(reason: str) -> None:
     """Warn, once per process, that rewards are computed one by one."""
     warnings.warn(
-        f"rewards are computed one by one: {SLOWER_BY} as by a PowerReward under a fusion that lays out; {why}",
+        f"rewards are computed one by one: {SLOWER_BY} as by a PowerReward under a fusion that lays out; {reason}",
         SlowRewardWarning,
         stacklevel=2,
     )

@@ -83,22 +83,22 @@ def _run_glmb(belief: GLMB, decision: Decision, settings: PlanningSettings, num_
     heaviest = heaviest_hypotheses(belief, settings.max_prior_hypotheses)
     single = heaviest.with_fields(tracks=single_gaussians(heaviest.tracks))
     prior = merge_similar_tracks(single, settings.max_version_divergence)
-    found, dim = label_sets(prior), prior.tracks.state_dim
-    set_offsets = offsets_of([len(labels) for labels in found.sets])
+    sets, dim = label_sets(prior), prior.tracks.state_dim
+    set_offsets = offsets_of([len(labels) for labels in sets.sets])
     results = GlmbResults(
         set_offsets,
-        np.empty((num_cases, len(found.sets))),
+        np.empty((num_cases, len(sets.sets))),
         np.empty((num_cases, int(set_offsets[-1]), dim)),
         np.empty((num_cases, int(set_offsets[-1]), dim, dim)),
     )
     kernel_prior = prior.to_kernel()
 
     def work(first: int, last: int) -> None:
-        pseudo_update_glmb(kernel_prior, found.groups, decision, first, last, results)
+        pseudo_update_glmb(kernel_prior, sets.groups, decision, first, last, results)
 
     with model_errors():
         run_chunks(work, num_cases, settings.threads())
-    return DensityBatch.of_glmbs(found.sets, results.log_weights, results.means, results.covs, **_counts(settings))
+    return DensityBatch.of_glmbs(sets.sets, results.log_weights, results.means, results.covs, **_counts(settings))
 
 
 def _run_lmb(
@@ -140,24 +140,26 @@ def _counts(settings: PlanningSettings) -> dict[str, int]:
     return {"num_samples": settings.num_samples, "num_threads": settings.threads()}
 
 
-def heaviest_hypotheses(belief: GLMB, most: int) -> GLMB:
-    """Return the `most` heaviest hypotheses of positive weight, normalised; of equal weights the first."""
-    order = np.argsort(-belief.hyp_log_weights, kind="stable")[:most]
+def heaviest_hypotheses(belief: GLMB, max_hypotheses: int) -> GLMB:
+    """Return the `max_hypotheses` heaviest hypotheses of positive weight, normalised; of equal weights the first."""
+    order = np.argsort(-belief.hyp_log_weights, kind="stable")[:max_hypotheses]
     taken = take_hypotheses(belief, order[belief.hyp_log_weights[order] > -np.inf])
     log_weights = taken.hyp_log_weights - log_sum(for_kernel(taken.hyp_log_weights))
     return taken.with_fields(hyp_log_weights=log_weights)
 
 
-def merge_similar_tracks(belief: GLMB, most: float) -> GLMB:
-    """Return the belief with tracks of a label replaced by a track from which they diverge by at most `most` nats.
+def merge_similar_tracks(belief: GLMB, max_divergence: float) -> GLMB:
+    """Return the belief with tracks of a label replaced by one from which they diverge by at most `max_divergence`.
 
     belief: one Gaussian per track, its hypotheses heaviest first. The tracks of heavier hypotheses stay, and those of
     lighter ones are replaced by the first of them that is near enough. Hypotheses that then have the same tracks are
-    merged, and their weights are added. most: 0 leaves everything unchanged.
+    merged, and their weights are added. max_divergence: in nats; 0 leaves everything unchanged.
     """
-    if most == 0.0 or len(belief.hyp_tracks) == 0:
+    if max_divergence == 0.0 or len(belief.hyp_tracks) == 0:
         return belief
-    return with_replaced_tracks(belief, _leaders(belief, _divergences(belief.tracks.means, belief.tracks.covs), most))
+    return with_replaced_tracks(
+        belief, _leaders(belief, _divergences(belief.tracks.means, belief.tracks.covs), max_divergence)
+    )
 
 
 def _divergences(means: Floats, covs: Floats) -> Floats:
@@ -169,13 +171,13 @@ def _divergences(means: Floats, covs: Floats) -> Floats:
     return np.asarray(0.5 * (traces + squares - means.shape[1] + log_dets - log_dets[:, np.newaxis]))
 
 
-def _leaders(belief: GLMB, divergences: Floats, most: float) -> Ints:
+def _leaders(belief: GLMB, divergences: Floats, max_divergence: float) -> Ints:
     """Return (num_tracks,) the track that replaces each; its own index if it stays, or if no hypothesis has it."""
     labels, leaders = belief.tracks.labels.tolist(), np.arange(belief.tracks.num_tracks)
     known: dict[tuple[int, ...], list[int]] = {}
     for track in dict.fromkeys(belief.hyp_tracks.tolist()):
         own = known.setdefault(tuple(labels[track]), [])
-        near = [leader for leader in own if divergences[track, leader] <= most]
+        near = [leader for leader in own if divergences[track, leader] <= max_divergence]
         if near:
             leaders[track] = near[0]
         else:

@@ -36,9 +36,9 @@ FIRST_ROUND = 8
 _GROWTH = 1.5
 
 
-def next_total(num_samples: int, most: int) -> int:
+def next_total(num_samples: int, max_samples: int) -> int:
     """Return the total number of samples after the next round, from the present number."""
-    return min(most, FIRST_ROUND if num_samples == 0 else math.ceil(_GROWTH * num_samples))
+    return min(max_samples, FIRST_ROUND if num_samples == 0 else math.ceil(_GROWTH * num_samples))
 
 
 @dataclass(slots=True, eq=False)

@@ -175,7 +175,7 @@ def scans_within(
     sensors: Sequence[MobileSensor], options: Sequence[Options], now: float | None, settings: PlanningSettings
 ) -> tuple[Bools, ...]:
     """Return for each sensor (num_courses, horizon_steps) the pseudo-updates at which it scans."""
-    found = []
+    scans = []
     for sensor, own in zip(sensors, options, strict=True):
-        found.append(own.scans if sensor.scan_times is None else own.scans & sensor.scans(now, settings))
-    return tuple(found)
+        scans.append(own.scans if sensor.scan_times is None else own.scans & sensor.scans(now, settings))
+    return tuple(scans)

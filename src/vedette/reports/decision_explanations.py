@@ -25,28 +25,32 @@ def explanation_data(plan: Plan, names: Sequence[str] = ()) -> dict[str, Any] | 
     others; the gain from targets not detected before; the cost of the actions; and for each sensor its number, action,
     share, and the reward without it.
     """
-    why = plan.explanation
-    if why is None or why.reward is None:
+    explanation = plan.explanation
+    if explanation is None or explanation.reward is None:
         return None
     return {
-        "facts": _facts(plan, why, why.reward, names or [f"sensor {s + 1}" for s in range(plan.num_sensors)]),
-        **({"targets": [], "more": None} if why.of_targets is None else _targets(why.of_targets)),
-        "undetected": _number(why.of_undetected or 0.0),
-        "price": _number(why.price),
-        "sensors": _sensors(plan, why),
+        "facts": _facts(
+            plan, explanation, explanation.reward, names or [f"sensor {s + 1}" for s in range(plan.num_sensors)]
+        ),
+        **({"targets": [], "more": None} if explanation.of_targets is None else _targets(explanation.of_targets)),
+        "undetected": _number(explanation.of_undetected or 0.0),
+        "price": _number(explanation.price),
+        "sensors": _sensors(plan, explanation),
     }
 
 
-def _facts(plan: Plan, why: Explanation, reward: float, names: Sequence[str]) -> list[tuple[str, str]]:
-    start = "" if why.baseline is None else f"; {number_text(why.baseline, reward)} without any scan"
-    facts = [("Reward", f"{with_error(reward, why.standard_error, '±')}{start}")]
-    if why.runner_up is not None:
-        facts.append(("Second best", f"{_margin(why.runner_up, reward)}: {_others(plan, why.runner_up, names)}"))
-    facts.append(("Evaluated", pluralise(why.evaluations, "choice")))
-    if why.bound is not None:
-        facts.append(("Bound", str(why.bound)))
+def _facts(plan: Plan, explanation: Explanation, reward: float, names: Sequence[str]) -> list[tuple[str, str]]:
+    start = "" if explanation.baseline is None else f"; {number_text(explanation.baseline, reward)} without any scan"
+    facts = [("Reward", f"{with_error(reward, explanation.standard_error, '±')}{start}")]
+    if explanation.runner_up is not None:
+        facts.append(
+            ("Second best", f"{_margin(explanation.runner_up, reward)}: {_others(plan, explanation.runner_up, names)}")
+        )
+    facts.append(("Evaluated", pluralise(explanation.evaluations, "choice")))
+    if explanation.bound is not None:
+        facts.append(("Bound", str(explanation.bound)))
     reasons: dict[str, list[str]] = {}
-    for name, reason in why.missing.items():
+    for name, reason in explanation.missing.items():
         if name in _WORDS:
             reasons.setdefault(reason, []).append(_WORDS[name])
     return facts + [("Not known", f"{', '.join(names)}: {reason}") for reason, names in reasons.items()]
@@ -56,8 +60,8 @@ def _margin(runner_up: RunnerUp, reward: float) -> str:
     if abs(runner_up.margin) <= _SAME * max(1.0, abs(reward)):
         return "as good"
     ratio = runner_up.in_standard_errors
-    apart = "" if ratio is None or math.isinf(ratio) else f", {ratio:.2g} standard errors"
-    return f"less by {with_error(runner_up.margin, runner_up.standard_error, '±')}{apart}"
+    standard_errors = "" if ratio is None or math.isinf(ratio) else f", {ratio:.2g} standard errors"
+    return f"less by {with_error(runner_up.margin, runner_up.standard_error, '±')}{standard_errors}"
 
 
 def _others(plan: Plan, runner_up: RunnerUp, names: Sequence[str]) -> str:
@@ -71,24 +75,24 @@ def _others(plan: Plan, runner_up: RunnerUp, names: Sequence[str]) -> str:
 
 def _targets(gains: TargetGains) -> dict[str, Any]:
     order = np.argsort(-np.abs(gains.total), kind="stable")
-    most, rest = order[:_MOST_TARGETS].tolist(), order[_MOST_TARGETS:].tolist()
+    largest, rest = order[:_MOST_TARGETS].tolist(), order[_MOST_TARGETS:].tolist()
     least = _SAME * float(np.abs(gains.total).max(initial=0.0))  # smaller gains are rounding
 
     def gained(which: list[int]) -> tuple[float, float]:
         existence, localisation = float(gains.existence[which].sum()), float(gains.localisation[which].sum())
         return _number(existence, least), _number(localisation, least)
 
-    shown = [(".".join(map(str, gains.labels[i].tolist())), *gained([i])) for i in most]
+    shown = [(".".join(map(str, gains.labels[i].tolist())), *gained([i])) for i in largest]
     return {"targets": shown, "more": (len(rest), *gained(rest)) if rest else None}
 
 
-def _sensors(plan: Plan, why: Explanation) -> list[tuple[int, str, float, float]]:
-    if why.of_sensors is None or why.without is None:
+def _sensors(plan: Plan, explanation: Explanation) -> list[tuple[int, str, float, float]]:
+    if explanation.of_sensors is None or explanation.without is None:
         return []
     return [
         (s, describe_action(rounded(own.columns, own.values[chosen])), _number(share), _number(without))
         for s, (own, chosen, share, without) in enumerate(
-            zip(plan.actions, plan.chosen, why.of_sensors.tolist(), why.without.tolist(), strict=True)
+            zip(plan.actions, plan.chosen, explanation.of_sensors.tolist(), explanation.without.tolist(), strict=True)
         )
     ]
 

@@ -167,11 +167,11 @@ def _rewards(strategy: Strategy) -> Figure | None:
 
 def typical_records(group: Group) -> tuple[tuple[Strategy, RunRecord], ...]:
     """Return for each strategy the run with the median of the mean OSPA; without a comparison its first run."""
-    found = []
+    typical = []
     for strategy in group.strategies:
         place = 0 if group.comparison is None else typical_run(group.comparison, strategy.label)
-        found.append((strategy, strategy.record(int(strategy.ensemble.runs[place]))))
-    return tuple(found)
+        typical.append((strategy, strategy.record(int(strategy.ensemble.runs[place]))))
+    return tuple(typical)
 
 
 def paired_records(group: Group) -> tuple[tuple[Strategy, RunRecord], ...]:

@@ -71,8 +71,8 @@ def forest_of(group: Group) -> Forest | None:
     comparison = group.comparison
     if comparison is None or len(comparison.strategies) < 2:
         return None
-    found = compare_with_first(comparison)
-    shown = [value for each in found for value in (each.mean, each.low, each.high) if math.isfinite(value)]
+    comparisons = compare_with_first(comparison)
+    shown = [value for each in comparisons for value in (each.mean, each.low, each.high) if math.isfinite(value)]
     ticks = [
         float(tick) for tick in MaxNLocator(5, steps=[1, 2, 5, 10]).tick_values(min(0.0, *shown), max(0.0, *shown))
     ]
@@ -86,7 +86,7 @@ def forest_of(group: Group) -> Forest | None:
     texts = [with_error(float(each.mean), float(each.standard_error)) for each in errors]
     strategies = group.strategies
     rows = [ForestRow(strategies[0].name, strategies[0].words, 0, texts[0])]
-    for index, each in enumerate(found, start=1):
+    for index, each in enumerate(comparisons, start=1):
         rows.append(
             ForestRow(
                 each.second,

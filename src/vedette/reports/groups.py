@@ -92,10 +92,10 @@ class Group:
 def comparison_groups(results: CampaignResults) -> Iterator[Group]:
     """Yield every group in the order of the specification, reading its runs when it is reached."""
     campaign = results.campaign
-    taken: set[str] = set()
+    used_slugs: set[str] = set()
     for cells in campaign.groups():
         shared = {axis: value for axis, value in cells[0].settings.items() if axis != campaign.compare}
-        taken.add(name := unique_name(_slug(campaign, shared), taken))
+        used_slugs.add(name := unique_name(_slug(campaign, shared), used_slugs))
         yield _group(results, cells, name, _title(campaign, cells[0]))
 
 

@@ -45,9 +45,9 @@ def strategy_diagnostics(strategy: Strategy) -> Iterator[Diagnostic]:
     yield from diagnostics(summarise_health(strategy.ensemble.health, strategy.scene.names))
 
 
-def failed_checks(found: Sequence[Diagnostic]) -> tuple[str, ...]:
+def failed_checks(diagnostics: Sequence[Diagnostic]) -> tuple[str, ...]:
     """Return name and result of the checks that may cost accuracy."""
-    return tuple(f"{each.name}: {each.text}" for each in found if each.level == "check")
+    return tuple(f"{each.name}: {each.text}" for each in diagnostics if each.level == "check")
 
 
 def _missed(strategy: Strategy) -> Diagnostic:
@@ -61,8 +61,8 @@ def _missed(strategy: Strategy) -> Diagnostic:
     share = float(missed.sum() / alive.sum())
     shares = missed / np.maximum(alive, 1.0)
     worst = int(np.argmax(shares))
-    most = f", run {ensemble.runs[worst]}: {percent(shares[worst])}" if share and ensemble.num_runs > 1 else ""
-    return Diagnostic(name, meaning, f"{percent(share)}{most}", "check" if share >= _TRIFLE else "ok")
+    worst_run = f", run {ensemble.runs[worst]}: {percent(shares[worst])}" if share and ensemble.num_runs > 1 else ""
+    return Diagnostic(name, meaning, f"{percent(share)}{worst_run}", "check" if share >= _TRIFLE else "ok")
 
 
 def _consistency(strategy: Strategy) -> Diagnostic:

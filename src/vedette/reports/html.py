@@ -105,14 +105,14 @@ def write_report(
         sections.append(section_of(group, f"g{number}", is_brief))
         runs += _replays(results, group, replays, trust)
     sweeps = _inline_figures(tuple(sweep_drawings(results.campaign, errors)), "sweep")
-    kept = _within(runs, MAX_REPLAY_BYTES) if replays is None else runs
+    shown_replays = _within(runs, MAX_REPLAY_BYTES) if replays is None else runs
     untrusted = () if trust else replay_code(results)
     campaign = results.campaign
-    made = last_version_and_date(results.manifest)
+    version_and_date = last_version_and_date(results.manifest)
     page = render(
         "report.html",
-        kept,
-        left_out=len(runs) - len(kept),
+        shown_replays,
+        left_out=len(runs) - len(shown_replays),
         untrusted=untrusted,
         campaign=campaign,
         folder=shlex.quote(campaign.default_folder),
@@ -127,8 +127,8 @@ def write_report(
         spec=spec_toml(campaign.spec),
         versions=versions_table(results.manifest),
         digest=results.manifest["digest"],
-        made=made,
-        citation=citation(made[0], made[1][:4]),
+        made=version_and_date,
+        citation=citation(version_and_date[0], version_and_date[1][:4]),
     )
     write_page(target, page)
 
@@ -230,15 +230,15 @@ def section_of(group: Group, prefix: str, is_brief: bool = False) -> _Section:
 def _inline_figures(
     drawings: Sequence[Drawing], prefix: str, names: Mapping[str, str] | None = None
 ) -> tuple[tuple[Drawing, Markup], ...]:
-    found = []
+    inlined = []
     for number, each in enumerate(drawings):
-        told = f"{each.title}. {each.caption}"
-        shown = inline_svg(each.figure, f"{prefix}-{number}", told, names)
+        description = f"{each.title}. {each.caption}"
+        shown = inline_svg(each.figure, f"{prefix}-{number}", description, names)
         if len(shown) <= MAX_DRAWING_BYTES:
-            found.append((each, shown))
+            inlined.append((each, shown))
         else:
-            found.append((replace(each, caption=f"{each.caption} {_IN_DOTS}"), inline_png(each.figure, told)))
-    return tuple(found)
+            inlined.append((replace(each, caption=f"{each.caption} {_IN_DOTS}"), inline_png(each.figure, description)))
+    return tuple(inlined)
 
 
 def _replays(
@@ -261,14 +261,14 @@ def _replays(
     ]
 
 
-def _within(runs: Sequence[dict[str, Any]], most: int) -> list[dict[str, Any]]:
+def _within(runs: Sequence[dict[str, Any]], max_bytes: int) -> list[dict[str, Any]]:
     """Return the runs that fit within a number of bytes, in order."""
-    kept, size = [], 0
+    fitting, size = [], 0
     for run in runs:
         size += len(_json(run))
-        if size <= most:
-            kept.append(run)
-    return kept
+        if size <= max_bytes:
+            fitting.append(run)
+    return fitting
 
 
 def _json(data: Any) -> str:
@@ -278,7 +278,7 @@ def _json(data: Any) -> str:
 
 
 def render(
-    template: str, replays: Sequence[dict[str, Any]], *, scripts: Sequence[str] = ("scripts",), **told: Any
+    template: str, replays: Sequence[dict[str, Any]], *, scripts: Sequence[str] = ("scripts",), **context: Any
 ) -> str:
     """Return a page of `template` with runs to replay, folders of scripts, and the other variables of the template."""
     script = _script(scripts)
@@ -295,7 +295,7 @@ def render(
         style=Markup((_FILES / "report.css").read_text("utf-8")),
         script=Markup(script),
         script_hash=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
-        **{"left_out": 0, "sections": (), "live": False, "together": False, **told},
+        **{"left_out": 0, "sections": (), "live": False, "together": False, **context},
     )
 
 

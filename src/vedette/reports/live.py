@@ -114,8 +114,8 @@ class LiveScreen:
         timeline = state.timeline
         belief, poses = timeline.state, timeline.poses
         time = None if state.start is None or belief.time is None else belief.time + state.start
-        found = None if time is None else self.live.estimate(belief.fused, belief.step)
-        extent = self._extent(poses[:, :2], np.empty((0, 2)) if found is None else found.means[:, :2])
+        estimates = None if time is None else self.live.estimate(belief.fused, belief.step)
+        extent = self._extent(poses[:, :2], np.empty((0, 2)) if estimates is None else estimates.means[:, :2])
         places = decimals_for(extent)
         frame = {
             "scene": self._scene,
@@ -123,8 +123,8 @@ class LiveScreen:
             "utc": 0.0 if state.is_utc else None,
             "extent": rounded_list(extent, places),
             "estimates": []
-            if found is None
-            else [[*estimate_data(found, i, places), 0, 0.0] for i in range(len(found.labels))],
+            if estimates is None
+            else [[*estimate_data(estimates, i, places), 0, 0.0] for i in range(len(estimates.labels))],
             "poses": [pose_data(*each, places) for each in zip(poses, self._sections, strict=True)],
             "scans": self._scans(timeline, places),
             "decision": self._decision_data(poses),
@@ -174,8 +174,8 @@ class LiveScreen:
         plan = self._planner.last
         if plan is not None and plan is not self._decided[0]:
             axes = dict[str, dict[str, Any]]()
-            told = decision_data(Decision(1, 0.0, poses, plan.without_evidence(explained=True)), axes, self._names)
-            self._decided = (plan, {**told, "axes": list(axes.values()), "number": self._planner.num_plans})
+            data = decision_data(Decision(1, 0.0, poses, plan.without_evidence(explained=True)), axes, self._names)
+            self._decided = (plan, {**data, "axes": list(axes.values()), "number": self._planner.num_plans})
         return self._decided[1]
 
     def _health(self, timeline: Timeline) -> str:

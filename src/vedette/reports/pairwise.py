@@ -75,8 +75,8 @@ def _comparison(
     sentence = _SENTENCES[verdict](*names, paired, unit)
     sentence = sentence[0].upper() + sentence[1:]
     if number > 1 and verdict != "unknown":
-        told = "< 0.001" if p_value < 0.001 else f"= {p_value:.2g}"
-        sentence = f"{sentence[:-1]} (p {told} among {number} comparisons)."
+        p_text = "< 0.001" if p_value < 0.001 else f"= {p_value:.2g}"
+        sentence = f"{sentence[:-1]} (p {p_text} among {number} comparisons)."
     mean, low, high = (float(each) for each in (paired.summary.mean, paired.summary.low, paired.summary.high))
     share = "unknown" if verdict == "unknown" else percent(paired.win_rate)
     interval = "" if verdict == "unknown" else f" ({low:+.2f} to {high:+.2f})"

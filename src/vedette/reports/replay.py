@@ -47,7 +47,7 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
     sensors = [sensor_data(name, section) for name, section in zip(names, sections, strict=True)]
     has_velocity = scenario.model.motion.kind != "custom"
     is_known, origin = scenario.model.targets.kind != "unknown", scenario.model.origin
-    told = recording_metadata(record, scenario)
+    metadata = recording_metadata(record, scenario)
     axes = dict[str, dict[str, Any]]()
     decisions = [decision_data(each, axes, names) for each in record.decisions]
     return {
@@ -72,8 +72,8 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
         "scans": _scans(record, scenario, places, trust),
         "recorded": scenario.model.recording is not None,
         "known": is_known,
-        "names": told.names,
-        "utc": told.start if told.is_utc else None,
+        "names": metadata.names,
+        "utc": metadata.start if metadata.is_utc else None,
         "origin": None if origin is None else [origin.lon, origin.lat],
         **({"compass": True} if scenario.model.by_compass else {}),
         "ospa": [rounded_list(parts, 2) for parts in record.ospa] if is_known else [],
@@ -122,23 +122,23 @@ def sensor_data(name: str, section: SensorSection) -> dict[str, Any]:
 
     `unturned` is the heading (rad) of a stationary sensor with a uniform view, which has no meaning.
     """
-    found: dict[str, Any] = {"name": name, "kind": PLANE_SHAPES.get(section.measurement.kind, "none")}
+    data: dict[str, Any] = {"name": name, "kind": PLANE_SHAPES.get(section.measurement.kind, "none")}
     if section.platform.kind == "still" and section.detection.kind in ("constant", "gaussian", "limited_range"):
-        found["unturned"] = round(math.radians(section.heading_deg), 4)
+        data["unturned"] = round(math.radians(section.heading_deg), 4)
     if section.detection.kind in ("limited_range", "limited_sector", "soft_sector"):
-        found["range"] = section.detection.max_range
+        data["range"] = section.detection.max_range
     if section.detection.kind in ("limited_sector", "soft_sector"):
-        found["half_width"] = round(math.radians(section.detection.half_width_deg), 4)
-    return found
+        data["half_width"] = round(math.radians(section.detection.half_width_deg), 4)
+    return data
 
 
 def pose_data(pose: Floats, section: SensorSection, places: int) -> list[float]:
     """Return position and heading; for a camera also its field of view: middle and half width in rad, reach in m."""
-    found = [*rounded_list(pose[:2], places), round(float(pose[2]), 4)]
+    pose_numbers = [*rounded_list(pose[:2], places), round(float(pose[2]), 4)]
     if section.detection.kind == "camera":
         field = field_of_view(section, pose.tolist())
-        found += [] if field is None else [*rounded_list(field[:2], 4), round(field.reach, places)]
-    return found
+        pose_numbers += [] if field is None else [*rounded_list(field[:2], 4), round(field.reach, places)]
+    return pose_numbers
 
 
 def _targets(record: RunRecord, scan: int, places: int, has_velocity: bool) -> list[list[float]]:
@@ -169,14 +169,14 @@ def _estimates(record: RunRecord, scenario: Scenario, places: int) -> list[list[
             strict=True,
         )
     }
-    found = []
+    estimates = []
     for scan, estimate in enumerate(record.estimates):
         rows: list[list[Any]] = []
         for place, label in enumerate(estimate.labels.tolist()):
             partner = partners.get((scan, *label, *estimate.means[place, :2].tolist()), (0, 0.0))
             rows.append([*estimate_data(estimate, place, places), *partner])
-        found.append(rows)
-    return found
+        estimates.append(rows)
+    return estimates
 
 
 def _heights(record: RunRecord) -> dict[str, Any]:

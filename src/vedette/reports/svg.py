@@ -73,7 +73,7 @@ def _adapted(tag: str, prefix: str) -> str:
     """Return a tag with unique ids, the page's colours, and numbers rounded to a hundredth of a point."""
     tag = re.sub(r'\bid="', f'id="{prefix}-', tag)
     tag = re.sub(r'(href="#|url\(#)', rf"\g<1>{prefix}-", tag)
-    tag = _COLOUR.sub(lambda found: _NAMES[found.group().lower()], tag)
+    tag = _COLOUR.sub(lambda match: _NAMES[match.group().lower()], tag)
     return _LONG_NUMBER.sub(r"\1", tag).replace(" \n", " ")
 
 

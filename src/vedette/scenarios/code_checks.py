@@ -40,7 +40,7 @@ def _diagnostics(scenario: Scenario) -> Iterator[Diagnostic]:
     with_paths = list(custom_objects(scenario.model))
     places = {id(section): path for path, section in with_paths}
     separate = [section for _, section in with_paths if section.field not in _COMPOSITE_PARTS]
-    attempts: list[Callable[[], Any]] = [partial(section.made, scenario.folder) for section in separate]
+    attempts: list[Callable[[], Any]] = [partial(section.instantiate, scenario.folder) for section in separate]
     attempts += [partial(build_planner, scenario, name) for name in scenario.model.planners]
     attempts += [partial(_plan, scenario), partial(_track, scenario)]
     for build in attempts:

@@ -53,14 +53,14 @@ def _content_findings(recorded: RecordedTargets, model: ScenarioModel, folder: F
 
     If scans or region are faulty, only the columns are checked.
     """
-    found = list[Finding]()
+    findings = list[Finding]()
     if all(map(is_complete, (recorded, model.region, model.time))):
         try:
             recorded.source(model, folder).truth(model.time.build(), rng=np.random.default_rng(0))
             return
         except InputError as error:
-            found = [(("targets", "path"), "a file of recorded targets that a run can use", str(error))]
-    yield from list(_column_findings(recorded, folder / recorded.path)) or found
+            findings = [(("targets", "path"), "a file of recorded targets that a run can use", str(error))]
+    yield from list(_column_findings(recorded, folder / recorded.path)) or findings
 
 
 def _column_findings(recorded: RecordedTargets, file: FilePath) -> Iterator[Finding]:
@@ -81,9 +81,9 @@ def _column_findings(recorded: RecordedTargets, file: FilePath) -> Iterator[Find
     from vedette.recorded.opensky import is_opensky
     from vedette.recorded.reports import usual_names
 
-    if not recorded.columns.given() and is_opensky(header):
+    if not recorded.columns.to_arguments() and is_opensky(header):
         return
-    given, shown = usual_names(header) | recorded.columns.given(), column_names(header)
+    given, shown = usual_names(header) | recorded.columns.to_arguments(), column_names(header)
     for key, name in given.items():
         if name not in header:
             yield ("targets", "columns", key), f"a column of {shown_key(recorded.path)}: {shown}", describe(name)

@@ -101,9 +101,10 @@ def crowd_text(crowd: GeneratedCrowd) -> str:
 
 
 def _summary(crowd: GeneratedCrowd) -> str:
-    seen = "the position" if crowd.measured == "position" else "bearing and range"
+    measurement = "the position" if crowd.measured == "position" else "bearing and range"
     return (
-        f"A crowd of {crowd.num_targets:,} targets, {crowd.density:g} a km^2; one still sensor measures {seen} of each."
+        f"A crowd of {crowd.num_targets:,} targets, {crowd.density:g} a km^2; "
+        f"one still sensor measures {measurement} of each."
     )
 
 

@@ -27,13 +27,13 @@ def _describe_fault(place: tuple[float, float], areas: Sequence[tuple[str, Seque
 
     The edges of `keep_out` and of its holes are forbidden, that of `stay_inside` is not.
     """
-    found = {kind for kind, corners in areas if _is_inside(*place, corners)}
+    containing = {kind for kind, corners in areas if _is_inside(*place, corners)}
     edges = {kind for kind, corners in areas if kind != COAST and _is_on_edge(*place, corners)}
     outside = any(k == INSIDE and not (_is_inside(*place, c) or _is_on_edge(*place, c)) for k, c in areas)
     follows = "and its first decisions lead it back as far as they can"
     if edges & {NO_GO, HOLE}:
         return f"on the edge of an area that control.constraints keep it out of, {follows}"
-    if NO_GO in found and HOLE not in found:
+    if NO_GO in containing and HOLE not in containing:
         return f"inside an area that control.constraints keep it out of, {follows}"
     if outside:
         return f"outside the area that control.constraints keep it inside, {follows}"

@@ -211,9 +211,9 @@ def _bias(section: BiasSection) -> str:
 
 def _true_differences(sensor: Sensor) -> list[tuple[str, str]]:
     """Return its bias if not 0, its true models if given, and its scan times if it does not scan at every step."""
-    found, truth = [], sensor.truth
+    differences, truth = [], sensor.truth
     if sensor.bias != BiasSection():
-        found.append(("bias", _bias(sensor.bias)))
+        differences.append(("bias", _bias(sensor.bias)))
     if truth is not None:
         parts = {name: getattr(truth, name) for name in type(truth).model_fields}
         sections = [(name, value) for name, value in parts.items() if isinstance(value, Section)]
@@ -221,18 +221,18 @@ def _true_differences(sensor: Sensor) -> list[tuple[str, str]]:
             "noise": partial(_noise, measured=sensor.measurement.kind),
             "bias": _bias,
         }
-        found += [
+        differences += [
             (f"true {name_in_words(name)}", special[name](value) if name in special else describe_settings(value))
             for name, value in sections
         ]
-        found += [("detection of", "the measurement")] if truth.detection_of == "measurement" else []
+        differences += [("detection of", "the measurement")] if truth.detection_of == "measurement" else []
     scans = sensor.scans
     if scans.period is not None:
-        found.append(("scans", f"every {scans.period:g} s from {scans.offset or 0.0:g} s on"))
+        differences.append(("scans", f"every {scans.period:g} s from {scans.offset or 0.0:g} s on"))
     elif scans.every > 1:
-        found.append(("scans", f"every {scans.every} steps from step {scans.first}"))
+        differences.append(("scans", f"every {scans.every} steps from step {scans.first}"))
     if sensor.scans.drop_out:
-        found.append(("drop-outs", f"{sensor.scans.drop_out:g} of its scans"))
+        differences.append(("drop-outs", f"{sensor.scans.drop_out:g} of its scans"))
     if sensor.scans.late is not None:
-        found.append(("late", describe_settings(sensor.scans.late)))
-    return found
+        differences.append(("late", describe_settings(sensor.scans.late)))
+    return differences

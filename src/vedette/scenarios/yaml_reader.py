@@ -53,9 +53,9 @@ class Document:
     def place(self, path: Path) -> Place:
         """Return the place of the key (or list item) at `path`, or of the nearest key or value around it."""
         for length in range(len(path), 0, -1):
-            found = self.key_places.get(path[:length]) or self.value_places.get(path[:length])
-            if found:
-                return found
+            place = self.key_places.get(path[:length]) or self.value_places.get(path[:length])
+            if place:
+                return place
         return self.value_places.get((), (1, 1))
 
     def value_place(self, path: Path) -> Place:
@@ -215,8 +215,8 @@ def _document_start(events: Iterator[Any]) -> Any:
 
 def _place_of_escape(text: str) -> Place:
     """Return the place of the first escape beyond the last Unicode letter, U+10FFFF."""
-    found = _NO_LETTER.search(text)
-    before = text[: found.start()] if found else ""
+    match = _NO_LETTER.search(text)
+    before = text[: match.start()] if match else ""
     return before.count("\n") + 1, len(before) - before.rfind("\n")
 
 

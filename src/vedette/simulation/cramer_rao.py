@@ -47,13 +47,13 @@ class CovarianceRecursion:
         costs = np.zeros(len(actions))
         beliefs: list[Floats] = [np.broadcast_to(own, (len(actions), *own.shape)) for own in covs]
         for k, (moved, noise) in enumerate(zip(self.transitions, self.noises, strict=True)):
-            said = [own[actions[:, s], k] for s, own in enumerate(self.sensor_information)]
+            information = [own[actions[:, s], k] for s, own in enumerate(self.sensor_information)]
             infos: list[Floats] = [_inverse(moved @ own @ moved.swapaxes(-1, -2) + noise) for own in beliefs]
             if self.one_belief:
-                beliefs = [_inverse(infos[0] + self._summed(said))]
+                beliefs = [_inverse(infos[0] + self._summed(information))]
                 fused = beliefs[0]
             else:
-                infos = [own + scan for own, scan in zip(infos, said, strict=True)]
+                infos = [own + scan for own, scan in zip(infos, information, strict=True)]
                 beliefs = [_inverse(own) for own in infos]
                 fused = _inverse(self._summed(infos))
             errors = np.sqrt(fused[..., 0, 0] + fused[..., 1, 1])
@@ -84,8 +84,8 @@ def scan_information(sensor: SensorModel, states: Floats, pose: Floats) -> Float
     change[..., angular] = np.remainder(change[..., angular] + np.pi, 2.0 * np.pi) - np.pi
     jacobians = change.transpose(1, 2, 0) / (2.0 * _STEP)
     weights = np.linalg.inv(sensor.noise.covs(states, pose, sensor.meas_dim))
-    seen = sensor.detection.prob(states, pose)[:, np.newaxis, np.newaxis]
-    return np.asarray(seen * (jacobians.swapaxes(1, 2) @ weights @ jacobians))
+    detection = sensor.detection.prob(states, pose)[:, np.newaxis, np.newaxis]
+    return np.asarray(detection * (jacobians.swapaxes(1, 2) @ weights @ jacobians))
 
 
 def _shifted(states: Floats) -> Floats:

@@ -89,13 +89,13 @@ def decision_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[str
                 own.append({"sensor": sensor, "action": rows.pop(f"action_{sensor}"), **rows})
     start, end = (*DECISION, "reward_table"), ("reward", "reward_se", "chosen")
     names = (*start, *(f"action_{sensor}" for sensor in range(num_sensors)), *end)
-    found = {
+    columns = {
         "decisions": stacked(of_decisions, DECISION_TABLES["decisions"]),
         "actions": _actions(decisions),
         "rewards": stacked(joint, DECISION_TABLES["rewards"], names),
     }
     layout = OWN_REWARDS["own_rewards"]
-    return {**found, "own_rewards": stacked(own, layout, list(layout.fixed))} if own else found
+    return {**columns, "own_rewards": stacked(own, layout, list(layout.fixed))} if own else columns
 
 
 def _counts(plan: Plan) -> dict[str, int]:
@@ -175,8 +175,8 @@ def _plan(
         room -= tables[number].mean.size
     if set(tables) != set(range(len(tables))):
         raise InputError("column reward_table: expected rows of every number from 0")
-    found = tuple(tables[number] for number in range(len(tables)))
-    return Plan(planner, tuple(options), tuple(chosen), found, counts, tuple(notes.splitlines()))
+    reward_tables = tuple(tables[number] for number in range(len(tables)))
+    return Plan(planner, tuple(options), tuple(chosen), reward_tables, counts, tuple(notes.splitlines()))
 
 
 def _own_table(rewards: Mapping[str, Any], rows: slice, num_actions: tuple[int, ...], room: int) -> RewardTable:

@@ -55,25 +55,29 @@ def explanation_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[
 
     Raises `InputError` for explanations with another number of sensors.
     """
-    found = [(number, each, each.plan.explanation) for number, each in enumerate(decisions)]
-    kept = [(number, each, why) for number, each, why in found if why is not None]
-    for _, _, why in kept:
+    explained = [(number, each, each.plan.explanation) for number, each in enumerate(decisions)]
+    stored = [(number, each, explanation) for number, each, explanation in explained if explanation is not None]
+    for _, _, explanation in stored:
         for name in ("of_sensors", "without"):
-            values = getattr(why, name)
+            values = getattr(explanation, name)
             if values is not None and np.shape(values) != (num_sensors,):
                 raise InputError(f"plan.explanation.{name}: expected {num_sensors} numbers; got {np.shape(values)}")
-    priced = ("price",) if any(why.price for _, _, why in kept) else ()  # only in runs whose actions have prices
+    priced = (
+        ("price",) if any(explanation.price for _, _, explanation in stored) else ()
+    )  # only in runs whose actions have prices
     names = [*EXPLANATION_TABLES["explanations"].fixed, *priced, *(f"action_{sensor}" for sensor in range(num_sensors))]
     parts: dict[str, list[dict[str, Any]]] = {name: [] for name in EXPLANATION_TABLES}
-    for number, each, why in kept:
-        of, gains = decision_columns(number, each), why.of_targets
-        parts["explanations"].append({**of, **_explanation_columns(why), **dict.fromkeys(priced, why.price)})
+    for number, each, explanation in stored:
+        of, gains = decision_columns(number, each), explanation.of_targets
+        parts["explanations"].append(
+            {**of, **_explanation_columns(explanation), **dict.fromkeys(priced, explanation.price)}
+        )
         if gains is not None:
             labels = {"birth_step": gains.labels[:, 0], "birth_site": gains.labels[:, 1]}
             gained = {"existence_gain": gains.existence, "localisation_gain": gains.localisation}
             parts["target_gains"].append({**of, **labels, **gained})
-        if why.of_sensors is not None and why.without is not None:
-            shares = {"sensor": np.arange(num_sensors), "gain": why.of_sensors, "without": why.without}
+        if explanation.of_sensors is not None and explanation.without is not None:
+            shares = {"sensor": np.arange(num_sensors), "gain": explanation.of_sensors, "without": explanation.without}
             parts["sensor_gains"].append({**of, **shares})
     return {
         name: stacked(
@@ -83,22 +87,22 @@ def explanation_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[
     }
 
 
-def _explanation_columns(why: Explanation) -> dict[str, Any]:
+def _explanation_columns(explanation: Explanation) -> dict[str, Any]:
     """Return the row of an explanation."""
-    bound, second = why.bound, why.runner_up
+    bound, second = explanation.bound, explanation.runner_up
     return {
-        "reward": _or_nan(why.reward),
-        "reward_se": _or_nan(why.standard_error),
-        "baseline": _or_nan(why.baseline),
-        "undetected_gain": _or_nan(why.of_undetected),
-        "evaluations": why.evaluations,
+        "reward": _or_nan(explanation.reward),
+        "reward_se": _or_nan(explanation.standard_error),
+        "baseline": _or_nan(explanation.baseline),
+        "undetected_gain": _or_nan(explanation.of_undetected),
+        "evaluations": explanation.evaluations,
         "bound": np.nan if bound is None else bound.upper,
         "bound_kind": "" if bound is None else bound.kind,
         "bound_unbounded": -1 if bound is None else bound.unbounded,
         "runner_up": "" if second is None else second.text,
         "margin": np.nan if second is None else second.margin,
         "margin_se": np.nan if second is None else _or_nan(second.standard_error),
-        "missing": "\n".join(f"{name}: {reason}" for name, reason in why.missing.items()),
+        "missing": "\n".join(f"{name}: {reason}" for name, reason in explanation.missing.items()),
         **({} if second is None else {f"action_{sensor}": action for sensor, action in enumerate(second.actions)}),
     }
 
@@ -109,16 +113,18 @@ def with_explanations(decisions: Sequence[Decision], tables: Mapping[str, Mappin
     Raises `InputError`, `KeyError`, `IndexError` or `ValueError` for inconsistent tables.
     """
     table, targets, sensors = (tables[name] for name in EXPLANATION_TABLES)
-    found = list(decisions)
+    explained = list(decisions)
     if len(np.unique(table["decision"])) < len(table["decision"]):
         raise InputError("explanations, column decision: expected each once")
     for row, number in enumerate(table["decision"].tolist()):
-        if not 0 <= number < len(found):
-            raise InputError(f"explanations, column decision: expected numbers below {len(found)}; got {number}")
-        plan = found[number].plan
-        why = _explanation(plan, table, row, _of(targets, number), _of(sensors, number))
-        found[number] = replace(found[number], plan=replace(plan, explanation=why, bound=why.bound))
-    return tuple(found)
+        if not 0 <= number < len(explained):
+            raise InputError(f"explanations, column decision: expected numbers below {len(explained)}; got {number}")
+        plan = explained[number].plan
+        explanation = _explanation(plan, table, row, _of(targets, number), _of(sensors, number))
+        explained[number] = replace(
+            explained[number], plan=replace(plan, explanation=explanation, bound=explanation.bound)
+        )
+    return tuple(explained)
 
 
 def _of(table: Mapping[str, Any], number: int) -> dict[str, Any]:

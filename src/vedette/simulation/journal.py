@@ -123,9 +123,9 @@ class Journal:
 
     def note_decision(self, plan: Plan, undetected: UndetectedIntensity | None = None, *, explain: bool) -> None:
         """Record the decision after the current scan, with its explanation if explanations are kept."""
-        kept = plan.without_evidence(explained=explain)
-        found = undetected if explain and kept.explanation is not None else None
-        self._decisions.append(Decision(self.step, self.time, self._poses[-1], kept, found))
+        stored_plan = plan.without_evidence(explained=explain)
+        stored_undetected = undetected if explain and stored_plan.explanation is not None else None
+        self._decisions.append(Decision(self.step, self.time, self._poses[-1], stored_plan, stored_undetected))
 
     def stage(self, error: BaseException) -> str:
         """Return the stage that failed, in words."""
@@ -133,9 +133,9 @@ class Journal:
 
     def place(self, error: BaseException) -> str:
         """Return the run and the place in it where an error occurred, in words."""
-        whose = f"{self.planner}, seed {self.seed}, run {self.run}" if self.file is None else self.file.name
+        source = f"{self.planner}, seed {self.seed}, run {self.run}" if self.file is None else self.file.name
         place = f"step {self.step} of {self.truth.num_scans} ({self.time:g} s), in {self.stage(error)}"
-        return f"{self.scenario}, {whose}: stopped at {place}"
+        return f"{self.scenario}, {source}: stopped at {place}"
 
     def record(self, ospa: Floats, stopped: str | None = None) -> RunRecord:
         """Return the record of the scans that have an estimate."""

@@ -45,8 +45,8 @@ def scan_flags_of_run(
     if not drop_out:
         return scans_at
     streams = sensor_streams(seed, run, DROP_OUTS, len(drop_out))
-    there = np.array([rng.random(num_scans) >= share for rng, share in zip(streams, drop_out, strict=True)])
-    return there if scans_at is None else there & scans_at[:, :num_scans]
+    taking_place = np.array([rng.random(num_scans) >= share for rng, share in zip(streams, drop_out, strict=True)])
+    return taking_place if scans_at is None else taking_place & scans_at[:, :num_scans]
 
 
 class RunningTracker:
@@ -212,8 +212,8 @@ def simulate(
 
 def _with_truth(planner: Any, truth: Truth) -> Planner | None:
     """Return the planner of this run; a planner that requires the true targets receives them."""
-    told: Planner | None = planner.with_truth(truth) if isinstance(planner, RequiresTruth) else planner
-    return told
+    informed: Planner | None = planner.with_truth(truth) if isinstance(planner, RequiresTruth) else planner
+    return informed
 
 
 def _run_scans(

@@ -209,17 +209,17 @@ class OraclePlanner:
             states[k] = states[max(k - 1, 0)]
             states[k, places], alive[k, places] = own[rows], 1.0
         steps = list(zip(states[:-1], np.diff(times[first - 1 : last]).tolist(), strict=True))
-        told = []
+        truths = []
         for sensor, own, when in zip(self.sensors, courses, scans, strict=True):
-            said = np.zeros((*own.shape[:2], num, dim, dim))
+            information = np.zeros((*own.shape[:2], num, dim, dim))
             for course, k in np.argwhere(when).tolist():
-                said[course, k] = scan_information(sensor.filter.sensor, states[k + 1], own[course, k])
-            told.append(said)
+                information[course, k] = scan_information(sensor.filter.sensor, states[k + 1], own[course, k])
+            truths.append(information)
         return CovarianceRecursion(
             np.array([transition_jacobians(motion, own, dt) for own, dt in steps]).reshape(len(steps), num, dim, dim),
             np.array([motion.noise_covs(own, dt) for own, dt in steps]).reshape(len(steps), num, dim, dim),
             alive[1:],
-            tuple(told),
+            tuple(truths),
             table.powers,
             table.one_belief,
             self.cutoff,

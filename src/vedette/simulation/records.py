@@ -143,8 +143,8 @@ class RunRecord(TabularRepr):
 
     def summary(self) -> RunSummary:
         """Return the part of the record that comparisons and reports use."""
-        whose = (self.scenario, self.seed, self.run, self.times, self.decisions)
-        return RunSummary(*whose, self.ospa, np.diff(self.truth.offsets), self.health, self.timings)
+        identity = (self.scenario, self.seed, self.run, self.times, self.decisions)
+        return RunSummary(*identity, self.ospa, np.diff(self.truth.offsets), self.health, self.timings)
 
     def scan_columns(self) -> Columns:
         """Return the table `scans` of a saved run, one row per scan; see docs/results.md."""
@@ -165,9 +165,9 @@ class RunRecord(TabularRepr):
         known = self.ospa[:, 0][~np.isnan(self.ospa[:, 0])]
         error = f", mean OSPA {known.mean():.4g}" if len(known) else ""
         drawn = f"by {elided(self.planner)}, seed {self.seed}, run {self.run}"
-        whose = f"of {elided(self.scenario)} {drawn if self.recording is None else f'from {elided(self.source)}'}"
+        origin = f"of {elided(self.scenario)} {drawn if self.recording is None else f'from {elided(self.source)}'}"
         sizes = f"{pluralise(self.num_scans, 'scan')}, {pluralise(self.num_sensors, 'sensor')}"
-        return f"{whose}: {sizes}, {pluralise(len(self.decisions), 'decision')}{error}"
+        return f"{origin}: {sizes}, {pluralise(len(self.decisions), 'decision')}{error}"
 
     def _detail(self) -> str:
         return "" if self.stopped is None else f"stopped: {self.stopped}"

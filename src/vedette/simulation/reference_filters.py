@@ -111,8 +111,8 @@ class LastScanFilter(_Reference):
         births: LMB | None = None,
     ) -> tuple[LMB, FilterInfo]:
         """Return a target at every measurement of the largest scan."""
-        there = [(scan, s) for s, scan in enumerate(scans) if scan is not None]
-        scan, s = max(there, key=lambda each: len(each[0]), default=(np.empty((0, 2)), 0))
+        taken_scans = [(scan, s) for s, scan in enumerate(scans) if scan is not None]
+        scan, s = max(taken_scans, key=lambda each: len(each[0]), default=(np.empty((0, 2)), 0))
         dim = self.targets.state_dim
         means = (
             self.sensors[s].measurement.states_at(np.asarray(scan), poses[s], dim) if len(scan) else np.empty((0, dim))

@@ -79,12 +79,12 @@ def _drawn(
     luck = rng.random(num)
     states, at = (states, pose) if true.bias is NO_BIAS else _shown(true, states, pose)
     measured = _noisy_measurements(model, states, at, rng.standard_normal((num, model.meas_dim)))
-    seen = _seen(model, _detected_at(true, states, at, measured), at, luck)
+    detected = _seen(model, _detected_at(true, states, at, measured), at, luck)
     clutter = model.clutter.sample(at, model.measurement, state_dim=states.shape[1], rng=rng)
     order = rng.random(num + len(clutter)).argsort()
     if true.bias is not NO_BIAS:
         measured, clutter = _biased(true, measured), _biased(true, clutter)
-    return Scan(*mixed_scan(measured, names, seen, clutter, order))
+    return Scan(*mixed_scan(measured, names, detected, clutter, order))
 
 
 @overload
@@ -172,11 +172,11 @@ def _detected_at(sensor: TrueSensor, states: Floats, pose: Floats, measured: Flo
 
 def _seen(sensor: SensorModel, states: Floats, pose: Floats, luck: Floats) -> Bools:
     chances = numbers_at(sensor.detection.function, states, pose, sensor.detection.params)
-    seen, bad = seen_with(chances, luck)
+    detected, bad = seen_with(chances, luck)
     if bad >= 0:
         state, got = states[bad], chances[bad]
         raise ModelError(f"detection model at state {state}, pose {pose}: expected a probability; got {got}")
-    return seen
+    return detected
 
 
 def _noisy_measurements(sensor: SensorModel, states: Floats, pose: Floats, normals: Floats) -> Floats:

@@ -115,10 +115,10 @@ def check_version(manifest: Mapping[str, Any], session: Any, place: Path) -> Non
     reader = "the version that wrote it"
     if isinstance(writer, str) and writer != versions()["vedette"]:
         reader = f"vedette {printable(writer)[:40]}"
-    which = "another" if number is None else "a later" if number > FORMAT_VERSION else "an earlier"
+    relation = "another" if number is None else "a later" if number > FORMAT_VERSION else "an earlier"
     got = shown(manifest.get("format_version"))
     raise InputError(
-        f"{place}: expected format {FORMAT_VERSION}; got {got}, written by {which} version of this program: "
+        f"{place}: expected format {FORMAT_VERSION}; got {got}, written by {relation} version of this program: "
         f"run it again, or read it with {reader}"
     )
 

@@ -71,7 +71,7 @@ def true_sensors_of(given: Sequence[TrueSensor], known: Sequence[SensorModel]) -
     for s, (true, model) in enumerate(zip(given, known, strict=True)):
         if not isinstance(true, TrueSensor):
             raise reject(f"true_sensors[{s}]", "a TrueSensor", true)
-        wanted, angular = (which.measurement.angular.tolist() for which in (model, true.model))
+        wanted, angular = (sensor_model.measurement.angular.tolist() for sensor_model in (model, true.model))
         if angular != wanted:
             expected = f"measurements of {len(wanted)} components with the angular flags {wanted}, as the filter's"
             raise reject(f"true_sensors[{s}]", expected, angular)
@@ -88,8 +88,8 @@ def sensors_at_step(sensors: Sequence[TrueSensor], scans_at: Bools | None, step:
     """
     if scans_at is None:
         return tuple(sensors) if step > 1 else tuple([sensor.at_first_scan() for sensor in sensors])
-    found: list[TrueSensor | None] = []
+    true_sensors: list[TrueSensor | None] = []
     for sensor, scans in zip(sensors, scans_at, strict=True):
         is_first = not scans[: step - 1].any()
-        found.append(None if not scans[step - 1] else sensor.at_first_scan() if is_first else sensor)
-    return tuple(found)
+        true_sensors.append(None if not scans[step - 1] else sensor.at_first_scan() if is_first else sensor)
+    return tuple(true_sensors)

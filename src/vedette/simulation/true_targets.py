@@ -85,17 +85,17 @@ class TrueTargetsPlanner:
         birth, step = check_sensors(self.sensors).birth, state.step
         ids, states = truth.at(max(step, 1) - 1)
         held = match_tracks(self.estimate, state.fused, step, states, self.cutoff)
-        kept = held.found | _may_be_born(birth, step)
-        places = np.concatenate([states[kept], held.false_means])
+        retained = held.found | _may_be_born(birth, step)
+        places = np.concatenate([states[retained], held.false_means])
         # Labels (0, id) of targets, and then (1, number) of false estimates.
-        labels = [(0, own) for own in ids[kept].tolist()] + [(1, k) for k in range(len(held.false_means))]
-        made: dict[int, Any] = {}
+        labels = [(0, own) for own in ids[retained].tolist()] + [(1, k) for k in range(len(held.false_means))]
+        densities: dict[int, Any] = {}
         for belief in (state.fused, *state.local):
-            if id(belief) not in made:
+            if id(belief) not in densities:
                 covs = match_tracks(self.estimate, belief, step, places, self.cutoff).covs
-                made[id(belief)] = _certain(belief, labels, places, covs)
-        local = tuple(made[id(belief)] for belief in state.local)
-        return replace(state, local=local, fused=made[id(state.fused)], undetected=None)
+                densities[id(belief)] = _certain(belief, labels, places, covs)
+        local = tuple(densities[id(belief)] for belief in state.local)
+        return replace(state, local=local, fused=densities[id(state.fused)], undetected=None)
 
 
 def match_tracks(estimate: Estimator, belief: Any, step: int, states: Floats, cutoff: float) -> TrackedTargets:
@@ -107,16 +107,16 @@ def match_tracks(estimate: Estimator, belief: Any, step: int, states: Floats, cu
     estimated = estimate(belief, step)
     stds = np.full(states.shape[1], _LOST * cutoff)
     stds[:2] = cutoff
-    covs, found = np.tile(np.diag(stds**2), (len(states), 1, 1)), np.zeros(len(states), bool)
+    covs, matched = np.tile(np.diag(stds**2), (len(states), 1, 1)), np.zeros(len(states), bool)
     false = np.ones(len(estimated.means), bool)
-    false[_assign(estimated.means, estimated.covs, states, cutoff, covs, found)] = False
-    if isinstance(belief, LabelledDensity) and not found.all():
+    false[_assign(estimated.means, estimated.covs, states, cutoff, covs, matched)] = False
+    if isinstance(belief, LabelledDensity) and not matched.all():
         named = {(step, index) for step, index in estimated.labels.tolist()}
         others = [own for own in belief.targets() if own.label not in named]
         if others:
             means, of_means = (np.array([getattr(own, name) for own in others]) for name in ("mean", "cov"))
-            _assign(means, of_means, states, cutoff, covs, found)
-    return TrackedTargets(covs, found, estimated.means[false])
+            _assign(means, of_means, states, cutoff, covs, matched)
+    return TrackedTargets(covs, matched, estimated.means[false])
 
 
 def with_components(truth: Truth, dim: int) -> Truth:
@@ -127,16 +127,16 @@ def with_components(truth: Truth, dim: int) -> Truth:
     return replace(truth, states=np.pad(truth.states, ((0, 0), (0, missing)))) if missing else truth
 
 
-def _assign(means: Floats, covs: Floats, states: Floats, cutoff: float, out: Floats, found: Bools) -> list[int]:
+def _assign(means: Floats, covs: Floats, states: Floats, cutoff: float, out: Floats, matched: Bools) -> list[int]:
     """Assign tracks within the cutoff to targets without one, set their covariances, and return the assigned tracks."""
     from scipy.optimize import linear_sum_assignment  # imported here, as it takes a third of a second
 
-    open_, assigned = np.flatnonzero(~found), []
+    open_, assigned = np.flatnonzero(~matched), []
     offsets = states[open_, np.newaxis, :2] - means[:, :2]
     gaps = np.minimum(np.hypot(offsets[..., 0], offsets[..., 1]), cutoff)
     for target, track in zip(*linear_sum_assignment(gaps), strict=True):
         if gaps[target, track] < cutoff:
-            out[open_[target]], found[open_[target]] = covs[track], True
+            out[open_[target]], matched[open_[target]] = covs[track], True
             assigned.append(int(track))
     return assigned
 

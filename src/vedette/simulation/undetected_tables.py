@@ -42,10 +42,10 @@ def with_undetected(decisions: Sequence[Decision], table: Mapping[str, Any]) -> 
 
     Raises `InputError` for decisions that do not exist, missing cells, or an invalid intensity.
     """
-    found = list(decisions)
+    completed = list(decisions)
     for row, number in enumerate(table["decision"].tolist()):
-        if not 0 <= number < len(found):
-            raise InputError(f"undetected, column decision: expected numbers below {len(found)}; got {number}")
+        if not 0 <= number < len(completed):
+            raise InputError(f"undetected, column decision: expected numbers below {len(completed)}; got {number}")
         grid = CellGrid(
             Region(*(float(table[name][row]) for name in _SIDES)), int(table["columns"][row]), int(table["rows"][row])
         )
@@ -55,8 +55,8 @@ def with_undetected(decisions: Sequence[Decision], table: Mapping[str, Any]) -> 
                 f"undetected: expected columns cell_0 to cell_{grid.num_cells - 1}; got {len(cells)} cells"
             )
         expected = np.array([table[f"cell_{cell}"][row] for cell in range(grid.num_cells)])
-        found[number] = replace(found[number], undetected=UndetectedIntensity(grid, expected))
-    return tuple(found)
+        completed[number] = replace(completed[number], undetected=UndetectedIntensity(grid, expected))
+    return tuple(completed)
 
 
 def _row(intensity: UndetectedIntensity) -> dict[str, Any]:

@@ -43,8 +43,8 @@ def _filled(content: bytes, table: str, lacking: Mapping[str, float]) -> bytes:
     """Return a table with its missing columns; unchanged if it has them already, as after an interruption."""
     layout = LAYOUTS[table]
     fixed = {name: kind for name, kind in layout.fixed.items() if name not in lacking}
-    had = Layout(fixed, {**layout.more, **{name: layout.fixed[name] for name in lacking}})
-    columns = read_table(content, had, f"{table}{ENDING}")
+    previous = Layout(fixed, {**layout.more, **{name: layout.fixed[name] for name in lacking}})
+    columns = read_table(content, previous, f"{table}{ENDING}")
     length = len(next(iter(columns.values())))
     filled: Columns = {name: np.full(length, value) for name, value in lacking.items() if name not in columns}
     return write_table({**columns, **filled}, layout)

@@ -118,10 +118,10 @@ def _alike(task: Task, *, shared: bool) -> list[tuple[int, ...]]:
     """Return groups of sensors with the same belief and equal models; each sensor alone unless `shared`."""
     if not shared:
         return [(s,) for s in range(len(task.sensors))]
-    found: dict[object, list[int]] = {}
+    groups: dict[object, list[int]] = {}
     for s, (sensor, belief) in enumerate(zip(task.sensors, task.state.local, strict=True)):
-        found.setdefault((id(belief), _model_key(sensor.filter.sensor)), []).append(s)
-    return list(map(tuple, found.values()))
+        groups.setdefault((id(belief), _model_key(sensor.filter.sensor)), []).append(s)
+    return list(map(tuple, groups.values()))
 
 
 @lru_cache(maxsize=1000)

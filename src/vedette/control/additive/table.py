@@ -186,25 +186,25 @@ def cells_of(
     sensor. Raises `ModelError` from the sensor models.
     """
     num_courses = int(first_courses[-1])
-    found: list[tuple[Ints, Floats]] = [(np.empty(0, np.int64), np.empty(0))] * num_courses
+    of_courses: list[tuple[Ints, Floats]] = [(np.empty(0, np.int64), np.empty(0))] * num_courses
     states, weights = undetected.grid.states(state_dim), undetected.grid.node_weights()
     with model_errors():
         for group in start.groups:
             offsets, cells, log_miss = _view(group, states, weights)
             for i, course in enumerate(places_of_courses(group, first_courses).tolist()):
                 own = slice(offsets[i], offsets[i + 1])
-                found[course] = (cells[own], np.maximum(log_miss[own], _LEAST_LOG_MISS))
+                of_courses[course] = (cells[own], np.maximum(log_miss[own], _LEAST_LOG_MISS))
     return Cells(
-        offsets_of([len(cells) for cells, _ in found]),
-        np.concatenate([np.empty(0, np.int64), *(cells for cells, _ in found)]),
-        np.concatenate([np.empty(0), *(log_miss for _, log_miss in found)]),
+        offsets_of([len(cells) for cells, _ in of_courses]),
+        np.concatenate([np.empty(0, np.int64), *(cells for cells, _ in of_courses)]),
+        np.concatenate([np.empty(0), *(log_miss for _, log_miss in of_courses)]),
         worth * undetected.expected,
     )
 
 
 def _view(group: SensorGroup, states: Floats, weights: Floats) -> tuple[Ints, Ints, Floats]:
     decision, horizon = group.decision, group.decision.horizon
-    found: tuple[Ints, Ints, Floats] = cells_in_view(
+    view: tuple[Ints, Ints, Floats] = cells_in_view(
         decision.sensor, horizon.poses, horizon.scans, states, weights, LEAST_DETECTION, group.reach
     )
-    return found
+    return view

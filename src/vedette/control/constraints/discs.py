@@ -45,8 +45,8 @@ def disc_probabilities(offsets: Floats, which: Ints, covs: Floats, radius: float
     small, large = np.sqrt(np.maximum(variances, np.finfo(float).tiny))[which].T
     x, y = (axes[which] * offsets[:, :, np.newaxis]).sum(axis=1).T
     distance = np.hypot(offsets[:, 0], offsets[:, 1])
-    found = (distance + _FAR * large <= radius).astype(np.float64)
-    rest = np.flatnonzero((found == 0.0) & (distance <= radius + _FAR * large))
+    probabilities = (distance + _FAR * large <= radius).astype(np.float64)
+    rest = np.flatnonzero((probabilities == 0.0) & (distance <= radius + _FAR * large))
     half = np.ceil(4.0 * radius / small[rest]) + 20.0
     first = _node(x[rest], -1.0, small[rest], half, radius)
     last = _node(x[rest], 1.0, small[rest], half, radius)
@@ -57,9 +57,9 @@ def disc_probabilities(offsets: Floats, which: Ints, covs: Floats, radius: float
         part = slice(begun, end)
         chosen = rest[part]
         shape = (x[chosen], y[chosen], small[chosen], large[chosen])
-        found[chosen] = _midpoints(shape, radius, half[part], first[part], num[part])
+        probabilities[chosen] = _midpoints(shape, radius, half[part], first[part], num[part])
         begun = end
-    return np.asarray(found)
+    return np.asarray(probabilities)
 
 
 def _node(x: Floats, side: float, small: Floats, half: Floats, radius: float) -> Floats:

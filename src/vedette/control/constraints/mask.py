@@ -70,13 +70,13 @@ class Mask:
 
         Counts forbidden courses, forbidden pairs of courses, and sensors that scan beyond the limit.
         """
-        found = np.zeros(len(actions), np.int64)
+        violations = np.zeros(len(actions), np.int64)
         for s, own in enumerate(self.single):
             if not own.all():
-                found += ~own[actions[:, s]]
+                violations += ~own[actions[:, s]]
         for (first, second), table in self.together.items():
-            found += ~table[actions[:, first], actions[:, second]]
-        return found if self.active is None else found + self.active.excess(actions)
+            violations += ~table[actions[:, first], actions[:, second]]
+        return violations if self.active is None else violations + self.active.excess(actions)
 
     def allows(self, actions: Ints) -> Bools:
         """Return (num,) whether joint actions (num, num_sensors) are allowed."""
@@ -94,10 +94,10 @@ class Mask:
 
         at: courses; negative ones belong to undecided sensors, which cause no conflict.
         """
-        found = self.forbidden(at, sensor)
+        conflicts = self.forbidden(at, sensor)
         if self.active is not None and self.active.is_full(at, sensor):
-            found += self.active.on[sensor]
-        return found
+            conflicts += self.active.on[sensor]
+        return conflicts
 
     def forbidden(self, at: Sequence[int], sensor: int) -> Ints:
         """Return the same numbers as `conflicts`, without the limit on the number of sensors that scan."""
@@ -176,12 +176,12 @@ def _descend(mask: Mask, at: list[int]) -> None:
 
 def _group(mask: Mask, sensor: int) -> list[int]:
     """Return the sensors that `sensor` conflicts with, directly or indirectly, in printed order."""
-    found, waiting = {sensor}, [sensor]
+    group, waiting = {sensor}, [sensor]
     while waiting:
-        new = set(mask.others(waiting.pop())) - found
-        found |= new
+        new = set(mask.others(waiting.pop())) - group
+        group |= new
         waiting.extend(new)
-    return sorted(found)
+    return sorted(group)
 
 
 def depth_first(

@@ -77,17 +77,17 @@ def violation_notes(constraints: Sequence[Constraint], situation: ConstraintCont
 
     Raises as `feasible_action_mask`.
     """
-    found = []
+    notes = []
     for constraint in constraints:
         single, pairs = _answers(constraint, situation), pairs_allowed([constraint], situation)
-        found += [
+        notes += [
             f"sensor {s + 1}: its course violates {constraint.name}" for s, own in enumerate(single) if not own[0]
         ]
-        found += [f"sensors {i + 1} and {j + 1}: their courses violate {constraint.name}" for i, j in pairs]
+        notes += [f"sensors {i + 1} and {j + 1}: their courses violate {constraint.name}" for i, j in pairs]
     active = active_of(constraints, situation.courses, situation.scans)
     if active is not None and (excess := int(active.excess(np.zeros((1, len(situation.courses)), np.int64))[0])):
-        found.append(f"{active.most + excess} sensors scan; expected at most {active.most}")
-    return tuple(found)
+        notes.append(f"{active.most + excess} sensors scan; expected at most {active.most}")
+    return tuple(notes)
 
 
 def _answers(constraint: Constraint, situation: ConstraintContext) -> list[Bools]:
@@ -118,16 +118,16 @@ def pairs_allowed(constraints: Sequence[Constraint], situation: ConstraintContex
     Constraints are not evaluated for sensors without courses. Raises as `feasible_action_mask`.
     """
     gaps = _least_distances(situation)
-    found: dict[tuple[int, int], Bools] = {}
+    allowed_pairs: dict[tuple[int, int], Bools] = {}
     for constraint in constraints:
         for first, second in np.argwhere(np.triu(gaps < interaction_range_of(constraint), 1)).tolist():
             answer = constraint.pairs(situation, first, second)
             if answer is not None:
                 shape = (len(situation.courses[first]), len(situation.courses[second]))
-                table = _checked(constraint, answer, shape) & found.get((first, second), True)
+                table = _checked(constraint, answer, shape) & allowed_pairs.get((first, second), True)
                 if not table.all():
-                    found[first, second] = table
-    return dict(sorted(found.items()))
+                    allowed_pairs[first, second] = table
+    return dict(sorted(allowed_pairs.items()))
 
 
 def _least_distances(situation: ConstraintContext) -> Floats:

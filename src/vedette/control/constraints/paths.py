@@ -96,10 +96,10 @@ class VisibilityGraph:
 
     def outside(self, points: Floats) -> Floats:
         """Return the points (num, 2), with those inside a zone replaced by the nearest points outside all zones."""
-        found = np.array(points, np.float64, order="C")
-        for i in np.flatnonzero(~_is_free(self.edges, found)).tolist():
-            found[i] = next(self._nearest(found[i]), found[i : i + 1])[0]
-        return found
+        moved = np.array(points, np.float64, order="C")
+        for i in np.flatnonzero(~_is_free(self.edges, moved)).tolist():
+            moved[i] = next(self._nearest(moved[i]), moved[i : i + 1])[0]
+        return moved
 
     def _nearest(self, point: Floats) -> Iterator[Floats]:
         """Yield points (1, 2) outside all zones near a point (2,), the nearest first."""
@@ -151,11 +151,11 @@ class Paths:
         start. inf: no path.
         """
         graph, origins = self.graph, self.graph.outside(starts)
-        found = clear_lengths(origins, self.points, graph.edges)
-        if not np.isfinite(found).all():
+        lengths = clear_lengths(origins, self.points, graph.edges)
+        if not np.isfinite(lengths).all():
             around = _added(clear_lengths(origins, graph.nodes, graph.edges), self.lengths)
-            found = np.minimum(found, around)
-        return np.asarray(np.hypot(*(origins - starts).T)[:, np.newaxis] + found + self.left)
+            lengths = np.minimum(lengths, around)
+        return np.asarray(np.hypot(*(origins - starts).T)[:, np.newaxis] + lengths + self.left)
 
     def path(self, start: Floats, goal: int) -> Floats:
         """Return the shortest path (num_corners, 2) m from a start (2,) to the point of a goal; a path must exist."""
@@ -192,11 +192,11 @@ def _added(first: Floats, then: Floats) -> Floats:
 
 def _inside(edges: Edges, points: Floats) -> Bools:
     """Return (num_points, num_zones) whether each point is inside each zone."""
-    found = np.empty((len(points), int(edges.zones[-1]) + 1), np.bool_)
-    for zone in range(found.shape[1]):
+    inside = np.empty((len(points), int(edges.zones[-1]) + 1), np.bool_)
+    for zone in range(inside.shape[1]):
         own = edges.zones == zone
-        found[:, zone] = inside_edges(points, (edges.starts[own], edges.ends[own]))
-    return found
+        inside[:, zone] = inside_edges(points, (edges.starts[own], edges.ends[own]))
+    return inside
 
 
 def _is_free(edges: Edges, points: Floats) -> Bools:
@@ -222,7 +222,7 @@ def _near_corners(corners: Floats) -> tuple[Floats, Floats]:
 
 def _crossings(edges: Edges) -> Floats:
     """Return points (num, 2) at `MARGIN` from the crossings of edges of two zones, one on each of the four sides."""
-    found = [np.empty((0, 2))]
+    crossings = [np.empty((0, 2))]
     for start, end, zone in zip(*edges, strict=True):
         others = edges.zones > zone
         along, across = end - start, edges.ends[others] - edges.starts[others]
@@ -234,5 +234,5 @@ def _crossings(edges: Edges) -> Floats:
         unit, units = along / np.hypot(*along), across[at] / np.hypot(*across[at].T)[:, np.newaxis]
         for side in (unit + units, unit - units):
             step = MARGIN * side / np.hypot(*side.T)[:, np.newaxis]
-            found += [start + here[at, np.newaxis] * along + step, start + here[at, np.newaxis] * along - step]
-    return np.concatenate(found)
+            crossings += [start + here[at, np.newaxis] * along + step, start + here[at, np.newaxis] * along - step]
+    return np.concatenate(crossings)

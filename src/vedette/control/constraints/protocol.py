@@ -164,9 +164,9 @@ class PerSensorConstraint:
 
 def with_start(ways: Floats, start: Floats) -> Floats:
     """Return ways (num_courses, num_times + 1, 2) that begin at `start` (2,), from ways (num_courses, num_times, 2)."""
-    found = np.empty((len(ways), ways.shape[1] + 1, 2))
-    found[:, 0], found[:, 1:] = start, ways
-    return found
+    extended = np.empty((len(ways), ways.shape[1] + 1, 2))
+    extended[:, 0], extended[:, 1:] = start, ways
+    return extended
 
 
 def least_on_legs(x: Floats, y: Floats) -> Floats:

@@ -49,10 +49,10 @@ class Revisit(PerSensorConstraint):
 
     def violations(self, situation: ConstraintContext) -> tuple[Floats, ...]:
         """Return (num_courses,) m, the distance of each course from its sensor's place, less that of the nearest."""
-        found = [np.zeros(len(own)) for own in situation.courses]
+        violations = [np.zeros(len(own)) for own in situation.courses]
         poses = situation.poses
         if poses is None:
-            return tuple(found)
+            return tuple(violations)
         if poses.shape[1] < CLOCKS + len(self.places):
             wanted = f"poses of {CLOCKS + len(self.places)} components, the last of them seconds since the last visits"
             raise InputError(f"constraint {self.name}: expected {wanted} (see Patrolling); got {poses.shape[1]}")
@@ -60,8 +60,8 @@ class Revisit(PerSensorConstraint):
             gaps = _gaps(situation.ways(sensor), np.array(self.places[place])) - self.radius
             if len(gaps):
                 gaps = np.maximum(gaps, 0.0)
-                found[sensor] = gaps - gaps.min()
-        return tuple(found)
+                violations[sensor] = gaps - gaps.min()
+        return tuple(violations)
 
     def _sent(self, situation: ConstraintContext, poses: Floats) -> list[tuple[int, int]]:
         """Return the sensors that must go to a place, each with the place.

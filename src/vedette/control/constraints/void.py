@@ -89,16 +89,16 @@ def _over_hypotheses(belief: FactoredGlmb, outside: Floats) -> Floats:
 
     outside: (num, num_tracks).
     """
-    found = np.ones(len(outside))
+    products = np.ones(len(outside))
     weights, sizes = np.exp(belief.hyp_log_weights), np.diff(belief.hyp_offsets)
     filled = np.flatnonzero(sizes)
     if len(filled) == 0:
-        return found
+        return products
     rows = max(1, _BLOCK // len(belief.hyp_tracks))
     for begun in range(0, len(outside), rows):
         columns = outside[begun : begun + rows, belief.hyp_tracks]
         terms = np.tile(weights, (len(columns), 1))
         # Between the starts of hypotheses with tracks there are no tracks of other hypotheses.
         terms[:, filled] *= np.multiply.reduceat(columns, belief.hyp_offsets[filled], axis=1)
-        found[begun : begun + rows] = np.add.reduceat(terms, belief.factor_offsets[:-1], axis=1).prod(axis=1)
-    return found
+        products[begun : begun + rows] = np.add.reduceat(terms, belief.factor_offsets[:-1], axis=1).prod(axis=1)
+    return products

@@ -82,9 +82,9 @@ class BeamSearch:
         while settled < problem.num_sensors and problem.left > 0:
             beams[s] = self._grow(problem, list(joint), list(joint), s, problem.left, rng)
             other = (*joint[:s], beams[s][0], *joint[s + 1 :])
-            found, settled = problem.evaluate([other])[0], settled + 1
-            if _is_better(found, value):
-                joint, value, settled = other, found, 1
+            reward, settled = problem.evaluate([other])[0], settled + 1
+            if _is_better(reward, value):
+                joint, value, settled = other, reward, 1
             s = (s + 1) % problem.num_sensors
         return joint, value, beams
 

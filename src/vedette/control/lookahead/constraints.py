@@ -108,8 +108,8 @@ class MultiStepConstraints:
 
     def active(self, places: Mapping[int, Place]) -> Active | None:
         """Return the limit on active sensors, from all sensors' courses at a decision; None: all may scan."""
-        found = [places[s] for s in range(len(places))]
-        return active_of(self.constraints, [own.courses for own in found], [own.scans for own in found])
+        active_places = [places[s] for s in range(len(places))]
+        return active_of(self.constraints, [own.courses for own in active_places], [own.scans for own in active_places])
 
     def moment(self, stage: int) -> int:
         """Return a key that is equal for decisions at which constraints allow the same courses."""

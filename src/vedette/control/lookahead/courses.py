@@ -60,38 +60,40 @@ class CourseTree:
         """Return the tree that includes dead ends."""
         return replace(self, omits_dead_ends=False, _allowed={})
 
-    def place(self, taken: Sequence) -> Place:
+    def place(self, sequence: Sequence) -> Place:
         """Return the pose and the courses of the decision after the courses taken so far."""
-        options = self.options(taken)
-        return Place(self.pose_after(taken), options.courses, options.scans)
+        options = self.options(sequence)
+        return Place(self.pose_after(sequence), options.courses, options.scans)
 
-    def pose_after(self, taken: Sequence) -> Floats:
+    def pose_after(self, sequence: Sequence) -> Floats:
         """Return the pose at the decision after the courses taken so far."""
-        return self.options(taken[:-1]).courses[taken[-1], self.stages.stride - 1] if taken else self.pose
+        return self.options(sequence[:-1]).courses[sequence[-1], self.stages.stride - 1] if sequence else self.pose
 
-    def options(self, taken: Sequence) -> Options:
+    def options(self, sequence: Sequence) -> Options:
         """Return the options after the courses taken so far. Raises `InputError` for invalid actions or courses."""
-        if taken not in self._found:
-            at = self.pose_after(taken)
-            times = self.stages.times(len(taken) + 1)
+        if sequence not in self._found:
+            at = self.pose_after(sequence)
+            times = self.stages.times(len(sequence) + 1)
             # Many ways lead to the same pose, up to rounding; the options there are the same.
             key = _pose_key(at), len(times)
             if key not in self._at_poses:
                 self._at_poses[key] = options_at(f"sensors[{self.sensor}].platform", self.platform, at, times)
-            self._found[taken] = self._at_poses[key]
-        return self._found[taken]
+            self._found[sequence] = self._at_poses[key]
+        return self._found[sequence]
 
-    def allowed(self, taken: Sequence) -> Sequence:
+    def allowed(self, sequence: Sequence) -> Sequence:
         """Return the distinct courses that it may take after those taken so far, at least one."""
         if self.ahead is None:
-            return tuple(range(len(self.options(taken).courses)))
-        key = self.pose_key(taken), len(taken)
+            return tuple(range(len(self.options(sequence).courses)))
+        key = self.pose_key(sequence), len(sequence)
         if key not in self._allowed:
-            found, _ = self._open_after(taken)
-            if self.omits_dead_ends and len(found) > 1 and len(taken) + 1 < self.stages.depth:
-                blocked = [self._least_blocked((*taken, course)) for course in found]
-                found = tuple(course for course, num in zip(found, blocked, strict=True) if num == min(blocked))
-            self._allowed[key] = found
+            allowed_options, _ = self._open_after(sequence)
+            if self.omits_dead_ends and len(allowed_options) > 1 and len(sequence) + 1 < self.stages.depth:
+                blocked = [self._least_blocked((*sequence, course)) for course in allowed_options]
+                allowed_options = tuple(
+                    course for course, num in zip(allowed_options, blocked, strict=True) if num == min(blocked)
+                )
+            self._allowed[key] = allowed_options
         return self._allowed[key]
 
     def course(self, sequence: Sequence) -> tuple[Floats, Bools]:
@@ -114,34 +116,34 @@ class CourseTree:
         found = [self.options(sequence[:k]) for k in range(len(sequence))]
         return np.array([own.actions.values[own.first_action(k)] for own, k in zip(found, sequence, strict=True)])
 
-    def nearest(self, taken: Sequence, among: Sequence) -> list[int]:
+    def nearest(self, sequence: Sequence, among: Sequence) -> list[int]:
         """Return courses after those taken so far, ordered by how near their actions are to the last one taken.
 
         If nothing was taken yet, in their order.
         """
-        if not taken:
+        if not sequence:
             return list(among)
-        before, own = self.options(taken[:-1]), self.options(taken)
-        last = before.actions.values[before.first_action(taken[-1])]
+        before, own = self.options(sequence[:-1]), self.options(sequence)
+        last = before.actions.values[before.first_action(sequence[-1])]
         order = own.which[np.argsort(_apart(own.actions.columns, own.actions.values, last), kind="stable")]
         wanted = set(among)
         return [course for course in dict.fromkeys(order.tolist()) if course in wanted]
 
-    def kept(self, taken: Sequence) -> Sequence:
+    def kept(self, sequence: Sequence) -> Sequence:
         """Return the sequence that repeats the last action, or the nearest one to it, until the end.
 
         If nothing was taken yet it begins with the first action.
         """
-        while len(taken) < self.stages.depth:
-            taken = (*taken, self.nearest(taken, self.allowed(taken))[0])
-        return taken
+        while len(sequence) < self.stages.depth:
+            sequence = (*sequence, self.nearest(sequence, self.allowed(sequence))[0])
+        return sequence
 
-    def count(self, most: int) -> int:
-        """Return the number of all sequences; if there are more than `most`, a number above that."""
+    def count(self, limit: int) -> int:
+        """Return the number of all sequences; if there are more than `limit`, a number above that."""
         level: list[Sequence] = [()]
         for _ in range(self.stages.depth - 1):
             level = [(*taken, k) for taken in level for k in self.allowed(taken)]
-            if len(level) > most:
+            if len(level) > limit:
                 return len(level)
         return sum(len(self.allowed(taken)) for taken in level)
 
@@ -156,39 +158,39 @@ class CourseTree:
         """Return the decisions of a sequence except the first, counted from 1, at which no course is allowed."""
         return [k + 1 for k in range(1, len(sequence)) if not self._open_after(sequence[:k])[1]]
 
-    def pose_key(self, taken: Sequence) -> bytes:
+    def pose_key(self, sequence: Sequence) -> bytes:
         """Return a key that is equal for decisions at the same pose, where the options are the same."""
-        if taken not in self._spots:
-            self._spots[taken] = _pose_key(self.pose_after(taken))
-        return self._spots[taken]
+        if sequence not in self._spots:
+            self._spots[sequence] = _pose_key(self.pose_after(sequence))
+        return self._spots[sequence]
 
-    def _moment(self, taken: Sequence) -> tuple[bytes, int]:
+    def _moment(self, sequence: Sequence) -> tuple[bytes, int]:
         """Return a key that is equal where constraints allow the same courses."""
         assert self.ahead is not None
-        return self.pose_key(taken), self.ahead.moment(len(taken) + 1)
+        return self.pose_key(sequence), self.ahead.moment(len(sequence) + 1)
 
-    def _open_after(self, taken: Sequence) -> tuple[Sequence, bool]:
+    def _open_after(self, sequence: Sequence) -> tuple[Sequence, bool]:
         """Return the feasible courses, or those with the least violation, and whether they are feasible."""
-        if not taken or self.ahead is None:
+        if not sequence or self.ahead is None:
             return tuple(np.flatnonzero(self.now).tolist()), True
-        key = self._moment(taken)
+        key = self._moment(sequence)
         if key not in self._open:
-            allowed, met = self.ahead.courses(self.sensor, len(taken) + 1, self.place(taken))
+            allowed, met = self.ahead.courses(self.sensor, len(sequence) + 1, self.place(sequence))
             self._open[key] = tuple(np.flatnonzero(allowed).tolist()), met
         return self._open[key]
 
-    def _least_blocked(self, taken: Sequence) -> int:
+    def _least_blocked(self, sequence: Sequence) -> int:
         """Return the least number of decisions from here on at which no course is allowed."""
-        if len(taken) == self.stages.depth:
+        if len(sequence) == self.stages.depth:
             return 0
-        key = self.pose_key(taken), len(taken)
+        key = self.pose_key(sequence), len(sequence)
         if key not in self._blocked:
             if len(self._blocked) >= _MOST_PLACES:
                 return 0
             self._blocked[key] = 0  # counted among the visited places from now on
-            found, met = self._open_after(taken)
-            ways = [(*taken, course) for course in found]
-            if len(taken) + 1 < self.stages.depth:
+            least_blocked, met = self._open_after(sequence)
+            ways = [(*sequence, course) for course in least_blocked]
+            if len(sequence) + 1 < self.stages.depth:
                 # One way out is enough; ways to visited places come first.
                 ways.sort(key=lambda way: self._moment(way) not in self._open)
             least = self.stages.depth

@@ -53,12 +53,12 @@ class FeasibleSequences:
         """
         mask = ahead.mask({s: tree.place(()) for s, tree in enumerate(trees)})
         bound = tuple(replace(tree, ahead=ahead, now=own) for tree, own in zip(trees, mask.single, strict=True))
-        found = _furthest(bound, ahead, mask)
-        if not found[0]:
+        furthest = _furthest(bound, ahead, mask)
+        if not furthest[0]:
             bound = tuple(tree.with_dead_ends() for tree in bound)
-            found = _furthest(bound, ahead, mask)
-        start = tuple(tree.kept(taken) for tree, taken in zip(bound, found, strict=True))
-        return cls(bound, ahead, mask, len(found[0]), start)
+            furthest = _furthest(bound, ahead, mask)
+        start = tuple(tree.kept(taken) for tree, taken in zip(bound, furthest, strict=True))
+        return cls(bound, ahead, mask, len(furthest[0]), start)
 
     def first(self) -> Mask:
         """Mask of the first decision, without dead ends."""
@@ -108,17 +108,17 @@ class FeasibleSequences:
 
     def notes(self, sequence: Several[Sequence]) -> tuple[str, ...]:
         """Return notes on a decision for a joint sequence."""
-        found = [
+        notes = [
             f"sensor {s + 1}, decision {k} of the sequence: {infeasible_note(self.ahead.constraints)}"
             for s, (tree, own) in enumerate(zip(self.trees, sequence, strict=True))
             for k in tree.blocked(own)
         ]
         if self.until < self.trees[0].stages.depth:
-            found.append(
+            notes.append(
                 f"no joint sequence was found on which the sensors go together after decision {self.until}; from there "
                 "on that is given up"
             )
-        return *self.mask.notes, *found
+        return *self.mask.notes, *notes
 
     @property
     def most_active(self) -> float:

@@ -67,10 +67,10 @@ class CrossEntropy(Checked):
 def _uniform(known: RewardCache) -> Floats:
     """Return (num_sensors, most courses) equal probabilities for all feasible courses of a sensor; 0 elsewhere."""
     shape = known.problem.shape
-    found = np.zeros((len(shape), max(shape)))
+    probabilities = np.zeros((len(shape), max(shape)))
     for s in range(len(shape)):
-        found[s, known.actions([-1] * len(shape), s)] = 1.0
-    return np.asarray(found / found.sum(axis=1, keepdims=True))
+        probabilities[s, known.actions([-1] * len(shape), s)] = 1.0
+    return np.asarray(probabilities / probabilities.sum(axis=1, keepdims=True))
 
 
 def _draw(mask: Mask | None, probabilities: Floats, num: int, rng: np.random.Generator) -> Ints:

@@ -174,21 +174,21 @@ class ExhaustiveSearch(Checked):
         return best_of_all(problem, self.max_joint_actions)
 
 
-def best_of_all(problem: JointProblem, most: int) -> Joint:
-    """Return the best of all allowed joint actions; raises `InputError` for more than `most`."""
+def best_of_all(problem: JointProblem, max_actions: int) -> Joint:
+    """Return the best of all allowed joint actions; raises `InputError` for more than `max_actions`."""
     if problem.mask is None:
         num_joint = math.prod(problem.shape)
-        if num_joint > most:
+        if num_joint > max_actions:
             sizes = " x ".join(map(str, problem.shape))
-            raise _too_many(most, f"{sizes} = {num_joint}")
+            raise _too_many(max_actions, f"{sizes} = {num_joint}")
         joint_actions = all_joint_actions(problem.shape)
     else:
-        joint_actions = _allowed(relaxed(problem.mask)[0], most)
+        joint_actions = _allowed(relaxed(problem.mask)[0], max_actions)
     best = first_best(problem.evaluate(joint_actions))
     return tuple(joint_actions[best].tolist())
 
 
-def _allowed(mask: Mask, most: int) -> Ints:
+def _allowed(mask: Mask, max_actions: int) -> Ints:
     """Return (num_allowed, num_sensors) in printed order, formed sensor by sensor from compatible courses."""
     found = np.empty((1, 0), np.int64)
     for s, own in enumerate(mask.single):
@@ -201,13 +201,13 @@ def _allowed(mask: Mask, most: int) -> Ints:
         if mask.active is not None:
             scanning = sum(on[found[:, i]].astype(np.int64) for i, on in enumerate(mask.active.on[: s + 1]))
             found = found[scanning <= mask.active.most]
-        if len(found) > most:
-            raise _too_many(most, f"more than that, of {s + 1} of {len(mask.single)} sensors")
+        if len(found) > max_actions:
+            raise _too_many(max_actions, f"more than that, of {s + 1} of {len(mask.single)} sensors")
     return np.ascontiguousarray(found)
 
 
-def _too_many(most: int, got: str) -> InputError:
+def _too_many(max_actions: int, got: str) -> InputError:
     return InputError(
-        f"joint actions: expected at most {most} for an exhaustive search; got {got}; "
+        f"joint actions: expected at most {max_actions} for an exhaustive search; got {got}; "
         "allow more, or search by CoordinateAscent"
     )

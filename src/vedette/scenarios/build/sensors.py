@@ -118,8 +118,8 @@ def build_true_sensors(scenario: Scenario, assumed: Sequence[SensorModel]) -> tu
 
 def drop_outs(scenario: Scenario) -> tuple[float, ...]:
     """Return the probability of each sensor that a scan does not take place; () if all are 0."""
-    found = tuple(sensor.scans.drop_out or 0.0 for sensor in scenario.model.sensors)
-    return found if any(found) else ()
+    probabilities = tuple(sensor.scans.drop_out or 0.0 for sensor in scenario.model.sensors)
+    return probabilities if any(probabilities) else ()
 
 
 def build_scan_times(scenario: Scenario) -> Bools:

@@ -79,7 +79,7 @@ def _central_filter(scenario: Scenario, filters: tuple[Filter, ...]) -> CentralF
         model.fusion.filter,
     )
     if section is not None:
-        central: CentralFilter = section.made(
+        central: CentralFilter = section.instantiate(
             scenario.folder, targets=targets, sensors=sensors, scene=partial(scene_for_program, scenario)
         )
         return central

@@ -144,8 +144,8 @@ class Control(Derived):
         return PlanningSettings(
             horizon_steps=horizon[0],
             horizon_period=horizon[1],
-            **self.given(),
-            **self.limits.given(),
+            **self.to_arguments(),
+            **self.limits.to_arguments(),
             limits=replace(
                 planning_limits(),
                 max_hypotheses=self.limits.max_hypotheses,

@@ -82,45 +82,45 @@ class Custom(Section):
         found: type = getattr(importlib.import_module(module), name)
         return found
 
-    def named(self, folder: Path) -> Any:
+    def load_object(self, folder: Path) -> Any:
         """Return the object that `function` names; importing it runs custom code.
 
         Raises `MissingMember` if that fails.
         """
         name, _, attribute = self.function.rpartition(":")
         try:
-            found: Any = _module(name, folder)
+            custom: Any = _module(name, folder)
             for part in attribute.split("."):
-                found = getattr(found, part)
+                custom = getattr(custom, part)
         except VedetteError:
             raise
         except Exception as error:
             raise self._not_given(f"{type(error).__name__}: {error}") from error
-        return found
+        return custom
 
-    def made(self, folder: Path, **parts: Any) -> Any:
+    def instantiate(self, folder: Path, **parts: Any) -> Any:
         """Return the object, made from `parts` if necessary. Raises `MissingMember` for an object of another kind."""
-        found, wanted = self.named(folder), self.protocol()
-        as_it_is = not isinstance(found, type) and (_is_function(wanted) or not self.lacking(found))
+        custom, wanted = self.load_object(folder), self.protocol()
+        as_it_is = not isinstance(custom, type) and (_is_function(wanted) or not self.protocol_mismatch(custom))
         try:
             if as_it_is and _is_function(wanted) and self.arguments:
-                found = partial(found, **self.arguments)
+                custom = partial(custom, **self.arguments)
             elif as_it_is and self.arguments:
                 got = ", ".join(self.arguments)
                 raise MissingMember(self, "arguments", f"none, as {self.function} is no class and no function", got)
-            elif not as_it_is and callable(found):
-                found = found(**matching_parts(found, parts), **self.arguments)
+            elif not as_it_is and callable(custom):
+                custom = custom(**matching_parts(custom, parts), **self.arguments)
         except VedetteError:
             raise
         except Exception as error:
             raise self._not_given(f"{type(error).__name__}: {error}") from error
-        if fault := self.lacking(found):
+        if fault := self.protocol_mismatch(custom):
             raise self._not_given(fault)
-        return found
+        return custom
 
-    def lacking(self, found: object) -> str:
+    def protocol_mismatch(self, custom: object) -> str:
         """Return in words how an object fails its protocol; empty if it meets it."""
-        return missing_members(found, self.protocol(), self.spared)
+        return missing_members(custom, self.protocol(), self.spared)
 
     def _not_given(self, got: str) -> MissingMember:
         return MissingMember(self, "function", f"{self.function} to give a {self.protocol().__name__}", got)
@@ -135,10 +135,10 @@ def _is_function(wanted: type) -> bool:
     return "__call__" in vars(wanted)
 
 
-def matching_parts(made: Any, parts: dict[str, Any]) -> dict[str, Any]:
+def matching_parts(factory: Any, parts: dict[str, Any]) -> dict[str, Any]:
     """Return the parts for which a class or function has parameters."""
     try:
-        parameters = inspect.signature(made).parameters
+        parameters = inspect.signature(factory).parameters
     except (ValueError, TypeError):  # some functions written in C have no signature
         return {}
     if inspect.Parameter.VAR_KEYWORD in [parameter.kind for parameter in parameters.values()]:
@@ -146,22 +146,22 @@ def matching_parts(made: Any, parts: dict[str, Any]) -> dict[str, Any]:
     return {name: part for name, part in parts.items() if name in parameters}
 
 
-def missing_members(found: Any, wanted: type, spared: Sequence[str] = ()) -> str:
+def missing_members(custom: Any, wanted: type, spared: Sequence[str] = ()) -> str:
     """Return in words how an object fails a class or protocol, except in the members `spared`; empty if it does not."""
     if not getattr(wanted, "_is_protocol", False):
-        return "" if isinstance(found, wanted) else f"a {type(found).__name__}"
+        return "" if isinstance(custom, wanted) else f"a {type(custom).__name__}"
     from vedette.models.arguments import protocol_members
 
-    what = f"a {type(found).__name__}"
+    kind = f"a {type(custom).__name__}"
     for name in protocol_members(wanted):
         if name in spared:
             continue
         member = inspect.getattr_static(wanted, name, None)  # an attribute without a default has none
-        if not hasattr(found, name):
-            return f"{what} without {_signature_text(name, member)}"
-        own = found if name == "__call__" else getattr(found, name)
+        if not hasattr(custom, name):
+            return f"{kind} without {_signature_text(name, member)}"
+        own = custom if name == "__call__" else getattr(custom, name)
         if inspect.isfunction(member) and not _accepts_call(own, member):
-            return f"{what} that cannot be called as {_signature_text(name, member)}"
+            return f"{kind} that cannot be called as {_signature_text(name, member)}"
     return ""
 
 

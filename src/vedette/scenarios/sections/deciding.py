@@ -38,15 +38,15 @@ class CustomReward(Custom):
     words: ClassVar[str] = ""
     gives: ClassVar[str] = "vedette.control:Reward"
 
-    def lacking(self, found: object) -> str:
+    def protocol_mismatch(self, reward: object) -> str:
         """Return in words how an object fails as a reward; a reward of sums need not be a function."""
         from vedette.control import LabelReward, PowerReward
 
-        return "" if isinstance(found, PowerReward | LabelReward) else super().lacking(found)
+        return "" if isinstance(reward, PowerReward | LabelReward) else super().protocol_mismatch(reward)
 
     def build(self, folder: Path) -> Any:
         """Return the custom reward."""
-        return self.made(folder)
+        return self.instantiate(folder)
 
 
 if TYPE_CHECKING:

@@ -50,18 +50,18 @@ class Derived(Section):
 
         def __getattr__(self, name: str) -> Any: ...
 
-    def given(self) -> dict[str, Any]:
+    def to_arguments(self) -> dict[str, Any]:
         """Return the values in the file, with names and units of the class or function; without limits left open."""
-        found = {}
-        for each in self.declared:
-            value = getattr(self, each.key)
+        arguments = {}
+        for declared in self.declared:
+            value = getattr(self, declared.key)
             if isinstance(value, Section):
                 value = value.build()  # type: ignore[attr-defined] # of a region, say
-            if each.in_degrees and value is not None:
+            if declared.in_degrees and value is not None:
                 value = math.radians(value)
-            if value is not None or each.type != "Limit":
-                found[each.name] = value
-        return found
+            if value is not None or declared.type != "Limit":
+                arguments[declared.name] = value
+        return arguments
 
 
 class Part(Derived):
@@ -70,14 +70,14 @@ class Part(Derived):
     def build(self, folder: Path | None = None, **given: Any) -> Any:
         """Return the part; uses the arguments `given` for which it has parameters."""
         module, _, name = self.of.partition(":")
-        made = getattr(importlib.import_module(module), name)
+        factory = getattr(importlib.import_module(module), name)
         with suppress_unit_warnings():
-            return made(**self.given(), **matching_parts(made, given))
+            return factory(**self.to_arguments(), **matching_parts(factory, given))
 
 
 class _OwnPart(Custom):
     def build(self, folder: Path, **_: Any) -> Any:
-        return self.made(folder)
+        return self.instantiate(folder)
 
 
 class Declared(NamedTuple):
@@ -148,19 +148,19 @@ def one_of(
     parts, with any further text of their description. own: sections that extend the class they are derived from, in
     place of generated ones. parent: of the others.
     """
-    found = {section.model_fields["kind"].default: section for section in own}
+    sections = {section.model_fields["kind"].default: section for section in own}
     for kind, of in _marked(folder)[room]:
-        if kind not in found:
-            found[kind] = _importable(_extended(parent, _name(room, kind), of, _kind(room, kind)))
+        if kind not in sections:
+            sections[kind] = _importable(_extended(parent, _name(room, kind), of, _kind(room, kind)))
     if gives:
         path, more = re.fullmatch(r"([\w.:]+)(.*)", gives).groups()  # type: ignore[union-attr]
         custom: Any = create_model(
             _name(room, "custom"), __base__=_OwnPart, __module__=__name__, **_kind(room, "custom")
         )
         custom.__doc__, custom.gives = f"A user's own `{path.replace(':', '.')}`{more}.", path
-        found["custom"] = _importable(custom)
-    ordered = sorted(found, key=lambda kind: (kind == "custom", kind))
-    return Annotated[Union[tuple(found[kind] for kind in ordered)], Field(discriminator="kind")]  # noqa: UP007
+        sections["custom"] = _importable(custom)
+    ordered = sorted(sections, key=lambda kind: (kind == "custom", kind))
+    return Annotated[Union[tuple(sections[kind] for kind in ordered)], Field(discriminator="kind")]  # noqa: UP007
 
 
 def _importable(section: Any) -> Any:
@@ -208,12 +208,12 @@ def _definition(of: str) -> Definition:
 @cache
 def _marked(folder: str) -> dict[str, list[tuple[str, str]]]:
     """Return by room the kind, and module and name, of the parts that are marked in the modules of a folder."""
-    found = defaultdict[str, list[tuple[str, str]]](list)
+    marked = defaultdict[str, list[tuple[str, str]]](list)
     for file in sorted((_ROOT / folder).glob("*.py")):
         module = ".".join(("vedette", *file.relative_to(_ROOT).with_suffix("").parts))
         for kind, room, name in _MARK.findall(_text(file)):
-            found[room].append((kind, f"{module}:{name}"))
-    return found
+            marked[room].append((kind, f"{module}:{name}"))
+    return marked
 
 
 def _summary(of: str) -> str:
@@ -223,14 +223,14 @@ def _summary(of: str) -> str:
 
 def _entries(text: str) -> dict[str, str]:
     """Return the description of each field or parameter in a docstring."""
-    found: dict[str, str] = {}
+    descriptions: dict[str, str] = {}
     names: list[str] = []
     for line in text.splitlines():
         entry = _ENTRY.fullmatch(line)
         names = entry[1].split(", ") if entry else names if line.startswith(" " * 8) else []
         for name in names:
-            found[name] = entry[2] if entry else f"{found[name]} {line.strip()}"
-    return found
+            descriptions[name] = entry[2] if entry else f"{descriptions[name]} {line.strip()}"
+    return descriptions
 
 
 @cache
@@ -240,13 +240,13 @@ def _declared(of: str) -> tuple[Declared, ...]:
     marks = [mark for mark in node.decorator_list if isinstance(mark, ast.Call)]
     keys = {ast.literal_eval(word.value): word.arg for mark in marks for word in mark.keywords if word.arg}
     stated = _fields(node) if isinstance(node, ast.ClassDef) else _parameters(node)
-    found = []
+    fields = []
     for name, kind, default in stated:
         key = keys.get(name) or re.sub("_rad$", "_deg", name)
         in_degrees = key.endswith("_deg") and not name.endswith("_deg")
-        said = None if default is None else ast.unparse(default)
-        found.append(Declared(key, name, kind, said, entries.get(name, ""), in_degrees))
-    return tuple(found)
+        default_text = None if default is None else ast.unparse(default)
+        fields.append(Declared(key, name, kind, default_text, entries.get(name, ""), in_degrees))
+    return tuple(fields)
 
 
 def _fields(node: ast.ClassDef) -> Iterator[tuple[str, str, ast.expr | None]]:
@@ -269,10 +269,10 @@ def _type(words: str) -> Any:
     if words == "Sequence[float]":
         return base.Reals
     try:
-        found = eval(words, _TYPES)  # the library's own source
+        kind = eval(words, _TYPES)  # the library's own source
     except (NameError, TypeError):
         return None
-    return found | None if words == "Limit" else found
+    return kind | None if words == "Limit" else kind
 
 
 def _field(declared: Declared) -> Any:

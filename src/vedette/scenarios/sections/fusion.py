@@ -55,7 +55,7 @@ class FusionLimits(Derived):
         """Return the caps, with the log of the weight."""
         from vedette.fusion import FusionLimits
 
-        return FusionLimits(log_min_component_weight=math.log(self.min_component_weight), **self.given())
+        return FusionLimits(log_min_component_weight=math.log(self.min_component_weight), **self.to_arguments())
 
 
 class CustomCentral(Custom):
@@ -204,8 +204,8 @@ class CustomFusion(Custom):
 
     def build(self, num_sensors: int, folder: Path) -> FusionRule:
         """Return the fusion of the sensors' densities."""
-        made: FusionRule = self.made(folder, num_sensors=num_sensors)
-        return made
+        rule: FusionRule = self.instantiate(folder, num_sensors=num_sensors)
+        return rule
 
 
 AnyFusion = Annotated[Fusion | CustomFusion, Field(discriminator="kind")]

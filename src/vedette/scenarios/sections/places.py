@@ -125,7 +125,7 @@ def misplaced_findings(model: ScenarioModel) -> Iterator[Finding]:
         return
     from vedette.recorded.geography import PLANE_REACH
 
-    told = max(abs(origin.lon), abs(origin.lat)) > 2.0 * _NEAR_DEG
+    is_origin_far = max(abs(origin.lon), abs(origin.lat)) > 2.0 * _NEAR_DEG
     wanted = "metres from the origin, or a place {lon: , lat: } in degrees"
     near = f"places within {PLANE_REACH / 1000.0:g} km of the origin"
     for path, section in sections_in(model):
@@ -136,7 +136,7 @@ def misplaced_findings(model: ScenarioModel) -> Iterator[Finding]:
                 got = f"x {x / 1000.0:.0f} km, y {y / 1000.0:.0f} km (are lon and lat exchanged, here or in `origin`?)"
                 yield (*path, *inside), near, got
             elif (
-                told
+                is_origin_far
                 and points
                 and all(abs(x - origin.lon) < _NEAR_DEG and abs(y - origin.lat) < _NEAR_DEG for x, y in points)
             ):

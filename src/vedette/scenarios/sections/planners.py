@@ -154,7 +154,7 @@ class NamedOracle(Strategy, Derived):
         from vedette.simulation import OraclePlanner
 
         own: dict[str, Any] = {"settings": parts.settings, "constraints": parts.constraints, "estimate": parts.estimate}
-        return OraclePlanner(parts.sensors, **own, **parts.oracle, **self.given())
+        return OraclePlanner(parts.sensors, **own, **parts.oracle, **self.to_arguments())
 
 
 class CustomPlanner(Strategy, Custom):
@@ -172,7 +172,7 @@ class CustomPlanner(Strategy, Custom):
 
     def planner(self, parts: Parts, folder: Path) -> Planner:
         """Return the custom planner."""
-        return with_reported_violations(self.made(folder, **parts._asdict()), parts)
+        return with_reported_violations(self.instantiate(folder, **parts._asdict()), parts)
 
 
 class ProgramStrategy(Strategy, ProgramSection):

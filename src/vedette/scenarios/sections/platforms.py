@@ -64,9 +64,9 @@ class Courses(_PlatformSection):
         if (self.speed is None) == (self.speeds is None):
             yield (), "either speed or speeds", "neither" if self.speed is None else "both"
 
-    def given(self) -> dict[str, Any]:
+    def to_arguments(self) -> dict[str, Any]:
         """Return the arguments of the platform, with one speed or several."""
-        return {**super().given(), "speed": self.top_speed if self.speeds is None else self.speeds}
+        return {**super().to_arguments(), "speed": self.top_speed if self.speeds is None else self.speeds}
 
     def first_action(self, heading_deg: float) -> Row | None:
         """Return its heading at the start, at its speed, or the first of several."""
@@ -107,8 +107,8 @@ class CustomPlatform(_PlatformSection, Custom):
 
     def build(self, folder: Path | None = None, **_: Any) -> Platform:
         """Return the custom platform."""
-        made: Platform = self.made(folder or Path())
-        return made
+        platform: Platform = self.instantiate(folder or Path())
+        return platform
 
     def components(self) -> Row:
         """Return the components of its pose at the start after place and heading."""

@@ -45,7 +45,7 @@ class ProgramSection(Section):
 class ProgramCentral(ProgramSection):
     """A tracker of all sensors' scans that is a program."""
 
-    def made(
+    def instantiate(
         self,
         folder: Path,
         *,

@@ -35,7 +35,7 @@ from vedette.scenarios.sections.sensing import (
     clutter_findings,
     noise_findings,
 )
-from vedette.scenarios.sections.true_sensors import BiasSection, TrueSensor, built_parts
+from vedette.scenarios.sections.true_sensors import BiasSection, TrueSensor, build_parts
 
 if TYPE_CHECKING:  # importing the models imports the compiler, which a check does not need
     from vedette.models import Region, SensorModel, SignalModel
@@ -245,7 +245,7 @@ class Sensor(Section):
         """
         from vedette.models import SensorModel
 
-        parts = built_parts(self, self.measurement, region, folder)
+        parts = build_parts(self, self.measurement, region, folder)
         with suppress_unit_warnings():
             return SensorModel(**parts, method=method, detection_at=detection_at)
 

@@ -119,7 +119,7 @@ class Columns(Section):
 
     @check
     def _pairs(self) -> Iterator[Finding]:
-        given = self.given()
+        given = self.to_arguments()
         for first, second in (("x", "y"), ("longitude", "latitude"), ("vx", "vy")):
             if (first in given) != (second in given):
                 yield (), f"{first} and {second} together", f"only {first if first in given else second}"
@@ -127,7 +127,7 @@ class Columns(Section):
         if "x" in given and "longitude" in given:
             yield (), "either x and y, or longitude and latitude", "both"
 
-    def given(self) -> dict[str, str]:
+    def to_arguments(self) -> dict[str, str]:
         """Return the given names: key -> name in the file."""
         return {key: name for key in type(self).model_fields if (name := getattr(self, key)) is not None}
 
@@ -193,11 +193,11 @@ def _read(
     edges = region.build()
     found = RecordedSource.from_file(
         file,
-        columns=section.columns.given(),
+        columns=section.columns.to_arguments(),
         origin_deg=section.origin_deg,
         usual_origin_deg=origin,
         time_origin=section.time_origin,
-        cleaning=Cleaning(**section.given(), region=edges if section.crop else None),
+        cleaning=Cleaning(**section.to_arguments(), region=edges if section.crop else None),
         sha256=section.sha256,
     )
     return replace(found, with_height=True) if has_height and found.reports.altitudes is not None else found

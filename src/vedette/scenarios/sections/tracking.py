@@ -112,7 +112,7 @@ class Filter(_Sensing, Derived):
             case "lmb":
                 return LmbFilter(targets, sensor, limits, assignment)
             case "factored_glmb":
-                return FactoredGlmbFilter(targets, sensor, limits, **self.given())
+                return FactoredGlmbFilter(targets, sensor, limits, **self.to_arguments())
             case "phd":
                 return PhdFilter(targets, sensor, limits)
             case "cphd":
@@ -134,7 +134,7 @@ class Filter(_Sensing, Derived):
 
         limits = self.limits.build()
         if self.kind == "factored_glmb":
-            return SequentialFactoredFilter(targets, sensors, limits, **self.given())
+            return SequentialFactoredFilter(targets, sensors, limits, **self.to_arguments())
         if self.kind == "lmb":
             if in_turn:
                 return SequentialLmbFilter(targets, sensors, limits, self.assignment.build(folder))
@@ -150,8 +150,8 @@ class CustomFilter(_Sensing, Custom):
 
     def build(self, targets: TargetModel, sensor: SensorModel, folder: Path) -> LocalFilter:
         """Return the filter of one sensor."""
-        made: LocalFilter = self.made(folder, targets=targets, sensor=sensor)
-        return made
+        local_filter: LocalFilter = self.instantiate(folder, targets=targets, sensor=sensor)
+        return local_filter
 
 
 AnyFilter = Annotated[Filter | CustomFilter, Field(discriminator="kind")]

@@ -30,19 +30,19 @@ if TYPE_CHECKING:  # importing the models imports the compiler, which a check do
     from vedette.simulation import TrueSensor as TrueSensorModel
 
 
-def built_parts(section: Any, like: Measurement, region: Region, folder: Path, known: Any = None) -> dict[str, Any]:
+def build_parts(section: Any, like: Measurement, region: Region, folder: Path, known: Any = None) -> dict[str, Any]:
     """Return the models of measurement, noise, detection and clutter that a section gives, by these names.
 
     like: the measurement to which noise and clutter apply. known: the measurement model if the section gives none.
     """
-    measured = known if section.measurement is None else section.measurement.build(folder)
-    given = {"measurement": measured, "angular": measured.angular, "kind": like.kind, "region": region}
-    found = {
+    model = known if section.measurement is None else section.measurement.build(folder)
+    given = {"measurement": model, "angular": model.angular, "kind": like.kind, "region": region}
+    parts = {
         name: part.build(folder, **given)
         for name in ("noise", "detection", "clutter")
         if (part := getattr(section, name)) is not None
     }
-    return {"measurement": measured, **found}
+    return {"measurement": model, **parts}
 
 
 class BiasSection(Section):
@@ -130,7 +130,7 @@ class TrueSensor(Section):
         from vedette.simulation.true_sensors import TrueSensor as Made
 
         like = self._like(measurement)
-        parts = built_parts(self, like, region, folder, known.measurement)
+        parts = build_parts(self, like, region, folder, known.measurement)
         with suppress_unit_warnings():
             # The filters' method may need a Jacobian; nothing is filtered with this model.
             model = replace(known, method="auto", **parts)

@@ -63,7 +63,9 @@ class UndetectedSection(Derived):
         from vedette.models import CellGrid, UndetectedModel
 
         grid = CellGrid.covering((self.region or region).build(), self.cell)
-        return UndetectedModel(grid, **{name: value for name, value in self.given().items() if value is not None})
+        return UndetectedModel(
+            grid, **{name: value for name, value in self.to_arguments().items() if value is not None}
+        )
 
 
 def undetected_anywhere(model: ScenarioModel, birth: BirthModel) -> UndetectedModel | None:
@@ -75,21 +77,21 @@ def undetected_anywhere(model: ScenarioModel, birth: BirthModel) -> UndetectedMo
     """
     section, measured, scan = model.undetected, birth.from_measurements, model.time.step_period
     if section is not None:
-        found = section.build(model.region)
+        undetected = section.build(model.region)
         if section.birth_rate is None and measured is not None:
-            found = replace(found, birth_rate="learnt")
+            undetected = replace(undetected, birth_rate="learnt")
     elif measured is None:
         return _cells_alone(model) if searches_by_default(model) else None
     elif not (measured.is_learnt or searches_by_default(model)):
         return None
     elif (uniform := replace(measured, expected="learnt").uniform(_cells_a_side(model))) is not None:
-        found = uniform
+        undetected = uniform
     else:
         return None
     if section is not None and section.prior_rate is not None:
-        return found
+        return undetected
     expected = _PRIOR_PER_SCAN if measured is None or isinstance(measured.expected, str) else measured.expected
-    return replace(found, prior_rate=expected / (birth.period or scan))
+    return replace(undetected, prior_rate=expected / (birth.period or scan))
 
 
 def _cells_alone(model: ScenarioModel) -> UndetectedModel:

@@ -98,7 +98,7 @@ class CustomMotion(Custom):
 
     def build(self, folder: Path, method: GaussianMethod = "auto") -> MotionModel:
         """Return the motion model. Raises `InputError` if its state dimension differs from the given one."""
-        motion: MotionModel = self.made(folder)
+        motion: MotionModel = self.instantiate(folder)
         if motion.state_dim != self.state_dim:
             raise MissingMember(self, "state_dim", f"that of {self.function}, {motion.state_dim}", str(self.state_dim))
         return motion if method == "auto" else replace(motion, method=method)
