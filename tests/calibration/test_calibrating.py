@@ -129,7 +129,7 @@ def calibrated(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Recordin
     return folder, found, calibrate(build_problem(found.scenario))
 
 
-def test_biases_of_two_radars_are_found(calibrated: tuple[Path, RecordingScenario, Calibration]) -> None:
+def test_biases_of_two_radars_are_estimated(calibrated: tuple[Path, RecordingScenario, Calibration]) -> None:
     _, _, calibration = calibrated
     assert calibration.log_likelihood > calibration.initial_log_likelihood + 300.0
     assert calibration.converged
@@ -273,7 +273,7 @@ def biases_of(problem: Problem) -> Calibration:
     return calibrate(problem, only=[each for each in problem.parameters if each.kind == "bias"])
 
 
-def test_where_a_radar_really_is_is_found_by_targets_all_around(tmp_path: Path) -> None:
+def test_radar_position_is_estimated_from_surrounding_targets(tmp_path: Path) -> None:
     targets = [(2000.0, 3000.0, 5.0, 3.0), (-3000.0, 1000.0, -4.0, 4.0), (1000.0, -3000.0, 3.0, -6.0)]
     calibration = biases_of(two_radars(tmp_path, targets))
     found = {(each.parameter.sensor, each.parameter.name): each for each in calibration.estimates}
@@ -299,7 +299,7 @@ def test_of_far_targets_in_one_direction_a_place_is_like_a_range(tmp_path: Path)
     assert calibration.rank == 5
 
 
-def test_of_a_radar_alone_no_place_is_found(tmp_path: Path) -> None:
+def test_position_of_a_single_radar_is_not_estimated(tmp_path: Path) -> None:
     calibration = biases_of(two_radars(tmp_path, [(2000.0, 3000.0, 5.0, 3.0), (-3000.0, 1000.0, -4.0, 4.0)], "a"))
     assert [each.parameter.name for each in calibration.estimates] == ["range"]
     assert "there is no other sensor" in calibration.estimates[0].reason

@@ -33,7 +33,7 @@ def test_a_regression_is_solved_and_its_information_found(seed: int) -> None:
     np.testing.assert_array_equal(lost, np.zeros((3, 3)))
 
 
-def test_a_direction_that_changes_nothing_is_named_and_not_followed() -> None:
+def test_an_unobservable_direction_is_reported_and_not_followed() -> None:
     factors, came = design(0)
     factors[:, 1] = factors[:, 0]  # only the sum of the first two can be found
     came = factors @ TRUTH

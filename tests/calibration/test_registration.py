@@ -49,7 +49,7 @@ def pairs_of(seconds: float = 200.0) -> MatchedMeasurements:
     )
 
 
-def test_without_noise_the_biases_are_found() -> None:
+def test_without_noise_the_biases_are_estimated() -> None:
     stds = np.array([[0.05, 300.0], [0.05, 300.0], [300.0, 300.0], [0.05, 300.0]])
     found = register(pairs_of(), SITES, ASKED, UNKNOWN * 1e3, stds, 7.0)
     np.testing.assert_allclose(found.biases[:, 0], TRUE[:, 0], atol=1.0)

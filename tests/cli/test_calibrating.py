@@ -92,7 +92,7 @@ def test_missing_files_are_reported(place: Path, words: tuple[str, ...], message
     assert message in result.stderr
 
 
-def test_a_bias_of_what_is_not_measured_is_refused(place: Path) -> None:
+def test_a_bias_of_an_unmeasured_quantity_is_refused(place: Path) -> None:
     text = (place / "radars.yaml").read_text("utf-8")
     measured = "bias: {range: 1.0}, measurement: {kind: bearing_only}"
     (place / "radars.yaml").write_text(text.replace("{name: Calshot,", f"{{name: Calshot, {measured},"))

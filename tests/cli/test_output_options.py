@@ -119,7 +119,7 @@ def test_documents_have_the_numbers_unrounded(place: Path) -> None:
     assert all(f"{each['total_mean_m']:.2f}" in call("results", "trial-results").stdout for each in group["strategies"])
 
 
-def test_faults_are_in_the_document_and_printed_when_quiet(place: Path) -> None:
+def test_errors_are_in_the_json_and_printed_when_quiet(place: Path) -> None:
     result = call("check", "faulty.yaml", "short.yaml", "absent.yaml", "--json")
     faulty, short, absent = json.loads(result.stdout)["files"]
     assert (result.exit_code, result.stderr) == (1, "")
@@ -162,7 +162,7 @@ def test_a_campaign_file_is_rejected_as_scenario_with_advice(place: Path, comman
 
 
 @pytest.mark.parametrize("words", [("init", "a.yaml"), ("generate", "a.yaml"), ("crowd", "a.yaml")], ids=" ".join)
-def test_the_overwrite_option_is_named_and_works(place: Path, words: tuple[str, ...]) -> None:
+def test_the_overwrite_option_is_suggested_and_works(place: Path, words: tuple[str, ...]) -> None:
     assert call(*words).exit_code == 0
     refused = call(*words)
     assert (refused.exit_code, refused.stderr) == (1, "a.yaml: already there; --overwrite replaces it\n")
@@ -229,7 +229,7 @@ def test_shell_completion_lists_names(place: Path, words: tuple[str, ...], expec
     assert done.stdout.split() == expected
 
 
-def test_missing_shards_are_named_with_the_commands_that_run_them(place: Path) -> None:
+def test_missing_shards_are_listed_with_the_commands_that_run_them(place: Path) -> None:
     assert call("campaign", "spec.toml", "--workers", "1", "--shard", "2/3").exit_code == 0
     result = call("merge", "trial-shards", "--out", "merged")
     assert result.exit_code == 1

@@ -34,7 +34,7 @@ def test_the_page_and_the_figures_are_written_where_they_should_be(folder: Path,
     assert "Fixed, run" in page.read_text("utf-8")
 
 
-def test_the_page_lies_in_the_folder_unless_said_otherwise_and_shows_the_chosen_runs(folder: Path) -> None:
+def test_the_page_is_in_the_folder_by_default_and_shows_the_chosen_runs(folder: Path) -> None:
     result = report(folder, "--runs", "still:1, fixed:0")
     assert result.exit_code == 0, result.output
     page = (folder / "report.html").read_text("utf-8")
@@ -65,7 +65,7 @@ def test_a_folder_without_results_is_an_error(tmp_path: Path) -> None:
     assert "expected" in result.output
 
 
-def test_places_that_cannot_be_written_are_named_by_their_option_alone(folder: Path, tmp_path: Path) -> None:
+def test_unwritable_paths_are_reported_by_option(folder: Path, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     below, in_the_way = tmp_path / "file" / "below.html", tmp_path / "folder.html"
     in_the_way.mkdir()

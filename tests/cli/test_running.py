@@ -64,7 +64,7 @@ def fail_at(monkeypatch, step, error):
     ("error", "status", "said"),
     [(NumericalError("no weight"), 1, "no weight"), (KeyboardInterrupt(), 130, "interrupted")],
 )
-def test_a_run_that_stops_keeps_what_it_had(scenario_file, tmp_path, monkeypatch, error, status, said):
+def test_an_interrupted_run_keeps_its_scans(scenario_file, tmp_path, monkeypatch, error, status, said):
     out = tmp_path / "results"
     fail_at(monkeypatch, 9, error)
     result = call("run", scenario_file, "--planner", "idm", "--out", out)

@@ -151,7 +151,7 @@ def test_crowd_rejects_invalid_options(words: tuple[str, ...], message: str, tmp
     assert list(tmp_path.iterdir()) == []
 
 
-def test_init_starts_in_a_folder_from_a_scene_whose_fusion_loses_nothing(tmp_path: Path) -> None:
+def test_init_starts_from_a_scene_with_lossless_fusion(tmp_path: Path) -> None:
     assert vedette("init", str(tmp_path)).exit_code == 0
     model = load_scenario(tmp_path / "scenario.yaml").model
     assert model == load_scenario("shore-radar").model
@@ -201,7 +201,7 @@ def test_init_from_an_unknown_scenario_is_a_usage_error(tmp_path: Path) -> None:
     assert f"expected one of {', '.join(list_builtin())}; got paper-z" in result.stderr.replace("\n", " ")
 
 
-def test_check_reports_all_faults_of_all_files(tmp_path: Path) -> None:
+def test_check_reports_all_errors_of_all_files(tmp_path: Path) -> None:
     good, bad, absent = (tmp_path / name for name in ("good.yaml", "bad.yaml", "absent.yaml"))
     good.write_text(MINIMAL.replace("steps: [1, 5]", "steps: [1]"), encoding="utf-8")
     broken = MINIMAL.replace("num_steps: 20", "num_steps: x").replace("cutoff: 50.0", "cutof: 50.0")

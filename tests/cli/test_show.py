@@ -67,7 +67,7 @@ def test_eight_mobile_is_described_in_words() -> None:
         ((1, 2, 4, 9, 11), "5 scans from 1 to 11"),
     ],
 )
-def test_the_scans_of_decisions_are_named_in_a_few_words(steps: tuple[int, ...], words: str) -> None:
+def test_the_scans_of_decisions_are_summarised(steps: tuple[int, ...], words: str) -> None:
     assert scans_in_words(steps, 4) == words
 
 

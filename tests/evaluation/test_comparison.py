@@ -47,7 +47,7 @@ def test_without_decisions_every_scan_counts(runs: dict[str, list[RunRecord]]) -
     assert compare({"fixed": runs["fixed"]}).counted.all()
 
 
-def test_differences_are_to_the_first_strategy_unless_named(comparison: Comparison) -> None:
+def test_differences_are_to_the_first_strategy_by_default(comparison: Comparison) -> None:
     against_first = comparison.difference("random").summary.mean
     assert float(against_first) == pytest.approx(
         float(comparison.summary("random").mean - comparison.summary("jdm").mean)

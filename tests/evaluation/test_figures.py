@@ -200,7 +200,7 @@ def test_the_style_is_available_for_custom_figures() -> None:
     assert [f"#{each.lstrip('#')}" for each in colours] == list(COLOURS)
 
 
-def test_overview_shows_a_run_beside_the_errors(comparison: Comparison) -> None:
+def test_overview_shows_a_run_next_to_the_errors(comparison: Comparison) -> None:
     left, right, above = overview_figure(make_record(), comparison).axes
     assert left.get_title() == "JDM, run 0"
     assert (left.get_ylabel(), right.get_ylabel(), above.get_ylabel()) == ("y (m)", "OSPA (m) minus JDM", "OSPA (m)")

@@ -137,7 +137,7 @@ def test_a_bad_line_is_reported_and_has_no_other_effect(tmp_path: Path, bad: byt
     assert live.process(after, good)[1][0]["tracks"] == live.process(state, good)[1][0]["tracks"]
 
 
-def test_what_a_part_of_ones_own_raises_is_told(tmp_path: Path) -> None:
+def test_errors_of_custom_parts_are_reported(tmp_path: Path) -> None:
     live = small(tmp_path)
 
     def fails(density: Any, step: int) -> Any:

@@ -113,7 +113,7 @@ def test_two_loops_do_not_write_one_file(name: str, tmp_path: Path, live: LiveLo
     PersistentLoop(live, **files).close()
 
 
-def test_a_full_disk_is_named_and_a_device_is_no_record(tmp_path: Path, live: LiveLoop) -> None:
+def test_a_full_disk_is_reported_and_a_device_is_no_record(tmp_path: Path, live: LiveLoop) -> None:
     if Path("/dev/full").exists():
         with pytest.raises(InputError, match="/dev/full: expected a file for the record; got something else"):
             PersistentLoop(live, record=Path("/dev/full"))

@@ -242,7 +242,7 @@ def test_a_slow_page_gets_the_latest_frame_and_the_number_missed(monkeypatch: py
     assert served(scene) == []
 
 
-def test_without_pages_nothing_is_drawn_and_faults_of_the_screen_are_reported() -> None:
+def test_without_pages_nothing_is_drawn_and_screen_errors_are_reported() -> None:
     class Faulty(Numbered):
         def frame(self) -> bytes:
             self.num += 1

@@ -80,7 +80,7 @@ def test_slopes_are_those_of_differences(kind: str, turns: bool) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_clutter_has_its_rate_and_is_drawn_where_its_intensity_says(kind: str) -> None:
+def test_clutter_has_its_rate_and_follows_its_intensity(kind: str) -> None:
     rng, region = np.random.default_rng(3), Region(-2e4, 3e4, -1e4, 2e4)
     clutter, model = region_clutter(50.0, region, kind, max_height=9e3), getattr(models, kind)()
     pose = random_pose(rng, turns=False)

@@ -189,7 +189,7 @@ def test_nothing_is_detected_beyond_the_reach(detection, reach):
     assert not detection.prob(STATES, np.array([*POSE, 0.2, 0.5]))[reach < RANGES].any()
 
 
-def test_a_reach_that_is_not_true_is_found():
+def test_a_wrong_reach_is_detected():
     detection = replace(models.gaussian_detection(600.0), reach=900.0)
     detection.check(STATES[RANGES < 900.0], POSE)
     with pytest.raises(ModelError, match="expected 0, as its reach is 900 m; got 0"):

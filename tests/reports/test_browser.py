@@ -206,7 +206,7 @@ def scene_place(page: Page, what: str) -> tuple[float, float]:
         ("run.scans[step][1].find((m) => m[0] === 2).slice(1, 3)", "detection of target 2 of sensor 2: bearing "),
     ],
 )
-def test_pointing_says_what_is_there(page: Page, what: str, said: str) -> None:
+def test_pointing_shows_a_description(page: Page, what: str, said: str) -> None:
     choose(page, "scrubber", "22")
     page.point(*scene_place(page, what))
     assert said in text(page, "hover")
@@ -246,7 +246,7 @@ def test_bearings_ranges_and_positions_are_drawn(browser: Browser, tmp_path: Pat
     assert kinds == ["ray", "circle"]
 
 
-def test_pointing_at_a_reward_says_its_actions_and_its_value(page: Page) -> None:
+def test_pointing_at_a_reward_shows_its_actions_and_value(page: Page) -> None:
     choose(page, "scrubber", "12")
     x, y = page.middle("[data-part=rewards]")
     page.point(x - 40, y)
@@ -310,7 +310,7 @@ def test_the_replay_shows_why_a_decision_was_taken(browser: Browser, tmp_path: P
         assert page.complaints() == []
 
 
-def test_a_decision_that_was_kept_without_says_so(browser: Browser, tmp_path: Path) -> None:
+def test_a_decision_stored_without_rewards_is_marked(browser: Browser, tmp_path: Path) -> None:
     campaign = campaign_of(planners=["jdm", "random"], runs=1, set={**SUMS, "control.explain": False})
     write_report(results_of(tmp_path / "results", campaign), tmp_path / "without.html")
     page = browser.open(tmp_path / "without.html")

@@ -40,7 +40,7 @@ def test_runs_that_not_every_strategy_has_are_left_out_of_a_comparison(tmp_path:
     assert {name: len(errors) for name, errors in run_errors(group).items()} == {"fixed": 2, "still": 2}
 
 
-def test_errors_have_their_tails_beside_them(tmp_path: Path) -> None:
+def test_errors_have_their_tails_next_to_them(tmp_path: Path) -> None:
     (group,) = comparison_groups(results_of(tmp_path / "results", campaign_of(planners=["still", "random"], runs=3)))
     table = error_table(group)
     assert table is not None
@@ -52,7 +52,7 @@ def test_errors_have_their_tails_beside_them(tmp_path: Path) -> None:
         assert row[-3:] == (f"{np.median(means):.2f}", f"{means.max():.2f}", f"{100.0 * lost.mean():.0f} %")
 
 
-def test_groups_are_named_by_what_sets_them_apart(tmp_path: Path) -> None:
+def test_groups_are_named_by_differing_settings(tmp_path: Path) -> None:
     grid = {"sensors.*.clutter.rate": [5.0, 40.0], "sensors.*.noise.sigma_range": [10.0, 20.0]}
     campaign = campaign_of(planners=["still"], grid=grid, runs=1)
     groups = list(comparison_groups(results_of(tmp_path / "results", campaign)))

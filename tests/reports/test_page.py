@@ -61,7 +61,7 @@ def page_of(results: CampaignResults, folder: Path, **options: Any) -> str:
     return (folder / "report.html").read_text("utf-8")
 
 
-def test_the_page_says_what_was_found_and_how_to_do_it_again(page: str) -> None:
+def test_the_page_has_findings_and_the_command_to_reproduce(page: str) -> None:
     words = Words(page).words
     assert "Which strategy tracks best on paper-a?" in words
     assert re.search(r"JDM joint decisions, CS divergence \d+\.\d\d ± \d+\.\d\d reference", words)
@@ -149,9 +149,7 @@ def test_measures_of_labels_are_left_out_for_filters_that_have_none(tmp_path: Pa
     assert missing == {"OSPA(2) (m)", "Label switches a run"}
 
 
-def test_a_page_that_grows_too_large_leaves_figures_and_runs_out_and_says_so(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_large_page_omits_figures_and_runs_with_a_note(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(html, "MAX_FIGURE_BYTES", 1000)
     monkeypatch.setattr(html, "MAX_REPLAY_BYTES", 100_000)
     campaign = campaign_of(planners=["fixed"], variants=[{"name": "one"}, {"name": "two"}], compare="planner")

@@ -101,7 +101,7 @@ def test_the_timeline_can_be_dragged_and_names_events(page: Page) -> None:
     assert page.complaints() == []
 
 
-def test_another_run_can_stand_beside(page: Page) -> None:
+def test_another_run_can_be_shown_alongside(page: Page) -> None:
     assert options(page, "beside") == [["", "nothing"], ["1", "IDM"], ["2", "Random"]]
     assert page.evaluate(f"{CANVASES}.length") == 1
     choose(page, "beside", "1")

@@ -151,7 +151,7 @@ def test_why_a_decision_was_taken_stands_with_it(tmp_path: Path) -> None:
         )
 
 
-def test_many_targets_are_told_by_the_ten_that_matter_most() -> None:
+def test_of_many_targets_the_ten_largest_gains_are_shown() -> None:
     plan = make_record().decisions[0].plan
     total = np.arange(1.0, 21.0)
     gains = TargetGains(np.stack([np.ones(20, np.int64), np.arange(20)], axis=1), 0.25 * total, 0.75 * total)

@@ -58,7 +58,7 @@ def test_measurements_are_those_of_the_recording(tmp_path: Path) -> None:
                 np.testing.assert_allclose([x, y], place, atol=1.0)
 
 
-def test_errors_are_told_where_targets_are_known(tmp_path: Path) -> None:
+def test_errors_are_shown_if_targets_are_known(tmp_path: Path) -> None:
     (scenario, *_), record = tracked(tmp_path, truth=True)
     words = words_of(record, scenario, tmp_path)
     for part in (
@@ -73,7 +73,7 @@ def test_errors_are_told_where_targets_are_known(tmp_path: Path) -> None:
     assert "drawn again" not in words
 
 
-def test_where_nobody_knows_the_targets_there_are_no_errors(tmp_path: Path) -> None:
+def test_without_true_targets_there_are_no_errors(tmp_path: Path) -> None:
     (scenario, *_), record = tracked(tmp_path, truth=False)
     data = data_of(record, scenario)
     assert (data["known"], data["ospa"]) == (False, [])
@@ -91,7 +91,7 @@ def test_a_recording_that_is_another_now_is_not_shown(tmp_path: Path) -> None:
     assert data_of(record, scenario)["scans"] == []
 
 
-def test_a_heading_that_nobody_gave_is_not_drawn(tmp_path: Path) -> None:
+def test_an_unknown_heading_is_not_drawn(tmp_path: Path) -> None:
     """Sensors that see all round, and of which the recording has no headings."""
     (scenario, *_), record = tracked(tmp_path, truth=False)
     data = data_of(record, scenario)

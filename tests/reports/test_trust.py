@@ -102,7 +102,7 @@ def test_a_module_that_a_manifest_names_is_not_run(results: Path, scenario: Path
     assert not mark.exists()
 
 
-def test_a_run_says_whose_code_it_runs(scenario: Path) -> None:
+def test_a_run_lists_the_custom_code_it_runs(scenario: Path) -> None:
     assert custom_code(load_scenario(scenario).model) == ("models.py:sees",)
     assert "runs code of yours: models.py:sees" in call("show", scenario)
     assert "code of" not in call("show", "paper-a")

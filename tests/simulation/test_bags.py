@@ -101,7 +101,7 @@ def test_receivers_report_where_they_are(tmp_path: Path) -> None:
     np.testing.assert_allclose(targets.tracks[0].positions, [[10.0 * k, -20.0] for k in range(4)], atol=1e-6)
 
 
-def test_what_is_not_there_or_no_number_is_named(tmp_path: Path) -> None:
+def test_missing_or_non_numeric_values_are_reported(tmp_path: Path) -> None:
     messages = [("/radar", poses(START, (1.0, 2.0))), ("/radar", poses(START + 1, (math.nan, 2.0)))]
     file = bag(tmp_path, messages)
     with pytest.raises(InputError, match=r"bag.db3, row 2, column 'x': expected a finite number; got nan"):

@@ -114,7 +114,7 @@ def test_positions_of_several_sensors_name_them() -> None:
         ),
     ],
 )
-def test_what_is_no_detection_is_named(reader: Any, quantities: Any, message: str) -> None:
+def test_invalid_detections_are_reported(reader: Any, quantities: Any, message: str) -> None:
     with pytest.raises(InputError, match=message):
         table_of_detections(reader, quantities, sensor="radar")
 

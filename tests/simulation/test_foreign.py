@@ -113,7 +113,7 @@ def test_ships_report_themselves(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("place", [12, 30, -3], ids=["time", "position", "checksum"])
-def test_a_damaged_message_is_left_out_and_told(place: int, tmp_path: Path) -> None:
+def test_a_damaged_message_is_skipped_and_reported(place: int, tmp_path: Path) -> None:
     lines = [ais(1452603741 + 10 * k, mmsi="235000001", lon=-1.11 + 1e-4 * k, lat=50.79) for k in range(6)]
     letters = list(lines[2])
     letters[place] = "7" if letters[place] != "7" else "5"
@@ -190,7 +190,7 @@ def test_valid_doppler_speeds_are_range_rates(tmp_path: Path) -> None:
     assert "range_rate_mps" not in read_table(tmp_path / "radar.ast").columns
 
 
-def test_records_without_a_place_are_told(tmp_path: Path) -> None:
+def test_records_without_a_position_are_reported(tmp_path: Path) -> None:
     category = CATS[48][-1]
     record = category.cv_record.create({"010": (("SAC", 1), ("SIC", 2)), "140": ((4.0, "s"))})
     (tmp_path / "radar.ast").write_bytes(plot(0.0, 5.0, 45.0) + category.create([record]).unparse().to_bytes())
@@ -239,7 +239,7 @@ def test_the_height_of_a_flight_level_is_taken_off_slant_ranges(tmp_path: Path) 
     assert table.notes[0].startswith("3 of 6 plots have no flight level: their slant ranges are taken for ranges along")
 
 
-def test_slant_ranges_are_warned_of(tmp_path: Path) -> None:
+def test_slant_ranges_warn(tmp_path: Path) -> None:
     (tmp_path / "radar.ast").write_bytes(b"".join(plot(5.0 * k, 5.0 + 0.1 * k, 45.0) for k in range(6)))
     text = "sensors:\n  - {name: 1/2, position: [0, 0], detection: {kind: constant, probability: .9}}\n"
     (tmp_path / "radar.yaml").write_text(text, "utf-8")

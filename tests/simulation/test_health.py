@@ -80,7 +80,7 @@ def test_every_field_of_both_reports_is_recorded() -> None:
     assert of_fusion - set(FUSION_COLUMNS) == {"fusion_missing_sets", "fusion_missing_labels"}  # these by sensor
 
 
-def test_the_record_holds_what_filters_and_fusion_said(experiment: Experiment) -> None:
+def test_the_record_has_reports_of_filters_and_fusion(experiment: Experiment) -> None:
     said: list[Any] = []
     health = run(with_fusion(experiment, lambda inner: _Recording(inner, said))).health
     health.check(8, 2)
@@ -117,7 +117,7 @@ def test_labels_that_a_sensor_lacks_are_counted_at_that_sensor(experiment: Exper
     assert summary.unknown_labels[1] > 0.5
 
 
-def test_a_target_that_one_sensor_alone_sees_is_told_as_lost(experiment: Experiment) -> None:
+def test_a_target_in_view_of_one_sensor_is_reported_as_lost(experiment: Experiment) -> None:
     def near(local: Any) -> Any:
         return replace(local, sensor=replace(local.sensor, detection=limited_range(0.98, 1.0)))
 

@@ -102,7 +102,7 @@ def test_files_and_frames_say_the_same(tmp_path: Path) -> None:
         np.testing.assert_array_equal(track.velocities, expected.velocities)
 
 
-def test_what_is_not_said_everywhere_is_not_used() -> None:
+def test_columns_with_gaps_are_not_used() -> None:
     rows = vectors()
     rows[0]["velocity"] = None
     found = parse_reports(as_table(columns(rows)))

@@ -188,7 +188,7 @@ def test_a_target_whose_label_is_held_but_not_estimated_is_kept() -> None:
 
 
 @pytest.mark.parametrize("step", [1, 4, 6])
-def test_where_nobody_can_be_helped_each_takes_its_first_course(step: int) -> None:
+def test_without_gain_each_sensor_takes_its_first_course(step: int) -> None:
     """No target is tracked; after the last scan there is nothing to follow either."""
     none = State((LMB.empty(4),) * 2, LMB.empty(4), step=step, time=float(TIMES[step - 1]))
     plan = OraclePlanner(SENSORS, schedule(), depth=2, truth=truth()).plan(none, POSES, rng=np.random.default_rng(0))
@@ -212,7 +212,7 @@ def test_a_run_tells_it_its_truth() -> None:
         assert [own.plan.planner for own in record.decisions] == [name]
 
 
-def test_own_planners_may_be_told_it_too() -> None:
+def test_custom_planners_may_require_the_truth() -> None:
     class Told:
         """A planner that keeps what it was told."""
 

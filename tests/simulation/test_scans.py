@@ -99,7 +99,7 @@ def test_same_seed_same_scan():
         np.testing.assert_array_equal(first.origins, second.origins)
 
 
-def test_nobody_there():
+def test_scans_without_targets():
     scan = simulate_scan(np.empty((0, 4)), POSE, sensor(rate=0.0), rng=np.random.default_rng(0))
     assert scan.measurements.shape == (0, 2)
     assert scan.origins.shape == (0,)

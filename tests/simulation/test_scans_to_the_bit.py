@@ -188,7 +188,7 @@ def raising_beyond(state, pose, params):
         ({"detection": models.DetectionModel(raising_beyond, np.array([1.0]))}, "'raising_beyond' .* too far"),
     ],
 )
-def test_what_a_model_got_wrong_is_told_with_the_state_and_the_pose(parts, message):
+def test_model_errors_are_reported_with_state_and_pose(parts, message):
     own = {
         "measurement": models.position(),
         "noise": models.constant_noise([1.0, 1.0]),

@@ -58,7 +58,7 @@ def test_another_world_is_the_run_once_more() -> None:
         assert not np.array_equal(mine, others)
 
 
-def test_it_says_when_it_is_over_and_where_nothing_can_be_sent() -> None:
+def test_it_ends_and_reports_where_nothing_can_be_sent() -> None:
     whole = build_experiment(load_scenario("linear-10"))
     experiment = replace(whole, times=whole.times[:1])
     world = SimulationRun(experiment, seed=1)

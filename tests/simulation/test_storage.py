@@ -220,7 +220,7 @@ def test_a_broken_manifest_is_named(saved: Path, manifest: str, message: str) ->
         load_run(saved)
 
 
-def test_what_is_no_run_is_named(tmp_path: Path) -> None:
+def test_invalid_runs_are_reported(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"manifest\.json: no such file; expected a file of a saved run"):
         load_run(tmp_path / "nowhere")
 

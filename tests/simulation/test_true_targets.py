@@ -125,7 +125,7 @@ def test_where_nothing_is_in_sight_it_goes_to_the_targets() -> None:
     assert errors["told"] < min(errors["jdm"], errors["oracle"]) - 1.0
 
 
-def test_a_named_one_takes_a_reward_of_its_own_and_looks_for_nothing() -> None:
+def test_a_named_planner_takes_its_own_reward_and_does_not_search() -> None:
     named = {"planners": {"floor": {"kind": "told", "reward": {"kind": "peecs"}}}, "control.association": "known"}
     scenario = replace_fields(load_scenario("paper-a"), named)
     built: Any = build_planner(scenario, "floor")

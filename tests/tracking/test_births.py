@@ -115,7 +115,7 @@ def test_labels_follow_the_sites_or_are_a_sensors_own() -> None:
     assert born(NOBODY, [None, None]).tracks.num_tracks == 0
 
 
-def test_a_bearing_and_range_say_where() -> None:
+def test_a_bearing_and_range_give_a_position() -> None:
     polar = models.SensorModel(
         models.bearing_range(),
         models.constant_noise([0.01, 3.0]),
@@ -146,7 +146,7 @@ TRUTH = np.array([[3.0, -4.0, 2.0, 1.0], [95.0, 5.0, -1.0, 2.0], [0.0, 200.0, 3.
 @pytest.mark.parametrize(
     "kind", [SequentialLmbFilter, MultiSensorLmbFilter, MultiSensorGlmbFilter, "feedback", "matched"]
 )
-def test_targets_are_found_without_birth_sites(kind: Any) -> None:
+def test_targets_are_tracked_without_birth_sites(kind: Any) -> None:
     if kind == "feedback":
         tracker: Any = Distributed(filters(WORLD, SENSORS), Clmb((0.5, 0.5)), feedback=True)
     elif kind == "matched":

@@ -105,7 +105,7 @@ class Own:
 
 @pytest.mark.parametrize("kind", ["m_delta_glmb", "lmb"])
 @pytest.mark.parametrize("planner", [JointPlanner, IndependentPlanner])
-def test_a_filter_of_ones_own_tracks_and_decides(experiment: Experiment, kind: str, planner: Any) -> None:
+def test_a_custom_filter_tracks_and_decides(experiment: Experiment, kind: str, planner: Any) -> None:
     tracker: Any = experiment.tracker
     if kind == "lmb":
         local = tuple(LmbFilter(one.targets, one.sensor) for one in tracker.filters)
@@ -286,7 +286,7 @@ def test_a_filter_without_a_report_is_named(experiment: Experiment) -> None:
         run(replace(experiment, tracker=silent))
 
 
-def test_a_tracker_of_ones_own_needs_no_stages(experiment: Experiment) -> None:
+def test_a_custom_tracker_needs_no_stages(experiment: Experiment) -> None:
     class OwnTracker:
         """Only the protocol; it gives up after three scans."""
 

@@ -191,7 +191,7 @@ class _Own:
         )[1]
 
 
-def test_a_tracker_of_ones_own_is_as_good() -> None:
+def test_undetected_targets_with_a_custom_tracker() -> None:
     state, _ = follow(UndetectedTargetTracker(_Own(), undetected()))[-1]
     (other, _) = follow(UndetectedTargetTracker(TRACKERS["central"], undetected()))[-1]
     assert state.fused == "nothing"
