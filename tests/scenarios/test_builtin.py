@@ -15,7 +15,7 @@ from vedette.scenarios import list_builtin, load_scenario
 from vedette.scenarios.build import build_experiment, build_targets
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections import ScenarioModel, Section
-from vedette.scenarios.sections.platforms import Courses
+from vedette.scenarios.sections.platforms import Heading
 from vedette.scenarios.sections.sensing import Clutter, Detection, Measurement, RangeDependentNoise
 from vedette.scenarios.sections.targets import RecordedTargets, ScriptedTargets
 from vedette.scenarios.sections.world import Motion
@@ -87,7 +87,7 @@ def test_the_papers_scenario_has_the_numbers_of_the_notes(name: str) -> None:
     assert [track.state for track in model.targets.tracks] == layout["targets"]
     assert not any(track.process_noise for track in model.targets.tracks)
     assert [sensor.position for sensor in model.sensors] == layout["sensors"]
-    assert {sensor.platform for sensor in model.sensors} == {Courses(speed=layout["speed"])}
+    assert {sensor.platform for sensor in model.sensors} == {Heading(speed=layout["speed"])}
     assert {sensor.moves_from for sensor in model.sensors} == {"first_decision"}
     assert [site.mean for site in model.birth.sites] == [(x, y, 0.0, 0.0) for x, y, *_ in layout["targets"]]
     assert {(site.existence, site.std) for site in model.birth.sites} == {(0.02, (50.0, 50.0, 25.0, 25.0))}

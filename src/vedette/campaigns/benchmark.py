@@ -165,9 +165,9 @@ def check_entrant(own: Entrant, campaign: Campaign) -> None:
         build_experiment(scenario)
         for _, section in sections_in(scenario.model):
             if isinstance(section, ProgramSection):
-                asked = section.asked(scenario.folder)
-                scene, seconds = scene_for_program(scenario), asked["start_seconds"]
-                start_program(asked["command"], asked["folder"], own.role, scene, rng, seconds)
+                program = section.call_arguments(scenario.folder)
+                scene, seconds = scene_for_program(scenario), program["start_seconds"]
+                start_program(program["command"], program["folder"], own.role, scene, rng, seconds)
     except VedetteError as error:
         raise InputError(f"{own.role} {own.name}: expected one that can be started; {error}") from None
 

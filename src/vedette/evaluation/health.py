@@ -46,15 +46,15 @@ def health_sums(healths: Sequence[Health]) -> HealthSums:
     if len({health.num_tracks.shape[1] for health in healths}) != 1:
         raise InputError("records: expected one run or more, of equally many sensors")
 
-    def joined(name: str) -> Floats:
+    def concatenated(name: str) -> Floats:
         return np.concatenate([getattr(health, name) for health in healths])
 
     def scans(name: str) -> int:
-        happened = joined(name) > 0
+        happened = concatenated(name) > 0
         return int(happened.reshape(len(happened), -1).any(axis=1).sum())
 
-    discarded, factoring = joined("discarded_weight_bound"), joined("factoring_error")
-    lacking = joined("num_missing_labels") > 0
+    discarded, factoring = concatenated("discarded_weight_bound"), concatenated("factoring_error")
+    lacking = concatenated("num_missing_labels") > 0
     return HealthSums(
         len(lacking),
         scans("cap_met"),
@@ -62,16 +62,16 @@ def health_sums(healths: Sequence[Health]) -> HealthSums:
         scans("num_inexact_clusters"),
         *_sum_and_worst(discarded),
         *_sum_and_worst(factoring),
-        float(joined("dropped_existence").max()),
-        int(joined("num_duplicates").sum()),
-        int(joined("num_clutter_raised").sum()),
-        joined("num_missing_sets").sum(axis=0, dtype=np.float64),
-        int(joined("fusion_num_sets").sum()),
+        float(concatenated("dropped_existence").max()),
+        int(concatenated("num_duplicates").sum()),
+        int(concatenated("num_clutter_raised").sum()),
+        concatenated("num_missing_sets").sum(axis=0, dtype=np.float64),
+        int(concatenated("fusion_num_sets").sum()),
         lacking.sum(axis=0, dtype=np.float64),
         scans("fusion_num_lost_labels"),
-        float(joined("fusion_num_lost_labels").max()),
+        float(concatenated("fusion_num_lost_labels").max()),
         scans("fusion_empty_intersection"),
-        float(joined("fusion_discarded_weight").max()),
+        float(concatenated("fusion_discarded_weight").max()),
     )
 
 

@@ -94,7 +94,7 @@ class WebServer:
     async def listen(self, port: int) -> Server:
         """Start to listen; raises `InputError` if the address is not available."""
 
-        class Counted(_Socket):
+        class ListeningSocket(_Socket):
             line_server = self._line_server
 
         try:
@@ -103,7 +103,7 @@ class WebServer:
                 self._host,
                 port,
                 process_request=self._answer_request,
-                create_connection=Counted,
+                create_connection=ListeningSocket,
                 backlog=BACKLOG,
                 open_timeout=ENTRY_TIMEOUT,
                 max_size=MAX_LINE_BYTES,

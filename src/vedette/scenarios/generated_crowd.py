@@ -44,8 +44,8 @@ class GeneratedCrowd:
     def __post_init__(self) -> None:
         if self.measured not in MEASURED:
             raise InputError(f"measured: expected one of {', '.join(MEASURED)}; got {self.measured!r}")
-        _whole("num_targets", self.num_targets, MAX_TARGETS)
-        _whole("num_steps", self.num_steps, 10_000)
+        _check_count("num_targets", self.num_targets, MAX_TARGETS)
+        _check_count("num_steps", self.num_steps, 10_000)
         for name, (least, most) in (("density", DENSITIES), ("clutter", (0.0, 100.0))):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value <= most:
@@ -67,7 +67,7 @@ class GeneratedCrowd:
         return "-".join(parts)
 
 
-def _whole(name: str, value: Any, largest: int) -> None:
+def _check_count(name: str, value: Any, largest: int) -> None:
     if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= largest:
         raise InputError(f"{name}: expected a whole number from 1 to {largest}; got {value!r}")
 

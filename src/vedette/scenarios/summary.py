@@ -15,7 +15,7 @@ from vedette.scenarios.sections.birth import Birth
 from vedette.scenarios.sections.control import Control
 from vedette.scenarios.sections.courses import directions_as_courses
 from vedette.scenarios.sections.fusion import AnyFusion, CustomFusion
-from vedette.scenarios.sections.platforms import Steps
+from vedette.scenarios.sections.platforms import GridMoves
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.tracking import AnyFilter, Filter
 from vedette.scenarios.sections.true_sensors import BiasSection
@@ -185,7 +185,7 @@ def sensing_rows(sensor: Sensor, north: Compass | None = None) -> list[tuple[str
 
 
 def _platform(section: Section, replaced: Mapping[str, tuple[str, object]] | None) -> str:
-    if isinstance(section, Steps):
+    if isinstance(section, GridMoves):
         way = f"steps of {section.length:g} m at {section.speed:g} m/s in {len(section.directions_deg)} directions"
         return f"{way}, or stay" if section.stay else way
     return describe_settings(section, replaced)

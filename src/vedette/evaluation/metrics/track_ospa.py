@@ -50,23 +50,23 @@ class TrackSet:
             raise InputError(f"{name}: expected finite positions")
 
     @classmethod
-    def of_truth(cls, truth: Truth) -> TrackSet:
+    def from_truth(cls, truth: Truth) -> TrackSet:
         """Return one track per target, by its id."""
         tracks = np.unique(truth.ids, return_inverse=True)[1].reshape(-1)
-        return cls._of_rows(tracks, np.diff(truth.offsets), truth.states)
+        return cls._from_rows(tracks, np.diff(truth.offsets), truth.states)
 
     @classmethod
-    def of_estimates(cls, estimates: Sequence[Estimate]) -> TrackSet:
+    def from_estimates(cls, estimates: Sequence[Estimate]) -> TrackSet:
         """Return one track per label. estimates: one per scan."""
         counts = np.array([estimate.num_targets for estimate in estimates], np.int64)
         if not counts.any():
             return cls(np.empty((0, len(counts)), np.bool_), np.empty((0, len(counts), 2)))
         labels = np.concatenate([estimate.labels for estimate in estimates])
         tracks = np.unique(labels, axis=0, return_inverse=True)[1].reshape(-1)
-        return cls._of_rows(tracks, counts, np.concatenate([estimate.means[:, :2] for estimate in estimates]))
+        return cls._from_rows(tracks, counts, np.concatenate([estimate.means[:, :2] for estimate in estimates]))
 
     @classmethod
-    def _of_rows(cls, tracks: Ints, counts: Ints, states: Floats) -> TrackSet:
+    def _from_rows(cls, tracks: Ints, counts: Ints, states: Floats) -> TrackSet:
         scans = np.repeat(np.arange(len(counts)), counts)
         alive = np.zeros((tracks.max(initial=-1) + 1, len(counts)), np.bool_)
         positions = np.zeros((*alive.shape, 2))
@@ -123,7 +123,9 @@ def ospa2(estimates: TrackSet, truths: TrackSet, *, cutoff: float, order: float,
 def ospa2_of_run(truth: Truth, estimates: Sequence[Estimate], *, cutoff: float, order: float, window: int) -> Floats:
     """Return the OSPA(2) of the estimated positions, with tracks by label; values and errors as in `ospa2`."""
     check_scans(truth, estimates)
-    return ospa2(TrackSet.of_estimates(estimates), TrackSet.of_truth(truth), cutoff=cutoff, order=order, window=window)
+    return ospa2(
+        TrackSet.from_estimates(estimates), TrackSet.from_truth(truth), cutoff=cutoff, order=order, window=window
+    )
 
 
 def _costs(first: TrackSet, second: TrackSet, cutoff: float) -> tuple[Floats, Bools]:

@@ -42,8 +42,8 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
         raise InputError(f"planner: expected one of {', '.join((*STRATEGIES, *model.planners))}; got {name!r}")
     sensors = build_sensors(scenario)
     strategy = get_strategy(model, name)
-    if misfit := strategy.misfit(model, labels=has_labels(sensors[0].filter)):
-        raise InputError(f"planner {name}: expected {misfit}; got {name}")
+    if reason := strategy.incompatibility(model, labels=has_labels(sensors[0].filter)):
+        raise InputError(f"planner {name}: expected {reason}; got {name}")
     parts = build_parts(scenario, sensors, strategy, num_threads)
     if name in model.planners:
         return NamedPlanner(name, model.planners[name].planner(parts, folder))

@@ -65,12 +65,12 @@ def expected(what: str, *, at: tuple[str | int, ...] = (), got: str = "") -> Pyd
     return PydanticCustomError("expected", "expected {expected}", {"expected": what, "at": at, "got": got})
 
 
-def _whole(value: Any) -> Any:
+def _as_integer(value: Any) -> Any:
     # In YAML 1.2 `1e3` is a floating-point number; as a count it is 1000.
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
-def _word(value: str) -> str:
+def _printable_name(value: str) -> str:
     if not value.strip() or not value.isprintable():
         raise expected("a name of one or more printable characters")
     return value
@@ -88,8 +88,8 @@ def _not_tiny(value: float) -> float:
     return value
 
 
-Whole = Annotated[int, BeforeValidator(_whole)]
-Name = Annotated[str, AfterValidator(_word)]
+Whole = Annotated[int, BeforeValidator(_as_integer)]
+Name = Annotated[str, AfterValidator(_printable_name)]
 Sha256 = Annotated[str, AfterValidator(_digest)]
 SHA256_FIELD = "SHA-256 that the file must have, as it is kept beside a run of it; none: any [-]."
 # Types with the names of `vedette.models.fields`, and limits that are sensible in a file.

@@ -98,12 +98,12 @@ class Birth(Section):
     )
 
     @check
-    def _somewhere(self) -> Iterator[Finding]:
+    def _has_births(self) -> Iterator[Finding]:
         if not self.sites and self.from_measurements is None:
             yield ("sites",), "at least one site, or from_measurements", "neither"
 
     @check
-    def _each_once(self) -> Iterator[Finding]:
+    def _unique_steps(self) -> Iterator[Finding]:
         earlier: set[int] = set()
         for i, step in enumerate(() if self.steps == "every" else self.steps):
             if step in earlier:

@@ -231,7 +231,7 @@ def _scans_of_unlabelled(model: ScenarioModel) -> Iterator[Finding]:
 
 def _planners_fit(model: ScenarioModel) -> Iterator[Finding]:
     for name, planner in model.planners.items():
-        if fault := planner.misfit(model):
+        if fault := planner.incompatibility(model):
             yield ("planners", name, "kind"), fault, describe(planner.kind)
 
 

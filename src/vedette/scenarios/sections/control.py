@@ -130,7 +130,7 @@ class Control(Derived):
         yield from _order("decision_times", self.decision_times or ())
 
     @check
-    def _confidence_beside_what_belongs_to_it(self) -> Iterator[Finding]:
+    def _confidence_for_sampling_settings(self) -> Iterator[Finding]:
         if self.confidence is None:
             for name, default in (("indifference", 0.0), ("max_samples", 2000)):
                 value = getattr(self, name)

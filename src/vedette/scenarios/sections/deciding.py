@@ -152,7 +152,7 @@ class Lookahead(Section):
     )
 
     @check
-    def _of_the_method(self) -> Iterator[Finding]:
+    def _fields_of_other_methods(self) -> Iterator[Finding]:
         for name, method in (("beam_width", "beam"), ("exploration", "tree"), ("rollout", "tree")):
             if method != self.method and getattr(self, name) is not None:
                 yield (name,), f"none, as it is of method {method}", describe(getattr(self, name))

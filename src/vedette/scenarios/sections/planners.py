@@ -37,7 +37,7 @@ class NamedJoint(ValuedStrategy):
     kind: Literal["joint"] = Field(default="joint", description="Kind of planner [-].")
     search: AnySearch | None = Field(default=None, description="In place of control.search; none: that one [-].")
 
-    def words(self, model: ScenarioModel) -> str:
+    def description(self, model: ScenarioModel) -> str:
         """Return a description: joint, and by which reward."""
         return self.by_reward("joint decisions", model)
 
@@ -49,16 +49,16 @@ class NamedJoint(ValuedStrategy):
         return JointPlanner(**self.shared(parts, folder), search=search)
 
 
-class NamedTold(NamedJoint):
+class NamedJointWithTruth(NamedJoint):
     """Joint decisions on the true targets (`told`): the floor that strategies are compared with."""
 
     kind: Literal["told"] = Field(default="told", description="Kind of planner [-].")  # type: ignore[assignment]
 
-    def misfit(self, model: ScenarioModel, *, labels: bool | None = None) -> str:
+    def incompatibility(self, model: ScenarioModel, *, labels: bool | None = None) -> str:
         """Return what is required instead, also if true targets are unknown or lack components of a custom motion."""
-        return super().misfit(model, labels=labels) or missing_truth(model)
+        return super().incompatibility(model, labels=labels) or missing_truth(model)
 
-    def words(self, model: ScenarioModel) -> str:
+    def description(self, model: ScenarioModel) -> str:
         """Return a description: joint, with the true targets."""
         return "joint decisions, true targets given"
 
@@ -79,7 +79,7 @@ class NamedIndependent(ValuedStrategy):
         default=None, description="In place of control.others; none: that one [-]."
     )
 
-    def words(self, model: ScenarioModel) -> str:
+    def description(self, model: ScenarioModel) -> str:
         """Return a description: independent, by which reward, and the assumption about other sensors."""
         return f"{self.by_reward('independent decisions', model)}, other sensors {self.others or model.control.others}"
 
@@ -124,7 +124,7 @@ class NamedRule(Strategy):
         if self.targets is not None and self.kind != "assigned":
             yield ("targets",), f"none, as the rule is {self.kind}", describe(list(self.targets))
 
-    def words(self, model: ScenarioModel) -> str:
+    def description(self, model: ScenarioModel) -> str:
         """Return a description: the rule."""
         return f"rule of thumb: {_RULES[self.kind]}"
 
@@ -141,11 +141,11 @@ class NamedOracle(Strategy, Derived):
 
     kind: Literal["oracle"] = Field(default="oracle", description="Kind of planner [-].")
 
-    def misfit(self, model: ScenarioModel, *, labels: bool | None = None) -> str:
+    def incompatibility(self, model: ScenarioModel, *, labels: bool | None = None) -> str:
         """Return what is required instead if true targets are unknown or lack components of a custom motion."""
         return missing_truth(model)
 
-    def words(self, model: ScenarioModel) -> str:
+    def description(self, model: ScenarioModel) -> str:
         """Return a description: with the true targets."""
         return "best decisions for the true targets"
 
@@ -166,7 +166,7 @@ class CustomPlanner(Strategy, Custom):
     spared: ClassVar[tuple[str, ...]] = ("name",)  # given by the scenario
     gives: ClassVar[str] = "vedette.control:Planner"
 
-    def words(self, model: ScenarioModel) -> str:
+    def description(self, model: ScenarioModel) -> str:
         """Return a description: the class or function."""
         return f"custom planner {self.function}"
 
@@ -178,7 +178,7 @@ class CustomPlanner(Strategy, Custom):
 class ProgramStrategy(Strategy, ProgramSection):
     """A planner that is a program."""
 
-    def words(self, model: ScenarioModel) -> str:
+    def description(self, model: ScenarioModel) -> str:
         """Return a description: the command."""
         return f"external program {self.code}"
 
@@ -187,11 +187,11 @@ class ProgramStrategy(Strategy, ProgramSection):
         from vedette.control import ProgramPlanner
 
         names = ("sensors", "scene", "settings", "constraints", "estimate")
-        return ProgramPlanner(**{name: getattr(parts, name) for name in names}, **self.asked(folder))
+        return ProgramPlanner(**{name: getattr(parts, name) for name in names}, **self.call_arguments(folder))
 
 
 class _Random(Strategy):
-    def words(self, model: ScenarioModel) -> str:
+    def description(self, model: ScenarioModel) -> str:
         """Return a description: random."""
         return "random actions"
 
@@ -202,7 +202,7 @@ class _Random(Strategy):
 
 
 class _Fixed(Strategy):
-    def words(self, model: ScenarioModel) -> str:
+    def description(self, model: ScenarioModel) -> str:
         """Return a description: no decisions."""
         return "first course kept"
 
@@ -221,7 +221,7 @@ STRATEGIES: dict[str, Strategy] = {
     "assigned": NamedRule(kind="assigned"),
     "centroid": NamedRule(kind="centroid"),
     "oracle": NamedOracle(),
-    "told": NamedTold.model_construct(),
+    "told": NamedJointWithTruth.model_construct(),
     "random": _Random(),
     "fixed": _Fixed(),
     "still": Strategy(),
@@ -236,7 +236,7 @@ def get_strategy(model: ScenarioModel, name: str) -> Strategy:
 def describe_strategy(model: ScenarioModel, name: str) -> str:
     """Return the description of a strategy; empty for an unknown name, such as `recorded`."""
     known = name in model.planners or name in STRATEGIES
-    return get_strategy(model, name).words(model) if known else ""
+    return get_strategy(model, name).description(model) if known else ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -265,7 +265,7 @@ AnyPlanner = Annotated[
     | NamedLookahead
     | NamedRule
     | NamedOracle
-    | NamedTold
+    | NamedJointWithTruth
     | CustomPlanner
     | ProgramStrategy,
     Field(discriminator="kind"),

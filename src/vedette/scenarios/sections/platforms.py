@@ -37,7 +37,7 @@ class _PlatformSection(Part):
         return float(self.speed) if "speed" in type(self).model_fields else 0.0
 
 
-class Still(_PlatformSection):
+class Stationary(_PlatformSection):
     """Stays where it is."""
 
     kind: Literal["still"] = Field(default="still", description="Kind of platform [-].")
@@ -45,7 +45,7 @@ class Still(_PlatformSection):
 
 
 @derived("vedette.platforms.courses:HeadingPlatform", first=("speed", "speeds"))
-class Courses(_PlatformSection):
+class Heading(_PlatformSection):
     """Turns at once, and keeps course and speed until the next decision; an action is a heading."""
 
     kind: Literal["courses"] = Field(default="courses", description="Kind of platform [-].")
@@ -79,7 +79,7 @@ class Courses(_PlatformSection):
 
 
 @derived("vedette.platforms.steps:GridPlatform")
-class Steps(_PlatformSection):
+class GridMoves(_PlatformSection):
     """Steps of one length, each made at a speed and followed by waiting; an action is a step."""
 
     kind: Literal["steps"] = Field(default="steps", description="Kind of platform [-].")
@@ -120,7 +120,7 @@ class CustomPlatform(_PlatformSection, Custom):
         return math.inf
 
 
-Carrier = Annotated[Still | Courses | Steps | Waypoints | CustomPlatform, Field(discriminator="kind")]
+Carrier = Annotated[Stationary | Heading | GridMoves | Waypoints | CustomPlatform, Field(discriminator="kind")]
 
 
 @derived("vedette.platforms.camera:Pointing", first=("pointing_deg", "half_width_deg"))
@@ -134,14 +134,16 @@ class Camera(_PlatformSection):
     pointing_deg: float = Field(default=0.0, description="Where it points at the start, as a heading [deg].")
     half_width_deg: HalfWidth = Field(description="Half the width of its field of view at the start [deg].")
     half_widths_deg: Annotated[tuple[HalfWidth, ...], Field(strict=False)]
-    carrier: Carrier = Field(default=Still(), description="What carries it [-].")
+    carrier: Carrier = Field(default=Stationary(), description="What carries it [-].")
 
     def build(self, folder: Path | None = None, **_: Any) -> Platform:
         """Return a camera, with its carrier if that moves."""
         from vedette.platforms import MountedPlatform
 
         pointing: Platform = super().build(folder)
-        return pointing if isinstance(self.carrier, Still) else MountedPlatform(self.carrier.build(folder), pointing)
+        return (
+            pointing if isinstance(self.carrier, Stationary) else MountedPlatform(self.carrier.build(folder), pointing)
+        )
 
     def components(self) -> Row:
         """Return pointing and half width, rad."""
@@ -149,7 +151,7 @@ class Camera(_PlatformSection):
 
     def first_action(self, heading_deg: float) -> Row | None:
         """Return the action that keeps its pointing."""
-        carried = () if isinstance(self.carrier, Still) else self.carrier.first_action(heading_deg)
+        carried = () if isinstance(self.carrier, Stationary) else self.carrier.first_action(heading_deg)
         zoom = (self.half_width_deg,) if self.half_widths_deg else ()
         return None if carried is None else (*carried, self.pointing_deg, *zoom)
 
@@ -162,5 +164,5 @@ class Camera(_PlatformSection):
 if TYPE_CHECKING:
     AnyPlatform = _PlatformSection
 else:
-    _WRITTEN = (Still, Courses, Steps, Waypoints, Camera, CustomPlatform)
+    _WRITTEN = (Stationary, Heading, GridMoves, Waypoints, Camera, CustomPlatform)
     AnyPlatform = one_of("platform", "platforms", own=_WRITTEN, parent=_PlatformSection)

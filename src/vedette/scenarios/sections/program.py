@@ -36,7 +36,7 @@ class ProgramSection(Section):
         place = folder / self.folder
         return tuple(str(place / word) for word in self.command if (place / word).is_file())
 
-    def asked(self, folder: Path) -> dict[str, Any]:
+    def call_arguments(self, folder: Path) -> dict[str, Any]:
         """Return the arguments for calling the program."""
         given = {name: getattr(self, name) for name in ("command", "seconds", "start_seconds")}
         return {**given, "folder": (folder / self.folder).resolve()}
@@ -56,4 +56,4 @@ class ProgramCentral(ProgramSection):
         """Return the filter that runs the program."""
         from vedette.tracking import ProgramFilter
 
-        return ProgramFilter(targets, sensors, scene=scene, **self.asked(folder))
+        return ProgramFilter(targets, sensors, scene=scene, **self.call_arguments(folder))

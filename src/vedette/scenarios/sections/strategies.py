@@ -55,14 +55,14 @@ class Strategy(Section):
 
     needs_labels: ClassVar[bool] = False
 
-    def misfit(self, model: ScenarioModel, *, labels: bool | None = None) -> str:
+    def incompatibility(self, model: ScenarioModel, *, labels: bool | None = None) -> str:
         """Return what is required instead, and why, if the planner does not suit a scenario; "" if it does.
 
         labels: True if the filter, already built, labels its targets; None: determined from its kind.
         """
         return ""
 
-    def words(self, model: ScenarioModel) -> str:
+    def description(self, model: ScenarioModel) -> str:
         """Return a description for readers of results: `joint decisions, expected loss`."""
         return "sensors do not move"
 
@@ -77,7 +77,7 @@ class ValuedStrategy(Strategy):
     reward: AnyReward | None = Field(default=None, description="In place of control.reward; none: that one [-].")
     needs_labels: ClassVar[bool] = True
 
-    def misfit(self, model: ScenarioModel, *, labels: bool | None = None) -> str:
+    def incompatibility(self, model: ScenarioModel, *, labels: bool | None = None) -> str:
         """Return what is required instead if filters have no labels, which the values need."""
         kind = model.filter.kind
         if kind not in UNLABELLED if labels is None else labels:
@@ -103,16 +103,16 @@ class LookaheadStrategy(ValuedStrategy):
         """Return the arguments of the depth and the search."""
         return parts.lookahead
 
-    def misfit(self, model: ScenarioModel, *, labels: bool | None = None) -> str:
+    def incompatibility(self, model: ScenarioModel, *, labels: bool | None = None) -> str:
         """Return what is required instead, also if decisions are not sums over labels."""
         reward = self.reward or model.control.reward
-        if unfit := super().misfit(model, labels=labels):
+        if unfit := super().incompatibility(model, labels=labels):
             return unfit
         if model.control.association == "known" or reward.kind == "expected_loss":
             return ""
         return "joint or another, as with control.association full decisions are no sums over labels (known has them)"
 
-    def words(self, model: ScenarioModel) -> str:
+    def description(self, model: ScenarioModel) -> str:
         """Return a description: joint over several periods, and by which reward."""
         return self.by_reward("joint decisions over several periods", model)
 

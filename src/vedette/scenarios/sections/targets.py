@@ -243,7 +243,7 @@ class PoissonTargets(Section):
         return PoissonTargets(motion, self.expected, mean, np.diag(std**2), self.death_probability, region)
 
 
-class CrowdTargets(Section):
+class UniformTargets(Section):
     """A steady crowd, drawn anew in every run: uniform over the region at the first scan and ever after.
 
     Births make up for deaths; where a target leaves the region another enters at the opposite edge.
@@ -293,5 +293,5 @@ class UnknownTargets(Section):
 
 
 Targets = Annotated[
-    ScriptedTargets | RecordedTargets | PoissonTargets | CrowdTargets | UnknownTargets, Field(discriminator="kind")
+    ScriptedTargets | RecordedTargets | PoissonTargets | UniformTargets | UnknownTargets, Field(discriminator="kind")
 ]

@@ -40,7 +40,7 @@ UNLABELLED = ("phd", "cphd", "cb_member")
 # Filters with labels, for messages.
 LABELLING = "delta_glmb, m_delta_glmb, lmb and factored_glmb"
 # Kinds of assignment that a filter supports, if not all.
-_ASKED = {"delta_glmb": "choices", "m_delta_glmb": "choices", "lmb": "marginals"}
+_REQUIRED_RESULTS = {"delta_glmb": "choices", "m_delta_glmb": "choices", "lmb": "marginals"}
 # Filters with a number of targets limited by `max_labels`.
 LABEL_LIMITED = ("lmb", "factored_glmb", "cb_member")
 
@@ -83,11 +83,11 @@ class Filter(_Sensing, Derived):
 
     @check
     def _assignment_fits(self) -> Iterator[Finding]:
-        asked = _ASKED.get(self.kind, "choices and marginals")
+        required = _REQUIRED_RESULTS.get(self.kind, "choices and marginals")
         fitting = [
             section.model_fields["kind"].default
             for section in get_args(get_args(Assignment)[0])
-            if asked in getattr(section, "finds", "marginals")  # those of the user's own
+            if required in getattr(section, "finds", "marginals")  # those of the user's own
         ]
         if self.assignment.kind not in fitting:
             yield (

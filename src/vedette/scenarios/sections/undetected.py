@@ -162,11 +162,13 @@ def cells_of_undetected(model: ScenarioModel) -> Iterator[Finding]:
     if min(width, height) <= 0.0:
         return
     if max(math.ceil(width / section.cell), 1) * max(math.ceil(height / section.cell), 1) > MAX_CELLS:
-        wanted = f"at least {_enough(width, height):.3g}, as at most {MAX_CELLS:,} cells may fill the region"
+        wanted = (
+            f"at least {_sufficient_cell_size(width, height):.3g}, as at most {MAX_CELLS:,} cells may fill the region"
+        )
         yield ("undetected", "cell"), wanted, describe(section.cell)
 
 
-def _enough(width: float, height: float) -> float:
+def _sufficient_cell_size(width: float, height: float) -> float:
     """Return a size that is large enough, also after rounding to three digits."""
     half = 0.5 * (width + height) / (MAX_CELLS - 1)  # (width / size + 1) (height / size + 1) = MAX_CELLS
     return 1.005 * (half + math.sqrt(half * half + width * height / (MAX_CELLS - 1)))
