@@ -110,11 +110,11 @@ def redraw(folder: Path, scene: Scene, seconds: float, seed: int, first: float, 
 
 def without(scan: SensorScan, problem: Problem, bias: Bias) -> SensorScan:
     """A scan without a bias."""
-    site, look = (
+    site, recorded_scan = (
         replace(problem.sites[scan.sensor], bias=bias),
         RecordedScan(scan.time, scan.sensor, scan.measurements, scan.pose),
     )
-    found = remove_bias(look, site, problem.recording.bearings[scan.sensor])
+    found = remove_bias(recorded_scan, site, problem.recording.bearings[scan.sensor])
     return SensorScan(scan.sensor, found.time, found.scan, found.pose)
 
 

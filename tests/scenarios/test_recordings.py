@@ -478,7 +478,7 @@ def test_a_compass_sensor_gives_degrees_from_north() -> None:
     np.testing.assert_allclose(site.to_raw(measured), told, atol=1e-12)
     plain = RecordedSensor("radar", "bearing_range", (0.0, 0.0, 0.0))
     np.testing.assert_array_equal(plain.to_raw(plain.from_raw(told)), told)
-    with pytest.raises(InputError, match="told: expected"):
+    with pytest.raises(InputError, match="raw: expected"):
         site.from_raw([[1.0]])
 
 

@@ -156,8 +156,8 @@ class OnlineBiasEstimator:
         """Return the scan without the biases estimated for its time; raises as `take`."""
         own = self._checked(scan)
         site = self.problem.with_biases(self.biases(state, own.time))[own.sensor]
-        look = RecordedScan(own.time, own.sensor, own.measurements, own.pose)
-        without = remove_bias(look, site, self.problem.recording.bearings[scan.sensor])
+        recorded_scan = RecordedScan(own.time, own.sensor, own.measurements, own.pose)
+        without = remove_bias(recorded_scan, site, self.problem.recording.bearings[scan.sensor])
         return SensorScan(scan.sensor, without.time, without.scan, without.pose)
 
     def _checked(self, scan: SensorScan) -> SensorScan:
@@ -190,12 +190,23 @@ class OnlineBiasEstimator:
         """Return the state with the estimates of the last window."""
         assert state.newest is not None
         recorded, start = self.problem.recording, min(scan.time for scan in state.scans)
-        looks = [RecordedScan(each.time - start, each.sensor, each.measurements, each.pose) for each in state.scans]
+        recorded_scans = [
+            RecordedScan(each.time - start, each.sensor, each.measurements, each.pose) for each in state.scans
+        ]
         sites = self.problem.sites
-        poses = np.zeros((len(sites), max(map(len, [*(site.pose for site in sites), *(look.pose for look in looks)]))))
+        poses = np.zeros(
+            (
+                len(sites),
+                max(
+                    map(
+                        len, [*(site.pose for site in sites), *(recorded_scan.pose for recorded_scan in recorded_scans)]
+                    )
+                ),
+            )
+        )
         for s, site in enumerate(sites):
             poses[s, : len(site.pose)] = site.pose
-        window = group_by_time(looks, poses, start, recorded.is_utc, (), recorded.bearings)
+        window = group_by_time(recorded_scans, poses, start, recorded.is_utc, (), recorded.bearings)
         problem = replace(self.problem, recording=window, parameters=state.parameters)
         drifts = [each for each in state.parameters if each.kind == "bias" and each.component != "clock"]
         calibration = calibrate(problem, only=drifts)
