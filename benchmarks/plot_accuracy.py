@@ -29,7 +29,7 @@ from pages import write_between
 from vedette.evaluation import track_recording
 from vedette.kernels.base.types import Floats
 from vedette.models import SignalModel
-from vedette.scenarios.of_recording import scenario_of_recording
+from vedette.scenarios.from_recording import scenario_from_recording
 from vedette.simulation.records import RunRecord
 
 PERIOD, SCANS, DETECTION, FALSE = 4.0, 60, 0.9, 8.0
@@ -106,7 +106,7 @@ def tracked(
     (folder / "radar.yaml").write_text(
         f"recording: {{bearings: east, turns: none}}\nsensors:\n  - {{name: R, position: [0, 0], {sensor}}}\n", "utf-8"
     )
-    found = scenario_of_recording(folder / "radar.yaml", folder / "scans.csv", speed=speed)
+    found = scenario_from_recording(folder / "radar.yaml", folder / "scans.csv", speed=speed)
     return track_recording(found.scenario, found.recording)
 
 

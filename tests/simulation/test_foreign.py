@@ -351,7 +351,7 @@ def test_service_messages_tell_the_turn_and_empty_turns_of_a_radar(tmp_path: Pat
     content += b"".join(plot(time + 1.0, 20.0, 90.0) for time in (1012.0, 1016.0, 1024.0))
     content += service(1001.0, kind=2, sic=7) + service(1002.0, kind=3)
     (tmp_path / "radar.ast").write_bytes(content)
-    site = Site("1/2", "bearing_range", (0.0, 0.0, 0.0))
+    site = RecordedSensor("1/2", "bearing_range", (0.0, 0.0, 0.0))
     found = parse_scans(read_table(tmp_path / "radar.ast"), [site], Conventions({}, {}))
     sizes = [0 if scans[0] is None else len(scans[0]) for scans in found.scans]
     assert 9 <= len(sizes) <= 10

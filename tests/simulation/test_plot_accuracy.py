@@ -24,13 +24,13 @@ from vedette.models import (
     with_row_noise,
 )
 from vedette.models.functions import numbers_at
-from vedette.recorded import Conventions, Origin, Site, parse_scans
+from vedette.recorded import Conventions, Origin, RecordedSensor, parse_scans
 from vedette.recorded.merging import merged
-from vedette.recorded.tables import table_of
-from vedette.scenarios.of_recording import scenario_of_recording
+from vedette.recorded.tables import as_table
+from vedette.scenarios.from_recording import scenario_from_recording
 
 EAST = Conventions({}, {}, "east")
-RADAR = Site("R", "bearing_range", (0.0, 0.0, 0.0), turn="none")
+RADAR = RecordedSensor("R", "bearing_range", (0.0, 0.0, 0.0), turn="none")
 SIGNAL = SignalModel(16.0, 10.0)
 ROWS = {
     "time": [0.0, 0.0, 1.0],
@@ -41,8 +41,8 @@ ROWS = {
 }
 
 
-def scans_of(columns: dict[str, Any], site: Site = RADAR, conventions: Conventions = EAST) -> list[Any]:
-    recording = parse_scans(table_of(columns), [site], conventions, Origin(0.0, 0.0))
+def scans_of(columns: dict[str, Any], site: RecordedSensor = RADAR, conventions: Conventions = EAST) -> list[Any]:
+    recording = parse_scans(as_table(columns), [site], conventions, Origin(0.0, 0.0))
     assert recording.unused == ()
     return [scan for (scan,) in recording.scans]
 
@@ -85,7 +85,7 @@ def test_a_correlation_of_one_is_refused() -> None:
 
 def test_a_ratio_without_a_signal_is_a_column_that_is_not_read() -> None:
     columns = ROWS | {"snr_db": [12.0, 20.0, None]}
-    assert parse_scans(table_of(columns), [RADAR], EAST).unused == ("snr_db",)
+    assert parse_scans(as_table(columns), [RADAR], EAST).unused == ("snr_db",)
     first, _ = scans_of(columns, replace(RADAR, signal=SIGNAL))
     np.testing.assert_allclose(first[:, -1], [SIGNAL.log_likelihood_ratio(each) for each in (12.0, 20.0)])
 
@@ -114,7 +114,7 @@ def test_a_bias_is_removed_and_the_accuracy_stays() -> None:
 
 def test_rows_of_one_target_are_merged_with_their_mean_covariance() -> None:
     columns = ROWS | {"bearing_rad": [0.5, 0.501, None], "range_km": [1.0, 1.01, None]}
-    recording = parse_scans(table_of(columns), [RADAR], EAST)
+    recording = parse_scans(as_table(columns), [RADAR], EAST)
     (scan,) = merged(recording, [RADAR], [(0.02, 30.0)], 4.0).scans[0]
     assert scan is not None
     before: Any = recording.scans[0][0]
@@ -175,7 +175,7 @@ def test_a_sensors_file_reads_accuracy_and_signal(tmp_path: Path) -> None:
     )
     rows = "".join(f"{k},{0.5 + 0.001 * k},1000,50,1.0,{11 + k % 3}\n" for k in range(12))
     (tmp_path / "scans.csv").write_text("time,bearing_rad,range_m,range_std_m,bearing_std_deg,snr_db\n" + rows)
-    found = scenario_of_recording(tmp_path / "radar.yaml", tmp_path / "scans.csv", speed=10.0).recording
+    found = scenario_from_recording(tmp_path / "radar.yaml", tmp_path / "scans.csv", speed=10.0).recording
     assert all(scan.shape == (1, 6) for (scan,) in found.scans if scan is not None)
 
 

@@ -16,7 +16,7 @@ from vedette.errors import InputError, ScenarioError
 from vedette.evaluation import track_recording
 from vedette.recorded import RecordedTargets
 from vedette.scenarios import load_scenario
-from vedette.scenarios.of_recording import scenario_of_recording
+from vedette.scenarios.from_recording import scenario_from_recording
 
 REPORTS: dict[str, Any] = {
     "time": [0.0, 10.0, 30.0],
@@ -72,7 +72,7 @@ def recording(folder: Path, altitude: str) -> Path:
 
 def test_errors_in_space_are_those_of_recorded_heights(tmp_path: Path) -> None:
     sensors = recording(tmp_path, "altitude_m")
-    found = scenario_of_recording(sensors, tmp_path / "scans.csv", truth=tmp_path / "truth.csv", speed=250.0)
+    found = scenario_from_recording(sensors, tmp_path / "scans.csv", truth=tmp_path / "truth.csv", speed=250.0)
     record = track_recording(found.scenario, found.recording)
     assert record.ospa[10:-1, 0].max() < 60.0  # at the last scan the target has left the region
 
@@ -80,7 +80,7 @@ def test_errors_in_space_are_those_of_recorded_heights(tmp_path: Path) -> None:
 def test_a_truth_without_altitudes_has_no_error_in_space(tmp_path: Path) -> None:
     sensors = recording(tmp_path, "depth")
     with pytest.raises(ScenarioError, match="expected a column altitude_m of every report"):
-        scenario_of_recording(sensors, tmp_path / "scans.csv", truth=tmp_path / "truth.csv", speed=250.0)
+        scenario_from_recording(sensors, tmp_path / "scans.csv", truth=tmp_path / "truth.csv", speed=250.0)
 
 
 def test_sensors_of_heights_measure_recorded_targets_that_have_them(tmp_path: Path) -> None:

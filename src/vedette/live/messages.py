@@ -190,7 +190,7 @@ def _rows(given: Any, field: str, site: RecordedSensor) -> list[list[float]]:
     return given
 
 
-def _accuracy(data: Mapping[str, Any], num: int, site: Site, place: str) -> dict[str, list[Any]]:
+def _accuracy(data: Mapping[str, Any], num: int, site: RecordedSensor, place: str) -> dict[str, list[Any]]:
     """Return standard deviations and signal-to-noise ratios as columns of a table."""
     names, found = COMPONENTS[site.kind], dict[str, list[Any]]()
     if (stds := data.get("stds")) is not None:

@@ -56,7 +56,7 @@ class ScanColumns:
         columns = (self.table.columns[self._columns[name][0]] for name in names)
         return any(is_empty(cell) and not all(map(is_empty, others)) for cell, *others in zip(*columns, strict=True))
 
-    def rows_bring_noise(self, site: Site) -> bool:
+    def rows_bring_noise(self, site: RecordedSensor) -> bool:
         """Return True if the rows of a sensor have their own noise, or miss a component of the measurement."""
         return bool(self.own_accuracy(site)) or not self._with_gaps.isdisjoint(COMPONENTS[site.kind])
 
@@ -72,7 +72,7 @@ class ScanColumns:
         used = {self._columns[name][0] for name in measured | own if name in self._columns} | {self._time, self._sensor}
         return tuple(name for name in self.table.columns if name not in used)
 
-    def own_accuracy(self, site: Site) -> tuple[str, ...]:
+    def own_accuracy(self, site: RecordedSensor) -> tuple[str, ...]:
         """Return the columns with the accuracy and signal-to-noise ratio of the rows of a sensor."""
         names = [f"{name}_std" for name in COMPONENTS[site.kind]]
         if {"x_std", "y_std"} <= set(self._columns):

@@ -186,7 +186,7 @@ class _Rows(ScanColumns):
         """Return a measured value; of a third component that the row does not have, what stands in for it."""
         return GAPS[quantity] if quantity in GAPS and self._is_blank(i, quantity) else self._value(i, quantity)
 
-    def _row_noise(self, i: int, site: Site) -> tuple[float, ...]:
+    def _row_noise(self, i: int, site: RecordedSensor) -> tuple[float, ...]:
         """Return covariance and log likelihood ratio of a row in the order of `row_noise`; () for rows without them."""
         if not self.rows_bring_noise(site):
             return ()
